@@ -1,0 +1,236 @@
+//! The one table of diagnostics: every message the tool can give has a code, a severity, an exit code, a
+//! title and a default help here. `docs/codes.md` is generated from it; `fixtures/codes/` triggers each.
+
+use crate::error::ExitCode;
+use std::path::{Path, PathBuf};
+
+/// How much a diagnostic weighs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// A fact the user should know.
+    Note,
+    /// The result stands, but something is unusual.
+    Warning,
+    /// The operation cannot be done, or its result cannot be trusted.
+    Error,
+}
+
+macro_rules! codes {
+    ($($variant:ident = $id:literal, $severity:ident, $exit:ident, $title:literal, $help:literal;)*) => {
+        /// A diagnostic's identity. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model,
+        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files, FB8xx usage.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Code {
+            $(#[doc = $title] $variant,)*
+        }
+
+        impl Code {
+            /// Every code, in the order of the table.
+            pub const ALL: &'static [Code] = &[$(Code::$variant,)*];
+
+            /// The printed identity, `FB` and three digits.
+            pub fn id(self) -> &'static str {
+                match self { $(Code::$variant => $id,)* }
+            }
+
+            /// Severity of every diagnostic with this code.
+            pub fn severity(self) -> Severity {
+                match self { $(Code::$variant => Severity::$severity,)* }
+            }
+
+            /// Exit code of a process that ends because of it ([`ExitCode::Done`] for warnings and notes).
+            pub fn exit_code(self) -> ExitCode {
+                match self { $(Code::$variant => ExitCode::$exit,)* }
+            }
+
+            /// What is wrong, in general.
+            pub fn title(self) -> &'static str {
+                match self { $(Code::$variant => $title,)* }
+            }
+
+            /// What to do about it, in general; a diagnostic may say something more precise.
+            pub fn help(self) -> &'static str {
+                match self { $(Code::$variant => $help,)* }
+            }
+        }
+    };
+}
+
+codes! {
+    // FB1xx: files
+    FileUnreadable = "FB101", Error, BadInput, "file cannot be read", "check the path and its permissions";
+    FileFormatUnknown = "FB102", Error, BadInput, "file format not recognised", "give Matrix Market (.mtx, .mtx.gz, .mtx.zst) or HDF5 (.h5, .hdf5) matrices";
+    FileCompressionBroken = "FB103", Error, BadInput, "compressed file is damaged or cut off", "transfer or write the file again";
+    OutputUnwritable = "FB104", Error, Resources, "output cannot be written", "check the folder, its permissions and the free space";
+    OutputFolderMissing = "FB105", Error, BadInput, "folder of the output file does not exist", "make the folder first";
+    FileEmpty = "FB106", Error, BadInput, "file is empty", "write the file again";
+    // FB2xx: tables and manifest
+    ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
+    ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
+    TableHeader = "FB203", Error, BadInput, "table header is not the expected one", "nodes: `node,x,y,z`; dofs: `node,dir` or `row,node,dir`";
+    TableRow = "FB204", Error, BadInput, "table row cannot be read", "give one row per line with the columns of the header";
+    NodeDuplicate = "FB205", Error, BadInput, "node number given twice", "give every node once";
+    CoordinateNotFinite = "FB206", Error, BadInput, "node coordinate is not a finite number", "correct the coordinate";
+    DofDirection = "FB207", Error, BadInput, "direction is not 1 to 6", "1, 2, 3 are displacements along x, y, z; 4, 5, 6 rotations";
+    DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... each once", "number the rows from 0 or leave the column out";
+    InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
+    // FB3xx: matrices
+    MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
+    MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
+    MatrixIndex = "FB303", Error, BadInput, "matrix index out of range", "Matrix Market counts from 1, HDF5 indices from 0";
+    MatrixCount = "FB304", Error, BadInput, "number of entries differs from the header", "the file may be cut off: write it again";
+    MatrixNotSquare = "FB305", Error, BadInput, "matrix is not square", "give the whole symmetric matrix";
+    MatrixNotFinite = "FB306", Error, BadInput, "matrix has NaN or infinite values", "find the element that made them in the FE program";
+    MatrixAsymmetric = "FB307", Error, BadInput, "matrix is not symmetric", "only symmetric K and M describe a conservative body; gyroscopic, follower and friction terms do not belong here";
+    MatrixSizesDiffer = "FB308", Error, BadInput, "stiffness and mass matrix differ in size", "write both from the same analysis";
+    MatrixTriangles = "FB309", Error, BadInput, "entries on both sides of the diagonal of a matrix declared symmetric", "write one triangle, or declare the matrix general";
+    Hdf5Layout = "FB310", Error, BadInput, "no sparse matrix found in the HDF5 file or group", "store data, indices, indptr and shape (CSC, CSR) or data, row, col and shape (COO); name the group as FILE.h5:/group";
+    MatrixDigits = "FB311", Warning, Done, "matrix values carry few digits", "write 15 to 17 significant digits: thin bodies lose them all";
+    MatrixEmpty = "FB312", Error, BadInput, "matrix has no nonzero entries", "write the matrix again";
+    MatrixTooLarge = "FB313", Error, BadInput, "matrix is larger than 4294967295 rows", "split the model";
+    // FB4xx: model
+    NodesMissing = "FB401", Error, BadInput, "degrees of freedom belong to nodes without coordinates", "add the nodes to the node table";
+    DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "one row of dofs.csv per matrix row; without dofs.csv three per node";
+    DofDuplicate = "FB403", Error, BadInput, "the same direction of the same node is given twice", "every (node, direction) pair labels one matrix row";
+    DofIncomplete = "FB404", Error, BadInput, "nodes lack displacement directions, so that the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
+    RotationsUnsupported = "FB405", Error, BadInput, "model has nodal rotations", "this version handles nodes with three displacements only";
+    NodesUnused = "FB406", Note, Done, "nodes without any degree of freedom are left out", "nothing to do if they are reference or deleted nodes";
+    MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
+    MassDirectional = "FB408", Error, BadInput, "mass differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
+    MassBlockStructure = "FB409", Error, BadInput, "3x3 node blocks of the mass matrix are not multiples of the identity", "this version handles displacement-based solid elements without eliminated constraints";
+    RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "the body is constrained or grounded, rotations are labelled as displacements, or coordinates are in other units or another order than the matrix";
+    PencilSingular = "FB411", Error, BadInput, "rows empty in both K and M: the eigenproblem is singular", "remove these degrees of freedom from the matrices";
+    MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
+    InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit the stated units", "check the units of the manifest";
+    BodiesSeveral = "FB414", Error, Untrustworthy, "model falls into separate bodies", "connect them, or convert each by itself";
+    DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
+    BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
+    StiffnessDiagonalZero = "FB417", Warning, Done, "mass without stiffness", "check the connection of these nodes";
+    ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more than six degrees of freedom";
+    // FB5xx: numerics
+    NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
+    Mechanism = "FB502", Error, Untrustworthy, "more than six zero-energy modes: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
+    MassIndefinite = "FB503", Error, Untrustworthy, "mass matrix is indefinite", "negative lumped masses or wrong signs: export the consistent mass";
+    StiffnessIndefinite = "FB504", Error, Untrustworthy, "stiffness matrix is indefinite", "check for negative springs, prestress beyond buckling, wrong signs";
+    FactorizationFailed = "FB505", Error, Untrustworthy, "factorisation failed or is inaccurate", "the model may be scaled pathologically; check units and stiffness contrasts";
+    CompletenessFailed = "FB506", Error, Untrustworthy, "completeness proof failed: the inertia count differs from the modes found", "report the model to us";
+    CompletenessUnproved = "FB507", Warning, Done, "completeness of the modes is not proved", "use --accuracy standard";
+    RepeatedSplit = "FB508", Warning, Done, "the last mode belongs to a repeated eigenvalue whose other modes are left out", "ask for as many modes as the note says to keep the body's symmetry";
+    ModesClamped = "FB509", Note, Done, "fewer modes exist than were asked for", "nothing to do";
+    NoiseFloor = "FB510", Warning, Done, "digits of the input limit the accuracy of the lowest modes", "write the matrices with 17 significant digits";
+    MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common for reduced integration";
+    // FB6xx: resources
+    MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
+    DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
+    // FB7xx: flex-body files
+    BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
+    BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
+    BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
+    BodyIdentity = "FB704", Error, CheckFailed, "identity violated", "convert the model again; if it stays, report the file to us";
+    BodiesDiffer = "FB705", Error, CheckFailed, "flexible bodies differ", "see the table of quantities and tolerances";
+    BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
+    BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
+    // FB8xx: usage
+    Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
+    LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";
+    LumpedMassTable = "FB803", Error, BadInput, "nodal masses cannot be used", "header `node,mass`, one finite mass for every node";
+    Internal = "FB999", Error, Bug, "internal error", "this is a bug: please report it with the input";
+}
+
+/// One finding: what, where, and what to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostic {
+    code: Code,
+    message: String,
+    file: Option<PathBuf>,
+    line: Option<usize>,
+    help: Option<String>,
+}
+
+impl Diagnostic {
+    /// A finding with `message`: a lowercase fragment that says what is wrong, with the facts in it.
+    pub fn new(code: Code, message: impl Into<String>) -> Self {
+        Self { code, message: message.into(), file: None, line: None, help: None }
+    }
+
+    /// Adds the file it is about.
+    pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
+        self.file = Some(file.as_ref().to_path_buf());
+        self
+    }
+
+    /// Adds the line (from 1) of that file.
+    pub fn at_line(mut self, line: usize) -> Self {
+        self.line = Some(line);
+        self
+    }
+
+    /// Replaces the table's help by a more precise one.
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Its code.
+    pub fn code(&self) -> Code {
+        self.code
+    }
+
+    /// Its severity, by the table.
+    pub fn severity(&self) -> Severity {
+        self.code.severity()
+    }
+
+    /// What is wrong, with the facts.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// File it is about.
+    pub fn file(&self) -> Option<&Path> {
+        self.file.as_deref()
+    }
+
+    /// Line (from 1) of that file.
+    pub fn line(&self) -> Option<usize> {
+        self.line
+    }
+
+    /// What to do.
+    pub fn help(&self) -> &str {
+        self.help.as_deref().unwrap_or(self.code.help())
+    }
+}
+
+impl std::fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let severity = match self.severity() {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        };
+        write!(f, "{severity}[{}]: {}", self.code.id(), self.message)?;
+        if let Some(file) = &self.file {
+            write!(f, "\n  in {}", file.display())?;
+            if let Some(line) = self.line {
+                write!(f, ", line {line}")?;
+            }
+        }
+        write!(f, "\n  help: {}", self.help())
+    }
+}
+
+impl serde::Serialize for Diagnostic {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        let mut s = serializer.serialize_struct("Diagnostic", 6)?;
+        s.serialize_field("code", self.code.id())?;
+        s.serialize_field("severity", &self.severity())?;
+        s.serialize_field("message", &self.message)?;
+        s.serialize_field("file", &self.file.as_ref().map(|f| f.display().to_string()))?;
+        s.serialize_field("line", &self.line)?;
+        s.serialize_field("help", self.help())?;
+        s.end()
+    }
+}

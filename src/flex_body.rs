@@ -1,0 +1,126 @@
+//! The product: a validated flexible body, independent of the files it came from and goes to.
+
+use crate::invariants::Invariants;
+use crate::model::Nodes;
+use crate::provenance::SourceFile;
+use crate::units::UnitSystem;
+use faer::Mat;
+use nalgebra::{Matrix3, Vector3};
+
+/// Where a body came from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Model name.
+    pub name: String,
+    /// Files and fingerprints.
+    pub files: Vec<SourceFile>,
+    /// Number of matrix rows of the FE model.
+    pub n_dofs: usize,
+    /// `rotation-invariant`: M = Ms kron I3; `diagonal`: the same and diagonal; `general`: neither.
+    pub mass_structure: MassStructure,
+    /// Settings of the run that can change the result, as JSON.
+    pub settings: serde_json::Value,
+}
+
+/// Structure of the FE mass matrix, as tested block by block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MassStructure {
+    /// Every 3x3 node block is a multiple of the identity: M = Ms kron I3.
+    RotationInvariant,
+    /// Rotation invariant and diagonal: lumped by the FE program.
+    Diagonal,
+    /// Neither.
+    General,
+}
+
+/// The body frame in model coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Origin in model axes. Unit: length.
+    pub origin: Vector3<f64>,
+    /// Columns are the body axes in model axes, right-handed: x_model = origin + axes x_body.
+    pub axes: Matrix3<f64>,
+}
+
+/// Mode shapes and what is known of each mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Modes {
+    /// lambda, ascending. Unit: 1/time^2.
+    pub eigenvalue: Vec<f64>,
+    /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), 2-norms.
+    pub residual: Vec<f64>,
+    /// Modal damping ratios, 0 when none was given.
+    pub damping_ratio: Vec<f64>,
+    /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
+    pub shape: Mat<f64>,
+}
+
+/// What was proved about the modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certificate {
+    /// Number of flexible modes below `shift` that the inertia count proves; `None`: not proved.
+    pub proved_modes: Option<usize>,
+    /// Shift sigma of the count. Unit: 1/time^2.
+    pub shift: f64,
+    /// Negative pivots of K - sigma M: rigid and flexible modes below sigma.
+    pub negative_pivots: Option<usize>,
+    /// Number of rigid modes.
+    pub rigid_modes: usize,
+    /// Why the proof is missing, or what limits it; empty when nothing does.
+    pub remark: String,
+    /// Largest |lambda| of the exact rigid modes relative to the first flexible lambda: the input's noise floor.
+    pub rigid_noise: f64,
+    /// max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix.
+    pub rigid_residual: f64,
+}
+
+/// Invariants that lumped masses would have given, with the same modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LumpedBody {
+    /// `row-sum`, `diagonal-scaling`, `user`.
+    pub scheme: String,
+    /// The same data from the lumped mass.
+    pub invariants: Invariants,
+    /// Number of negative nodal masses.
+    pub negative_masses: usize,
+    /// Error norms against the exact invariants, by name (`I0_frobenius`, `W2_spectral`, ...), in table order.
+    pub comparison: Vec<(String, f64)>,
+}
+
+/// A named interface of the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interface {
+    /// Name.
+    pub name: String,
+    /// Indices into the body's nodes.
+    pub nodes: Vec<usize>,
+}
+
+/// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexBody {
+    parts: Parts,
+}
+
+/// The parts of a [`FlexBody`], public so that makers (pipeline, reader) can fill them; see [`FlexBody::new`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// Provenance.
+    pub source: Source,
+    /// Units of all numbers.
+    pub units: UnitSystem,
+    /// Body frame.
+    pub frame: Frame,
+    /// Node numbers and positions in the BODY frame.
+    pub nodes: Nodes,
+    /// Modes.
+    pub modes: Modes,
+    /// Exact invariants about the frame origin, body axes.
+    pub invariants: Invariants,
+    /// Lumped comparators.
+    pub lumped: Vec<LumpedBody>,
+    /// Proof of completeness and noise floor.
+    pub certificate: Certificate,
+    /// Interfaces.
+    pub interfaces: Vec<Interface>,
+}

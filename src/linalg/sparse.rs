@@ -1,0 +1,226 @@
+//! Compressed sparse matrices: a general one as readers deliver it, and the symmetric one that all work uses.
+
+/// Sparse matrix in compressed column form, rows ascending within each column, no duplicates, no stored zeros.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CscMatrix {
+    n_rows: usize,
+    n_cols: usize,
+    col_ptr: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl CscMatrix {
+    /// Takes the three arrays as they are.
+    ///
+    /// # Panics
+    /// When they do not describe a matrix: lengths that disagree, rows out of range or not strictly
+    /// ascending within a column. Readers check and report before they call this.
+    pub fn from_parts(
+        n_rows: usize,
+        n_cols: usize,
+        col_ptr: Vec<usize>,
+        row_idx: Vec<u32>,
+        values: Vec<f64>,
+    ) -> Self {
+        assert_eq!(col_ptr.len(), n_cols + 1, "column pointers");
+        assert_eq!(col_ptr[0], 0, "first column pointer");
+        assert_eq!(*col_ptr.last().expect("n_cols + 1 >= 1"), row_idx.len(), "entries");
+        assert_eq!(row_idx.len(), values.len(), "values");
+        for j in 0..n_cols {
+            let rows = &row_idx[col_ptr[j]..col_ptr[j + 1]];
+            assert!(rows.windows(2).all(|w| w[0] < w[1]), "rows of column {j} not ascending");
+            assert!(rows.last().is_none_or(|&r| (r as usize) < n_rows), "row out of range");
+        }
+        Self { n_rows, n_cols, col_ptr, row_idx, values }
+    }
+
+    /// Builds a matrix from (row, column, value) triplets: duplicates are summed in the order given, entries
+    /// that are zero before summing are dropped.
+    ///
+    /// # Panics
+    /// When an index is out of range.
+    pub fn from_triplets(n_rows: usize, n_cols: usize, triplets: &[(u32, u32, f64)]) -> Self {
+        let mut count = vec![0usize; n_cols + 1];
+        for &(r, c, v) in triplets {
+            assert!((r as usize) < n_rows && (c as usize) < n_cols, "triplet out of range");
+            if v != 0.0 {
+                count[c as usize + 1] += 1;
+            }
+        }
+        for j in 0..n_cols {
+            count[j + 1] += count[j];
+        }
+        let mut next = count.clone();
+        let mut entries = vec![(0u32, 0.0f64); count[n_cols]];
+        for &(r, c, v) in triplets {
+            if v != 0.0 {
+                entries[next[c as usize]] = (r, v);
+                next[c as usize] += 1;
+            }
+        }
+        let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
+        for j in 0..n_cols {
+            let column = &mut entries[count[j]..count[j + 1]];
+            column.sort_by_key(|e| e.0); // stable: duplicates keep their order
+            let start = row_idx.len();
+            for &(r, v) in column.iter() {
+                if row_idx.len() > start && row_idx[row_idx.len() - 1] == r {
+                    let last = values.len() - 1;
+                    values[last] += v;
+                } else {
+                    row_idx.push(r);
+                    values.push(v);
+                }
+            }
+            col_ptr.push(row_idx.len());
+        }
+        Self { n_rows, n_cols, col_ptr, row_idx, values }
+    }
+
+    /// Takes a compressed matrix of the `sprs` crate (row or column storage).
+    pub fn from_sprs(matrix: &sprs::CsMat<f64>) -> Self {
+        let csc = matrix.to_csc();
+        let (n_rows, n_cols) = (csc.rows(), csc.cols());
+        let mut triplets = Vec::with_capacity(csc.nnz());
+        for (value, (r, c)) in csc.iter() {
+            triplets.push((r as u32, c as u32, *value));
+        }
+        Self::from_triplets(n_rows, n_cols, &triplets)
+    }
+
+    /// Number of rows.
+    pub fn n_rows(&self) -> usize {
+        self.n_rows
+    }
+
+    /// Number of columns.
+    pub fn n_cols(&self) -> usize {
+        self.n_cols
+    }
+
+    /// Number of stored entries.
+    pub fn nnz(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Column pointers, `n_cols + 1` of them.
+    pub fn col_ptr(&self) -> &[usize] {
+        &self.col_ptr
+    }
+
+    /// Row of each entry.
+    pub fn row_idx(&self) -> &[u32] {
+        &self.row_idx
+    }
+
+    /// Value of each entry.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Rows and values of column `j`.
+    pub fn column(&self, j: usize) -> (&[u32], &[f64]) {
+        let range = self.col_ptr[j]..self.col_ptr[j + 1];
+        (&self.row_idx[range.clone()], &self.values[range])
+    }
+
+    /// The entry at (`row`, `col`), zero when not stored.
+    pub fn get(&self, row: usize, col: usize) -> f64 {
+        let (rows, values) = self.column(col);
+        rows.binary_search(&(row as u32)).map_or(0.0, |k| values[k])
+    }
+
+    /// The transpose; for a symmetric matrix, an equal one.
+    pub fn transpose(&self) -> Self {
+        let mut col_ptr = vec![0usize; self.n_rows + 1];
+        for &r in &self.row_idx {
+            col_ptr[r as usize + 1] += 1;
+        }
+        for i in 0..self.n_rows {
+            col_ptr[i + 1] += col_ptr[i];
+        }
+        let mut next = col_ptr.clone();
+        let mut row_idx = vec![0u32; self.nnz()];
+        let mut values = vec![0.0; self.nnz()];
+        for j in 0..self.n_cols {
+            let (rows, vals) = self.column(j);
+            for (&r, &v) in rows.iter().zip(vals) {
+                let at = &mut next[r as usize];
+                row_idx[*at] = j as u32;
+                values[*at] = v;
+                *at += 1;
+            }
+        }
+        Self { n_rows: self.n_cols, n_cols: self.n_rows, col_ptr, row_idx, values }
+    }
+}
+
+/// Symmetric sparse matrix, both triangles stored: column j is also row j, so products gather row by row
+/// with the same sum order at any thread count.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SymmetricMatrix(CscMatrix);
+
+impl SymmetricMatrix {
+    /// Takes a matrix whose pattern and values are exactly symmetric; `None` when they are not.
+    pub fn new(matrix: CscMatrix) -> Option<Self> {
+        (matrix.n_rows == matrix.n_cols && matrix == matrix.transpose()).then_some(Self(matrix))
+    }
+
+    /// Takes the mean of a nearly symmetric matrix and its transpose.
+    ///
+    /// # Panics
+    /// When the matrix is not square.
+    pub fn symmetrised(matrix: &CscMatrix) -> Self {
+        assert_eq!(matrix.n_rows, matrix.n_cols, "square");
+        let transpose = matrix.transpose();
+        let n = matrix.n_cols;
+        let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
+        for j in 0..n {
+            let (ra, va) = matrix.column(j);
+            let (rb, vb) = transpose.column(j);
+            let (mut a, mut b) = (0, 0);
+            while a < ra.len() || b < rb.len() {
+                let row = match (ra.get(a), rb.get(b)) {
+                    (Some(&x), Some(&y)) => x.min(y),
+                    (Some(&x), None) => x,
+                    (None, Some(&y)) => y,
+                    (None, None) => break,
+                };
+                let mut sum = 0.0;
+                if ra.get(a) == Some(&row) {
+                    sum += va[a];
+                    a += 1;
+                }
+                if rb.get(b) == Some(&row) {
+                    sum += vb[b];
+                    b += 1;
+                }
+                row_idx.push(row);
+                values.push(0.5 * sum);
+            }
+            col_ptr.push(row_idx.len());
+        }
+        Self(CscMatrix { n_rows: n, n_cols: n, col_ptr, row_idx, values })
+    }
+
+    /// Number of rows and columns.
+    pub fn n(&self) -> usize {
+        self.0.n_cols
+    }
+
+    /// The matrix in compressed column (equally: row) form.
+    pub fn as_csc(&self) -> &CscMatrix {
+        &self.0
+    }
+
+    /// Columns and values of row `i`.
+    pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
+        self.0.column(i)
+    }
+
+    /// The diagonal.
+    pub fn diagonal(&self) -> Vec<f64> {
+        (0..self.n()).map(|i| self.0.get(i, i)).collect()
+    }
+}

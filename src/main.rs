@@ -1,0 +1,3 @@
+//! The `flexbody` program.
+
+fn main() {}

@@ -1,0 +1,56 @@
+//! Nodes, labels of degrees of freedom, and named node sets.
+
+/// Node numbers and undeformed positions, in the order of the node table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nodes {
+    /// Node numbers as the FE program gave them; gaps and any order are fine, duplicates are not.
+    pub ids: Vec<i64>,
+    /// Positions in model axes, model length units (2D tables: z = 0).
+    pub positions: Vec<[f64; 3]>,
+}
+
+impl Nodes {
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+}
+
+/// What a matrix row stands for: a direction of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DofLabel {
+    /// Node number.
+    pub node: i64,
+    /// 1, 2, 3: displacement along x, y, z; 4, 5, 6: rotation about x, y, z.
+    pub direction: u8,
+}
+
+impl std::fmt::Display for DofLabel {
+    /// `node 17 uy`, `node 17 rz`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = match self.direction {
+            1 => "ux",
+            2 => "uy",
+            3 => "uz",
+            4 => "rx",
+            5 => "ry",
+            6 => "rz",
+            _ => "?",
+        };
+        write!(f, "node {} {name}", self.node)
+    }
+}
+
+/// A named set of nodes: an interface of the manifest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NodeSet {
+    /// Name, unique within the model.
+    pub name: String,
+    /// Node numbers.
+    pub nodes: Vec<i64>,
+}

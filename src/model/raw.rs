@@ -1,0 +1,47 @@
+//! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
+
+use super::{DofLabel, NodeSet, Nodes};
+use crate::linalg::CscMatrix;
+use crate::units::UnitSystem;
+use std::path::PathBuf;
+
+/// A matrix with what its file says about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawMatrix {
+    /// The matrix, both triangles (a reader expands a stored triangle), zeros dropped, duplicates summed.
+    pub matrix: CscMatrix,
+    /// Largest number of significant decimal digits among its values, at most 17; 17 for binary files.
+    /// Thresholds of the model checks follow it.
+    pub digits: u8,
+    /// Where it came from; empty for matrices handed over in memory.
+    pub path: PathBuf,
+}
+
+/// Everything that describes one model, before the checks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawModel {
+    /// Name of the model.
+    pub name: String,
+    /// 3 or 2.
+    pub dimension: u8,
+    /// Units of the numbers.
+    pub units: UnitSystem,
+    /// Stiffness matrix K.
+    pub stiffness: RawMatrix,
+    /// Mass matrix M.
+    pub mass: RawMatrix,
+    /// Node table.
+    pub nodes: Nodes,
+    /// Where the node table came from; empty when handed over in memory.
+    pub nodes_path: PathBuf,
+    /// Label of each matrix row; `None`: node-major x, y, z in the order of the node table.
+    pub dofs: Option<Vec<DofLabel>>,
+    /// Where the labels came from; empty when handed over in memory.
+    pub dofs_path: PathBuf,
+    /// Named node sets.
+    pub interfaces: Vec<NodeSet>,
+    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `manifest`), file name and SHA-256 (hex) of every file read.
+    pub sources: Vec<SourceFile>,
+}
+
+pub use crate::provenance::SourceFile;

@@ -1,0 +1,28 @@
+//! What a result was made from: fingerprints of the input files and the generator's name.
+
+/// One input file of a model.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct SourceFile {
+    /// `manifest`, `stiffness`, `mass`, `nodes`, `dofs`, `interface`.
+    pub role: String,
+    /// File name without folders: results do not depend on where the model lies.
+    pub name: String,
+    /// SHA-256 of the bytes on disk (compressed files: as stored), lowercase hex.
+    pub sha256: String,
+}
+
+/// Name and version written into every output.
+pub fn generator() -> String {
+    format!("flexbody {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// SHA-256 of `bytes` in lowercase hex.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    use sha2::Digest;
+    use std::fmt::Write;
+    let mut hex = String::with_capacity(64);
+    for byte in sha2::Sha256::digest(bytes) {
+        write!(hex, "{byte:02x}").expect("writing to a String cannot fail");
+    }
+    hex
+}

@@ -1,0 +1,84 @@
+//! Unit systems: numbers stay in the model's own units; these name them and give their size in SI.
+
+/// A unit of length, mass or time: its name as the user wrote it and its size in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unit {
+    name: String,
+    to_si: f64,
+}
+
+impl Unit {
+    /// Name as the user wrote it (`mm`, `tonne`, or a number).
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its size in m, kg or s.
+    pub fn to_si(&self) -> f64 {
+        self.to_si
+    }
+
+    fn parse(text: &str, table: &[(&str, f64)]) -> Option<Self> {
+        let to_si = table
+            .iter()
+            .find(|(name, _)| *name == text)
+            .map(|(_, to_si)| *to_si)
+            .or_else(|| text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0))?;
+        Some(Self { name: text.to_owned(), to_si })
+    }
+}
+
+const LENGTH: &[(&str, f64)] =
+    &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("km", 1e3), ("in", 0.0254), ("ft", 0.3048)];
+
+const MASS: &[(&str, f64)] = &[
+    ("kg", 1.0),
+    ("g", 1e-3),
+    ("t", 1e3),
+    ("tonne", 1e3),
+    ("lb", 0.453_592_37),
+    // Mass that one pound-force accelerates at 1 ft/s^2 and 1 in/s^2; lbf = 0.45359237 * 9.80665 N.
+    ("slug", 4.448_221_615_260_5 / 0.3048),
+    ("slinch", 4.448_221_615_260_5 / 0.0254),
+];
+
+const TIME: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
+
+/// The units of a model. Force, stress and frequency units follow from these three.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnitSystem {
+    /// Unit of length.
+    pub length: Unit,
+    /// Unit of mass.
+    pub mass: Unit,
+    /// Unit of time.
+    pub time: Unit,
+    /// Whether the user stated them; plausibility is checked only then.
+    pub stated: bool,
+}
+
+impl UnitSystem {
+    /// Reads three unit names (or factors to SI); `Err` gives the name that is not known.
+    pub fn parse(length: &str, mass: &str, time: &str) -> Result<Self, String> {
+        Ok(Self {
+            length: Unit::parse(length, LENGTH).ok_or_else(|| format!("length `{length}`"))?,
+            mass: Unit::parse(mass, MASS).ok_or_else(|| format!("mass `{mass}`"))?,
+            time: Unit::parse(time, TIME).ok_or_else(|| format!("time `{time}`"))?,
+            stated: true,
+        })
+    }
+
+    /// One frequency unit (cycles per time unit) in hertz.
+    pub fn hertz(&self) -> f64 {
+        1.0 / self.time.to_si()
+    }
+}
+
+impl Default for UnitSystem {
+    /// m, kg, s, not stated.
+    fn default() -> Self {
+        let mut units = Self::parse("m", "kg", "s").expect("names of the tables");
+        units.stated = false;
+        units
+    }
+}
