@@ -4,6 +4,7 @@
 mod assemble;
 mod derived;
 mod hdf5_value;
+mod heap;
 mod names;
 mod read;
 mod scan;

@@ -2,9 +2,9 @@
 
 use super::assemble::assemble;
 use super::derived::check_derived;
-use super::hdf5_value;
 use super::scan::Scan;
 use super::schema::{FORMAT, MAJOR};
+use super::{hdf5_value, heap};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
@@ -55,7 +55,11 @@ fn open(path: &Path) -> Result<(hdf5::File, u64)> {
     if !meta.is_file() {
         return Err(unreadable(Code::FileUnreadable, "it is not a regular file".to_owned()));
     }
-    std::fs::File::open(path).map_err(|e| unreadable(Code::FileUnreadable, e.to_string()))?;
+    let broken_heap = std::fs::File::open(path).and_then(|mut file| heap::first_broken(&mut file));
+    if let Some(position) = broken_heap.map_err(|e| unreadable(Code::FileUnreadable, e.to_string()))? {
+        let why = format!("the text heap at byte {position} is damaged");
+        return Err(unreadable(Code::BodyUnreadable, why));
+    }
     let file = hdf5::File::open(path).map_err(|e| unreadable(Code::BodyUnreadable, e.to_string()))?;
     Ok((file, meta.len()))
 }
