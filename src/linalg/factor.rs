@@ -104,7 +104,7 @@ impl<'a> Cholesky<'a> {
         let matrix =
             SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
         let symbolic = &analysis.symbolic;
-        let par = Par::rayon(0);
+        let par = Par::Seq;
         let params = Spec::default();
         let mut values = vec![0.0; symbolic.len_val()];
         let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, params));
@@ -179,7 +179,7 @@ impl Inertia {
         let matrix =
             SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
         let symbolic = &analysis.symbolic;
-        let par = Par::rayon(0);
+        let par = Par::Seq;
         let params = Spec::default();
         let mut values = vec![0.0; symbolic.len_val()];
         let mut subdiagonal = vec![0.0; n];
