@@ -9,6 +9,7 @@
 
 pub mod basis;
 pub mod cli;
+pub mod convert;
 pub mod diagnostic;
 pub mod eigen;
 pub mod error;

@@ -2,6 +2,7 @@
 
 use super::problem::{Counters, EigenProblem};
 use crate::linalg::{Cholesky, Solve, combine, gram, subtract_combination};
+use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
 /// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is rounding.
@@ -193,7 +194,7 @@ fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
 /// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`] of
 /// their norm before are dropped. Returns T (new x old) with W_old = W_new T.
 fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> {
-    let (n, width) = (w.nrows(), w.ncols());
+    let width = w.ncols();
     let mut t = Mat::zeros(width, width);
     let mut kept = 0;
     for j in 0..width {
@@ -202,11 +203,8 @@ fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> 
             for i in 0..kept {
                 let along = dot(w, mw, i, j);
                 t[(i, j)] += along;
-                for block in [&mut *w, &mut *mw] {
-                    for row in 0..n {
-                        block[(row, j)] -= along * block[(row, i)];
-                    }
-                }
+                subtract_column(w, j, i, along);
+                subtract_column(mw, j, i, along);
             }
         }
         let norm = dot(w, mw, j, j).max(0.0).sqrt();
@@ -215,7 +213,7 @@ fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> 
         }
         t[(kept, j)] = norm;
         for block in [&mut *w, &mut *mw] {
-            for row in 0..n {
+            for row in 0..block.nrows() {
                 block[(row, kept)] = block[(row, j)] / norm;
             }
         }
@@ -224,6 +222,16 @@ fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> 
     *w = w.as_ref().subcols(0, kept).to_owned();
     *mw = mw.as_ref().subcols(0, kept).to_owned();
     t.as_ref().subrows(0, kept).to_owned()
+}
+
+/// Column `target` -= factor * column `source`, for source < target.
+fn subtract_column(block: &mut Mat<f64>, target: usize, source: usize, factor: f64) {
+    let (left, right) = block.as_mut().split_at_col_mut(target);
+    let from = left.into_const().col(source).try_as_col_major().expect("blocks are column-major").as_slice();
+    let to = right.col_mut(0).try_as_col_major_mut().expect("blocks are column-major").as_slice_mut();
+    for (t, s) in to.iter_mut().zip(from) {
+        *t -= factor * s;
+    }
 }
 
 /// Reproducible uniform noise in (-1, 1) by place: a SplitMix64 hash of (seed, row, column).
