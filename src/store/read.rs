@@ -31,8 +31,7 @@ pub fn validate(path: impl AsRef<Path>) -> Vec<Diagnostic> {
 }
 
 fn examine(path: &Path) -> Result<(Option<FlexBody>, Vec<Diagnostic>)> {
-    let (file, bytes) = open(path)?;
-    check_format(&file, path)?;
+    let (file, bytes) = open_checked(path)?;
     let mut scan = Scan::new(&file, path, bytes);
     let units = scan.units().cloned().filter(|_| scan.problems.is_empty());
     let Some(parts) = units.and_then(|units| assemble(&mut scan, units)) else {
@@ -47,7 +46,8 @@ fn examine(path: &Path) -> Result<(Option<FlexBody>, Vec<Diagnostic>)> {
     }
 }
 
-fn open(path: &Path) -> Result<(hdf5::File, u64)> {
+/// Opens a file of this program and of a format that this version knows; also gives its size in bytes.
+pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the flexible body: {why}")).in_file(path))
     };
@@ -61,6 +61,7 @@ fn open(path: &Path) -> Result<(hdf5::File, u64)> {
         return Err(unreadable(Code::BodyUnreadable, why));
     }
     let file = hdf5::File::open(path).map_err(|e| unreadable(Code::BodyUnreadable, e.to_string()))?;
+    check_format(&file, path)?;
     Ok((file, meta.len()))
 }
 
