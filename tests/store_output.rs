@@ -110,6 +110,19 @@ mod unix {
         assert_eq!(std::fs::read(&target).unwrap(), b"new");
     }
 
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_path_that_hdf5_cannot_take_is_known_before_the_work() {
+        use std::os::unix::ffi::OsStrExt;
+        let folder = tempfile::tempdir().unwrap();
+        let odd = folder.path().join(std::ffi::OsStr::from_bytes(b"caf\xe9"));
+        std::fs::create_dir(&odd).unwrap();
+        let error = store::prepare_output(odd.join("body.flex.h5")).unwrap_err();
+        assert!(error.has(Code::OutputUnwritable) && error.to_string().contains("UTF-8"), "{error}");
+        OutputSlot::prepare(odd.join("report.txt")).unwrap().write(b"fine").unwrap();
+        assert_eq!(members(&odd), ["report.txt"]);
+    }
+
     #[test]
     fn outputs_have_the_permissions_of_ordinary_files() {
         let folder = tempfile::tempdir().unwrap();

@@ -94,6 +94,9 @@ fn what_is_not_a_flex_body_file() {
     }
     hdf5::File::create(&path).unwrap().close().unwrap();
     assert_says(&refusal(&path), Code::BodyUnreadable, &["HDF5 file without the attribute `format`"]);
+    let small = hdf5::file::SizeofInfo { sizeof_addr: 8, sizeof_size: 4 };
+    hdf5::File::with_options().with_fcpl(|p| p.sizes(small)).create(&path).unwrap().close().unwrap();
+    assert_says(&refusal(&path), Code::BodyUnreadable, &["sizes do not have 8 bytes"]);
     let other = damaged(|f| set_text(f, "format", "SDynPy"));
     assert_says(&other, Code::BodyUnreadable, &["attribute `format` is \"SDynPy\", expected `flexbody`"]);
 }

@@ -61,6 +61,12 @@ pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
         return Err(unreadable(Code::BodyUnreadable, why));
     }
     let file = hdf5::File::open(path).map_err(|e| unreadable(Code::BodyUnreadable, e.to_string()))?;
+    // The check of the heaps knows 8-byte sizes only; nothing else is in use.
+    let sizes = file.create_plist().and_then(|p| p.get_sizes());
+    if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (8, 8)) {
+        let why = "its addresses or sizes do not have 8 bytes".to_owned();
+        return Err(unreadable(Code::BodyUnreadable, why));
+    }
     check_format(&file, path)?;
     Ok((file, meta.len()))
 }

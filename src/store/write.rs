@@ -4,6 +4,7 @@ use super::names;
 use super::scan::place;
 use super::schema::{Extent, Item, Kind, Per, TABLE};
 use super::value::{Value, View};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::output::OutputSlot;
@@ -19,9 +20,14 @@ const DEFLATE_LEVEL: u8 = 1;
 /// Reserves `path` for a body file, so that a long computation does not end at an unwritable output.
 ///
 /// # Errors
-/// See [`OutputSlot::prepare`].
+/// See [`OutputSlot::prepare`]; also [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot take.
 pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
-    OutputSlot::prepare(path)
+    let slot = OutputSlot::prepare(path)?;
+    if slot.temporary().to_str().is_none() {
+        let message = format!("cannot write {}: HDF5 needs a path in UTF-8", slot.path().display());
+        return Err(Diagnostic::new(Code::OutputUnwritable, message).into());
+    }
+    Ok(slot)
 }
 
 /// Writes `body` to `path`; the file appears whole or not at all. Equal bodies give equal bytes.
@@ -35,8 +41,7 @@ pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
 /// Writes `body` to a place reserved by [`prepare_output`].
 ///
 /// # Errors
-/// [`DiskShort`](crate::diagnostic::Code::DiskShort) or
-/// [`OutputUnwritable`](crate::diagnostic::Code::OutputUnwritable); an existing file is then as it was.
+/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
 pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
     fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))?;
     slot.commit()
