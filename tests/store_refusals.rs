@@ -5,6 +5,7 @@ mod store_support;
 use flexbody::diagnostic::Code;
 use flexbody::error::Error;
 use flexbody::store;
+use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::{Path, PathBuf};
 use store_support::{Random, body};
@@ -94,7 +95,7 @@ fn what_is_not_a_flex_body_file() {
     }
     hdf5::File::create(&path).unwrap().close().unwrap();
     assert_says(&refusal(&path), Code::BodyUnreadable, &["HDF5 file without the attribute `format`"]);
-    let small = hdf5::file::SizeofInfo { sizeof_addr: 8, sizeof_size: 4 };
+    let small = hdf5::file::SizeofInfo { sizeof_addr: Sizeof::Bytes8, sizeof_size: Sizeof::Bytes4 };
     hdf5::File::with_options().with_fcpl(|p| p.sizes(small)).create(&path).unwrap().close().unwrap();
     assert_says(&refusal(&path), Code::BodyUnreadable, &["sizes do not have 8 bytes"]);
     let other = damaged(|f| set_text(f, "format", "SDynPy"));

@@ -8,6 +8,7 @@ use super::{hdf5_value, heap};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
+use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -63,7 +64,7 @@ pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
     let file = hdf5::File::open(path).map_err(|e| unreadable(Code::BodyUnreadable, e.to_string()))?;
     // The check of the heaps knows 8-byte sizes only; nothing else is in use.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
-    if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (8, 8)) {
+    if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
         let why = "its addresses or sizes do not have 8 bytes".to_owned();
         return Err(unreadable(Code::BodyUnreadable, why));
     }
