@@ -71,6 +71,21 @@ fn constants_and_shapes_are_checked() {
     }
 }
 
+#[test]
+fn groups_that_contain_themselves_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.flex.h5");
+    store::write(&body(1, 3, 2, 1, 1), &path).unwrap();
+    let file = hdf5_metno::File::open_rw(&path).unwrap();
+    for i in 0..20 {
+        file.link_hard("/terms", &format!("terms/again{i}")).unwrap();
+    }
+    file.close().unwrap();
+    assert!(store::read(&path).is_ok(), "members unknown to this version are ignored");
+    let error = store::structure(&path).unwrap_err();
+    assert!(error.to_string().contains("more than 20000 members"), "{error}");
+}
+
 /// JSON pointers of all members of all objects.
 fn pointers(value: &Value) -> Vec<String> {
     let Value::Object(map) = value else { return Vec::new() };
