@@ -6,8 +6,10 @@ use std::path::PathBuf;
 /// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
 #[derive(Debug, Parser)]
 #[command(version, about, max_term_width = 100, disable_help_subcommand = false)]
-#[command(after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
-    numerical result; 4 not enough memory or disk; 70 internal error. Codes of all messages: docs/codes.md.")]
+#[command(
+    after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
+    numerical result; 4 not enough memory or disk; 70 internal error. Codes of all messages: docs/codes.md."
+)]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -18,8 +20,10 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Make a flexible body from the matrices of an FE model
-    #[command(after_help = "Examples:\n  flexbody convert model.toml -o rod.flex.h5\n  flexbody convert --stiffness K.mtx \
-        --mass M.mtx.gz --nodes nodes.csv --units mm,t,s --modes 40 -o rod.flex.h5 --report rod.html")]
+    #[command(
+        after_help = "Examples:\n  flexbody convert model.toml -o rod.flex.h5\n  flexbody convert --stiffness K.mtx \
+        --mass M.mtx.gz --nodes nodes.csv --units mm,t,s --modes 40 -o rod.flex.h5 --report rod.html"
+    )]
     Convert(Box<ConvertArguments>),
     /// Show what a flex-body file holds
     Inspect(InspectArguments),

@@ -20,12 +20,13 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
         checks.extend(verify(&body, &checked.model)?);
     }
     let passed = checks.iter().all(|check| check.passed);
-    Ok(Outcome { text: identities_text(&checks), json: identities_json(&checks), passed })
+    Ok(Outcome { text: identities_text(&checks), json: format!("{:#}", identities_json(&checks)), passed })
 }
 
 fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
     let name = body.source().settings["frame"].as_str();
-    let frame = BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model);
+    let frame =
+        BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model);
     let expected = Expected {
         mass_normalised: true,
         free_surface: true,

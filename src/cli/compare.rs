@@ -18,5 +18,9 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
         invariants: arguments.invariants.unwrap_or(usual.invariants),
     };
     let comparison = compare(&a, &b, &tolerances)?;
-    Ok(Outcome { text: comparison.text(), json: comparison.json(), passed: comparison.passed() })
+    Ok(Outcome {
+        text: comparison.text(),
+        json: format!("{:#}", comparison.json()),
+        passed: comparison.passed(),
+    })
 }

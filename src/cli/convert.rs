@@ -5,7 +5,7 @@ use super::output::{Outcome, tell};
 use super::resources::peak_memory_bytes;
 use super::watcher::Watcher;
 use crate::basis::ModeSettings;
-use crate::convert::{ConvertSettings, Conversion, Lumping, convert};
+use crate::convert::{Conversion, ConvertSettings, Lumping, convert};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Method, Wanted};
 use crate::error::Result;
@@ -100,7 +100,8 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
             },
         });
     }
-    let mut names: Vec<&str> = text.split(',').map(|name| name.split('=').next().unwrap_or(name).trim()).collect();
+    let mut names: Vec<&str> =
+        text.split(',').map(|name| name.split('=').next().unwrap_or(name).trim()).collect();
     names.sort_unstable();
     if names.windows(2).any(|pair| pair[0] == pair[1]) {
         let message = format!("a lumping scheme is named twice in `{text}`");
@@ -119,17 +120,30 @@ fn format_of(path: &Path) -> Result<Format> {
 fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
         (Some(manifest), ..) => read_manifest(manifest),
-        (None, Some(stiffness), Some(mass), Some(nodes)) => {
-            ModelFiles::from_arguments(stiffness, mass, nodes, arguments.dofs.clone(), arguments.units.as_deref())
-        }
+        (None, Some(stiffness), Some(mass), Some(nodes)) => ModelFiles::from_arguments(
+            stiffness,
+            mass,
+            nodes,
+            arguments.dofs.clone(),
+            arguments.units.as_deref(),
+        ),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
 }
 
 /// No output may replace an input or another output.
 fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles) -> Result<()> {
-    let inputs = [Some(&files.stiffness.path), Some(&files.mass.path), Some(&files.nodes), files.dofs.as_ref(), files.manifest.as_ref()];
-    let place = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()));
+    let inputs = [
+        Some(&files.stiffness.path),
+        Some(&files.mass.path),
+        Some(&files.nodes),
+        files.dofs.as_ref(),
+        files.manifest.as_ref(),
+    ];
+    let place = |path: &Path| {
+        std::fs::canonicalize(path)
+            .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
+    };
     let mut taken: Vec<_> = inputs.into_iter().flatten().map(|path| place(path)).collect();
     for output in std::iter::once(&arguments.output).chain(&arguments.report) {
         let path = place(output);

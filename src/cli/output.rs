@@ -38,7 +38,9 @@ fn finish(printing: Printing, outcome: Result<Outcome>) -> ExitCode {
         Err(error) => {
             let code = error.exit_code();
             if printing.json {
-                print(&diagnostics_json(error.diagnostics(), code as u8));
+                let mut json = diagnostics_json(error.diagnostics());
+                json["exit_code"] = (code as u8).into();
+                print(&format!("{json:#}"));
             } else {
                 tell(printing, error.diagnostics());
             }
