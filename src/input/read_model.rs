@@ -41,9 +41,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let dofs = dofs.and_then(|dofs| take(&mut diagnostics, dofs));
     let interfaces: Vec<NodeSet> =
         interfaces.into_iter().filter_map(|interface| take(&mut diagnostics, interface)).collect();
-    for (matrix, role) in [(&stiffness, MatrixRole::Stiffness), (&mass, MatrixRole::Mass)] {
-        diagnostics.extend(matrix.as_ref().and_then(|matrix| few_digits(matrix, role)));
-    }
+    diagnostics.extend(stiffness.as_ref().and_then(few_digits));
     let (Some(stiffness), Some(mass), Some(nodes), false) =
         (stiffness, mass, nodes, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
@@ -121,11 +119,13 @@ fn read_opened(file: &InputFile, group: Option<&str>, role: MatrixRole) -> Resul
     reader.read(&MatrixSource { file, compression, group, role })
 }
 
-fn few_digits(matrix: &RawMatrix, role: MatrixRole) -> Option<Diagnostic> {
-    (matrix.digits < FEW_DIGITS).then(|| {
+/// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass matrix
+/// enter results as they are, and exact short numbers are common there.
+fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
+    (stiffness.digits < FEW_DIGITS).then(|| {
         let message =
-            format!("values of the {} matrix carry only {} significant digits", role.name(), matrix.digits);
-        Diagnostic::new(Code::MatrixDigits, message).in_file(&matrix.path)
+            format!("values of the stiffness matrix carry only {} significant digits", stiffness.digits);
+        Diagnostic::new(Code::MatrixDigits, message).in_file(&stiffness.path)
     })
 }
 
