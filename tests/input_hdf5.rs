@@ -124,6 +124,9 @@ proptest! {
         }
         let full: Entries = if triangle {
             entries.iter().flat_map(|&(i, j, v)| [Some((i, j, v)), (i != j).then_some((j, i, v))]).flatten().collect()
+        } else if layout == Layout::Rows {
+            // Rows are taken for columns: the transpose, which is as asymmetric.
+            entries.iter().map(|&(i, j, v)| (j, i, v)).collect()
         } else {
             entries.clone()
         };

@@ -135,10 +135,30 @@ nodes_file = "right.csv"
 }
 
 #[test]
+fn the_manifest_of_the_documentation_is_in_order() {
+    let docs = include_str!("../docs/input.md");
+    let example =
+        docs.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    let files = manifest(example).unwrap();
+    assert_eq!(
+        (files.name.as_str(), files.units.mass.to_si(), files.interfaces.len()),
+        ("conrod", 1000.0, 2)
+    );
+}
+
+#[test]
 fn a_manifest_may_say_little() {
     let files = manifest("files = { stiffness = 'K.mtx', mass = 'M.mtx', nodes = 'n.csv' }").unwrap();
     assert_eq!((files.name.as_str(), files.dimension, files.units.stated), ("model", 3, false));
     assert!(files.interfaces.is_empty());
+}
+
+#[test]
+fn a_manifest_nested_without_end_is_refused() {
+    for open in ["[", "{a="] {
+        let text = format!("files = {}", open.repeat(100_000));
+        assert!(manifest(&text).unwrap_err().has(Code::ManifestSyntax), "{open}");
+    }
 }
 
 /// Manifest texts, and whether they are in order.

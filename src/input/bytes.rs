@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::provenance::{SourceFile, sha256_hex};
+use crate::provenance::sha256_hex;
 use memmap2::Mmap;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -53,9 +53,9 @@ impl InputFile {
         &self.map
     }
 
-    /// Its fingerprint under a role of [`SourceFile::role`].
-    pub fn fingerprint(&self, role: &str) -> SourceFile {
-        SourceFile::new(role, &self.path, sha256_hex(self.bytes()))
+    /// SHA-256 of its bytes, lowercase hex.
+    pub fn sha256(&self) -> String {
+        sha256_hex(self.bytes())
     }
 }
 

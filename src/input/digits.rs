@@ -62,7 +62,8 @@ mod tests {
 
     #[test]
     fn values_rounded_before_they_were_written_in_full_are_seen_through() {
-        assert_eq!(digits(&[7.964_245_014_244_999_9e8, 1.0], 17), 13);
+        let padded: f64 = "7.9642450142449999e+08".parse().unwrap();
+        assert_eq!(digits(&[padded, 1.0], 17), 13);
         assert_eq!(digits(&[0.1 + 0.2], 17), 17);
     }
 

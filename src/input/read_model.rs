@@ -164,11 +164,11 @@ impl OpenFiles {
         file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
     }
 
-    /// Path and fingerprint of every file that could be opened.
-    fn fingerprints(&self) -> Vec<(&Path, SourceFile)> {
+    /// Path and SHA-256 of every file that could be opened.
+    fn fingerprints(&self) -> Vec<(&Path, String)> {
         self.files
             .par_iter()
-            .filter_map(|(path, file)| Some((path.as_path(), file.as_ref().ok()?.fingerprint(""))))
+            .filter_map(|(path, file)| Some((path.as_path(), file.as_ref().ok()?.sha256())))
             .collect()
     }
 }
@@ -188,10 +188,10 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles
 }
 
-fn sources(files: &ModelFiles, fingerprints: &[(&Path, SourceFile)]) -> Vec<SourceFile> {
+fn sources(files: &ModelFiles, fingerprints: &[(&Path, String)]) -> Vec<SourceFile> {
     let of = |(role, path): (&str, &Path)| {
-        let (_, file) = fingerprints.iter().find(|(known, _)| *known == path)?;
-        Some(SourceFile { role: role.to_owned(), ..file.clone() })
+        let (_, sha256) = fingerprints.iter().find(|(known, _)| *known == path)?;
+        Some(SourceFile::new(role, path, sha256.clone()))
     };
     roles(files).into_iter().filter_map(of).collect()
 }

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 pub struct RawMatrix {
     /// The matrix, both triangles (a reader expands a stored triangle), zeros dropped, duplicates summed.
     pub matrix: CscMatrix,
-    /// Largest number of significant decimal digits among its values, at most 17; 17 for binary files.
-    /// Thresholds of the model checks follow it.
+    /// Significant decimal digits that its values really carry, 1 to 17, however many were written; 17 for
+    /// short exact numbers. Thresholds of the model checks follow it.
     pub digits: u8,
     /// Where it came from; empty for matrices handed over in memory.
     pub path: PathBuf,

@@ -5,16 +5,16 @@ use super::super::assemble::{Entry, Sides, Storage, assemble, check_size, undecl
 use super::members::{Members, POINTERS};
 use super::values::{Found, Vector, integers_of, text_of, truth_of};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::input::InputFile;
 use crate::model::RawMatrix;
 use hdf5_metno::Group;
-use std::path::Path;
 
 /// Entries read at a time.
 const PIECE: usize = 1 << 20;
 
 /// Reads the matrix in `group`, called `name` in messages.
-pub(super) fn read(group: &Group, name: &str, path: &Path) -> Found<RawMatrix> {
-    let reader = GroupReader { group, name, members: Members::of(group) };
+pub(super) fn read(group: &Group, name: &str, file: &InputFile) -> Found<RawMatrix> {
+    let reader = GroupReader { file, group, name, members: Members::of(group) };
     let declared = reader.declared_symmetry().map_err(|d| vec![d])?;
     let parsed = match reader.members.compressed() {
         Some(names) => reader.compressed(names)?,
@@ -43,7 +43,7 @@ pub(super) fn read(group: &Group, name: &str, path: &Path) -> Found<RawMatrix> {
         }
         _ => Storage::Full,
     };
-    let mut raw = assemble(parsed.n, parsed.pieces, storage, 17, path).map_err(|d| vec![d])?;
+    let mut raw = assemble(parsed.n, parsed.pieces, storage, 17, file.path()).map_err(|d| vec![d])?;
     if parsed.single_precision {
         raw.digits = raw.digits.min(7);
     }
@@ -70,6 +70,7 @@ struct Parsed {
 }
 
 struct GroupReader<'a> {
+    file: &'a InputFile,
     group: &'a Group,
     name: &'a str,
     members: Members,
@@ -108,14 +109,13 @@ impl GroupReader<'_> {
                 Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"),
             ]);
         }
-        let by_rows = self.stored_by_rows();
+        // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to say.
         let mut major = 0usize;
         self.entries(&values, &[&indices], n, |k, index| {
             while pointer_values[major + 1] <= k as i64 {
                 major += 1;
             }
-            let minor = index[0];
-            if by_rows { (major as i64, minor) } else { (minor, major as i64) }
+            (index[0], major as i64)
         })
     }
 
@@ -201,17 +201,6 @@ impl GroupReader<'_> {
         }
     }
 
-    /// Whether the group says that it stores compressed rows; without a word columns are taken, which for a
-    /// symmetric matrix is the same.
-    fn stored_by_rows(&self) -> bool {
-        let attribute = ["encoding-type", "h5sparse_format", "format"]
-            .iter()
-            .find_map(|name| self.group.attr(name).ok())
-            .and_then(|attribute| text_of(&attribute));
-        let dataset = || self.group.dataset("format").ok().and_then(|dataset| text_of(&dataset));
-        attribute.or_else(dataset).is_some_and(|text| matches!(text.as_str(), "csr" | "csr_matrix"))
-    }
-
     fn declared_symmetry(&self) -> Result<Declared, Diagnostic> {
         let Ok(attribute) = self.group.attr("symmetric") else {
             return Ok(Declared::No);
@@ -219,18 +208,19 @@ impl GroupReader<'_> {
         let word = match truth_of(&attribute) {
             Some(true) => return Ok(Declared::Symmetric),
             Some(false) => return Ok(Declared::No),
-            None => text_of(&attribute).unwrap_or_default(),
+            None => text_of(&attribute, self.file.bytes()),
         };
+        let help = "it may be true, false, \"lower\" or \"upper\"";
+        let refuse = |what: String| {
+            let message = format!("attribute `symmetric` of group `{}` {what}", self.name);
+            Diagnostic::new(Code::MatrixKind, message).with_help(help)
+        };
+        let word = word.ok_or_else(|| refuse("cannot be read as text, number or boolean".into()))?;
         match word.to_lowercase().as_str() {
             "lower" | "upper" | "l" | "u" => Ok(Declared::Triangle),
             "true" | "yes" | "symmetric" => Ok(Declared::Symmetric),
             "false" | "no" | "general" => Ok(Declared::No),
-            _ => {
-                let message =
-                    format!("attribute `symmetric` of group `{}` is `{}`", self.name, word.escape_debug());
-                let help = "it may be true, false, \"lower\" or \"upper\"";
-                Err(Diagnostic::new(Code::MatrixKind, message).with_help(help))
-            }
+            _ => Err(refuse(format!("is `{}`", word.escape_debug()))),
         }
     }
 }

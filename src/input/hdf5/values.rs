@@ -3,7 +3,7 @@
 use super::members::Members;
 use crate::diagnostic::{Code, Diagnostic};
 use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
-use hdf5_metno::{Attribute, Container, Dataset, Group, Hyperslab, LinkType, SliceOrIndex};
+use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, LinkType, SliceOrIndex};
 use std::ops::Range;
 
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -154,23 +154,56 @@ pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
     }
 }
 
-/// A short text, whichever of the string types of HDF5 it has.
-pub(super) fn text_of(container: &Container) -> Option<String> {
-    if container.shape().iter().product::<usize>() != 1 || (container.ndim() == 0 && !container.is_scalar()) {
+/// A short text, whichever of the string types of HDF5 it has; `bytes` are those of the file.
+pub(super) fn text_of(attribute: &Attribute, bytes: &[u8]) -> Option<String> {
+    // A null dataspace has no value.
+    if !attribute.is_scalar() && attribute.shape() != [1] {
         return None;
     }
-    let bytes = match container.dtype().ok()?.to_descriptor().ok()? {
-        TypeDescriptor::VarLenUnicode => {
-            container.read_raw::<VarLenUnicode>().ok()?.first()?.as_bytes().to_vec()
+    let text = match attribute.dtype().ok()?.to_descriptor().ok()? {
+        TypeDescriptor::VarLenUnicode if heaps_end(bytes) => {
+            attribute.read_raw::<VarLenUnicode>().ok()?.first()?.as_bytes().to_vec()
         }
-        TypeDescriptor::VarLenAscii => container.read_raw::<VarLenAscii>().ok()?.first()?.as_bytes().to_vec(),
+        TypeDescriptor::VarLenAscii if heaps_end(bytes) => {
+            attribute.read_raw::<VarLenAscii>().ok()?.first()?.as_bytes().to_vec()
+        }
         TypeDescriptor::FixedAscii(_) => {
-            container.read_raw::<FixedAscii<64>>().ok()?.first()?.as_bytes().to_vec()
+            attribute.read_raw::<FixedAscii<64>>().ok()?.first()?.as_bytes().to_vec()
         }
         TypeDescriptor::FixedUnicode(_) => {
-            container.read_raw::<FixedUnicode<64>>().ok()?.first()?.as_bytes().to_vec()
+            attribute.read_raw::<FixedUnicode<64>>().ok()?.first()?.as_bytes().to_vec()
         }
         _ => return None,
     };
-    String::from_utf8(bytes).ok().map(|text| text.trim().to_owned())
+    String::from_utf8(text).ok().map(|text| text.trim().to_owned())
+}
+
+/// Whether walking the global heaps of a file, where texts of variable length lie, comes to an end. The HDF5
+/// library walks them without end when a damaged object has no length.
+fn heaps_end(bytes: &[u8]) -> bool {
+    const SIGNATURE_AND_VERSION: &[u8] = b"GCOL\x01\0\0\0";
+    let mut heaps = bytes.windows(8).enumerate().filter(|(_, window)| *window == SIGNATURE_AND_VERSION);
+    heaps.all(|(at, _)| heap_ends(&bytes[at..]).is_some())
+}
+
+/// HDF5 file format specification, III.E: signature and version (8 bytes), size of the heap (8), then objects:
+/// index (2), references (2), reserved (4), size (8), contents in multiples of 8. Index 0 is the free space,
+/// whose size counts its own head.
+fn heap_ends(heap: &[u8]) -> Option<()> {
+    let number = |at: usize| {
+        let bytes: [u8; 8] = heap.get(at..at + 8)?.try_into().ok()?;
+        usize::try_from(u64::from_le_bytes(bytes)).ok()
+    };
+    let end = number(8).filter(|end| *end <= heap.len())?;
+    let mut at = 16;
+    while end - at >= 16 {
+        let size = number(at + 8)?;
+        let free = heap[at..at + 2] == [0, 0];
+        let step = if free { size } else { size.checked_next_multiple_of(8)?.checked_add(16)? };
+        if step < 16 || step > end - at {
+            return None;
+        }
+        at += step;
+    }
+    Some(())
 }

@@ -46,12 +46,10 @@ pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
     while at < text.len() {
         piece.lines += 1;
         at = skip_blanks(text, at);
-        if matches!(text.get(at), Some(b'1'..=b'9')) {
-            if let Some((entry, number, next)) = fast(text, at, limits) {
-                piece.push(entry, number);
-                at = next;
-                continue;
-            }
+        if let Some((entry, number, next)) = fast(text, at, limits) {
+            piece.push(entry, number);
+            at = next;
+            continue;
         }
         let end = text[at..].iter().position(|&b| b == b'\n').map_or(text.len(), |length| at + length);
         let line = text[at..end].trim_ascii();
