@@ -4,7 +4,7 @@ use super::html::escape;
 use super::lumped::LumpedFacts;
 use super::numbers::percent;
 
-/// Errors below this are drawn as nothing: rounding, not an effect of lumping.
+/// Power of ten at the left end: errors below 0.0001 % are of no consequence and have no bar.
 const LOWEST: i32 = -6;
 /// Places on the drawing, in its own units.
 const LABEL: f64 = 112.0;

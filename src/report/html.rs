@@ -105,7 +105,7 @@ fn body(html: &mut String, facts: &Facts) {
     let units = &model.units;
     let triple = |values: &[f64; 3], unit: &str| {
         let [x, y, z] = values.map(|v| significant(v, 7));
-        format!("{x}, &ensp;{y}, &ensp;{z} {}", escape(unit))
+        format!("{x}, &ensp;{y}, &ensp;{z} {}", escape(&unit.replace("^2", "\u{b2}")))
     };
     let [x, y, z] = body.frame_axes.map(|row| row.map(|v| significant(v, 6)).join(", "));
     section(html, "Body");
@@ -171,20 +171,23 @@ fn modes(html: &mut String, facts: &Facts) {
     }
     terms(html, items);
     section(html, "Frequencies");
-    let rows: Vec<_> = (0..modes.count)
-        .map(|j| {
-            vec![
-                (j + 1).to_string(),
-                significant(modes.frequency_hz[j], 8),
-                significant(modes.eigenvalue[j], 8),
-                significant(modes.residual[j], 2),
-                significant(modes.damping_ratio[j], 4),
-            ]
-        })
-        .collect();
-    let eigenvalue = format!("Eigenvalue (1/{}^2)", escape(&facts.model.units.time));
-    let head = ["Mode", "Frequency (Hz)", &eigenvalue, "Residual", "Damping ratio"];
-    table(html, "Flexible modes, ascending", &texts(head), &[], &rows);
+    // Without damping a column of zeros would say nothing.
+    let damped = modes.damping_ratio.iter().any(|&d| d != 0.0);
+    let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(&facts.model.units.time));
+    let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue, "Residual"]);
+    head.extend(damped.then(|| "Damping ratio".to_owned()));
+    let row = |j: usize| {
+        let mut cells = vec![
+            (j + 1).to_string(),
+            significant(modes.frequency_hz[j], 8),
+            significant(modes.eigenvalue[j], 8),
+            significant(modes.residual[j], 2),
+        ];
+        cells.extend(damped.then(|| significant(modes.damping_ratio[j], 4)));
+        cells
+    };
+    let rows: Vec<_> = (0..modes.count).map(row).collect();
+    table(html, "Flexible modes, ascending", &head, &[], &rows);
 }
 
 fn lumped(html: &mut String, facts: &Facts) {
@@ -196,7 +199,7 @@ fn lumped(html: &mut String, facts: &Facts) {
     let chart = bar_chart(&facts.lumped);
     if !chart.is_empty() {
         html.push_str(&format!(
-            "<figure>\n{chart}<figcaption>Logarithmic axis; what is below its left end is rounding.</figcaption>\n</figure>\n"
+            "<figure>\n{chart}<figcaption>Logarithmic axis; errors below its left end have no bar.</figcaption>\n</figure>\n"
         ));
     }
     let rows: Vec<_> = facts

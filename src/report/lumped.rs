@@ -23,12 +23,12 @@ impl ErrorNorm {
         Self { name: name.clone(), invariant: invariant_of(name).to_owned(), value: *value, meaning }
     }
 
-    /// Kind of norm in words.
+    /// Kind of norm in a word.
     pub fn kind(&self) -> &'static str {
         match self.name.rsplit('_').next() {
-            Some("frobenius") => "Frobenius norm",
-            Some("spectral") => "spectral norm",
-            Some("max") => "largest entry",
+            Some("frobenius") => "Frobenius",
+            Some("spectral") => "spectral",
+            Some("max") => "entry",
             _ => "relative",
         }
     }
