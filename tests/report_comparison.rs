@@ -83,23 +83,19 @@ fn signs_bases_of_repeated_eigenvalues_node_order_and_frames_make_no_difference(
     frames.push(any);
     for frame in frames {
         agrees(&reference, &condensed(&mass, ids.clone(), &positions, shape.clone(), frame));
-        let turned = condensed(&mass, ids.clone(), &positions, other_basis(&shape), frame);
-        agrees(&reference, &turned);
+        let turned = other_basis(&shape);
+        agrees(&reference, &condensed(&mass, ids.clone(), &positions, turned.clone(), frame));
 
         let order = random.permutation(n);
         let permuted = condensed(
             &permute(&mass, &order),
             order.iter().map(|&i| ids[i]).collect(),
             &order.iter().map(|&i| positions[i]).collect::<Vec<_>>(),
-            Mat::from_fn(3 * n, 6, |row, p| turned_shape(&shape)[(3 * order[row / 3] + row % 3, p)]),
+            Mat::from_fn(3 * n, 6, |row, p| turned[(3 * order[row / 3] + row % 3, p)]),
             frame,
         );
         agrees(&reference, &permuted);
     }
-}
-
-fn turned_shape(shape: &Mat<f64>) -> Mat<f64> {
-    other_basis(shape)
 }
 
 fn permute(mass: &SymmetricMatrix, order: &[usize]) -> SymmetricMatrix {
@@ -127,7 +123,7 @@ fn a_turned_basis_is_a_difference_where_eigenvalues_are_distinct() {
         let shape = p.modes.shape.clone();
         p.modes.shape = Mat::from_fn(shape.nrows(), 6, |i, j| shape[(i, [0, 1, 2, 3, 5, 4][j])]);
     });
-    assert_eq!(failed(&compared(&body, &swapped)), ["mode shapes"]);
+    assert!(failed(&compared(&body, &swapped)).contains(&"mode shapes"));
 }
 
 #[test]
@@ -229,8 +225,10 @@ fn a_distant_origin_costs_the_digits_that_it_costs_and_no_more() {
     let (principal, model) = (at(BodyFrame::Principal), at(BodyFrame::Model));
     for (a, b) in [(&principal, &model), (&model, &principal)] {
         let comparison = compared(a, b);
-        let inertia = comparison.rows().iter().find(|r| r.quantity == "inertia").unwrap();
-        assert!(inertia.passed, "{}", comparison.text());
+        assert!(comparison.passed(), "{}", comparison.text());
+        let widest = comparison.rows().iter().map(|r| r.tolerance).fold(0.0, f64::max);
+        // 8 eps m d^2 / J_min, d = 2.3e4, m = 6, J_min = 0.5: far below the difference that must be seen next.
+        assert!(widest < 1.2e-5, "{}", comparison.text());
     }
     let other = changed(&principal, |p| p.invariants.second_moment *= 1.0 + 1e-4);
     assert!(failed(&compared(&principal, &other)).contains(&"inertia"));
