@@ -90,9 +90,10 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     let change = FrameChange::new(a, b);
     let in_a = b.invariants().shifted(change.shift).rotated(&change.axes);
     let groups = clusters(&a.modes().eigenvalue, &b.modes().eigenvalue);
+    let pair = Pair { a, b, change, in_a, groups };
     match common_nodes(&a.nodes().ids, &b.nodes().ids) {
-        Some(order) => comparison.mode_by_mode(a, b, &in_a, &groups, &change, &order, tolerances),
-        None => comparison.norms_only(a, b, &in_a, &groups, tolerances),
+        Some(order) => comparison.mode_by_mode(&pair, &order, tolerances),
+        None => comparison.norms_only(&pair, tolerances.invariants),
     }
     if a.units().stated != b.units().stated {
         comparison
@@ -122,6 +123,17 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
         refuse(format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes()));
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
+}
+
+/// Two bodies brought together.
+struct Pair<'a> {
+    a: &'a FlexBody,
+    b: &'a FlexBody,
+    change: FrameChange,
+    /// Invariants of b in the frame of a, in the basis of b.
+    in_a: Invariants,
+    /// Clusters of close eigenvalues.
+    groups: Vec<Range<usize>>,
 }
 
 /// From the frame of b to that of a: x_a = axes' (x_b - shift).
@@ -252,17 +264,9 @@ impl BodyComparison {
         self.row("frequency", "relative, largest of all modes", largest, tolerances.frequency);
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn mode_by_mode(
-        &mut self,
-        a: &FlexBody,
-        b: &FlexBody,
-        in_a: &Invariants,
-        groups: &[Range<usize>],
-        change: &FrameChange,
-        order: &[usize],
-        tolerances: &Tolerances,
-    ) {
+    /// Positions, shapes and invariants; `order` gives the node of b for each of a.
+    fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) {
+        let Pair { a, b, change, in_a, groups } = pair;
         self.same_nodes = true;
         let (pa, pb) = (&a.nodes().positions, &b.nodes().positions);
         let distance = |(x, &i): (&[f64; 3], &usize)| (change.point(&pb[i]) - Vector3::from(*x)).norm();
@@ -303,14 +307,9 @@ impl BodyComparison {
         }
     }
 
-    fn norms_only(
-        &mut self,
-        a: &FlexBody,
-        b: &FlexBody,
-        in_a: &Invariants,
-        groups: &[Range<usize>],
-        tolerances: &Tolerances,
-    ) {
+    /// Norms of the invariants over groups of modes, which no orthogonal change inside the groups alters.
+    fn norms_only(&mut self, pair: &Pair<'_>, tolerance: f64) {
+        let Pair { a, b, in_a, groups, .. } = pair;
         let (na, nb) = (a.n_nodes(), b.n_nodes());
         let count = if na == nb { format!("{na} with other numbers") } else { format!("{na} and {nb}") };
         self.notes.push(format!(
@@ -340,9 +339,9 @@ impl BodyComparison {
                 }
             }
         }
-        self.row("norms of C1", "over groups of modes / sqrt(m) |psi|", c1, tolerances.invariants);
-        self.row("norms of Ibar", "over groups of modes / sqrt(J_kk) |psi|", ibar, tolerances.invariants);
-        self.row("norms of S", "over groups of modes / |psi_p| |psi_q|", s, tolerances.invariants);
+        self.row("norms of C1", "over groups of modes / sqrt(m) |psi|", c1, tolerance);
+        self.row("norms of Ibar", "over groups of modes / sqrt(J_kk) |psi|", ibar, tolerance);
+        self.row("norms of S", "over groups of modes / |psi_p| |psi_q|", s, tolerance);
     }
 }
 
