@@ -290,7 +290,8 @@ impl BodyComparison {
         let largest = by_group.iter().copied().fold(0.0, worst);
         self.row("mode shapes", "|psi_a - psi_b| / |psi_a|, nodal norm", largest, tolerances.invariants);
         let rest = &by_group[..by_group.len().saturating_sub(1)];
-        if !(largest <= tolerances.invariants) && rest.iter().all(|d| *d <= tolerances.invariants) {
+        let shapes_agree = largest <= tolerances.invariants;
+        if !shapes_agree && rest.iter().all(|d| *d <= tolerances.invariants) {
             self.notes.push(
                 "only the last modes differ: other modes of the same repeated eigenvalue may have been left out"
                     .to_owned(),

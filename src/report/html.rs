@@ -2,9 +2,11 @@
 
 use super::Facts;
 use super::bar_chart::bar_chart;
+use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
 use crate::invariants::ERROR_NORMS;
+use std::collections::HashMap;
 
 const STYLE: &str = include_str!("report.css");
 
@@ -221,23 +223,21 @@ fn lumped(html: &mut String, facts: &Facts) {
         .collect();
     table(html, "Schemes", &texts(["Scheme", "Negative masses", "Worst error", "Of"]), &[0, 3], &rows);
 
-    let mut names: Vec<&str> = Vec::new();
-    for (name, _) in facts.lumped.iter().flat_map(|l| &l.errors.error_norms.0) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
-        }
-    }
+    let norms: Vec<HashMap<&str, f64>> = facts
+        .lumped
+        .iter()
+        .map(|l| l.errors.error_norms.0.iter().map(|(name, value)| (name.as_str(), *value)).collect())
+        .collect();
+    let names =
+        distinct(facts.lumped.iter().flat_map(|l| &l.errors.error_norms.0).map(|(name, _)| name.as_str()));
     let head: Vec<String> = std::iter::once("Norm".to_owned())
         .chain(facts.lumped.iter().map(|l| escape(&l.scheme)))
         .chain(["Meaning (X exact, D lumped minus exact)".to_owned()])
         .collect();
     let row = |name: &&str| {
-        let value = |l: &super::lumped::LumpedFacts| {
-            let found = l.errors.error_norms.0.iter().find(|(known, _)| known == name);
-            found.map_or_else(String::new, |(_, value)| percent(*value))
-        };
+        let value = |norms: &HashMap<&str, f64>| norms.get(name).map_or_else(String::new, |v| percent(*v));
         let meaning = ERROR_NORMS.iter().find(|(known, _)| known == name).map_or("", |(_, meaning)| meaning);
-        std::iter::once(escape(name)).chain(facts.lumped.iter().map(value)).chain([escape(meaning)]).collect()
+        std::iter::once(escape(name)).chain(norms.iter().map(value)).chain([escape(meaning)]).collect()
     };
     let rows: Vec<Vec<String>> = names.iter().map(row).collect();
     table(html, "All error norms", &head, &[0, head.len() - 1], &rows);
