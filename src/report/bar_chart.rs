@@ -1,10 +1,11 @@
 //! Errors of lumped masses as bars on a logarithmic axis: inline SVG, readable without colour.
 
 use super::html::escape;
-use super::lumped::LumpedFacts;
+use super::lumped::{ErrorNorm, LumpedFacts, distinct};
 use super::numbers::percent;
+use std::collections::HashMap;
 
-/// Errors below this are drawn as nothing: rounding, not an effect of lumping.
+/// Power of ten at the left end: errors below 0.0001 % are of no consequence and have no bar.
 const LOWEST: i32 = -6;
 /// Places on the drawing, in its own units.
 const LABEL: f64 = 112.0;
@@ -18,12 +19,8 @@ const COLOURS: usize = 3;
 
 /// The worst norm of each invariant for each scheme; empty without errors to draw.
 pub(super) fn bar_chart(lumped: &[LumpedFacts]) -> String {
-    let mut invariants: Vec<&str> = Vec::new();
-    for norm in lumped.iter().flat_map(|l| &l.errors.worst_by_invariant) {
-        if !invariants.contains(&norm.invariant.as_str()) {
-            invariants.push(&norm.invariant);
-        }
-    }
+    let norms = lumped.iter().flat_map(|l| &l.errors.worst_by_invariant);
+    let invariants = distinct(norms.map(|norm| norm.invariant.as_str()));
     if invariants.is_empty() {
         return String::new();
     }
@@ -32,6 +29,10 @@ pub(super) fn bar_chart(lumped: &[LumpedFacts]) -> String {
     let highest = (largest.log10().ceil() as i32).clamp(0, 300);
     let place = |decade: f64| LABEL + PLOT * (decade - f64::from(LOWEST)) / f64::from(highest - LOWEST);
 
+    let worst: Vec<HashMap<&str, &ErrorNorm>> = lumped
+        .iter()
+        .map(|l| l.errors.worst_by_invariant.iter().map(|norm| (norm.invariant.as_str(), norm)).collect())
+        .collect();
     let row = lumped.len() as f64 * BAR + GAP;
     let (width, height) = (LABEL + PLOT + VALUES, TOP + invariants.len() as f64 * row);
     let mut svg = format!(
@@ -54,11 +55,7 @@ pub(super) fn bar_chart(lumped: &[LumpedFacts]) -> String {
             LABEL - 8.0
         ));
         for (j, scheme) in lumped.iter().enumerate() {
-            let Some(norm) =
-                scheme.errors.worst_by_invariant.iter().find(|norm| norm.invariant == *invariant)
-            else {
-                continue;
-            };
+            let Some(norm) = worst[j].get(invariant) else { continue };
             let y = top + j as f64 * BAR;
             let decade = norm.value.abs().log10().clamp(f64::from(LOWEST), f64::from(highest));
             let end = if decade.is_nan() { LABEL } else { place(decade) };

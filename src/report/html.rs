@@ -2,9 +2,11 @@
 
 use super::Facts;
 use super::bar_chart::bar_chart;
+use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
 use crate::invariants::ERROR_NORMS;
+use std::collections::HashMap;
 
 const STYLE: &str = include_str!("report.css");
 
@@ -105,7 +107,7 @@ fn body(html: &mut String, facts: &Facts) {
     let units = &model.units;
     let triple = |values: &[f64; 3], unit: &str| {
         let [x, y, z] = values.map(|v| significant(v, 7));
-        format!("{x}, &ensp;{y}, &ensp;{z} {}", escape(unit))
+        format!("{x}, &ensp;{y}, &ensp;{z} {}", escape(&unit.replace("^2", "\u{b2}")))
     };
     let [x, y, z] = body.frame_axes.map(|row| row.map(|v| significant(v, 6)).join(", "));
     section(html, "Body");
@@ -171,20 +173,23 @@ fn modes(html: &mut String, facts: &Facts) {
     }
     terms(html, items);
     section(html, "Frequencies");
-    let rows: Vec<_> = (0..modes.count)
-        .map(|j| {
-            vec![
-                (j + 1).to_string(),
-                significant(modes.frequency_hz[j], 8),
-                significant(modes.eigenvalue[j], 8),
-                significant(modes.residual[j], 2),
-                significant(modes.damping_ratio[j], 4),
-            ]
-        })
-        .collect();
-    let eigenvalue = format!("Eigenvalue (1/{}^2)", escape(&facts.model.units.time));
-    let head = ["Mode", "Frequency (Hz)", &eigenvalue, "Residual", "Damping ratio"];
-    table(html, "Flexible modes, ascending", &texts(head), &[], &rows);
+    // Without damping a column of zeros would say nothing.
+    let damped = modes.damping_ratio.iter().any(|&d| d != 0.0);
+    let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(&facts.model.units.time));
+    let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue, "Residual"]);
+    head.extend(damped.then(|| "Damping ratio".to_owned()));
+    let row = |j: usize| {
+        let mut cells = vec![
+            (j + 1).to_string(),
+            significant(modes.frequency_hz[j], 8),
+            significant(modes.eigenvalue[j], 8),
+            significant(modes.residual[j], 2),
+        ];
+        cells.extend(damped.then(|| significant(modes.damping_ratio[j], 4)));
+        cells
+    };
+    let rows: Vec<_> = (0..modes.count).map(row).collect();
+    table(html, "Flexible modes, ascending", &head, &[], &rows);
 }
 
 fn lumped(html: &mut String, facts: &Facts) {
@@ -196,7 +201,7 @@ fn lumped(html: &mut String, facts: &Facts) {
     let chart = bar_chart(&facts.lumped);
     if !chart.is_empty() {
         html.push_str(&format!(
-            "<figure>\n{chart}<figcaption>Logarithmic axis; what is below its left end is rounding.</figcaption>\n</figure>\n"
+            "<figure>\n{chart}<figcaption>Logarithmic axis; errors below its left end have no bar.</figcaption>\n</figure>\n"
         ));
     }
     let rows: Vec<_> = facts
@@ -218,23 +223,21 @@ fn lumped(html: &mut String, facts: &Facts) {
         .collect();
     table(html, "Schemes", &texts(["Scheme", "Negative masses", "Worst error", "Of"]), &[0, 3], &rows);
 
-    let mut names: Vec<&str> = Vec::new();
-    for (name, _) in facts.lumped.iter().flat_map(|l| &l.errors.error_norms.0) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
-        }
-    }
+    let norms: Vec<HashMap<&str, f64>> = facts
+        .lumped
+        .iter()
+        .map(|l| l.errors.error_norms.0.iter().map(|(name, value)| (name.as_str(), *value)).collect())
+        .collect();
+    let names =
+        distinct(facts.lumped.iter().flat_map(|l| &l.errors.error_norms.0).map(|(name, _)| name.as_str()));
     let head: Vec<String> = std::iter::once("Norm".to_owned())
         .chain(facts.lumped.iter().map(|l| escape(&l.scheme)))
         .chain(["Meaning (X exact, D lumped minus exact)".to_owned()])
         .collect();
     let row = |name: &&str| {
-        let value = |l: &super::lumped::LumpedFacts| {
-            let found = l.errors.error_norms.0.iter().find(|(known, _)| known == name);
-            found.map_or_else(String::new, |(_, value)| percent(*value))
-        };
+        let value = |norms: &HashMap<&str, f64>| norms.get(name).map_or_else(String::new, |v| percent(*v));
         let meaning = ERROR_NORMS.iter().find(|(known, _)| known == name).map_or("", |(_, meaning)| meaning);
-        std::iter::once(escape(name)).chain(facts.lumped.iter().map(value)).chain([escape(meaning)]).collect()
+        std::iter::once(escape(name)).chain(norms.iter().map(value)).chain([escape(meaning)]).collect()
     };
     let rows: Vec<Vec<String>> = names.iter().map(row).collect();
     table(html, "All error norms", &head, &[0, head.len() - 1], &rows);

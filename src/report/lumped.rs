@@ -4,6 +4,7 @@ use super::run_data::LumpedModes;
 use crate::flex_body::LumpedBody;
 use crate::invariants::ERROR_NORMS;
 use serde::{Serialize, Serializer};
+use std::collections::{HashMap, HashSet};
 
 /// One error norm and what it measures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,12 +24,12 @@ impl ErrorNorm {
         Self { name: name.clone(), invariant: invariant_of(name).to_owned(), value: *value, meaning }
     }
 
-    /// Kind of norm in words.
+    /// Kind of norm in a word.
     pub fn kind(&self) -> &'static str {
         match self.name.rsplit('_').next() {
-            Some("frobenius") => "Frobenius norm",
-            Some("spectral") => "spectral norm",
-            Some("max") => "largest entry",
+            Some("frobenius") => "Frobenius",
+            Some("spectral") => "spectral",
+            Some("max") => "entry",
             _ => "relative",
         }
     }
@@ -37,6 +38,12 @@ impl ErrorNorm {
 /// `I0` of `I0_frobenius`; names without a kind of norm stand for themselves.
 fn invariant_of(name: &str) -> &str {
     ["_frobenius", "_spectral", "_max"].iter().find_map(|kind| name.strip_suffix(kind)).unwrap_or(name)
+}
+
+/// Names in the order of their first appearance.
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut seen = HashSet::new();
+    names.filter(|name| seen.insert(*name)).collect()
 }
 
 /// Errors by name: an object in JSON, in the order of the table.
@@ -60,11 +67,15 @@ pub(super) struct Errors {
 impl Errors {
     fn new(comparison: &[(String, f64)]) -> Self {
         let mut by_invariant: Vec<ErrorNorm> = Vec::new();
+        let mut places: HashMap<String, usize> = HashMap::new();
         for norm in comparison.iter().map(ErrorNorm::new) {
-            match by_invariant.iter_mut().find(|known| known.invariant == norm.invariant) {
-                Some(known) if exceeds(norm.value, known.value) => *known = norm,
+            match places.get(&norm.invariant) {
+                Some(&place) if exceeds(norm.value, by_invariant[place].value) => by_invariant[place] = norm,
                 Some(_) => {}
-                None => by_invariant.push(norm),
+                None => {
+                    places.insert(norm.invariant.clone(), by_invariant.len());
+                    by_invariant.push(norm);
+                }
             }
         }
         let worse = |a: ErrorNorm, b: &ErrorNorm| if exceeds(b.value, a.value) { b.clone() } else { a };

@@ -98,7 +98,8 @@ fn largest_product(inertia: &Matrix3<f64>) -> f64 {
 fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
     let mut moments: [f64; 3] = inertia.diagonal().into();
     // Not finite: the iteration would not end with anything better.
-    if !(largest_product(inertia) <= DIAGONAL) && inertia.iter().all(|v| v.is_finite()) {
+    let diagonal = largest_product(inertia) <= DIAGONAL;
+    if !diagonal && inertia.iter().all(|v| v.is_finite()) {
         let scale = inertia.amax();
         moments = SymmetricEigen::try_new(inertia / scale, f64::EPSILON, 1000)
             .map_or([f64::NAN; 3], |e| (e.eigenvalues * scale).into());

@@ -121,10 +121,10 @@ fn modes(page: &mut Page, facts: &Facts) {
     let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
     let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
     let last = last.map_or(String::new(), |f| format!("{dots} {}", significant(*f, 5)));
-    page.entry(
-        "modes",
-        &format!("{} flexible, worst residual {}", modes.count, significant(modes.worst_residual, 2)),
-    );
+    let accuracy = facts.run.as_ref().map(|run| plain(&run.accuracy)).filter(|name| !name.is_empty());
+    let accuracy = accuracy.map_or(String::new(), |name| format!(", {name} accuracy"));
+    let residual = significant(modes.worst_residual, 2);
+    page.entry("modes", &format!("{} flexible, worst residual {residual}{accuracy}", modes.count));
     page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);
@@ -133,10 +133,7 @@ fn modes(page: &mut Page, facts: &Facts) {
     }
     let noise = significant(completeness.rigid_noise, 2);
     let residual = significant(completeness.rigid_residual, 2);
-    page.entry(
-        "noise",
-        &format!("rigid modes at {noise} of the first eigenvalue; |K R| {residual} of |K| |R|"),
-    );
+    page.entry("noise", &format!("rigid modes at {noise} of the first eigenvalue; K R {residual}"));
 }
 
 fn lumped(page: &mut Page, facts: &Facts) {
@@ -158,7 +155,7 @@ fn worst(errors: &Errors) -> String {
     match &errors.worst {
         None => "not compared".to_owned(),
         Some(norm) => {
-            format!("off by up to {} ({}, {})", percent(norm.value), plain(&norm.invariant), norm.kind())
+            format!("worst {} ({}, {})", percent(norm.value), plain(&norm.invariant), norm.kind())
         }
     }
 }
@@ -184,12 +181,8 @@ fn timing(page: &mut Page, run: &RunFacts) {
     }
     let memory = run.peak_memory_bytes.map_or(String::new(), |m| format!(", peak memory {}", bytes(m)));
     let (wall, cpu) = (duration(run.wall_seconds), duration(run.cpu_seconds));
-    let accuracy =
-        if run.accuracy.is_empty() { String::new() } else { format!(", {} accuracy", plain(&run.accuracy)) };
-    page.entry(
-        "total",
-        &format!("{wall} wall, {cpu} CPU, {}{memory}{accuracy}", counted(run.threads, "thread")),
-    );
+    let threads = counted(run.threads, "thread");
+    page.entry("total", &format!("{wall} wall, {cpu} CPU, {threads}{memory}"));
     if let Some(output) = &run.output {
         page.entry("output", &format!("{}, {}", plain(&output.name), bytes(output.bytes)));
     }
