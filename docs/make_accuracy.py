@@ -109,7 +109,7 @@ def checks_of(found):
 
 def page(models, version):
     out = [HEAD.format(version=version), "## Modes", "",
-           "Largest relative differences over all modes. CalculiX prints seven digits. The residual is |K psi - lambda M psi| / (|K psi| + |lambda M psi|), the noise "
+           "Largest relative differences over all modes. CalculiX prints seven digits and splits the repeated frequencies of the cube in the last of them. The residual is |K psi - lambda M psi| / (|K psi| + |lambda M psi|), the noise "
            "what the digits of K leave of rigid motion, relative to the first eigenvalue. The count of negative pivots must be six plus the number of modes.", ""]
     out += table(["model", "element", "DOF", "modes", "eigenvalues, scipy", "frequencies, CalculiX", "worst residual", "scipy's residual", "noise", "negative pivots", "complete"],
                  [[m["name"], m["element"], f"{m['dofs']:,}", str(m["modes"]), digits(m["eigenvalue"]), digits(m["calculix"]), digits(m["residual"]),
