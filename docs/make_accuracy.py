@@ -1,0 +1,156 @@
+#!/usr/bin/env python3
+"""Converts every model of fixtures/models and writes docs/accuracy.md: differences from the reference numbers beside the models.
+
+    pip install numpy h5py
+    cargo build --release --locked
+    python3 docs/make_accuracy.py
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+SCHEMES = ("row-sum", "diagonal-scaling")
+HEAD = """<!-- Written by docs/make_accuracy.py -->
+
+# Accuracy
+
+What `flexbody` {version} makes of the models in `fixtures/models`, against the reference numbers beside them (`expected.json`: scipy on the same
+matrices, mass properties as plain sums; frequencies printed by CalculiX). Written by `python3 docs/make_accuracy.py`.
+"""
+
+
+def run(program, *arguments):
+    done = subprocess.run([program, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"flexbody {' '.join(map(str, arguments))} ended with {done.returncode}:\n{done.stderr}{done.stdout}")
+    return json.loads(done.stdout)
+
+
+def relative(found, expected):
+    found, expected = np.asarray(found, float), np.asarray(expected, float)
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+def evaluate(program, folder, scratch):
+    """Everything the tables show of one model."""
+    expected = json.loads((folder / "expected.json").read_text())
+    values = np.array(expected["flexible_eigenvalues"])
+    path = scratch / f"{folder.name}.flex.h5"
+    report = run(program, "convert", folder / "model.toml", "-o", path, "--modes", len(values), "--json")
+    identities = run(program, "check", path, "--against", folder / "model.toml", "--json")
+    rigid, norms = expected["rigid_body"], expected["invariant_norms"]
+    with h5py.File(path) as body:
+        axes, data = body["frame/axes"][()], body["invariants"]
+        inertia = axes @ data["I0"][()] @ axes.T
+        mass = float(data["mass"][0])
+        radius = np.sqrt(np.trace(rigid["inertia_com"]) / 2 / rigid["mass"])
+        found = {name: body["modes"][name][()] for name in ("eigenvalue", "frequency_hz", "residual")}
+        sizes = {"consistent": {name: np.linalg.norm(data[name][()]) for name in ("I0", "W1", "W2", "W3")}}
+        errors, negative = {}, {}
+        for scheme in SCHEMES:
+            sizes[scheme] = {name: np.linalg.norm(body[f"lumped/{scheme}/{name}"][()]) for name in ("W1", "W2", "W3")}
+            errors[scheme] = dict(body[f"comparison/{scheme}"].attrs)
+            negative[scheme] = (int(body[f"lumped/{scheme}"].attrs["negative_masses"]), expected["lumped"][scheme]["negative_nodal_masses"])
+        pivots = (int(body["certificate"].attrs["negative_pivots"]), 6 + len(values))
+        proved = int(body["certificate"].attrs["proved"]) == 1
+        origin = body["frame/origin"][()]
+    assert len(found["eigenvalue"]) == len(values) == norms["modes"], folder.name
+    return {
+        "name": folder.name,
+        "element": expected["element"],
+        "dofs": expected["n_dofs"],
+        "modes": len(values),
+        "eigenvalue": float(np.abs(found["eigenvalue"] / values - 1).max()),
+        "calculix": float(np.abs(found["frequency_hz"] / expected["calculix_frequencies_hz"] - 1).max()),
+        "residual": float(found["residual"].max()),
+        "reference_residual": expected["eigenvalue_facts"]["residual_max"],
+        "noise": report["completeness"]["rigid_noise"],
+        "proved": proved,
+        "pivots": pivots,
+        "mass": abs(mass / rigid["mass"] - 1),
+        "com": float(np.linalg.norm(origin - rigid["com"]) / radius),
+        "inertia": relative(inertia, rigid["inertia_com"]),
+        "invariants": {name: abs(size / norms["consistent"][name] - 1) for name, size in sizes["consistent"].items()},
+        "lumped": {s: max(abs(size / norms[s][name] - 1) for name, size in sizes[s].items()) for s in SCHEMES},
+        "errors": errors,
+        "negative": negative,
+        "identities": identities,
+    }
+
+
+def table(head, rows):
+    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in rows), ""]
+
+
+def digits(value):
+    return "0" if value == 0 else f"{value:.1e}"
+
+
+def percent(value):
+    if value < 1e-12:  # rounding
+        return "0"
+    return f"{100 * value:.2g} %" if value < 1 else f"{100 * value:.0f} %"
+
+
+def checks_of(found):
+    """Identity checks in the JSON of `flexbody check`."""
+    checks = found if isinstance(found, list) else next(v for v in found.values() if isinstance(v, list) and v and "limit" in v[0])
+    return checks
+
+
+def page(models, version):
+    out = [HEAD.format(version=version), "## Modes", "",
+           "Largest relative differences over all modes. CalculiX prints seven digits and splits the repeated frequencies of the cube in the last of them. The residual is |K psi - lambda M psi| / (|K psi| + |lambda M psi|), the noise "
+           "what the digits of K leave of rigid motion, relative to the first eigenvalue. The count of negative pivots must be six plus the number of modes.", ""]
+    out += table(["model", "element", "DOF", "modes", "eigenvalues, scipy", "frequencies, CalculiX", "worst residual", "scipy's residual", "noise", "negative pivots", "complete"],
+                 [[m["name"], m["element"], f"{m['dofs']:,}", str(m["modes"]), digits(m["eigenvalue"]), digits(m["calculix"]), digits(m["residual"]),
+                   digits(m["reference_residual"]), digits(m["noise"]), f"{m['pivots'][0]} of {m['pivots'][1]}", "proved" if m["proved"] else "not proved"] for m in models])
+    out += ["## Mass properties and invariants", "",
+            "Mass and inertia relative, centre of mass relative to the radius of gyration. Frobenius norms of the invariants relative to the reference's: they do not "
+            "depend on axes, signs or the basis of repeated eigenvalues.", ""]
+    out += table(["model", "mass", "centre of mass", "inertia", "I0", "W1", "W2", "W3", "row-sum W", "diagonal-scaling W"],
+                 [[m["name"], *(digits(m[k]) for k in ("mass", "com", "inertia")), *(digits(m["invariants"][k]) for k in ("I0", "W1", "W2", "W3")),
+                   *(digits(m["lumped"][s]) for s in SCHEMES)] for m in models])
+    out += ["## What lumped masses give", "", "Error norms of [theory](theory.md) section 9 (`max`: largest entry, otherwise spectral norm), same modes. Rounding counts as 0.", ""]
+    rows = []
+    for m in models:
+        for s in SCHEMES:
+            e = m["errors"][s]
+            rows.append([m["name"], s, "{0} (reference {1})".format(*m["negative"][s]), percent(e["com_shift"]), percent(e["I0_max"]),
+                         *(percent(e[f"{k}_spectral"]) for k in ("I0", "W1", "W2", "W3", "modal_mass", "C2"))])
+    out += table(["model", "scheme", "negative masses", "centre of mass", "I0 (max)", "I0", "W1", "W2", "W3", "modal mass", "C2"], rows)
+    out += ["## Identities", "", "`flexbody check --against model.toml`: how many hold, and the one that comes closest to its limit.", ""]
+    rows = []
+    for m in models:
+        checks = checks_of(m["identities"])
+        worst = max((c for c in checks if c["limit"] > 0), key=lambda c: c["value"] / c["limit"])
+        rows.append([m["name"], f"{sum(c['passed'] for c in checks)} of {len(checks)}", f"`{worst['name']}`: {digits(worst['value'])} of {digits(worst['limit'])}"])
+    out += table(["model", "hold", "closest"], rows)
+    return "\n".join(out).rstrip() + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "accuracy.md")
+    args = parser.parse_args()
+    folders = sorted(f.parent for f in (ROOT / "fixtures" / "models").glob("*/expected.json"))
+    version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
+    with tempfile.TemporaryDirectory() as scratch:
+        models = [evaluate(args.program, folder, Path(scratch)) for folder in folders]
+    args.output.write_text(page(models, version), encoding="utf-8")
+    print(args.output)
+
+
+if __name__ == "__main__":
+    main()

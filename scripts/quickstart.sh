@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Builds flexbody and turns the connecting rod of fixtures/ into a flexible body, with a report.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+if ! command -v cargo >/dev/null; then
+    echo "error: cargo is not on the PATH" >&2
+    echo "  help: install Rust 1.89 or newer, see https://rustup.rs" >&2
+    exit 1
+fi
+# shellcheck source=scripts/cmake.sh
+source scripts/cmake.sh
+
+cargo build --release --locked
+mkdir -p target/quickstart
+cargo run --release --locked --quiet -- convert fixtures/models/connecting_rod/model.toml \
+    -o target/quickstart/connecting_rod.flex.h5 --report target/quickstart/connecting_rod.html
+
+echo
+echo "flexible body: target/quickstart/connecting_rod.flex.h5"
+echo "report:        target/quickstart/connecting_rod.html"
