@@ -1,0 +1,6 @@
+//! Properties of bodies that mechanics dictates: closed forms, symmetry, convergence, covariance, conservation.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod assembler;
