@@ -108,6 +108,7 @@ codes! {
     BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
     StiffnessDiagonalZero = "FB417", Warning, Done, "mass without stiffness", "check the connection of these nodes";
     ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more than six degrees of freedom";
+    DimensionUnsupported = "FB419", Error, BadInput, "dimension not supported", "this version handles bodies in three dimensions";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more than six zero-energy modes: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

@@ -17,6 +17,7 @@ pub mod input;
 pub mod invariants;
 pub mod linalg;
 pub mod model;
+pub mod progress;
 pub mod provenance;
 pub mod report;
 pub mod store;

@@ -1,1 +1,20 @@
-//! (filled below)
+//! Free modes of K psi = lambda M psi: shift-invert block Lanczos or a dense solve, both followed by the same
+//! refinement, canonical form and completeness count. Sees operators, never nodes or files.
+
+mod canonical;
+mod completeness;
+mod dense;
+mod krylov;
+mod lanczos;
+mod noise;
+mod problem;
+mod refine;
+mod solve;
+
+pub use canonical::{canonical_basis, clusters};
+pub use completeness::{Completeness, Proof};
+pub use noise::{energy_noise, rounding_residual};
+pub use problem::{
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Wanted,
+};
+pub use solve::solve;

@@ -131,6 +131,33 @@ impl CscMatrix {
         rows.binary_search(&(row as u32)).map_or(0.0, |k| values[k])
     }
 
+    /// The square matrix with row and column i moved to `to[i]`.
+    ///
+    /// # Panics
+    /// When `to` is not a permutation of the rows.
+    pub fn permuted(&self, to: &[u32]) -> Self {
+        let n = self.n_cols;
+        assert!(self.n_rows == n && to.len() == n, "permutation of a square matrix");
+        let mut from = vec![u32::MAX; n];
+        for (old, &new) in to.iter().enumerate() {
+            from[new as usize] = old as u32;
+        }
+        let mut col_ptr = Vec::with_capacity(n + 1);
+        let mut entries: Vec<(u32, f64)> = Vec::new();
+        let (mut row_idx, mut values) = (Vec::with_capacity(self.nnz()), Vec::with_capacity(self.nnz()));
+        col_ptr.push(0);
+        for &old in &from {
+            let (rows, vals) = self.column(old as usize);
+            entries.clear();
+            entries.extend(rows.iter().zip(vals).map(|(&r, &v)| (to[r as usize], v)));
+            entries.sort_unstable_by_key(|e| e.0);
+            row_idx.extend(entries.iter().map(|e| e.0));
+            values.extend(entries.iter().map(|e| e.1));
+            col_ptr.push(row_idx.len());
+        }
+        Self { n_rows: n, n_cols: n, col_ptr, row_idx, values }
+    }
+
     /// The transpose; for a symmetric matrix, an equal one.
     pub fn transpose(&self) -> Self {
         let mut col_ptr = vec![0usize; self.n_rows + 1];
@@ -222,5 +249,19 @@ impl SymmetricMatrix {
     /// The diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
         (0..self.n()).map(|i| self.0.get(i, i)).collect()
+    }
+
+    /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every other.
+    pub(super) fn with_raised_diagonal(&self, factor: f64) -> Self {
+        let mut triplets = Vec::with_capacity(self.0.nnz() + self.n());
+        for j in 0..self.n() {
+            let (rows, values) = self.row(j);
+            triplets.extend(
+                rows.iter().zip(values).filter(|(r, _)| **r as usize != j).map(|(&r, &v)| (r, j as u32, v)),
+            );
+            let diagonal = self.0.get(j, j);
+            triplets.push((j as u32, j as u32, if diagonal > 0.0 { diagonal * factor } else { 1.0 }));
+        }
+        Self(CscMatrix::from_triplets(self.n(), self.n(), &triplets))
     }
 }

@@ -1,6 +1,7 @@
 //! The checked model: every used node has three displacements, DOF 3 i + k is direction k of node i.
 
-use super::{NodeSet, Nodes};
+use super::{CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check};
+use crate::error::Result;
 use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
@@ -16,9 +17,44 @@ pub struct FeModel {
     interfaces: Vec<NodeSet>,
     sources: Vec<SourceFile>,
     digits: u8,
+    rigid_residual: f64,
+    mass_deviation: f64,
+    diagonal_mass: bool,
 }
 
 impl FeModel {
+    /// Checks a model as a reader delivered it, and brings it into the internal order.
+    ///
+    /// # Errors
+    /// See [`check`].
+    pub fn from_raw(raw: RawModel) -> Result<CheckedModel> {
+        check(raw)
+    }
+
+    pub(super) fn new(
+        raw: RawModel,
+        nodes: Nodes,
+        stiffness: SymmetricMatrix,
+        scalar_mass: SymmetricMatrix,
+        rigid_residual: f64,
+        mass_deviation: f64,
+        diagonal_mass: bool,
+    ) -> Self {
+        Self {
+            digits: raw.stiffness.digits,
+            name: raw.name,
+            units: raw.units,
+            nodes,
+            stiffness,
+            scalar_mass,
+            interfaces: raw.interfaces,
+            sources: raw.sources,
+            rigid_residual,
+            mass_deviation,
+            diagonal_mass,
+        }
+    }
+
     /// Model name.
     pub fn name(&self) -> &str {
         &self.name
@@ -57,5 +93,25 @@ impl FeModel {
     /// Significant decimal digits of the stiffness values.
     pub fn digits(&self) -> u8 {
         self.digits
+    }
+
+    /// max over the rows of |K R| / sum |K|: how well K annihilates rigid motion.
+    pub fn rigid_residual(&self) -> f64 {
+        self.rigid_residual
+    }
+
+    /// Largest deviation of a mass block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj).
+    pub fn mass_deviation(&self) -> f64 {
+        self.mass_deviation
+    }
+
+    /// Whether M is diagonal: lumped by the FE program.
+    pub fn has_diagonal_mass(&self) -> bool {
+        self.diagonal_mass
+    }
+
+    /// Label of an internal row.
+    pub fn label(&self, row: usize) -> DofLabel {
+        DofLabel { node: self.nodes.ids[row / 3], direction: (row % 3) as u8 + 1 }
     }
 }

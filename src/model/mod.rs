@@ -1,9 +1,15 @@
 //! The finite element model of one free body: nodes, degrees of freedom, K, M. Knows no file format.
 
+mod checks;
 mod fe_model;
+mod layout;
+mod mass_structure;
 mod nodes;
 mod raw;
+mod rigid;
 
+pub use checks::{CheckedModel, check};
 pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel};
+pub use rigid::{centre_and_length, rigid_fields};

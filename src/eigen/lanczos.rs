@@ -1,0 +1,221 @@
+//! Shift-invert block Lanczos with thick restart: the lowest flexible modes of a large pencil.
+//!
+//! The operator (K + tau M)^-1 M has the eigenvalues theta = 1 / (lambda + tau) and is self-adjoint in the M inner
+//! product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) keeps repeated
+//! eigenvalues complete up to what the later inertia count proves.
+
+use super::krylov::Krylov;
+use super::noise::energy_noise;
+use super::problem::{Counters, EigenFailure, EigenProblem};
+use crate::linalg::{Analysis, Cholesky, SymmetricEigen, symmetric_eigen};
+use crate::progress::{Event, Watch};
+use faer::Mat;
+
+/// Columns solved at once: the factor is streamed once for all of them.
+const BLOCK: usize = 8;
+
+/// Restarts without which every model met so far converged, times ten.
+const MAX_RESTARTS: u64 = 100;
+
+/// Energy this many standard deviations above the noise of the entries of K is real.
+pub(super) const NOISE_FACTOR: f64 = 30.0;
+
+/// The shift tau lies between these parts of the first flexible eigenvalue: larger ones need more iterations,
+/// smaller ones lose digits.
+const SHIFT_RANGE: (f64, f64) = (0.02, 1.0);
+
+/// Lowest Ritz pairs, ascending in lambda.
+pub(super) struct RitzPairs {
+    /// lambda by the projected problem.
+    pub eigenvalues: Vec<f64>,
+    /// Vectors (N x k), M-orthonormal.
+    pub vectors: Mat<f64>,
+    /// Further Ritz values, loosely converged.
+    pub next: Vec<f64>,
+    /// The shift in use.
+    pub tau: f64,
+}
+
+/// A factor of K + tau M with tau from the flexible spectrum; refactors when the first estimate was far off.
+pub(super) fn shifted_factor<'a>(
+    problem: &EigenProblem<'_>,
+    analysis: &'a Analysis,
+    counters: &mut Counters,
+) -> Result<(Cholesky<'a>, f64), EigenFailure> {
+    let mut tau = 0.3 * problem.first_estimate;
+    loop {
+        let factor = factorise(problem, analysis, tau, counters)?;
+        let lowest = probe_lowest(problem, &factor, tau, counters)?;
+        // A Ritz value is an upper bound: the shift is far too large when it is below a small part of tau.
+        if lowest > SHIFT_RANGE.0 * tau {
+            return Ok((factor, tau));
+        }
+        tau = 0.5 * SHIFT_RANGE.1 * lowest;
+    }
+}
+
+/// Cholesky factor with a probe of its accuracy.
+pub(super) fn factorise<'a>(
+    problem: &EigenProblem<'_>,
+    analysis: &'a Analysis,
+    tau: f64,
+    counters: &mut Counters,
+) -> Result<Cholesky<'a>, EigenFailure> {
+    counters.factorizations += 1;
+    let pencil = &problem.pencil;
+    let factor =
+        Cholesky::new(analysis, pencil, tau).ok_or(EigenFailure::NotPositiveDefinite { shift: tau })?;
+    let b = Mat::from_fn(pencil.n(), 1, |i, _| if i % 3 == i % 2 { 1.0 } else { -0.5 });
+    let mut x = b.clone();
+    factor.solve_in_place(x.as_mut());
+    let residual = &b - pencil.apply_stiffness(x.as_ref()) - pencil.apply_mass(x.as_ref()) * faer::Scale(tau);
+    let scale = b.norm_max() + 1e-3 * pencil.apply_stiffness(x.as_ref()).norm_max();
+    let relative = residual.norm_max() / scale;
+    // Backward stable factors leave 1e-12 or so here; a wrong one leaves O(1).
+    if relative.is_nan() || relative > 1e-4 {
+        return Err(EigenFailure::Inaccurate { residual: relative });
+    }
+    Ok(factor)
+}
+
+/// Upper bound of the first flexible eigenvalue by three block steps; an error when it is zero to noise.
+fn probe_lowest(
+    problem: &EigenProblem<'_>,
+    factor: &Cholesky<'_>,
+    tau: f64,
+    counters: &mut Counters,
+) -> Result<f64, EigenFailure> {
+    let mut krylov = Krylov::new(problem, factor, 4 * 4);
+    krylov.append_random(4, counters);
+    for _ in 0..3 {
+        if krylov.exhausted() {
+            break;
+        }
+        krylov.step(counters);
+    }
+    let ritz = descending(&krylov)?;
+    let (lambda, vectors) = best(&krylov, &ritz, 1, tau);
+    let Some(&lowest) = lambda.first() else {
+        return Err(EigenFailure::NotConverged { converged: 0, wanted: 1 });
+    };
+    let noise =
+        NOISE_FACTOR * energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error)[0];
+    // Far below the shift and within noise: no shift can resolve it, there is no strain energy.
+    if lowest < SHIFT_RANGE.0 * tau && lowest.abs() <= noise {
+        return Err(zero_energy(problem, factor, tau, counters)?);
+    }
+    if lowest < 0.0 && lowest < -noise {
+        return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lowest, vector: vectors });
+    }
+    Ok(lowest.max(noise))
+}
+
+/// Counts and resolves the modes without strain energy.
+fn zero_energy(
+    problem: &EigenProblem<'_>,
+    factor: &Cholesky<'_>,
+    tau: f64,
+    counters: &mut Counters,
+) -> Result<EigenFailure, EigenFailure> {
+    let mut krylov = Krylov::new(problem, factor, 12 * BLOCK);
+    krylov.append_random(BLOCK, counters);
+    while krylov.room() >= BLOCK && !krylov.exhausted() {
+        krylov.step(counters);
+    }
+    let ritz = descending(&krylov)?;
+    let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
+    let noise = energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error);
+    let count = lambda.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count().max(1);
+    Ok(EigenFailure::ZeroEnergy {
+        count,
+        eigenvalues: lambda[..count].to_vec(),
+        vectors: vectors.as_ref().subcols(0, count).to_owned(),
+    })
+}
+
+/// The `wanted` lowest flexible modes with relative Ritz residuals of the operator below `tolerance`, extended to
+/// the end of the cluster of the last one. `extra` rounds of fresh random directions are added first: a repeated
+/// search after a count that found too many.
+pub(super) fn lowest_modes(
+    problem: &EigenProblem<'_>,
+    factor: &Cholesky<'_>,
+    tau: f64,
+    wanted: usize,
+    tolerance: f64,
+    cluster_gap: f64,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<RitzPairs, EigenFailure> {
+    let free = problem.pencil.n() - problem.rigid.ncols();
+    let capacity = (2 * wanted + 16 * BLOCK).min(free + BLOCK);
+    let mut krylov = Krylov::new(problem, factor, capacity);
+    krylov.append_random(BLOCK.min(free), counters);
+    let mut checked = 0;
+    loop {
+        if krylov.exhausted() {
+            // An invariant subspace: go on with new directions, or everything is found.
+            krylov.append_random(BLOCK.min(krylov.room()), counters);
+        }
+        let complete = krylov.exhausted();
+        if !complete {
+            krylov.step(counters);
+        }
+        let size = krylov.projected();
+        let full = krylov.room() < BLOCK;
+        // The projected eigenproblem costs size^3: look again when the basis has grown by a tenth.
+        if !(complete || full) && (size < wanted + 1 || size < checked + checked / 10) {
+            continue;
+        }
+        checked = size;
+        let ritz = descending(&krylov)?;
+        if ritz.values.first().is_some_and(|&theta| theta < -1e-8 * ritz.values[size - 1].abs()) {
+            return Err(EigenFailure::MassIndefinite);
+        }
+        let lambda = |i: usize| 1.0 / ritz.values[size - 1 - i] - tau;
+        let s = Mat::from_fn(size, size, |i, j| ritz.vectors[(i, size - 1 - j)]);
+        let norms = krylov.residual_norms(s.as_ref());
+        let good = |i: usize, tol: f64| norms[i] <= tol * ritz.values[size - 1 - i];
+        let mut last = wanted.min(size);
+        while last < size
+            && last > 0
+            && lambda(last) - lambda(last - 1) <= cluster_gap * lambda(last - 1).abs()
+        {
+            last += 1;
+        }
+        let converged = (0..last).take_while(|&i| complete || good(i, tolerance)).count();
+        // One more, loosely: it shows the gap above the last mode.
+        let beyond = complete || (last < size && good(last, 1e-3));
+        watch(Event::Fraction(converged as f64 / wanted.max(1) as f64));
+        if converged == last && beyond {
+            return Ok(RitzPairs {
+                eigenvalues: (0..last).map(lambda).collect(),
+                vectors: krylov.combination(s.as_ref().subcols(0, last)),
+                next: (last..size).take_while(|&i| complete || good(i, 1e-2)).map(lambda).collect(),
+                tau,
+            });
+        }
+        if complete || counters.restarts >= MAX_RESTARTS {
+            return Err(EigenFailure::NotConverged { converged, wanted });
+        }
+        if full {
+            counters.restarts += 1;
+            let keep = (last + (capacity - last) / 3).min(size.saturating_sub(BLOCK));
+            let theta: Vec<f64> = (0..keep).map(|i| ritz.values[size - 1 - i]).collect();
+            krylov.restart(s.as_ref().subcols(0, keep), &theta);
+            checked = 0;
+        }
+    }
+}
+
+fn descending(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> {
+    symmetric_eigen(krylov.t()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })
+}
+
+/// The `count` Ritz pairs with the largest theta, as lambda ascending and vectors.
+fn best(krylov: &Krylov<'_>, ritz: &SymmetricEigen, count: usize, tau: f64) -> (Vec<f64>, Mat<f64>) {
+    let size = ritz.values.len();
+    let count = count.min(size);
+    let lambda = (0..count).map(|i| 1.0 / ritz.values[size - 1 - i] - tau).collect();
+    let s = Mat::from_fn(size, count, |i, j| ritz.vectors[(i, size - 1 - j)]);
+    (lambda, krylov.combination(s.as_ref()))
+}

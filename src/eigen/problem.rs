@@ -1,0 +1,181 @@
+//! What is asked of the eigen-solver and what it answers.
+
+use super::Completeness;
+use crate::linalg::Pencil;
+use faer::{Mat, MatRef};
+
+/// K psi = lambda M psi on the M-orthogonal complement of the known rigid modes.
+#[derive(Debug, Clone, Copy)]
+pub struct EigenProblem<'a> {
+    /// K and M.
+    pub pencil: Pencil<'a>,
+    /// Rigid modes (N x r), M-orthonormal: exact null vectors of K, projected out at every step.
+    pub rigid: MatRef<'a, f64>,
+    /// A Rayleigh quotient of some flexible field: an upper bound of the first flexible eigenvalue.
+    pub first_estimate: f64,
+    /// Relative error of the entries of K: half a unit of the last digit that the input carries.
+    pub input_error: f64,
+}
+
+/// Which modes are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wanted {
+    /// The lowest so many flexible modes.
+    Lowest(usize),
+    /// Every flexible mode with an eigenvalue below this one.
+    Below(f64),
+}
+
+/// Promises about the result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accuracy {
+    /// K-residual 1e-6; completeness is not proved.
+    Fast,
+    /// K-residual 1e-9 or the rounding floor of the matrices; completeness proved.
+    Standard,
+    /// K-residual at the rounding floor; completeness proved.
+    Certified,
+}
+
+impl Accuracy {
+    /// K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) that is promised.
+    pub fn residual(self) -> f64 {
+        match self {
+            Self::Fast => 1e-6,
+            Self::Standard => 1e-9,
+            Self::Certified => 1e-12,
+        }
+    }
+
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Standard => "standard",
+            Self::Certified => "certified",
+        }
+    }
+}
+
+/// Which algorithm computes the modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Dense for small models or when most modes are wanted, Lanczos otherwise.
+    Auto,
+    /// Dense generalised eigenproblem.
+    Dense,
+    /// Shift-invert block Lanczos with thick restart.
+    Lanczos,
+}
+
+/// Settings of the eigen-solver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EigenSettings {
+    /// Which modes.
+    pub wanted: Wanted,
+    /// How good.
+    pub accuracy: Accuracy,
+    /// How.
+    pub method: Method,
+}
+
+impl Default for EigenSettings {
+    /// 20 modes (the usual size of a modal basis), proved, by the method that suits the size.
+    fn default() -> Self {
+        Self { wanted: Wanted::Lowest(20), accuracy: Accuracy::Standard, method: Method::Auto }
+    }
+}
+
+/// Work done, independent of the machine: snapshotted in tests, so that a slower algorithm fails without timing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Numeric factorisations (Cholesky and inertia counts).
+    pub factorizations: u64,
+    /// Columns solved with the factor.
+    pub solved_columns: u64,
+    /// Columns multiplied by K.
+    pub stiffness_columns: u64,
+    /// Columns multiplied by M.
+    pub mass_columns: u64,
+    /// Thick restarts.
+    pub restarts: u64,
+    /// Numbers in one factor (0 for the dense path).
+    pub factor_len: u64,
+}
+
+/// Flexible modes, ascending.
+#[derive(Debug, Clone)]
+pub struct EigenSolution {
+    /// lambda, ascending.
+    pub eigenvalues: Vec<f64>,
+    /// Modes (N x nf): M-orthonormal, M-orthogonal to the rigid modes.
+    pub vectors: Mat<f64>,
+    /// K-residual of each mode.
+    pub residuals: Vec<f64>,
+    /// K-residual that rounding alone explains, for each mode.
+    pub rounding_floors: Vec<f64>,
+    /// What is known about missed modes.
+    pub completeness: Completeness,
+    /// Eigenvalues that were computed beyond the last mode given, at least loosely (for cluster and gap decisions).
+    pub next_eigenvalue: Option<f64>,
+    /// Number of flexible modes with a finite eigenvalue, where it is known (dense path).
+    pub finite_modes: Option<usize>,
+    /// Shift tau of K + tau M that was used last.
+    pub shift: f64,
+    /// Work.
+    pub counters: Counters,
+}
+
+/// Why there is no trustworthy result.
+#[derive(Debug, Clone)]
+pub enum EigenFailure {
+    /// `converged` of `wanted` modes converged within the allowed restarts.
+    NotConverged {
+        /// Modes that did converge.
+        converged: usize,
+        /// Modes asked for.
+        wanted: usize,
+    },
+    /// K + tau M is not positive definite: K or M is indefinite.
+    NotPositiveDefinite {
+        /// The shift tau.
+        shift: f64,
+    },
+    /// A negative eigenvalue beyond noise.
+    NegativeEigenvalue {
+        /// The eigenvalue.
+        eigenvalue: f64,
+        /// Its vector (N).
+        vector: Mat<f64>,
+    },
+    /// M has a negative direction beyond rounding.
+    MassIndefinite,
+    /// Flexible modes without strain energy: a mechanism or several bodies.
+    ZeroEnergy {
+        /// How many beyond the rigid modes.
+        count: usize,
+        /// Their eigenvalues as computed.
+        eigenvalues: Vec<f64>,
+        /// Their shapes (N x as many as were resolved).
+        vectors: Mat<f64>,
+    },
+    /// The inertia count contradicts the modes found, also after another search.
+    CountDiffers {
+        /// Modes found below the shift.
+        found: usize,
+        /// Modes that the count says there are.
+        counted: usize,
+        /// The shift.
+        shift: f64,
+    },
+    /// A factorisation is useless (element growth, overflow).
+    Inaccurate {
+        /// Probe residual.
+        residual: f64,
+    },
+    /// The pencil is too large for the memory of the machine.
+    Memory {
+        /// Bytes needed, where known.
+        bytes: Option<u64>,
+    },
+}

@@ -1,0 +1,124 @@
+//! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals.
+
+use super::noise::rounding_residual;
+use super::problem::{Counters, EigenFailure, EigenProblem};
+use crate::linalg::{Cholesky, combine, gram, subtract_combination, symmetric_eigen};
+use faer::{Mat, MatRef};
+
+/// Refined modes with their products.
+pub(super) struct Refined {
+    pub eigenvalues: Vec<f64>,
+    pub vectors: Mat<f64>,
+    pub residuals: Vec<f64>,
+    pub floors: Vec<f64>,
+}
+
+/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the basis.
+pub(super) fn inverse_iteration(
+    problem: &EigenProblem<'_>,
+    factor: &Cholesky<'_>,
+    x: MatRef<'_, f64>,
+    counters: &mut Counters,
+) -> Mat<f64> {
+    counters.mass_columns += x.ncols() as u64;
+    counters.solved_columns += x.ncols() as u64;
+    let mut y = problem.pencil.apply_mass(x);
+    factor.solve_in_place(y.as_mut());
+    y
+}
+
+/// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz vectors
+/// in ascending order of lambda.
+pub(super) fn rayleigh_ritz(
+    problem: &EigenProblem<'_>,
+    mut x: Mat<f64>,
+    counters: &mut Counters,
+) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+    let pencil = &problem.pencil;
+    let k = x.ncols() as u64;
+    for _ in 0..2 {
+        counters.mass_columns += k;
+        let mx = pencil.apply_mass(x.as_ref());
+        let along = gram(problem.rigid, mx.as_ref());
+        subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
+    }
+    // Unit M-norms first: inverse iteration scales the columns by theta.
+    counters.mass_columns += k;
+    counters.stiffness_columns += k;
+    let mx = pencil.apply_mass(x.as_ref());
+    let kx = pencil.apply_stiffness(x.as_ref());
+    let gm = gram(x.as_ref(), mx.as_ref());
+    let gk = gram(x.as_ref(), kx.as_ref());
+    let scale: Vec<f64> = (0..x.ncols()).map(|j| gm[(j, j)].sqrt().recip()).collect();
+    if scale.iter().any(|s| !s.is_finite()) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    let scaled = |g: &Mat<f64>| {
+        Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
+    };
+    let (gm, gk) = (scaled(&gm), scaled(&gk));
+    // G_M is the identity up to a small defect: its inverse square root is stable.
+    let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    if eigen.values.first().is_some_and(|&v| v < 1e-8) {
+        return Err(EigenFailure::Inaccurate { residual: eigen.values[0] });
+    }
+    let root = Mat::from_fn(gm.nrows(), gm.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+    let to_orthonormal = &root * eigen.vectors.transpose();
+    let projected = to_orthonormal.transpose() * &gk * &to_orthonormal;
+    let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let coefficients = &to_orthonormal * &ritz.vectors;
+    let coefficients =
+        Mat::from_fn(coefficients.nrows(), coefficients.ncols(), |i, j| scale[i] * coefficients[(i, j)]);
+    Ok((ritz.values, combine(x.as_ref(), coefficients.as_ref())))
+}
+
+/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that rounding explains.
+pub(super) fn residuals(
+    problem: &EigenProblem<'_>,
+    eigenvalues: &[f64],
+    x: MatRef<'_, f64>,
+    counters: &mut Counters,
+) -> (Vec<f64>, Vec<f64>) {
+    let pencil = &problem.pencil;
+    counters.mass_columns += x.ncols() as u64;
+    counters.stiffness_columns += x.ncols() as u64;
+    let mx = pencil.apply_mass(x);
+    let kx = pencil.apply_stiffness(x);
+    let rounding = rounding_residual(pencil.stiffness(), x);
+    let mut residuals = Vec::with_capacity(x.ncols());
+    let mut floors = Vec::with_capacity(x.ncols());
+    for (j, &lambda) in eigenvalues.iter().enumerate() {
+        let r = kx.col(j) - mx.col(j) * faer::Scale(lambda);
+        let scale = kx.col(j).norm_l2() + lambda.abs() * mx.col(j).norm_l2();
+        residuals.push(if scale > 0.0 { r.norm_l2() / scale } else { 0.0 });
+        floors.push(if scale > 0.0 { rounding[j] / scale } else { 0.0 });
+    }
+    (residuals, floors)
+}
+
+/// Refines Lanczos vectors until the K-residuals keep `tolerance` or stand at the rounding floor; at most three times.
+pub(super) fn refine(
+    problem: &EigenProblem<'_>,
+    factor: &Cholesky<'_>,
+    mut x: Mat<f64>,
+    tolerance: f64,
+    counters: &mut Counters,
+) -> Result<Refined, EigenFailure> {
+    let mut best: Option<Refined> = None;
+    for _ in 0..3 {
+        let y = inverse_iteration(problem, factor, x.as_ref(), counters);
+        let (eigenvalues, vectors) = rayleigh_ritz(problem, y, counters)?;
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        let worst = |r: &[f64]| r.iter().fold(0.0f64, |m, v| m.max(*v));
+        let done = residuals.iter().zip(&floors).all(|(r, f)| *r <= tolerance.max(*f));
+        let stalled = best.as_ref().is_some_and(|b| worst(&residuals) > 0.5 * worst(&b.residuals));
+        if best.as_ref().is_none_or(|b| worst(&residuals) < worst(&b.residuals)) {
+            best = Some(Refined { eigenvalues, vectors: vectors.clone(), residuals, floors });
+        }
+        if done || stalled {
+            break;
+        }
+        x = vectors;
+    }
+    best.ok_or(EigenFailure::NotConverged { converged: 0, wanted: 0 })
+}

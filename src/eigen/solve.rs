@@ -1,0 +1,262 @@
+//! The one entry: chooses the method, refines, counts, puts into canonical form.
+
+use super::canonical::{canonical_basis, clusters};
+use super::completeness::{Completeness, Proof, count_below};
+use super::dense;
+use super::lanczos::{self, NOISE_FACTOR, RitzPairs};
+use super::noise::energy_noise;
+use super::problem::{
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Wanted,
+};
+use super::refine::{Refined, rayleigh_ritz, refine, residuals};
+use crate::linalg::{Analysis, Cholesky, is_positive_semidefinite};
+use crate::progress::{Event, Watch};
+
+/// Models up to this size are solved densely: all modes take less than a second.
+const DENSE_ALWAYS: usize = 600;
+
+/// Largest model that is solved densely because most of its modes are wanted (n^2 numbers, three times).
+const DENSE_AT_MOST: usize = 9000;
+
+/// Part of all modes beyond which the dense path does less work than a Krylov basis of twice that size.
+const DENSE_PART: f64 = 0.2;
+
+/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
+const CLUSTER_GAP: f64 = 1e-9;
+
+/// Computes the wanted flexible modes.
+///
+/// # Errors
+/// [`EigenFailure`] says why no trustworthy modes exist.
+pub fn solve(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    watch: Watch<'_>,
+) -> Result<EigenSolution, EigenFailure> {
+    let mut counters = Counters::default();
+    let pencil = &problem.pencil;
+    watch(Event::Phase("ordering"));
+    let analysis = Analysis::new(pencil).ok_or(EigenFailure::Memory { bytes: None })?;
+    counters.factor_len = analysis.factor_len() as u64;
+    if !is_positive_semidefinite(pencil.mass(), &analysis, pencil.block()) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    let rigid = problem.rigid.ncols();
+    let available = pencil.n() - rigid;
+    let wanted = match settings.wanted {
+        Wanted::Lowest(count) => count.min(available),
+        Wanted::Below(lambda) => {
+            watch(Event::Phase("counting modes"));
+            count_below(problem, &analysis, lambda, &mut counters)?.saturating_sub(rigid)
+        }
+    };
+    let dense = match settings.method {
+        Method::Dense => true,
+        Method::Lanczos => false,
+        Method::Auto => {
+            pencil.n() <= DENSE_ALWAYS
+                || (pencil.n() <= DENSE_AT_MOST && wanted as f64 > DENSE_PART * available as f64)
+        }
+    };
+    let tolerance = settings.accuracy.residual();
+    let (mut search, finite_modes) = if dense {
+        let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
+        (search, Some(finite))
+    } else {
+        (search_iteratively(problem, &analysis, wanted, tolerance, watch, &mut counters)?, None)
+    };
+    let mut completeness = prove(problem, settings, &analysis, &search, watch, &mut counters)?;
+    if let Some(missed) = missed(&completeness, rigid) {
+        // Once more, from other directions and for as many modes as there are.
+        search = search_iteratively(problem, &analysis, wanted + missed, tolerance, watch, &mut counters)?;
+        completeness = prove(problem, settings, &analysis, &search, watch, &mut counters)?;
+        if missed_or_spurious(&completeness, rigid) {
+            return Err(EigenFailure::CountDiffers {
+                found: completeness.modes_below,
+                counted: completeness.negative_pivots.unwrap_or(0).saturating_sub(rigid),
+                shift: completeness.shift,
+            });
+        }
+    } else if missed_or_spurious(&completeness, rigid) {
+        return Err(EigenFailure::CountDiffers {
+            found: completeness.modes_below,
+            counted: completeness.negative_pivots.unwrap_or(0).saturating_sub(rigid),
+            shift: completeness.shift,
+        });
+    }
+    finish(problem, search, completeness, wanted, finite_modes, counters)
+}
+
+/// Modes as a method found them.
+struct Search {
+    refined: Refined,
+    next: Vec<f64>,
+    tau: f64,
+}
+
+fn search_densely(
+    problem: &EigenProblem<'_>,
+    wanted: usize,
+    tolerance: f64,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Search, usize), EigenFailure> {
+    watch(Event::Phase("dense eigenproblem"));
+    let pencil = &problem.pencil;
+    let finite = dense::finite_eigenvalues(pencil).ok_or(EigenFailure::MassIndefinite)?;
+    let flexible = finite.saturating_sub(problem.rigid.ncols());
+    let all = dense::highest_estimate(pencil);
+    let highest = if wanted * 5 > flexible { all } else { problem.first_estimate };
+    let mut pairs = dense::lowest_modes(problem, wanted, flexible, highest)?;
+    // The whole of the last cluster.
+    let complete = cluster_end(&pairs);
+    if complete > pairs.eigenvalues.len() {
+        pairs = dense::lowest_modes(problem, complete, flexible, highest)?;
+    }
+    let _ = tolerance;
+    let (eigenvalues, vectors) = rayleigh_ritz(problem, pairs.vectors, counters)?;
+    let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+    let refined = Refined { eigenvalues, vectors, residuals, floors };
+    check_zero_energy(problem, &refined)?;
+    Ok((Search { refined, next: pairs.next, tau: pairs.tau }, flexible))
+}
+
+/// Number of modes up to the end of the cluster that the last computed one belongs to.
+fn cluster_end(pairs: &RitzPairs) -> usize {
+    let mut last = match pairs.eigenvalues.last() {
+        Some(&last) => last,
+        None => return 0,
+    };
+    let mut end = pairs.eigenvalues.len();
+    for &next in &pairs.next {
+        if next - last > CLUSTER_GAP * last.abs() {
+            break;
+        }
+        last = next;
+        end += 1;
+    }
+    end
+}
+
+fn search_iteratively(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    wanted: usize,
+    tolerance: f64,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Search, EigenFailure> {
+    watch(Event::Phase("factorisation"));
+    let (factor, tau): (Cholesky<'_>, f64) = lanczos::shifted_factor(problem, analysis, counters)?;
+    watch(Event::Phase("modes"));
+    let pairs =
+        lanczos::lowest_modes(problem, &factor, tau, wanted, 0.1 * tolerance, CLUSTER_GAP, watch, counters)?;
+    let refined = refine(problem, &factor, pairs.vectors, tolerance, counters)?;
+    check_zero_energy(problem, &refined)?;
+    Ok(Search { refined, next: pairs.next, tau: pairs.tau })
+}
+
+/// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
+fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
+    let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
+    let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
+    if let Some(&lambda) = refined.eigenvalues.first()
+        && lambda < -NOISE_FACTOR * noise[0]
+    {
+        let vector = refined.vectors.as_ref().subcols(0, 1).to_owned();
+        return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lambda, vector });
+    }
+    let count = refined.eigenvalues.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count();
+    if count > 0 {
+        return Err(EigenFailure::ZeroEnergy {
+            count,
+            eigenvalues: refined.eigenvalues[..count].to_vec(),
+            vectors: refined.vectors.as_ref().subcols(0, count).to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// The inertia count in the gap above the last mode.
+fn prove(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    analysis: &Analysis,
+    search: &Search,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Completeness, EigenFailure> {
+    let found = search.refined.eigenvalues.len();
+    let last = search.refined.eigenvalues.last().copied().unwrap_or(0.0);
+    let shift = match (settings.wanted, search.next.first()) {
+        (Wanted::Below(lambda), _) => lambda,
+        (_, Some(&next)) if found == 0 => 0.5 * next,
+        (_, Some(&next)) => 0.5 * (last + next),
+        // Nothing above: every finite mode was computed.
+        (_, None) => 1.1 * last,
+    };
+    if settings.accuracy == Accuracy::Fast {
+        return Ok(Completeness {
+            proof: Proof::NotProved,
+            shift,
+            negative_pivots: None,
+            modes_below: found,
+            remark: "accuracy `fast` leaves the count out".to_owned(),
+        });
+    }
+    watch(Event::Phase("completeness"));
+    let below = search.refined.eigenvalues.iter().filter(|&&l| l < shift).count();
+    let negative = count_below(problem, analysis, shift, counters)?;
+    Ok(Completeness {
+        proof: Proof::InertiaCount,
+        shift,
+        negative_pivots: Some(negative),
+        modes_below: below,
+        remark: String::new(),
+    })
+}
+
+/// How many modes the count knows that the search did not find.
+fn missed(completeness: &Completeness, rigid: usize) -> Option<usize> {
+    completeness
+        .negative_pivots
+        .map(|negative| negative.saturating_sub(rigid + completeness.modes_below))
+        .filter(|&missed| missed > 0)
+}
+
+fn missed_or_spurious(completeness: &Completeness, rigid: usize) -> bool {
+    completeness.negative_pivots.is_some_and(|negative| negative != rigid + completeness.modes_below)
+}
+
+/// Canonical form, the wanted number of modes, residuals of what is handed out.
+fn finish(
+    problem: &EigenProblem<'_>,
+    search: Search,
+    completeness: Completeness,
+    wanted: usize,
+    finite_modes: Option<usize>,
+    mut counters: Counters,
+) -> Result<EigenSolution, EigenFailure> {
+    let Refined { eigenvalues, mut vectors, mut residuals, mut floors } = search.refined;
+    let groups = clusters(&eigenvalues, CLUSTER_GAP);
+    canonical_basis(vectors.as_mut(), &groups);
+    if groups.iter().any(|g| g.len() > 1) {
+        (residuals, floors) = self::residuals(problem, &eigenvalues, vectors.as_ref(), &mut counters);
+    }
+    let given = wanted.min(eigenvalues.len());
+    let next_eigenvalue = eigenvalues.get(given).copied().or(search.next.first().copied());
+    if given < eigenvalues.len() {
+        vectors = vectors.as_ref().subcols(0, given).to_owned();
+    }
+    Ok(EigenSolution {
+        eigenvalues: eigenvalues[..given].to_vec(),
+        vectors,
+        residuals: residuals[..given].to_vec(),
+        rounding_floors: floors[..given].to_vec(),
+        completeness,
+        next_eigenvalue,
+        finite_modes,
+        shift: search.tau,
+        counters,
+    })
+}

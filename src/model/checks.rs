@@ -1,0 +1,306 @@
+//! What must hold before any work is done on a model: each failure named with its facts.
+
+use super::layout::{Layout, layout, name_some};
+use super::mass_structure::{ScalarMass, scalar_mass};
+use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
+use super::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
+use crate::diagnostic::{Code, Diagnostic, Severity};
+use crate::error::{Error, Result};
+use crate::linalg::{SymmetricMatrix, connected_components};
+
+/// A model that passed, with the warnings and notes on the way.
+#[derive(Debug, Clone)]
+pub struct CheckedModel {
+    /// The model.
+    pub model: FeModel,
+    /// Warnings and notes, in the order found.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Checks `raw` and brings it into the internal order.
+///
+/// # Errors
+/// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and rigid motion.
+pub fn check(raw: RawModel) -> Result<CheckedModel> {
+    let mut found = Vec::new();
+    check_matrix(&raw.stiffness, "stiffness", &mut found);
+    check_matrix(&raw.mass, "mass", &mut found);
+    let (nk, nm) = (raw.stiffness.matrix.n_cols(), raw.mass.matrix.n_cols());
+    if nk != nm {
+        let message = format!("stiffness matrix has {nk} rows, mass matrix {nm}");
+        found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&raw.mass.path));
+    }
+    if raw.dimension != 3 {
+        let message = format!("model has dimension {}", raw.dimension);
+        found.push(Diagnostic::new(Code::DimensionUnsupported, message));
+    }
+    stop_on_error(&mut found)?;
+
+    let layout = layout(&raw, &mut found);
+    stop_on_error(&mut found)?;
+    let layout = layout.expect("a missing layout comes with an error");
+    let nodes = Nodes {
+        ids: layout.used.iter().map(|&i| raw.nodes.ids[i]).collect(),
+        positions: layout.used.iter().map(|&i| raw.nodes.positions[i]).collect(),
+    };
+    if nodes.positions.iter().flatten().any(|x| !x.is_finite()) {
+        let message = "a node coordinate is not a finite number";
+        found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
+    }
+    for set in &raw.interfaces {
+        let unknown: Vec<i64> = set.nodes.iter().filter(|id| !nodes.ids.contains(id)).copied().collect();
+        if !unknown.is_empty() {
+            let message = format!(
+                "interface `{}` names {} unknown nodes: {}",
+                set.name,
+                unknown.len(),
+                name_some(&unknown)
+            );
+            found.push(Diagnostic::new(Code::InterfaceNode, message));
+        }
+    }
+    if nk <= 6 {
+        let message = format!("model has {nk} degrees of freedom");
+        found.push(Diagnostic::new(Code::ModelTooSmall, message));
+    }
+    stop_on_error(&mut found)?;
+
+    let label = |row: usize| DofLabel { node: nodes.ids[row / 3], direction: (row % 3) as u8 + 1 };
+    let stiffness = symmetric(&raw.stiffness, &layout, "stiffness", label, &mut found);
+    let mass = symmetric(&raw.mass, &layout, "mass", label, &mut found);
+    stop_on_error(&mut found)?;
+    let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
+        unreachable!("an asymmetric matrix is an error")
+    };
+    check_diagonals(&stiffness, &mass, label, &raw, &mut found);
+    stop_on_error(&mut found)?;
+
+    let scalar = match scalar_mass(&mass, block_tolerance(raw.mass.digits), label) {
+        Ok(scalar) => Some(scalar),
+        Err(diagnostic) => {
+            found.push(diagnostic.in_file(&raw.mass.path));
+            None
+        }
+    };
+    drop(mass);
+    check_connections(&stiffness, &nodes, &raw, &mut found);
+    let rigid_residual = check_rigid_motion(&stiffness, &nodes, &raw, label, &mut found);
+    stop_on_error(&mut found)?;
+    let ScalarMass { matrix: scalar_mass, deviation } = scalar.expect("a missing mass comes with an error");
+    let diagonal_mass = scalar_mass.as_csc().nnz() == scalar_mass.n();
+    if diagonal_mass {
+        let message = "mass matrix is diagonal: it was lumped before it came here";
+        found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
+    }
+    check_plausibility(&scalar_mass, &nodes, &raw, &mut found);
+    let model = FeModel::new(raw, nodes, stiffness, scalar_mass, rigid_residual, deviation, diagonal_mass);
+    Ok(CheckedModel { model, diagnostics: found })
+}
+
+fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
+    if found.iter().any(|d| d.severity() == Severity::Error) {
+        return Err(Error::new(std::mem::take(found)));
+    }
+    Ok(())
+}
+
+/// Relative size below which a difference is rounding of values with `digits` significant digits.
+fn rounding(digits: u8, margin: i32) -> f64 {
+    10f64.powi(margin - i32::from(digits)).clamp(1e-12, 1e-4)
+}
+
+fn block_tolerance(digits: u8) -> f64 {
+    rounding(digits, 3).max(1e-10)
+}
+
+fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
+    let matrix = &raw.matrix;
+    if matrix.n_rows() != matrix.n_cols() {
+        let message = format!("{name} matrix has {} rows and {} columns", matrix.n_rows(), matrix.n_cols());
+        found.push(Diagnostic::new(Code::MatrixNotSquare, message).in_file(&raw.path));
+    } else if matrix.nnz() == 0 {
+        let message = format!("{name} matrix has no nonzero entries");
+        found.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
+    }
+    if let Some(at) = matrix.values().iter().position(|v| !v.is_finite()) {
+        let column = matrix.col_ptr().partition_point(|&p| p <= at);
+        let message = format!(
+            "{name} matrix has {} in row {}, column {column}",
+            matrix.values()[at],
+            matrix.row_idx()[at] + 1
+        );
+        found.push(Diagnostic::new(Code::MatrixNotFinite, message).in_file(&raw.path));
+    }
+}
+
+/// The matrix in internal order, symmetric; `None` with a diagnostic when it is not symmetric to rounding.
+fn symmetric(
+    raw: &RawMatrix,
+    layout: &Layout,
+    name: &str,
+    label: impl Fn(usize) -> DofLabel,
+    found: &mut Vec<Diagnostic>,
+) -> Option<SymmetricMatrix> {
+    let ordered =
+        if layout.is_identity() { raw.matrix.clone() } else { raw.matrix.permuted(&layout.row_to_internal) };
+    let transpose = ordered.transpose();
+    if ordered == transpose {
+        return SymmetricMatrix::new(ordered);
+    }
+    let n = ordered.n_cols();
+    let size: Vec<f64> = (0..n).map(|i| ordered.get(i, i).abs().sqrt()).collect();
+    let (mut worst, mut at) = (0.0f64, (0, 0));
+    let mut one_sided = 0usize;
+    for j in 0..n {
+        let (rows, values) = ordered.column(j);
+        for (&i, &v) in rows.iter().zip(values) {
+            let i = i as usize;
+            let other = transpose.get(i, j);
+            one_sided += usize::from(other == 0.0);
+            let scale =
+                (size[i] * size[j]).max(if size[i] * size[j] > 0.0 { 0.0 } else { v.abs().max(other.abs()) });
+            let difference = (v - other).abs() / scale;
+            if difference > worst {
+                (worst, at) = (difference, (i, j));
+            }
+        }
+    }
+    if worst > rounding(raw.digits, 2) {
+        let (i, j) = at;
+        let message = format!(
+            "{name} matrix is not symmetric: {} at ({}, {}), {} at the mirrored place",
+            ordered.get(i, j),
+            label(i),
+            label(j),
+            ordered.get(j, i)
+        );
+        let mut diagnostic = Diagnostic::new(Code::MatrixAsymmetric, message).in_file(&raw.path);
+        if one_sided * 2 >= ordered.nnz().saturating_sub(n) * 2 && one_sided > 0 {
+            diagnostic = diagnostic.with_help("only one triangle is stored: declare the matrix symmetric");
+        }
+        found.push(diagnostic);
+        return None;
+    }
+    Some(SymmetricMatrix::symmetrised(&ordered))
+}
+
+fn check_diagonals(
+    stiffness: &SymmetricMatrix,
+    mass: &SymmetricMatrix,
+    label: impl Fn(usize) -> DofLabel,
+    raw: &RawModel,
+    found: &mut Vec<Diagnostic>,
+) {
+    for (matrix, name, path) in
+        [(stiffness, "stiffness", &raw.stiffness.path), (mass, "mass", &raw.mass.path)]
+    {
+        let negative: Vec<DofLabel> =
+            matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
+        if !negative.is_empty() {
+            let message = format!(
+                "{} diagonal entries of the {name} matrix are negative: {}",
+                negative.len(),
+                name_some(&negative)
+            );
+            found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
+        }
+    }
+    let empty = |m: &SymmetricMatrix, i: usize| m.row(i).0.is_empty();
+    let both: Vec<DofLabel> =
+        (0..stiffness.n()).filter(|&i| empty(stiffness, i) && empty(mass, i)).map(&label).collect();
+    if !both.is_empty() {
+        let message = format!("{} rows are empty in both matrices: {}", both.len(), name_some(&both));
+        found.push(Diagnostic::new(Code::PencilSingular, message).in_file(&raw.stiffness.path));
+    }
+}
+
+fn check_connections(
+    stiffness: &SymmetricMatrix,
+    nodes: &Nodes,
+    raw: &RawModel,
+    found: &mut Vec<Diagnostic>,
+) {
+    let component = connected_components(stiffness, 3);
+    let count = component.iter().max().map_or(0, |last| last + 1);
+    if count > 1 {
+        let mut sizes = vec![0usize; count];
+        let mut first = vec![0i64; count];
+        for (i, &c) in component.iter().enumerate().rev() {
+            sizes[c] += 1;
+            first[c] = nodes.ids[i];
+        }
+        let bodies: Vec<String> =
+            sizes.iter().zip(&first).map(|(size, id)| format!("{size} nodes with node {id}")).collect();
+        let message =
+            format!("stiffness connects the nodes to {count} separate bodies: {}", name_some(&bodies));
+        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
+    }
+}
+
+/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body.
+fn check_rigid_motion(
+    stiffness: &SymmetricMatrix,
+    nodes: &Nodes,
+    raw: &RawModel,
+    label: impl Fn(usize) -> DofLabel,
+    found: &mut Vec<Diagnostic>,
+) -> f64 {
+    let (centre, length) = centre_and_length(&nodes.positions);
+    let fields = rigid_fields(&nodes.positions, centre, length);
+    let residuals = rigid_residuals(stiffness, &fields);
+    let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
+    // Node tables written with few digits leave 1e-6 without harm; supports leave 0.01 to 1.
+    let limit = rounding(raw.stiffness.digits, 3).max(1e-6);
+    if worst > limit {
+        let mut rows: Vec<usize> = (0..residuals.len()).filter(|&i| residuals[i] > limit).collect();
+        rows.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]).then(a.cmp(&b)));
+        let named: Vec<String> =
+            rows.iter().map(|&i| format!("{} ({:.1e})", label(i), residuals[i])).collect();
+        let message = format!(
+            "K R is not zero for {} of {} rows: |K R| reaches {worst:.1e} of the row sum of |K| (allowed {limit:.0e}); worst: {}",
+            rows.len(),
+            residuals.len(),
+            name_some(&named)
+        );
+        let help = if rows.len() * 4 < residuals.len() {
+            "these degrees of freedom are supported or tied to ground: export the free body"
+        } else {
+            "nearly all rows fail: coordinates in other units or another node order than the matrices, or rotations labelled as displacements"
+        };
+        found.push(
+            Diagnostic::new(Code::RigidMotionStrained, message).in_file(&raw.stiffness.path).with_help(help),
+        );
+    }
+    worst
+}
+
+/// Densities between aerogel and osmium, for the box around the nodes.
+const DENSITY: (f64, f64) = (0.1, 30_000.0);
+
+fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {
+    if !raw.units.stated {
+        return;
+    }
+    let total: f64 = mass.as_csc().values().iter().sum::<f64>() * raw.units.mass.to_si();
+    let extent = |k: usize| {
+        let (low, high) = nodes
+            .positions
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x[k]), h.max(x[k])));
+        (high - low) * raw.units.length.to_si()
+    };
+    let volume = extent(0) * extent(1) * extent(2);
+    if volume <= 0.0 {
+        return;
+    }
+    let density = total / volume;
+    if !(DENSITY.0..=DENSITY.1).contains(&density) {
+        let message = format!(
+            "{total:.3e} kg in a box of {:.3e} x {:.3e} x {:.3e} m is {density:.1e} kg/m^3",
+            extent(0),
+            extent(1),
+            extent(2)
+        );
+        found.push(Diagnostic::new(Code::InertiaImplausible, message));
+    }
+}

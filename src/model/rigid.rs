@@ -1,0 +1,63 @@
+//! Rigid displacement fields of the nodes, and how far K is from annihilating them.
+
+use crate::linalg::SymmetricMatrix;
+use faer::Mat;
+use rayon::prelude::*;
+
+/// The six rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x - centre) / `length`.
+pub fn rigid_fields(positions: &[[f64; 3]], centre: [f64; 3], length: f64) -> Mat<f64> {
+    let mut fields = Mat::zeros(3 * positions.len(), 6);
+    for (i, x) in positions.iter().enumerate() {
+        let r = [0, 1, 2].map(|k| (x[k] - centre[k]) / length);
+        for k in 0..3 {
+            fields[(3 * i + k, k)] = 1.0;
+            // e_k x r has the components -r_m at l and r_l at m, for (k, l, m) cyclic.
+            let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+            fields[(3 * i + l, 3 + k)] = -r[m];
+            fields[(3 * i + m, 3 + k)] = r[l];
+        }
+    }
+    fields
+}
+
+/// Mean of the positions and the largest distance from it (1 when all coincide).
+pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
+    let n = positions.len().max(1) as f64;
+    // Differences to the first node: sums keep their digits far from the origin.
+    let first = positions.first().copied().unwrap_or_default();
+    let mut centre = [0.0; 3];
+    for x in positions {
+        for k in 0..3 {
+            centre[k] += (x[k] - first[k]) / n;
+        }
+    }
+    for k in 0..3 {
+        centre[k] += first[k];
+    }
+    let length = positions
+        .iter()
+        .map(|x| (0..3).map(|k| (x[k] - centre[k]).powi(2)).sum::<f64>().sqrt())
+        .fold(0.0, f64::max);
+    (centre, if length > 0.0 { length } else { 1.0 })
+}
+
+/// For each row i: max over the six fields of |(K R)_i| / sum_j |K_ij|, zero for empty rows. The fields have
+/// components of at most one, so that values near one mean a support and values near roundoff a free body.
+pub fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>) -> Vec<f64> {
+    (0..k.n())
+        .into_par_iter()
+        .map(|i| {
+            let (columns, values) = k.row(i);
+            let mut sums = [0.0; 6];
+            let mut scale = 0.0;
+            for (&j, &v) in columns.iter().zip(values) {
+                scale += v.abs();
+                for (c, sum) in sums.iter_mut().enumerate() {
+                    *sum += v * fields[(j as usize, c)];
+                }
+            }
+            let worst = sums.iter().fold(0.0f64, |m, s| m.max(s.abs()));
+            if scale > 0.0 { worst / scale } else { 0.0 }
+        })
+        .collect()
+}
