@@ -7,13 +7,14 @@ use proc_macro2::{Delimiter, Ident, Spacing, TokenStream, TokenTree};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Used by every room: errors, the table of diagnostics, units, provenance.
-const BASE: &[&str] = &["diagnostic", "error", "provenance", "units"];
+/// Used by every room: errors, the table of diagnostics, units, provenance, progress.
+const BASE: &[&str] = &["diagnostic", "error", "progress", "provenance", "units"];
 
 /// Each room and what it may use besides [`BASE`] and itself.
 const ROOMS: &[(&str, &[&str])] = &[
     ("diagnostic", &[]),
     ("error", &[]),
+    ("progress", &[]),
     ("provenance", &[]),
     ("units", &[]),
     ("linalg", &[]),

@@ -4,3 +4,5 @@
 mod support;
 
 mod assembler;
+mod beams;
+mod symmetry;

@@ -5,5 +5,6 @@
 pub mod elements;
 pub mod files;
 pub mod mesh;
+pub mod pipeline;
 pub mod random;
 pub mod reference;

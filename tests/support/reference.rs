@@ -31,7 +31,7 @@ pub fn dense_modes(assembly: &Assembly) -> DenseModes {
     for _ in 0..2 {
         let (theta, _) = shifted(k.as_ref(), m.as_ref(), sigma);
         let lambda: Vec<f64> = theta.iter().rev().map(|t| 1.0 / t + sigma).collect();
-        sigma = -lambda.iter().find(|l| **l > -1e-9 * sigma).expect("a flexible mode");
+        sigma = -lambda.iter().find(|l| **l > -1e-7 * sigma).expect("a flexible mode");
     }
     let (theta, vectors) = shifted(k.as_ref(), m.as_ref(), sigma);
     let limit = 1e-12 * theta[n - 1];
