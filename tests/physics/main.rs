@@ -6,3 +6,4 @@ mod support;
 mod assembler;
 mod beams;
 mod symmetry;
+mod convergence;

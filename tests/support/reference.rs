@@ -57,12 +57,21 @@ fn shifted(k: MatRef<f64>, m: MatRef<f64>, sigma: f64) -> (Vec<f64>, Mat<f64>) {
     solve(&mut reduced);
     reduced = reduced.transpose().to_owned();
     solve(&mut reduced);
-    let symmetric = Mat::from_fn(m.nrows(), m.nrows(), |i, j| 0.5 * (reduced[(i, j)] + reduced[(j, i)]));
-    let eigen = symmetric.self_adjoint_eigen(Side::Lower).expect("eigenvalues of a symmetric matrix");
-    let mut vectors = eigen.U().to_owned();
+    let (theta, mut vectors) = symmetric_eigen(reduced.as_ref());
     let upper = l.transpose();
     faer::linalg::triangular_solve::solve_upper_triangular_in_place(upper, vectors.as_mut(), Par::Seq);
-    (eigen.S().column_vector().iter().copied().collect(), vectors)
+    (theta, vectors)
+}
+
+/// Eigenvalues (ascending) and orthonormal eigenvectors of the symmetric part of `a`, by another library than the
+/// one under test uses.
+pub fn symmetric_eigen(a: MatRef<f64>) -> (Vec<f64>, Mat<f64>) {
+    let n = a.nrows();
+    let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| 0.5 * (a[(i, j)] + a[(j, i)])).symmetric_eigen();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&i, &j| eigen.eigenvalues[i].total_cmp(&eigen.eigenvalues[j]));
+    let vectors = Mat::from_fn(n, n, |i, j| eigen.eigenvectors[(i, order[j])]);
+    (order.iter().map(|&j| eigen.eigenvalues[j]).collect(), vectors)
 }
 
 pub fn dense(matrix: &CscMatrix) -> Mat<f64> {
