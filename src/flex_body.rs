@@ -5,7 +5,8 @@ use crate::model::Nodes;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
-use nalgebra::{Matrix3, Vector3};
+
+pub use crate::invariants::Frame;
 
 /// Where a body came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,15 +32,6 @@ pub enum MassStructure {
     Diagonal,
     /// Neither.
     General,
-}
-
-/// The body frame in model coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Origin in model axes. Unit: length.
-    pub origin: Vector3<f64>,
-    /// Columns are the body axes in model axes, right-handed: x_model = origin + axes x_body.
-    pub axes: Matrix3<f64>,
 }
 
 /// Mode shapes and what is known of each mode.

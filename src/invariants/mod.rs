@@ -1,6 +1,26 @@
 //! Exact condensation of the nodal equations of motion: primary data, invariants, frames, lumped comparators,
 //! identities. No I/O, no eigen-solver.
 
+mod alignment;
+mod cauchy_schwarz;
+mod comparison;
+mod condense;
+mod dense;
+mod derived;
+mod frame;
+mod identities;
+mod identity_terms;
+mod lumped;
 mod primary;
+mod principal_axes;
+mod transform;
 
+pub use alignment::{Alignment, align, compare_invariants};
+pub use cauchy_schwarz::{CauchySchwarz, primary_differences};
+pub use comparison::{ERROR_NORMS, error_norms};
+pub use condense::condense;
+pub use derived::Derived;
+pub use frame::{BodyFrame, Frame, MassProperties, choose_frame};
+pub use identities::{Expected, IdentityCheck, derived_identities, identities};
+pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use primary::Invariants;

@@ -1,0 +1,111 @@
+//! The invariants of the equations of motion, linear in the primary data (theory section 2).
+
+use super::Invariants;
+use faer::Mat;
+use nalgebra::Matrix3;
+
+/// The two other axes of axis k, in cyclic order: (k, l, m) is right-handed.
+pub(super) const CYCLIC: [(usize, usize, usize); 3] = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
+
+/// All invariants that follow from the primary data, as files and exports carry them.
+///
+/// Component-blocked: column (or row) b nf + j belongs to axis b and mode j.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derived {
+    /// I0 (3 x 3). Unit: mass length^2.
+    pub inertia: Matrix3<f64>,
+    /// C2 (3 x nf).
+    pub c2: Mat<f64>,
+    /// W1 (3 x 3nf).
+    pub w1: Mat<f64>,
+    /// W2 (3nf x 3nf).
+    pub w2: Mat<f64>,
+    /// W3 (3nf x nf).
+    pub w3: Mat<f64>,
+    /// m_ff (nf x nf).
+    pub modal_mass: Mat<f64>,
+}
+
+/// I0 = tr(J) I - J.
+pub(super) fn inertia_of(second_moment: &Matrix3<f64>) -> Matrix3<f64> {
+    // Sums of two diagonal entries: the trace minus the third would cancel for needles.
+    Matrix3::from_fn(|k, l| {
+        let (_, a, b) = CYCLIC[k];
+        if k == l { second_moment[(a, a)] + second_moment[(b, b)] } else { -second_moment[(k, l)] }
+    })
+}
+
+impl Invariants {
+    /// Number of modes nf.
+    pub fn n_modes(&self) -> usize {
+        self.c1.ncols()
+    }
+
+    /// I0 = tr(J) I - J: inertia of the undeformed body about the frame origin, frame axes. Unit: mass length^2.
+    pub fn inertia(&self) -> Matrix3<f64> {
+        inertia_of(&self.second_moment)
+    }
+
+    /// C2 (3 x nf) = Phi_r' M Psi: rows Ibar23 - Ibar32, Ibar31 - Ibar13, Ibar12 - Ibar21.
+    pub fn c2(&self) -> Mat<f64> {
+        Mat::from_fn(3, self.n_modes(), |k, p| {
+            let (_, l, m) = CYCLIC[k];
+            self.ibar[l][m][p] - self.ibar[m][l][p]
+        })
+    }
+
+    /// W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk).
+    pub fn w1(&self) -> Mat<f64> {
+        let nf = self.n_modes();
+        Mat::from_fn(3, 3 * nf, |k, column| {
+            let (l, p) = (column / nf, column % nf);
+            if k == l {
+                let (_, a, b) = CYCLIC[k];
+                2.0 * (self.ibar[a][a][p] + self.ibar[b][b][p])
+            } else {
+                -(self.ibar[k][l][p] + self.ibar[l][k][p])
+            }
+        })
+    }
+
+    /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk.
+    pub fn w2(&self) -> Mat<f64> {
+        let nf = self.n_modes();
+        Mat::from_fn(3 * nf, 3 * nf, |row, column| {
+            let (k, p, l, q) = (row / nf, row % nf, column / nf, column % nf);
+            if k == l {
+                let (_, a, b) = CYCLIC[k];
+                self.s[a][a][(p, q)] + self.s[b][b][(p, q)]
+            } else {
+                -self.s[l][k][(p, q)]
+            }
+        })
+    }
+
+    /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew.
+    pub fn w3(&self) -> Mat<f64> {
+        let nf = self.n_modes();
+        Mat::from_fn(3 * nf, nf, |row, q| {
+            let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
+            self.s[l][m][(p, q)] - self.s[m][l][(p, q)]
+        })
+    }
+
+    /// m_ff (nf x nf) = S11 + S22 + S33 = Psi' M Psi: the identity for mass-normalised modes.
+    pub fn modal_mass(&self) -> Mat<f64> {
+        let nf = self.n_modes();
+        Mat::from_fn(nf, nf, |p, q| (0..3).map(|k| self.s[k][k][(p, q)]).sum())
+    }
+
+    /// All of them.
+    pub fn derived(&self) -> Derived {
+        Derived {
+            inertia: self.inertia(),
+            c2: self.c2(),
+            w1: self.w1(),
+            w2: self.w2(),
+            w3: self.w3(),
+            modal_mass: self.modal_mass(),
+        }
+    }
+}

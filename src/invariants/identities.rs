@@ -1,0 +1,170 @@
+//! Identities that hold for every exact body (theory section 10), evaluated from the invariants.
+
+use super::cauchy_schwarz::scaled;
+use super::identity_terms as terms;
+use super::{BodyFrame, CauchySchwarz, Derived, Invariants};
+use faer::Mat;
+use nalgebra::Vector3;
+
+/// Limit of what holds for the Gram matrix of any vectors: rounding of its sums, 1e-15 relative to the
+/// Cauchy-Schwarz bounds, with room for data that were rotated or shifted after they were condensed.
+const ROUNDING: f64 = 1e-12;
+/// Limit of what holds for modes: the solver separates them from each other and from rigid motion to 1e-13, a
+/// residual of 1e-10 leaves 1e-10 in close pairs; worse modes are not modes.
+const MODAL: f64 = 1e-9;
+/// Limit of the products of inertia about principal axes: moments within 1e-9 of each other count as equal and
+/// keep the model axes.
+const PRINCIPAL: f64 = 2e-9;
+
+/// One identity: what it says, how far the body is from it, and whether that is near enough.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IdentityCheck {
+    /// Name, stable.
+    pub name: &'static str,
+    /// What must hold.
+    pub formula: &'static str,
+    /// How far it is missed, dimensionless, scaled by the Cauchy-Schwarz bound of its terms; 0 is perfect.
+    pub value: f64,
+    /// Largest value that passes.
+    pub limit: f64,
+    /// Whether `value <= limit`; a NaN never passes.
+    pub passed: bool,
+}
+
+impl IdentityCheck {
+    fn new(name: &'static str, formula: &'static str, value: f64, limit: f64) -> Self {
+        Self { name, formula, value, limit, passed: value <= limit }
+    }
+}
+
+/// What a body claims to be: decides which identities apply.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Expected<'a> {
+    /// Psi' M Psi = I.
+    pub mass_normalised: bool,
+    /// Modes are M-orthogonal to rigid motion.
+    pub free_surface: bool,
+    /// Body frame.
+    pub frame: BodyFrame,
+    /// Origin of the body frame in model coordinates: about a distant origin the centre of mass is known to the
+    /// spacing of numbers there.
+    pub origin: Vector3<f64>,
+    /// lambda, when Psi' K Psi is to be diag(lambda).
+    pub eigenvalues: Option<&'a [f64]>,
+    /// Relative noise of the lowest eigenvalue that the digits of the input leave (the certificate's
+    /// `rigid_noise`); 0 when unknown.
+    pub eigenvalue_noise: f64,
+}
+
+/// Evaluates every identity that the primary data of a body must fulfil, in a fixed order.
+///
+/// None depends on the units, the origin or the axes, nor on the basis except where [`Expected`] says more of it.
+pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityCheck> {
+    let bound = CauchySchwarz::of(body);
+    let check = IdentityCheck::new;
+    let mut checks = vec![
+        check("finite", "no NaN, no infinity", terms::not_finite(body), 0.0),
+        check("mass_positive", "m > 0", if body.mass > 0.0 { 0.0 } else { 1.0 }, 0.0),
+        check("second_moment_symmetric", "J = J'", terms::second_moment_asymmetry(body, &bound), ROUNDING),
+        check(
+            "second_moment_psd",
+            "J - c c'/m positive semidefinite",
+            terms::second_moment_negative(body),
+            ROUNDING,
+        ),
+        check(
+            "inertia_triangle",
+            "I_3 <= I_1 + I_2 about the centre of mass",
+            terms::triangle_excess(body),
+            ROUNDING,
+        ),
+        check("s_transposed", "S_lk = S_kl'", terms::s_asymmetry(body, &bound), ROUNDING),
+        check("s_psd", "S_kk positive semidefinite", terms::s_negative(body), ROUNDING),
+        check("s_bounded", "|S_kl,pq| <= |psi_p| |psi_q|", terms::s_excess(body, &bound), ROUNDING),
+        check(
+            "ibar_bounded",
+            "|Ibar_kl,p| <= sqrt(J_kk) |psi_p|",
+            terms::ibar_excess(body, &bound),
+            ROUNDING,
+        ),
+        check("c1_bounded", "|C1_kp| <= sqrt(m) |psi_p|", terms::c1_ratio(body, &bound) - 1.0, ROUNDING),
+        check("w3_skew", "every block of W3 skew", terms::w3_symmetric_part(body, &bound), ROUNDING),
+        check("w3_bounded", "|block of W3|_2 <= |m_ff|_2", terms::w3_excess(body), ROUNDING),
+        check(
+            "scalar_gram_psd",
+            "[1 x Psi_1 Psi_2 Psi_3]' Ms [...] positive semidefinite",
+            terms::scalar_gram_negative(body, &bound),
+            ROUNDING,
+        ),
+        check(
+            "motion_gram_psd",
+            "[rigid Psi]' M [rigid Psi] positive semidefinite",
+            terms::motion_gram_negative(body, &bound),
+            ROUNDING,
+        ),
+    ];
+    if expected.mass_normalised {
+        checks.push(check(
+            "modal_mass_identity",
+            "S11 + S22 + S33 = I",
+            terms::modal_mass_deviation(body),
+            MODAL,
+        ));
+    }
+    if expected.free_surface {
+        checks.push(check("c1_zero", "C1 = 0", terms::c1_ratio(body, &bound), MODAL));
+        checks.push(check("c2_zero", "C2 = 0", terms::c2_ratio(body, &bound), MODAL));
+        checks.push(check("ibar_symmetric", "Ibar_kl = Ibar_lk", terms::ibar_asymmetry(body, &bound), MODAL));
+    }
+    if let Some(eigenvalues) = expected.eigenvalues {
+        let value = terms::stiffness_deviation(body, eigenvalues);
+        let limit = MODAL + expected.eigenvalue_noise;
+        checks.push(check("modal_stiffness_diagonal", "Psi' K Psi = diag(lambda)", value, limit));
+    }
+    if expected.frame != BodyFrame::Model {
+        let radius = (body.second_moment.trace() / body.mass).sqrt();
+        let value = scaled(body.first_moment.norm(), body.mass * radius);
+        let limit = ROUNDING + 4.0 * f64::EPSILON * scaled(expected.origin.norm(), radius);
+        checks.push(check("first_moment_zero", "c = 0: origin at the centre of mass", value, limit));
+    }
+    if expected.frame == BodyFrame::Principal {
+        checks.push(check(
+            "inertia_diagonal",
+            "I0 diagonal: principal axes",
+            terms::products_of_inertia(body),
+            PRINCIPAL,
+        ));
+    }
+    checks
+}
+
+/// Evaluates that stored invariants follow from the primary data, and W3 from the stored W2.
+///
+/// The blocks of W3 are W2(2,3) - W2(3,2), W2(3,1) - W2(1,3), W2(1,2) - W2(2,1) (theory section 2). A stored array
+/// of the wrong shape misses its identity infinitely.
+pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCheck> {
+    let nf = body.n_modes();
+    let bound = CauchySchwarz::of(body);
+    let own = body.derived();
+    let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
+    let check = |name, formula, a: &Mat<f64>, b: &Mat<f64>, bound: &dyn Fn(usize, usize) -> f64| {
+        IdentityCheck::new(name, formula, terms::difference(a, b, bound), ROUNDING)
+    };
+    let (i0, stored_i0) = (terms::matrix(&own.inertia), terms::matrix(&stored.inertia));
+    let w1 = |k: usize, column: usize| bound.w1(k, column / nf, column % nf);
+    vec![
+        check("i0_of_j", "I0 = tr(J) I - J", &i0, &stored_i0, &|k, l| bound.inertia(k, l)),
+        check("c2_of_ibar", "C2_k = Ibar_lm - Ibar_ml", &own.c2, &stored.c2, &|k, p| bound.c2(k, p)),
+        check(
+            "w1_of_ibar",
+            "W1_kl = -(Ibar_kl + Ibar_lk), W1_kk = 2 (Ibar_ll + Ibar_mm)",
+            &own.w1,
+            &stored.w1,
+            &w1,
+        ),
+        check("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &own.w2, &stored.w2, &by_modes),
+        check("w3_of_s", "W3_k = S_lm - S_ml", &own.w3, &stored.w3, &by_modes),
+        check("w3_of_w2", "W3_k = W2_lm - W2_ml", &terms::w3_of_w2(&stored.w2, nf), &stored.w3, &by_modes),
+        check("modal_mass_of_s", "m_ff = S11 + S22 + S33", &own.modal_mass, &stored.modal_mass, &by_modes),
+    ]
+}

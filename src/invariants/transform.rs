@@ -1,0 +1,97 @@
+//! How the primary data change with the frame and with the basis (theory section 5).
+
+use super::Invariants;
+use super::dense::{product, transpose_product};
+use faer::{Mat, MatRef};
+use nalgebra::{Matrix3, Vector3};
+
+impl Invariants {
+    /// The same body about the origin `d` (frame coordinates): x' = x - d.
+    ///
+    /// c' = c - m d; J' = J - c d' - d c' + m d d'; Ibar'_kl = Ibar_kl - d_k C1_l; S unchanged. Cancels when d is
+    /// far compared with the body: to get data about the centre of mass, shift the coordinates and condense.
+    pub fn shifted(&self, d: Vector3<f64>) -> Self {
+        let c = &self.first_moment;
+        let mixed = c * d.transpose();
+        let mut shifted = self.clone();
+        shifted.first_moment = c - self.mass * d;
+        shifted.second_moment =
+            self.second_moment - (mixed + mixed.transpose()) + d * d.transpose() * self.mass;
+        for (k, row) in shifted.ibar.iter_mut().enumerate() {
+            for (l, entry) in row.iter_mut().enumerate() {
+                for (p, value) in entry.iter_mut().enumerate() {
+                    *value -= d[k] * self.c1[(l, p)];
+                }
+            }
+        }
+        shifted
+    }
+
+    /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same origin.
+    pub fn rotated(&self, axes: &Matrix3<f64>) -> Self {
+        let nf = self.n_modes();
+        let second_moment = axes.transpose() * self.second_moment * axes;
+        let terms = |k: usize, l: usize| {
+            (0..9).map(move |ab| (ab / 3, ab % 3, axes[(ab / 3, k)] * axes[(ab % 3, l)]))
+        };
+        let s = |k: usize, l: usize| {
+            Mat::from_fn(nf, nf, |p, q| terms(k, l).map(|(a, b, r)| r * self.s[a][b][(p, q)]).sum::<f64>())
+        };
+        let mut rotated = Self {
+            mass: self.mass,
+            first_moment: axes.transpose() * self.first_moment,
+            second_moment: (second_moment + second_moment.transpose()) * 0.5,
+            c1: Mat::from_fn(3, nf, |k, p| (0..3).map(|a| axes[(a, k)] * self.c1[(a, p)]).sum()),
+            ibar: std::array::from_fn(|k| {
+                std::array::from_fn(|l| {
+                    (0..nf).map(|p| terms(k, l).map(|(a, b, r)| r * self.ibar[a][b][p]).sum()).collect()
+                })
+            }),
+            s: std::array::from_fn(|k| std::array::from_fn(|l| s(k, l))),
+            modal_stiffness: self.modal_stiffness.clone(),
+        };
+        rotated.restore_symmetry();
+        rotated
+    }
+
+    /// The same body in the basis Psi' = Psi T, with `t` (nf x nf'): S' = T' S T, Ibar' = Ibar T, C1' = C1 T,
+    /// K' = T' K T.
+    ///
+    /// # Panics
+    /// When `t` has not one row per mode.
+    pub fn with_basis(&self, t: MatRef<'_, f64>) -> Self {
+        let nf = self.n_modes();
+        assert_eq!(t.nrows(), nf, "one row per mode");
+        let congruent = |a: &Mat<f64>| transpose_product(t, product(a.as_ref(), t).as_ref());
+        let stiffness = congruent(&self.modal_stiffness);
+        let mut changed = Self {
+            mass: self.mass,
+            first_moment: self.first_moment,
+            second_moment: self.second_moment,
+            c1: product(self.c1.as_ref(), t),
+            ibar: self.ibar.each_ref().map(|row| {
+                row.each_ref()
+                    .map(|a| (0..t.ncols()).map(|q| (0..nf).map(|p| a[p] * t[(p, q)]).sum()).collect())
+            }),
+            s: self.s.each_ref().map(|row| row.each_ref().map(congruent)),
+            modal_stiffness: Mat::from_fn(t.ncols(), t.ncols(), |p, q| {
+                0.5 * (stiffness[(p, q)] + stiffness[(q, p)])
+            }),
+        };
+        changed.restore_symmetry();
+        changed
+    }
+
+    /// Makes S_lk = S_kl' exact again after a transformation that rounds.
+    fn restore_symmetry(&mut self) {
+        for k in 0..3 {
+            for l in 0..=k {
+                let mean = Mat::from_fn(self.n_modes(), self.n_modes(), |p, q| {
+                    0.5 * (self.s[k][l][(p, q)] + self.s[l][k][(q, p)])
+                });
+                self.s[l][k] = mean.transpose().to_owned();
+                self.s[k][l] = mean;
+            }
+        }
+    }
+}
