@@ -11,6 +11,14 @@ pub struct SourceFile {
     pub sha256: String,
 }
 
+impl SourceFile {
+    /// A file at `path`, of which only the name is kept.
+    pub fn new(role: &str, path: &std::path::Path, sha256: String) -> Self {
+        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Self { role: role.to_owned(), name, sha256 }
+    }
+}
+
 /// Name and version written into every output.
 pub fn generator() -> String {
     format!("flexbody {}", env!("CARGO_PKG_VERSION"))

@@ -1,1 +1,21 @@
-//! (filled below)
+//! Reading: manifest, matrices, tables of nodes and degrees of freedom. One file per matrix format behind
+//! [`Reader`] and [`READERS`]; the contract users see is `docs/input.md`.
+
+mod assemble;
+mod bytes;
+mod compression;
+mod digits;
+mod hdf5;
+mod manifest;
+mod matrix_market;
+mod model_files;
+mod read_model;
+mod reader;
+mod table;
+mod tables;
+
+pub use bytes::InputFile;
+pub use manifest::read_manifest;
+pub use model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles};
+pub use read_model::{read_matrix, read_model};
+pub use reader::{MatrixRole, MatrixSource, READERS, Reader};

@@ -1,6 +1,7 @@
 //! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
 
 use super::{DofLabel, NodeSet, Nodes};
+use crate::diagnostic::Diagnostic;
 use crate::linalg::CscMatrix;
 use crate::units::UnitSystem;
 use std::path::PathBuf;
@@ -42,6 +43,8 @@ pub struct RawModel {
     pub interfaces: Vec<NodeSet>,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Vec<SourceFile>,
+    /// Warnings and notes of the readers; never an error.
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 pub use crate::provenance::SourceFile;

@@ -1,0 +1,69 @@
+//! A file as bytes: mapped into memory, so that a gigabyte of matrix is parsed where it lies.
+
+// The one exception to `unsafe_code = "deny"` in this room: a memory map is sound only while nobody truncates
+// the file under it. We map input files for the length of one read and never write to them.
+#![allow(unsafe_code)]
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::provenance::{SourceFile, sha256_hex};
+use memmap2::Mmap;
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// An opened input file. Its bytes are those on disk (compressed files: as stored).
+#[derive(Debug)]
+pub struct InputFile {
+    path: PathBuf,
+    map: Mmap,
+}
+
+impl InputFile {
+    /// Opens a regular file that is not empty.
+    ///
+    /// # Errors
+    /// FB101 when it does not exist, is no regular file or may not be read; FB106 when it has no bytes.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Diagnostic> {
+        let path = path.as_ref();
+        let unreadable = |what: String| Diagnostic::new(Code::FileUnreadable, what).in_file(path);
+        // Opening a pipe would wait for its writer, so ask what it is first.
+        let metadata = std::fs::metadata(path).map_err(|e| unreadable(reason(&e)))?;
+        if metadata.is_dir() {
+            return Err(unreadable("this is a folder, not a file".into()));
+        }
+        if !metadata.is_file() {
+            return Err(unreadable("this is not a regular file (a pipe or a device)".into()));
+        }
+        let file = File::open(path).map_err(|e| unreadable(reason(&e)))?;
+        if metadata.len() == 0 {
+            return Err(Diagnostic::new(Code::FileEmpty, "file has no bytes").in_file(path));
+        }
+        // SAFETY: the map is private to this value and read-only; see the head of this file for truncation.
+        let map = unsafe { Mmap::map(&file) }.map_err(|e| unreadable(reason(&e)))?;
+        Ok(Self { path: path.to_path_buf(), map })
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its bytes, at least one.
+    pub fn bytes(&self) -> &[u8] {
+        &self.map
+    }
+
+    /// Its fingerprint under a role of [`SourceFile::role`].
+    pub fn fingerprint(&self, role: &str) -> SourceFile {
+        SourceFile::new(role, &self.path, sha256_hex(self.bytes()))
+    }
+}
+
+/// The reason in words that do not depend on the operating system, where there are such.
+fn reason(error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => "file does not exist".into(),
+        ErrorKind::PermissionDenied => "no permission to read the file".into(),
+        _ => format!("file cannot be read: {error}"),
+    }
+}

@@ -1,0 +1,86 @@
+//! gzip and Zstandard around a text file, recognised by their first bytes whatever the file is called.
+
+use crate::diagnostic::{Code, Diagnostic};
+use std::io::Read;
+use std::path::Path;
+
+/// How the bytes on disk are packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Compression {
+    /// Not at all.
+    None,
+    /// gzip, one member or several (RFC 1952).
+    Gzip,
+    /// Zstandard, one frame or several (RFC 8878).
+    Zstd,
+}
+
+impl Compression {
+    /// What the first bytes say.
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        if bytes.starts_with(&[0x1f, 0x8b]) {
+            Self::Gzip
+        } else if bytes.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
+            Self::Zstd
+        } else {
+            Self::None
+        }
+    }
+
+    /// A stream of the unpacked bytes.
+    pub(super) fn stream<'a>(self, bytes: &'a [u8]) -> std::io::Result<Box<dyn Read + 'a>> {
+        Ok(match self {
+            Self::None => Box::new(bytes),
+            Self::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(bytes)),
+            Self::Zstd => Box::new(zstd::stream::read::Decoder::with_buffer(bytes)?),
+        })
+    }
+
+    /// The first unpacked bytes, at most `limit` of them; fewer when the file is short or damaged.
+    pub(super) fn head(self, bytes: &[u8], limit: usize) -> Vec<u8> {
+        let mut head = Vec::new();
+        if let Ok(stream) = self.stream(bytes) {
+            // A damaged stream gives what came before the damage; reading it in earnest reports it.
+            let _ = stream.take(limit as u64).read_to_end(&mut head);
+        }
+        head
+    }
+}
+
+/// FB103 for `path`, with the decoder's reason.
+pub(super) fn broken(path: &Path, error: &std::io::Error) -> Diagnostic {
+    let message = if error.kind() == std::io::ErrorKind::UnexpectedEof {
+        "compressed file ends before its data does".to_owned()
+    } else {
+        format!("compressed file is damaged: {error}")
+    };
+    Diagnostic::new(Code::FileCompressionBroken, message).in_file(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn members_and_frames_are_read_one_after_the_other() {
+        let gzip = |text: &[u8]| {
+            let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+            encoder.write_all(text).unwrap();
+            encoder.finish().unwrap()
+        };
+        let zstd = |text: &[u8]| zstd::encode_all(text, 1).unwrap();
+        for (two, expected) in [
+            ([gzip(b"one "), gzip(b"two")].concat(), Compression::Gzip),
+            ([zstd(b"one "), zstd(b"two")].concat(), Compression::Zstd),
+            (b"one two".to_vec(), Compression::None),
+        ] {
+            let compression = Compression::of(&two);
+            assert_eq!(compression, expected);
+            let mut text = String::new();
+            compression.stream(&two).unwrap().read_to_string(&mut text).unwrap();
+            assert_eq!(text, "one two");
+            assert_eq!(compression.head(&two, 3), b"one");
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! How many decimal digits the values of a matrix really carry.
+//!
+//! FE programs write 6, 14 or 17 digits, and scripts copy a 14-digit value as 17 digits
+//! (`7.9642450142449999e+08` is 796424501.4245). The digits that matter are those of the shortest decimal
+//! number that reads back as the value.
+
+use std::collections::HashSet;
+
+/// Entries looked at, evenly spread.
+const SAMPLES: usize = 20_000;
+
+/// From here on the digits of the values are believed without further evidence.
+const MANY: u8 = 10;
+
+/// Significant decimal digits (1 to 17) of `count` values of which `value(k)` gives the k-th; `written` is the
+/// largest number of digits in which the file writes one (17 for binary files).
+///
+/// Few digits mean rounding only when there is evidence of it: the mass matrix of a uniform mesh holds a
+/// handful of exact short numbers. Such a matrix counts as exact (17).
+pub(super) fn significant_digits(count: usize, written: u8, value: impl Fn(usize) -> f64) -> u8 {
+    let step = count.div_ceil(SAMPLES).max(1);
+    let (mut digits, mut distinct) = (0u8, HashSet::new());
+    let mut text = String::new();
+    for k in (0..count).step_by(step) {
+        let v = value(k).abs();
+        if v != 0.0 && distinct.insert(v.to_bits()) {
+            digits = digits.max(shortest(v, &mut text));
+        }
+    }
+    let exact = (digits <= 4 && distinct.len() <= 32) || (written >= MANY && distinct.len() <= 256);
+    match digits {
+        MANY.. => digits,
+        _ if exact => 17,
+        _ if written < MANY => written.max(digits),
+        _ => digits,
+    }
+}
+
+/// Digits of the shortest decimal number that reads back as `v`.
+fn shortest(v: f64, text: &mut String) -> u8 {
+    use std::fmt::Write;
+    text.clear();
+    write!(text, "{v:e}").expect("writing to a String cannot fail");
+    let mantissa = text.split('e').next().unwrap_or("");
+    mantissa.bytes().filter(u8::is_ascii_digit).count() as u8
+}
+
+/// Significant digits of a number as written: leading zeros and the exponent do not count.
+pub(super) fn written_digits(number: &[u8]) -> u8 {
+    let mantissa = number.iter().take_while(|b| matches!(b, b'0'..=b'9' | b'.' | b'+' | b'-'));
+    let digits = mantissa.filter(|b| b.is_ascii_digit()).skip_while(|&&b| b == b'0').count();
+    digits.min(17) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn digits(values: &[f64], written: u8) -> u8 {
+        significant_digits(values.len(), written, |k| values[k])
+    }
+
+    #[test]
+    fn values_rounded_before_they_were_written_in_full_are_seen_through() {
+        assert_eq!(digits(&[7.964_245_014_244_999_9e8, 1.0], 17), 13);
+        assert_eq!(digits(&[0.1 + 0.2], 17), 17);
+    }
+
+    #[test]
+    fn short_exact_numbers_count_as_exact() {
+        assert_eq!(digits(&[1000.0, -1000.0, 0.25], 4), 17); // springs
+        assert_eq!(digits(&[6.132_812_5e-4, 1.226_562_5e-3], 17), 17); // uniform mesh, long fields
+    }
+
+    #[test]
+    fn rounded_numbers_count_as_written() {
+        let rounded: Vec<f64> =
+            (1..200).map(|k| format!("{:.5e}", (k as f64).sqrt()).parse().unwrap()).collect();
+        assert_eq!(digits(&rounded, 6), 6);
+        let many: Vec<f64> =
+            (1..2000).map(|k| format!("{:.5e}", (k as f64).sqrt()).parse().unwrap()).collect();
+        assert_eq!(digits(&many, 17), 6); // a binary file of rounded numbers
+    }
+
+    #[test]
+    fn digits_as_written() {
+        for (text, expected) in [("1.50e+3", 3), ("-0.0012D-10", 2), ("+100", 3), ("0.", 0)] {
+            assert_eq!(written_digits(text.as_bytes()), expected, "{text}");
+        }
+    }
+}

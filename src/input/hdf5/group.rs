@@ -1,0 +1,276 @@
+//! One sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy,
+//! anndata, MATLAB and PETSc (`docs/input.md`).
+
+use super::super::assemble::{Entry, Sides, Storage, assemble, check_size, undeclared_triangle};
+use super::members::{Members, POINTERS};
+use super::values::{Found, Vector, integers_of, text_of, truth_of};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::model::RawMatrix;
+use hdf5_metno::Group;
+use std::path::Path;
+
+/// Entries read at a time.
+const PIECE: usize = 1 << 20;
+
+/// Reads the matrix in `group`, called `name` in messages.
+pub(super) fn read(group: &Group, name: &str, path: &Path) -> Found<RawMatrix> {
+    let reader = GroupReader { group, name, members: Members::of(group) };
+    let declared = reader.declared_symmetry().map_err(|d| vec![d])?;
+    let parsed = match reader.members.compressed() {
+        Some(names) => reader.compressed(names)?,
+        None => match reader.members.coordinates() {
+            Some(names) => reader.coordinates(names)?,
+            None => return Err(vec![reader.layout("holds no sparse matrix")]),
+        },
+    };
+    let sides = parsed.sides;
+    let storage = match declared {
+        Declared::Triangle if sides == (Sides { lower: true, upper: true }) => {
+            let message = format!(
+                "group `{name}` declares one triangle, but has entries on both sides of the diagonal"
+            );
+            return Err(vec![Diagnostic::new(Code::MatrixTriangles, message)]);
+        }
+        Declared::Triangle | Declared::Symmetric if sides.lower != sides.upper => Storage::Triangle,
+        Declared::No => {
+            let help = |stored: &str| {
+                format!("store both triangles, or set the attribute symmetric = \"{stored}\" of group {name}")
+            };
+            match undeclared_triangle(sides, help) {
+                Some(diagnostic) => return Err(vec![diagnostic]),
+                None => Storage::Full,
+            }
+        }
+        _ => Storage::Full,
+    };
+    let mut raw = assemble(parsed.n, parsed.pieces, storage, 17, path).map_err(|d| vec![d])?;
+    if parsed.single_precision {
+        raw.digits = raw.digits.min(7);
+    }
+    Ok(raw)
+}
+
+/// What the attribute `symmetric` of the group says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Declared {
+    /// Nothing: the matrix is stored in full.
+    No,
+    /// Symmetric, stored in full or by one triangle.
+    Symmetric,
+    /// Stored by one triangle.
+    Triangle,
+}
+
+/// A parsed group.
+struct Parsed {
+    n: usize,
+    pieces: Vec<Vec<Entry>>,
+    sides: Sides,
+    single_precision: bool,
+}
+
+struct GroupReader<'a> {
+    group: &'a Group,
+    name: &'a str,
+    members: Members,
+}
+
+impl GroupReader<'_> {
+    fn layout(&self, what: &str) -> Diagnostic {
+        Diagnostic::new(Code::Hdf5Layout, format!("group `{}` {what}", self.name))
+    }
+
+    fn vector(&self, dataset: &str) -> Found<Vector> {
+        Vector::open(self.group, &self.members, self.name, dataset)
+    }
+
+    fn compressed(&self, (values, indices, pointers): (&str, &str, &str)) -> Found<Parsed> {
+        let values = self.vector(values)?;
+        let indices = self.vector(indices)?;
+        let pointers = self.vector(pointers)?;
+        let pointer_values = pointers.integers(0..pointers.len)?;
+        let Some(majors) = pointers.len.checked_sub(1) else {
+            return Err(vec![self.layout(&format!("has an empty {}", pointers.name))]);
+        };
+        let (rows, cols) = self.shape()?.unwrap_or((majors as u64, majors as u64));
+        let entries = self.same_length(&values, &indices)?;
+        let n = check_size(rows, cols, entries as u64).map_err(|d| vec![d])?;
+        if majors != n {
+            let message =
+                format!("{} has {} values, expected {} for {n} columns", pointers.name, pointers.len, n + 1);
+            return Err(vec![Diagnostic::new(Code::MatrixCount, message)]);
+        }
+        let ascending = pointer_values.is_sorted() && pointer_values[0] == 0;
+        if !ascending || pointer_values[n] != entries as i64 {
+            let message =
+                format!("{} does not rise from 0 to {entries}, the number of values", pointers.name);
+            return Err(vec![
+                Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"),
+            ]);
+        }
+        let by_rows = self.stored_by_rows();
+        let mut major = 0usize;
+        self.entries(&values, &[&indices], n, |k, index| {
+            while pointer_values[major + 1] <= k as i64 {
+                major += 1;
+            }
+            let minor = index[0];
+            if by_rows { (major as i64, minor) } else { (minor, major as i64) }
+        })
+    }
+
+    fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {
+        let values = self.vector(values)?;
+        let row_indices = self.vector(rows)?;
+        let column_indices = self.vector(columns)?;
+        let (rows, cols) = self.shape()?.ok_or_else(|| {
+            vec![self.layout("has coordinates but no `shape`").with_help("store shape = [rows, columns]")]
+        })?;
+        let entries = self.same_length(&values, &row_indices)?;
+        self.same_length(&values, &column_indices)?;
+        let n = check_size(rows, cols, entries as u64).map_err(|d| vec![d])?;
+        self.entries(&values, &[&row_indices, &column_indices], n, |_, index| (index[0], index[1]))
+    }
+
+    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices.
+    fn entries<const N: usize>(
+        &self,
+        values: &Vector,
+        indices: &[&Vector; N],
+        n: usize,
+        mut place: impl FnMut(usize, [i64; N]) -> (i64, i64),
+    ) -> Found<Parsed> {
+        // Whole chunks, so that none is unpacked twice.
+        let step = indices.iter().map(|v| v.chunk).fold(PIECE.max(values.chunk), usize::max);
+        let single_precision = values.is_single_precision();
+        let mut parsed = Parsed { n, pieces: Vec::new(), sides: Sides::default(), single_precision };
+        let mut bad = Bad { n, shown: Vec::new(), count: 0 };
+        for start in (0..values.len).step_by(step) {
+            let range = start..values.len.min(start.saturating_add(step));
+            let numbers = values.floats(range.clone())?;
+            let mut lists: [Vec<i64>; N] = std::array::from_fn(|_| Vec::new());
+            for (list, vector) in lists.iter_mut().zip(indices) {
+                *list = vector.integers(range.clone())?;
+            }
+            let mut piece = Vec::with_capacity(numbers.len());
+            for (offset, &value) in numbers.iter().enumerate() {
+                let (row, col) = place(start + offset, std::array::from_fn(|which| lists[which][offset]));
+                if let Some(entry) = bad.check(row, col, value, start + offset) {
+                    parsed.sides.lower |= entry.row > entry.col;
+                    parsed.sides.upper |= entry.row < entry.col;
+                    piece.push(entry);
+                }
+            }
+            if bad.count == 0 {
+                parsed.pieces.push(piece);
+            }
+        }
+        if bad.count == 0 { Ok(parsed) } else { Err(bad.finish(self.name)) }
+    }
+
+    fn same_length(&self, values: &Vector, indices: &Vector) -> Found<usize> {
+        if values.len == indices.len {
+            return Ok(values.len);
+        }
+        let message =
+            format!("{} has {} values, {} has {}", values.name, values.len, indices.name, indices.len);
+        let help = "both have one value per entry: write the matrix again";
+        Err(vec![Diagnostic::new(Code::MatrixCount, message).with_help(help)])
+    }
+
+    /// Rows and columns, from the attribute or dataset `shape` or from MATLAB's attribute.
+    fn shape(&self) -> Found<Option<(u64, u64)>> {
+        let attribute = ["shape", "h5sparse_shape"].iter().find_map(|name| self.group.attr(name).ok());
+        let numbers = if let Some(attribute) = attribute {
+            integers_of(&attribute)
+        } else if self.members.link("shape").is_some() {
+            let vector = self.vector("shape")?;
+            // Only two numbers are wanted; reading one more tells that there are too many.
+            Some(vector.integers(0..vector.len.min(3))?)
+        } else if let Ok(rows) = self.group.attr("MATLAB_sparse") {
+            // The number of columns is that of the pointers.
+            let columns = self.members.first(POINTERS).map(|name| self.vector(name)).transpose()?;
+            let columns = columns.map(|pointers| pointers.len as i64 - 1);
+            integers_of(&rows).map(|rows| rows.into_iter().chain(columns).collect())
+        } else {
+            return Ok(None);
+        };
+        match numbers.as_deref() {
+            Some(&[rows, cols]) if rows >= 0 && cols >= 0 => Ok(Some((rows as u64, cols as u64))),
+            _ => Err(vec![self.layout("has a `shape` that is not two whole numbers")]),
+        }
+    }
+
+    /// Whether the group says that it stores compressed rows; without a word columns are taken, which for a
+    /// symmetric matrix is the same.
+    fn stored_by_rows(&self) -> bool {
+        let attribute = ["encoding-type", "h5sparse_format", "format"]
+            .iter()
+            .find_map(|name| self.group.attr(name).ok())
+            .and_then(|attribute| text_of(&attribute));
+        let dataset = || self.group.dataset("format").ok().and_then(|dataset| text_of(&dataset));
+        attribute.or_else(dataset).is_some_and(|text| matches!(text.as_str(), "csr" | "csr_matrix"))
+    }
+
+    fn declared_symmetry(&self) -> Result<Declared, Diagnostic> {
+        let Ok(attribute) = self.group.attr("symmetric") else {
+            return Ok(Declared::No);
+        };
+        let word = match truth_of(&attribute) {
+            Some(true) => return Ok(Declared::Symmetric),
+            Some(false) => return Ok(Declared::No),
+            None => text_of(&attribute).unwrap_or_default(),
+        };
+        match word.to_lowercase().as_str() {
+            "lower" | "upper" | "l" | "u" => Ok(Declared::Triangle),
+            "true" | "yes" | "symmetric" => Ok(Declared::Symmetric),
+            "false" | "no" | "general" => Ok(Declared::No),
+            _ => {
+                let message =
+                    format!("attribute `symmetric` of group `{}` is `{}`", self.name, word.escape_debug());
+                let help = "it may be true, false, \"lower\" or \"upper\"";
+                Err(Diagnostic::new(Code::MatrixKind, message).with_help(help))
+            }
+        }
+    }
+}
+
+/// Entries that cannot be used: the first few, and how many.
+struct Bad {
+    n: usize,
+    shown: Vec<Diagnostic>,
+    count: usize,
+}
+
+impl Bad {
+    fn check(&mut self, row: i64, col: i64, value: f64, k: usize) -> Option<Entry> {
+        let inside = |index: i64| (0..self.n as i64).contains(&index);
+        let (code, message) = if !inside(row) || !inside(col) {
+            (
+                Code::MatrixIndex,
+                format!(
+                    "entry {k} (from 0) is at ({row}, {col}), the matrix has indices 0 to {}",
+                    self.n as i64 - 1
+                ),
+            )
+        } else if !value.is_finite() {
+            (Code::MatrixNotFinite, format!("entry {k} (from 0) at ({row}, {col}) is {value}"))
+        } else {
+            return (value != 0.0).then_some(Entry { row: row as u32, col: col as u32, value });
+        };
+        self.count += 1;
+        if self.shown.len() < 5 {
+            self.shown.push(Diagnostic::new(code, message));
+        }
+        None
+    }
+
+    fn finish(mut self, group: &str) -> Vec<Diagnostic> {
+        let more = self.count - self.shown.len();
+        if more > 0 {
+            let message = format!("{more} more entries of group `{group}` are bad");
+            self.shown.push(Diagnostic::new(Code::MatrixIndex, message));
+        }
+        self.shown
+    }
+}

@@ -1,0 +1,176 @@
+//! Lists of numbers and small attributes, whatever type they are stored in.
+
+use super::members::Members;
+use crate::diagnostic::{Code, Diagnostic};
+use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
+use hdf5_metno::{Attribute, Container, Dataset, Group, Hyperslab, LinkType, SliceOrIndex};
+use std::ops::Range;
+
+pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// More than this many values per stored byte no filter reaches on real data (deflate: 1032): the rest of the
+/// dataset is not in the file.
+const RATIO: u64 = 1100;
+
+/// Type of the numbers of a dataset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Whole,
+    Single,
+    Double,
+}
+
+impl Kind {
+    fn of(descriptor: &TypeDescriptor) -> Option<Self> {
+        match descriptor {
+            TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) => Some(Self::Whole),
+            TypeDescriptor::Float(FloatSize::U4) => Some(Self::Single),
+            TypeDescriptor::Float(FloatSize::U8) => Some(Self::Double),
+            _ => None,
+        }
+    }
+}
+
+/// A list of numbers in the file.
+pub(super) struct Vector {
+    dataset: Dataset,
+    /// Path within the file, for messages.
+    pub name: String,
+    dimensions: usize,
+    axis: usize,
+    pub len: usize,
+    kind: Kind,
+    /// Values per chunk, 1 when not chunked.
+    pub chunk: usize,
+}
+
+impl Vector {
+    /// Opens a dataset of numbers with one dimension (or with others of length 1).
+    ///
+    /// # Errors
+    /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values that are
+    /// not in this file.
+    pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
+        let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
+        let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
+        if members.link(name) == Some(LinkType::External) {
+            return Err(refuse(Code::Hdf5Layout, "lies in another file".into()));
+        }
+        let dataset =
+            group.dataset(name).map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be opened: {e}")))?;
+        let properties =
+            dataset.dcpl().map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be read: {e}")))?;
+        if dataset.layout() == hdf5_metno::dataset::Layout::Virtual || !properties.external().is_empty() {
+            return Err(refuse(Code::Hdf5Layout, "keeps its values in another file".into()));
+        }
+        let shape = dataset.shape();
+        let long: Vec<usize> = (0..shape.len()).filter(|&d| shape[d] != 1).collect();
+        let axis = match (shape.len(), long.as_slice()) {
+            (0, _) => return Err(refuse(Code::MatrixKind, "is a single value, expected a list".into())),
+            (_, []) => 0,
+            (_, &[axis]) => axis,
+            _ => {
+                let message = format!("has the shape {shape:?}, expected a list");
+                return Err(refuse(Code::MatrixKind, message));
+            }
+        };
+        let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| Kind::of(&t));
+        let kind = kind.ok_or_else(|| {
+            refuse(Code::MatrixKind, "holds no real numbers (complex, boolean or structured values?)".into())
+        })?;
+        let len = shape[axis];
+        let stored = dataset.storage_size();
+        if len as u64 > stored.saturating_mul(RATIO) {
+            let message = format!("declares {len} values, but only {stored} bytes are stored");
+            return Err(refuse(Code::MatrixCount, message));
+        }
+        let chunk = dataset.chunk().and_then(|chunk| chunk.get(axis).copied()).unwrap_or(1).min(len.max(1));
+        Ok(Self { dataset, name: at, dimensions: shape.len(), axis, len, kind, chunk })
+    }
+
+    pub(super) fn is_single_precision(&self) -> bool {
+        self.kind == Kind::Single
+    }
+
+    pub(super) fn floats(&self, range: Range<usize>) -> Found<Vec<f64>> {
+        self.read::<f64>(range)
+    }
+
+    /// Whole numbers; 64-bit ones beyond i64 come out as its largest.
+    pub(super) fn integers(&self, range: Range<usize>) -> Found<Vec<i64>> {
+        if self.kind == Kind::Whole {
+            return self.read::<i64>(range);
+        }
+        // MATLAB's h5write stores indices as doubles.
+        let numbers = self.read::<f64>(range)?;
+        if let Some(bad) = numbers.iter().find(|v| v.fract() != 0.0) {
+            let message = format!("dataset {} has {bad}, expected whole numbers", self.name);
+            return Err(vec![Diagnostic::new(Code::MatrixIndex, message)]);
+        }
+        Ok(numbers.into_iter().map(|v| v as i64).collect())
+    }
+
+    fn read<T: hdf5_metno::H5Type>(&self, range: Range<usize>) -> Found<Vec<T>> {
+        if range.is_empty() {
+            return Ok(Vec::new());
+        }
+        let slab: Vec<SliceOrIndex> = (0..self.dimensions)
+            .map(|d| if d == self.axis { range.clone().into() } else { SliceOrIndex::Index(0) })
+            .collect();
+        let values = self.dataset.read_slice_1d::<T, _>(Hyperslab::from(slab)).map_err(|e| {
+            let message = format!("dataset {} cannot be read: {e}", self.name);
+            vec![Diagnostic::new(Code::FileUnreadable, message).with_help("write the file again")]
+        })?;
+        Ok(values.into_raw_vec_and_offset().0)
+    }
+}
+
+/// The whole numbers of a small attribute.
+pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
+    let kind = Kind::of(&attribute.dtype().ok()?.to_descriptor().ok()?)?;
+    let shape = attribute.shape();
+    let scalar = attribute.is_scalar();
+    // A null dataspace has no shape and no value.
+    if (shape.is_empty() && !scalar) || shape.iter().try_fold(1usize, |a, &b| a.checked_mul(b))? > 3 {
+        return None;
+    }
+    match kind {
+        Kind::Whole => attribute.read_raw::<i64>().ok(),
+        _ => {
+            let numbers = attribute.read_raw::<f64>().ok()?;
+            numbers.iter().all(|v| v.fract() == 0.0).then(|| numbers.iter().map(|&v| v as i64).collect())
+        }
+    }
+}
+
+/// A boolean, or a whole number that stands for one.
+pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
+    if attribute.is_scalar() && attribute.dtype().ok()?.to_descriptor().ok()? == TypeDescriptor::Boolean {
+        return attribute.read_scalar::<bool>().ok();
+    }
+    match integers_of(attribute)?.as_slice() {
+        &[number @ 0..=1] => Some(number == 1),
+        _ => None,
+    }
+}
+
+/// A short text, whichever of the string types of HDF5 it has.
+pub(super) fn text_of(container: &Container) -> Option<String> {
+    if container.shape().iter().product::<usize>() != 1 || (container.ndim() == 0 && !container.is_scalar()) {
+        return None;
+    }
+    let bytes = match container.dtype().ok()?.to_descriptor().ok()? {
+        TypeDescriptor::VarLenUnicode => {
+            container.read_raw::<VarLenUnicode>().ok()?.first()?.as_bytes().to_vec()
+        }
+        TypeDescriptor::VarLenAscii => container.read_raw::<VarLenAscii>().ok()?.first()?.as_bytes().to_vec(),
+        TypeDescriptor::FixedAscii(_) => {
+            container.read_raw::<FixedAscii<64>>().ok()?.first()?.as_bytes().to_vec()
+        }
+        TypeDescriptor::FixedUnicode(_) => {
+            container.read_raw::<FixedUnicode<64>>().ok()?.first()?.as_bytes().to_vec()
+        }
+        _ => return None,
+    };
+    String::from_utf8(bytes).ok().map(|text| text.trim().to_owned())
+}

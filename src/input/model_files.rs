@@ -1,0 +1,173 @@
+//! Which files make up a model.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::units::UnitSystem;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// The files of one model and what is said about them, from a manifest or from the command line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelFiles {
+    /// Name of the model.
+    pub name: String,
+    /// 3 or 2.
+    pub dimension: u8,
+    /// Units of the numbers in the files.
+    pub units: UnitSystem,
+    /// Stiffness matrix K.
+    pub stiffness: MatrixLocation,
+    /// Mass matrix M.
+    pub mass: MatrixLocation,
+    /// Node table.
+    pub nodes: PathBuf,
+    /// Labels of the matrix rows; without it node-major x, y, z in the order of the node table.
+    pub dofs: Option<PathBuf>,
+    /// Named node sets.
+    pub interfaces: Vec<InterfaceSource>,
+    /// The manifest, when there is one.
+    pub manifest: Option<PathBuf>,
+}
+
+/// An interface and where its nodes are listed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InterfaceSource {
+    /// Name, unique within the model.
+    pub name: String,
+    /// Its nodes.
+    pub nodes: InterfaceNodes,
+}
+
+/// Nodes of an interface.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum InterfaceNodes {
+    /// Node numbers in the manifest.
+    Listed(Vec<i64>),
+    /// A table with the column `node`.
+    File(PathBuf),
+}
+
+/// A matrix file and, for formats that hold several matrices, the group within it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MatrixLocation {
+    /// The file.
+    pub path: PathBuf,
+    /// Group within the file, with its leading `/`; `None`: the only one, or the one named after its role.
+    pub group: Option<String>,
+}
+
+impl MatrixLocation {
+    /// Reads `FILE` or `FILE:/group`. A single letter before the `:/` is a Windows drive, not a file.
+    ///
+    /// ```
+    /// use flexbody::input::MatrixLocation;
+    /// let location = MatrixLocation::parse("C:/models/beam.h5:/fe/K");
+    /// assert_eq!(location.path.to_str(), Some("C:/models/beam.h5"));
+    /// assert_eq!(location.group.as_deref(), Some("/fe/K"));
+    /// assert_eq!(MatrixLocation::parse("C:/K.mtx").group, None);
+    /// ```
+    pub fn parse(text: impl AsRef<OsStr>) -> Self {
+        let text = text.as_ref();
+        if let Some((file, group)) = text.to_str().and_then(|t| t.rsplit_once(":/")) {
+            let drive = file.len() == 1 && file.starts_with(|c: char| c.is_ascii_alphabetic());
+            if !file.is_empty() && !drive {
+                return Self { path: file.into(), group: Some(format!("/{group}")) };
+            }
+        }
+        Self { path: text.into(), group: None }
+    }
+
+    /// The same, with a relative path taken from `folder`.
+    pub fn relative_to(mut self, folder: &Path) -> Self {
+        self.path = folder.join(self.path);
+        self
+    }
+}
+
+impl std::fmt::Display for MatrixLocation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        self.group.as_ref().map_or(Ok(()), |group| write!(f, ":{group}"))
+    }
+}
+
+impl ModelFiles {
+    /// A three-dimensional model without a manifest, named after its stiffness file; `units` is `length,mass,time`
+    /// as in `m,kg,s`.
+    ///
+    /// # Errors
+    /// FB202 when the units are not three known ones.
+    pub fn from_arguments(
+        stiffness: impl AsRef<OsStr>,
+        mass: impl AsRef<OsStr>,
+        nodes: impl Into<PathBuf>,
+        dofs: Option<PathBuf>,
+        units: Option<&str>,
+    ) -> Result<Self> {
+        let stiffness = MatrixLocation::parse(stiffness);
+        Ok(Self {
+            name: stem(&stiffness.path),
+            dimension: 3,
+            units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
+            stiffness,
+            mass: MatrixLocation::parse(mass),
+            nodes: nodes.into(),
+            dofs,
+            interfaces: Vec::new(),
+            manifest: None,
+        })
+    }
+}
+
+fn parse_units(text: &str) -> Result<UnitSystem> {
+    let names: Vec<&str> = text.split(',').map(str::trim).collect();
+    let &[length, mass, time] = names.as_slice() else {
+        let message = format!("units are `{text}`, expected length,mass,time as in `mm,t,s`");
+        return Err(Diagnostic::new(Code::ManifestUnit, message).into());
+    };
+    UnitSystem::parse(length, mass, time).map_err(|unknown| {
+        Diagnostic::new(Code::ManifestUnit, format!("unit of {unknown} is not known")).into()
+    })
+}
+
+/// File name up to its first dot.
+pub(super) fn stem(path: &Path) -> String {
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    match name.split('.').next() {
+        Some(stem) if !stem.is_empty() => stem.to_owned(),
+        _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_told_from_drives() {
+        for (text, path, group) in [
+            ("K.h5:/K", "K.h5", Some("/K")),
+            ("K.h5:/", "K.h5", Some("/")),
+            ("C:/K.mtx", "C:/K.mtx", None),
+            ("C:\\x\\K.h5:/fe/K", "C:\\x\\K.h5", Some("/fe/K")),
+            ("c:/a.h5:/K", "c:/a.h5", Some("/K")),
+            ("dir/K.mtx", "dir/K.mtx", None),
+            (":/K", ":/K", None),
+        ] {
+            let location = MatrixLocation::parse(text);
+            assert_eq!((location.path.to_str(), location.group.as_deref()), (Some(path), group), "{text}");
+            assert_eq!(location.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn units_on_the_command_line() {
+        let files = |units| ModelFiles::from_arguments("d/K.mtx.gz", "M.mtx", "n.csv", None, units);
+        let model = files(Some("mm, t,s")).unwrap();
+        assert_eq!((model.name.as_str(), model.units.mass.to_si()), ("K", 1000.0));
+        assert!(!files(None).unwrap().units.stated);
+        for bad in ["mm,t", "mm,t,s,K", "mm,stone,s", "mm,-1,s", ""] {
+            assert!(files(Some(bad)).unwrap_err().has(Code::ManifestUnit), "{bad}");
+        }
+    }
+}
