@@ -15,7 +15,8 @@ const BENDING_ROOTS: [f64; 3] = [4.730040744862704, 7.853204624095838, 10.995607
 
 /// Frequencies of Euler-Bernoulli bending, square section of side h.
 fn euler_bernoulli(material: &Material, length: f64, h: f64) -> [f64; 3] {
-    BENDING_ROOTS.map(|b| (b / length).powi(2) * h * (material.youngs / (12.0 * material.density)).sqrt() / TAU)
+    BENDING_ROOTS
+        .map(|b| (b / length).powi(2) * h * (material.youngs / (12.0 * material.density)).sqrt() / TAU)
 }
 
 /// First bending frequency of a free-free Timoshenko beam, square section of side h: the root near the
@@ -110,10 +111,12 @@ fn shaft_twists_at_multiples_of_the_shear_wave_frequency() {
     let errors: Vec<f64> = [1, 2, 4]
         .iter()
         .map(|&n| {
-            let body = Mesh::cylinder(Kind::Hex8, n, 4 * n, radius, length).assemble(&STEEL, MassRule::Consistent);
+            let body =
+                Mesh::cylinder(Kind::Hex8, n, 4 * n, radius, length).assemble(&STEEL, MassRule::Consistent);
             let found = modes(&body, 8);
             let shapes = &found.modes.solution.vectors;
-            let twist = (0..8).find(|&j| is_twist(&body.nodes, |i| shapes[(i, j)])).expect("a torsional mode");
+            let twist =
+                (0..8).find(|&j| is_twist(&body.nodes, |i| shapes[(i, j)])).expect("a torsional mode");
             found.frequencies()[twist] / exact - 1.0
         })
         .collect();

@@ -3,7 +3,12 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+use support::equations;
+
 mod assembler;
 mod beams;
-mod symmetry;
 mod convergence;
+mod covariance;
+mod errata;
+mod small_models;
+mod symmetry;

@@ -153,6 +153,15 @@ impl Assembly {
         CscMatrix::from_triplets(self.n_dofs(), self.n_dofs(), &triplets)
     }
 
+    /// The same body with its row-sum lumped mass.
+    pub fn with_lumped_mass(&self) -> Self {
+        let mut sums = vec![0.0; self.nodes.len()];
+        entries(&self.scalar_mass).for_each(|(row, _, value)| sums[row as usize] += value);
+        let diagonal: Vec<_> = sums.iter().enumerate().map(|(i, m)| (i as u32, i as u32, *m)).collect();
+        let scalar_mass = CscMatrix::from_triplets(sums.len(), sums.len(), &diagonal);
+        Self { scalar_mass, ..self.clone() }
+    }
+
     /// The model with node numbers 1, 2, ... and no row labels: node-major.
     pub fn raw_model(&self) -> RawModel {
         let matrix = |matrix| RawMatrix { matrix, digits: 17, path: PathBuf::new() };
@@ -168,6 +177,7 @@ impl Assembly {
             dofs_path: PathBuf::new(),
             interfaces: Vec::new(),
             sources: Vec::new(),
+            diagnostics: Vec::new(),
         }
     }
 }

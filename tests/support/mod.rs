@@ -3,8 +3,11 @@
 #![allow(dead_code)]
 
 pub mod elements;
+pub mod equations;
 pub mod files;
+pub mod integrate;
 pub mod mesh;
+pub mod nodal;
 pub mod pipeline;
 pub mod random;
 pub mod reference;
