@@ -1,6 +1,7 @@
 //! CPU time of the condensation at 300k degrees of freedom and 20 modes: `cargo bench --bench condense`.
 
 #[path = "../tests/support/cuboid.rs"]
+#[allow(dead_code)] // shared with tests
 mod cuboid;
 
 use cuboid::Cuboid;

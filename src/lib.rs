@@ -9,6 +9,7 @@
 
 pub mod basis;
 pub mod cli;
+pub mod convert;
 pub mod diagnostic;
 pub mod eigen;
 pub mod error;
@@ -17,6 +18,7 @@ pub mod input;
 pub mod invariants;
 pub mod linalg;
 pub mod model;
+pub mod output;
 pub mod progress;
 pub mod provenance;
 pub mod report;

@@ -31,6 +31,13 @@ pub struct Completeness {
     pub remark: String,
 }
 
+impl Completeness {
+    /// Flexible modes below the shift: counted where there is a count, otherwise those found.
+    pub(super) fn counted(&self, rigid: usize) -> usize {
+        self.negative_pivots.map_or(self.modes_below, |negative| negative.saturating_sub(rigid))
+    }
+}
+
 /// Eigenvalues of the pencil below `sigma`, rigid modes included.
 pub(super) fn count_below(
     problem: &EigenProblem<'_>,

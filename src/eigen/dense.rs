@@ -1,11 +1,11 @@
 //! All finite modes of a small pencil by one dense symmetric eigenproblem.
 
-use super::lanczos::RitzPairs;
 use super::problem::{EigenFailure, EigenProblem};
-use crate::linalg::{Pencil, SymmetricMatrix, symmetric_eigen};
+use crate::linalg::{Pencil, Solve, SymmetricEigen, SymmetricMatrix, symmetric_eigen};
 use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::{Mat, Par, Side};
+use faer::prelude::ReborrowMut;
+use faer::{Mat, MatMut, Par, Side};
 
 /// Scaled eigenvalues of Ms below this are zero: files with 10 digits leave less.
 const NULL: f64 = 1e-10;
@@ -23,53 +23,75 @@ pub(super) fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
     (!indefinite).then_some(rank * pencil.block())
 }
 
-/// The lowest `wanted` flexible modes (and the values of the next ones) from
-/// S = L^-1 M L^-T with K + tau M = L L', whose eigenvalues are 1 / (lambda + tau).
-///
-/// `highest` is an estimate of the largest eigenvalue wanted: tau is the geometric mean of it and the first one, so
-/// that both ends keep digits.
-pub(super) fn lowest_modes(
-    problem: &EigenProblem<'_>,
-    wanted: usize,
-    flexible: usize,
-    highest: f64,
-) -> Result<RitzPairs, EigenFailure> {
-    let pencil = &problem.pencil;
-    let n = pencil.n();
-    let tau = (0.3 * problem.first_estimate * highest.max(problem.first_estimate)).sqrt();
-    let m = dense_mass(pencil);
-    let k = dense(pencil.stiffness());
-    let a = Mat::from_fn(n, n, |i, j| k[(i, j)] + tau * m[(i, j)]);
-    let factor =
-        Llt::new(a.as_ref(), Side::Lower).map_err(|_| EigenFailure::NotPositiveDefinite { shift: tau })?;
-    let l = factor.L();
-    let mut s = m;
-    solve_lower_triangular_in_place(l, s.as_mut(), Par::Seq);
-    let mut s = s.transpose().to_owned();
-    solve_lower_triangular_in_place(l, s.as_mut(), Par::Seq);
-    // Deflation: a rigid mode r has S y = y / tau with the unit vector y = L' r / sqrt(tau).
-    let y = l.transpose() * problem.rigid;
-    let s = Mat::from_fn(n, n, |i, j| {
-        let rigid: f64 = (0..y.ncols()).map(|c| y[(i, c)] * y[(j, c)]).sum();
-        0.5 * (s[(i, j)] + s[(j, i)]) - rigid / (tau * tau)
-    });
-    let eigen = symmetric_eigen(s.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
-    let count = wanted.min(flexible);
-    let lambda = |i: usize| 1.0 / eigen.values[n - 1 - i] - tau;
-    let mut vectors = Mat::from_fn(n, count, |i, j| eigen.vectors[(i, n - 1 - j)]);
-    solve_upper_triangular_in_place(l.transpose(), vectors.as_mut(), Par::Seq);
-    for j in 0..count {
-        let root = eigen.values[n - 1 - j].sqrt().recip();
-        for i in 0..n {
-            vectors[(i, j)] *= root;
-        }
+/// Shift for modes between `first` and `highest`: the geometric mean, so that both ends keep digits.
+pub(super) fn shift(first: f64, highest: f64) -> f64 {
+    (0.3 * first * highest.max(first)).sqrt()
+}
+
+/// Dense Cholesky factor K + tau M = L L'.
+pub(super) struct DenseFactor {
+    l: Mat<f64>,
+    tau: f64,
+}
+
+impl Solve for DenseFactor {
+    fn shift(&self) -> f64 {
+        self.tau
     }
-    Ok(RitzPairs {
-        eigenvalues: (0..count).map(lambda).collect(),
-        vectors,
-        next: (count..flexible).map(lambda).collect(),
-        tau,
-    })
+
+    fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
+        solve_lower_triangular_in_place(self.l.as_ref(), x.rb_mut(), Par::Seq);
+        solve_upper_triangular_in_place(self.l.as_ref().transpose(), x, Par::Seq);
+    }
+}
+
+/// The whole spectrum of S = L^-1 M L^-T, whose eigenvalues are 1 / (lambda + tau), rigid modes deflated.
+pub(super) struct Spectrum {
+    /// The factor, for refinement.
+    pub factor: DenseFactor,
+    eigen: SymmetricEigen,
+}
+
+impl Spectrum {
+    /// Factors and diagonalises.
+    pub(super) fn new(problem: &EigenProblem<'_>, tau: f64) -> Result<Self, EigenFailure> {
+        let pencil = &problem.pencil;
+        let n = pencil.n();
+        let m = dense_mass(pencil);
+        let k = dense(pencil.stiffness());
+        let a = Mat::from_fn(n, n, |i, j| k[(i, j)] + tau * m[(i, j)]);
+        let llt = Llt::new(a.as_ref(), Side::Lower)
+            .map_err(|_| EigenFailure::NotPositiveDefinite { shift: tau })?;
+        let l = llt.L().to_owned();
+        let mut s = m;
+        solve_lower_triangular_in_place(l.as_ref(), s.as_mut(), Par::Seq);
+        let mut s = s.transpose().to_owned();
+        solve_lower_triangular_in_place(l.as_ref(), s.as_mut(), Par::Seq);
+        // Deflation: a rigid mode r has S y = y / tau with the unit vector y = L' r / sqrt(tau).
+        let y = l.transpose() * problem.rigid;
+        let s = Mat::from_fn(n, n, |i, j| {
+            let rigid: f64 = (0..y.ncols()).map(|c| y[(i, c)] * y[(j, c)]).sum();
+            0.5 * (s[(i, j)] + s[(j, i)]) - rigid / (tau * tau)
+        });
+        let eigen = symmetric_eigen(s.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+        Ok(Self { factor: DenseFactor { l, tau }, eigen })
+    }
+
+    /// The i-th flexible eigenvalue lambda, ascending.
+    pub(super) fn eigenvalue(&self, i: usize) -> f64 {
+        let n = self.eigen.values.len();
+        1.0 / self.eigen.values[n - 1 - i] - self.factor.tau
+    }
+
+    /// The lowest `count` modes.
+    pub(super) fn vectors(&self, count: usize) -> Mat<f64> {
+        let n = self.eigen.values.len();
+        let mut vectors = Mat::from_fn(n, count, |i, j| {
+            self.eigen.vectors[(i, n - 1 - j)] / self.eigen.values[n - 1 - j].abs().sqrt()
+        });
+        solve_upper_triangular_in_place(self.factor.l.as_ref().transpose(), vectors.as_mut(), Par::Seq);
+        vectors
+    }
 }
 
 /// The largest ratio K_ii / M_ii: a Rayleigh quotient, hence a lower bound of the largest eigenvalue and close to it.

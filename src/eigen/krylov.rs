@@ -1,11 +1,9 @@
 //! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
 
 use super::problem::{Counters, EigenProblem};
-use crate::linalg::{Cholesky, combine, gram, subtract_combination, symmetric_eigen};
+use crate::linalg::{Cholesky, Solve, combine, gram, subtract_combination};
+use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
-
-/// Directions of a new block whose scaled Gram eigenvalue is below this are dependent on the others.
-const DEPENDENT: f64 = 1e-10;
 
 /// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is rounding.
 const VANISHED: f64 = 1e-13;
@@ -49,6 +47,11 @@ impl<'a> Krylov<'a> {
             coupling: Mat::zeros(0, 0),
             random: 0,
         }
+    }
+
+    /// Starts the sequence of random blocks elsewhere.
+    pub(super) fn choose_random(&mut self, seed: u64) {
+        self.random = seed;
     }
 
     /// Vectors that the operator has been applied to: the size of T that is valid.
@@ -151,40 +154,27 @@ impl<'a> Krylov<'a> {
         self.m_fresh = block.mw;
     }
 
-    /// Two full passes of block Gram-Schmidt against the rigid modes and the basis, then an orthonormalisation by
-    /// the eigenvectors of the scaled Gram matrix (rank revealing), twice.
+    /// Two passes of: block Gram-Schmidt against the rigid modes and the basis, then column by column inside the block.
+    /// The second pass works on unit vectors, so that even a direction that lost ten digits in the first ends
+    /// orthogonal to rounding; only what is rounding altogether is dropped.
     fn orthonormalise(&self, mut w: Mat<f64>, counters: &mut Counters) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
         let basis = self.v.as_ref().subcols(0, self.m);
         let mut h = Mat::zeros(self.m, width);
-        let mut norms = Vec::new();
-        for pass in 0..2 {
-            counters.mass_columns += width as u64;
-            let mw = pencil.apply_mass(w.as_ref());
-            if pass == 0 {
-                norms = (0..width).map(|j| (w.col(j).transpose() * mw.col(j)).max(0.0).sqrt()).collect();
-            }
+        let mut b = Mat::<f64>::identity(width, width);
+        let mut mw = Mat::zeros(0, 0);
+        for _ in 0..2 {
+            counters.mass_columns += 2 * w.ncols() as u64;
+            mw = pencil.apply_mass(w.as_ref());
+            let norms: Vec<f64> = (0..w.ncols()).map(|j| dot(&w, &mw, j, j).max(0.0).sqrt()).collect();
             let rigid = gram(self.problem.rigid, mw.as_ref());
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
             subtract_combination(w.as_mut(), basis, part.as_ref());
-            h += part;
-        }
-        let mut b = Mat::<f64>::identity(width, width);
-        let mut mw = Mat::zeros(0, 0);
-        for pass in 0..2 {
-            counters.mass_columns += w.ncols() as u64;
+            h += &part * &b;
             mw = pencil.apply_mass(w.as_ref());
-            let g = gram(w.as_ref(), mw.as_ref());
-            let smallest: Vec<f64> = match pass {
-                0 => norms.iter().map(|norm| VANISHED * norm).collect(),
-                _ => vec![0.0; w.ncols()],
-            };
-            let (to_new, to_old) = orthonormal_factors(g.as_ref(), &smallest);
-            w = combine(w.as_ref(), to_new.as_ref());
-            mw = combine(mw.as_ref(), to_new.as_ref());
-            b = &to_old * &b;
+            b = gram_schmidt(&mut w, &mut mw, &norms) * &b;
         }
         let room = self.room();
         if w.ncols() > room {
@@ -196,31 +186,52 @@ impl<'a> Krylov<'a> {
     }
 }
 
-/// For a Gram matrix G = W'MW: C with (W C)' M (W C) = I on the independent directions, and its left inverse B with
-/// W = (W C) B there. Columns with a norm of at most `smallest` count as zero.
-fn orthonormal_factors(g: MatRef<'_, f64>, smallest: &[f64]) -> (Mat<f64>, Mat<f64>) {
-    let n = g.nrows();
-    let norm = |i: usize| g[(i, i)].max(0.0).sqrt();
-    let scale: Vec<f64> = (0..n).map(|i| if norm(i) > smallest[i] { norm(i) } else { 0.0 }).collect();
-    let scaled = Mat::from_fn(n, n, |i, j| {
-        let d = scale[i] * scale[j];
-        if d > 0.0 { g[(i.max(j), i.min(j))] / d } else { 0.0 }
-    });
-    let Some(eigen) = symmetric_eigen(scaled.as_ref()) else {
-        return (Mat::zeros(n, 0), Mat::zeros(0, n));
-    };
-    let largest = eigen.values.last().copied().unwrap_or(0.0);
-    let kept: Vec<usize> =
-        (0..n).rev().filter(|&i| eigen.values[i] > DEPENDENT * largest && largest > 0.0).collect();
-    let to_new = Mat::from_fn(n, kept.len(), |i, c| {
-        let j = kept[c];
-        if scale[i] > 0.0 { eigen.vectors[(i, j)] / (scale[i] * eigen.values[j].sqrt()) } else { 0.0 }
-    });
-    let to_old = Mat::from_fn(kept.len(), n, |c, i| {
-        let j = kept[c];
-        eigen.vectors[(i, j)] * eigen.values[j].sqrt() * scale[i]
-    });
-    (to_new, to_old)
+/// w_i' (M w)_j.
+fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
+    gram(w.as_ref().subcols(i, 1), mw.as_ref().subcols(j, 1))[(0, 0)]
+}
+
+/// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`] of
+/// their norm before are dropped. Returns T (new x old) with W_old = W_new T.
+fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> {
+    let width = w.ncols();
+    let mut t = Mat::zeros(width, width);
+    let mut kept = 0;
+    for j in 0..width {
+        // Twice, as in any Gram-Schmidt that may lose digits.
+        for _ in 0..2 {
+            for i in 0..kept {
+                let along = dot(w, mw, i, j);
+                t[(i, j)] += along;
+                subtract_column(w, j, i, along);
+                subtract_column(mw, j, i, along);
+            }
+        }
+        let norm = dot(w, mw, j, j).max(0.0).sqrt();
+        if norm <= VANISHED * norms[j] {
+            continue;
+        }
+        t[(kept, j)] = norm;
+        for block in [&mut *w, &mut *mw] {
+            for row in 0..block.nrows() {
+                block[(row, kept)] = block[(row, j)] / norm;
+            }
+        }
+        kept += 1;
+    }
+    *w = w.as_ref().subcols(0, kept).to_owned();
+    *mw = mw.as_ref().subcols(0, kept).to_owned();
+    t.as_ref().subrows(0, kept).to_owned()
+}
+
+/// Column `target` -= factor * column `source`, for source < target.
+fn subtract_column(block: &mut Mat<f64>, target: usize, source: usize, factor: f64) {
+    let (left, right) = block.as_mut().split_at_col_mut(target);
+    let from = left.into_const().col(source).try_as_col_major().expect("blocks are column-major").as_slice();
+    let to = right.col_mut(0).try_as_col_major_mut().expect("blocks are column-major").as_slice_mut();
+    for (t, s) in to.iter_mut().zip(from) {
+        *t -= factor * s;
+    }
 }
 
 /// Reproducible uniform noise in (-1, 1) by place: a SplitMix64 hash of (seed, row, column).

@@ -7,7 +7,7 @@
 use super::krylov::Krylov;
 use super::noise::energy_noise;
 use super::problem::{Counters, EigenFailure, EigenProblem};
-use crate::linalg::{Analysis, Cholesky, SymmetricEigen, symmetric_eigen};
+use crate::linalg::{Analysis, Cholesky, Solve, SymmetricEigen, symmetric_eigen};
 use crate::progress::{Event, Watch};
 use faer::Mat;
 
@@ -26,14 +26,10 @@ const SHIFT_RANGE: (f64, f64) = (0.02, 1.0);
 
 /// Lowest Ritz pairs, ascending in lambda.
 pub(super) struct RitzPairs {
-    /// lambda by the projected problem.
-    pub eigenvalues: Vec<f64>,
     /// Vectors (N x k), M-orthonormal.
     pub vectors: Mat<f64>,
     /// Further Ritz values, loosely converged.
     pub next: Vec<f64>,
-    /// The shift in use.
-    pub tau: f64,
 }
 
 /// A factor of K + tau M with tau from the flexible spectrum; refactors when the first estimate was far off.
@@ -41,14 +37,14 @@ pub(super) fn shifted_factor<'a>(
     problem: &EigenProblem<'_>,
     analysis: &'a Analysis,
     counters: &mut Counters,
-) -> Result<(Cholesky<'a>, f64), EigenFailure> {
+) -> Result<Cholesky<'a>, EigenFailure> {
     let mut tau = 0.3 * problem.first_estimate;
     loop {
         let factor = factorise(problem, analysis, tau, counters)?;
         let lowest = probe_lowest(problem, &factor, tau, counters)?;
         // A Ritz value is an upper bound: the shift is far too large when it is below a small part of tau.
         if lowest > SHIFT_RANGE.0 * tau {
-            return Ok((factor, tau));
+            return Ok(factor);
         }
         tau = 0.5 * SHIFT_RANGE.1 * lowest;
     }
@@ -133,22 +129,33 @@ fn zero_energy(
     })
 }
 
-/// The `wanted` lowest flexible modes with relative Ritz residuals of the operator below `tolerance`, extended to
-/// the end of the cluster of the last one. `extra` rounds of fresh random directions are added first: a repeated
-/// search after a count that found too many.
+/// What a search is for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Goal {
+    /// Number of modes, extended to the end of the cluster of the last one.
+    pub wanted: usize,
+    /// Relative Ritz residual of the operator.
+    pub tolerance: f64,
+    /// Eigenvalues closer than this (relative) are one cluster.
+    pub cluster_gap: f64,
+    /// Chooses the random start: a search repeated after a count that found more modes starts elsewhere.
+    pub attempt: u64,
+}
+
+/// The lowest flexible modes.
 pub(super) fn lowest_modes(
     problem: &EigenProblem<'_>,
     factor: &Cholesky<'_>,
-    tau: f64,
-    wanted: usize,
-    tolerance: f64,
-    cluster_gap: f64,
+    goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<RitzPairs, EigenFailure> {
+    let Goal { wanted, tolerance, cluster_gap, attempt } = *goal;
+    let tau = factor.shift();
     let free = problem.pencil.n() - problem.rigid.ncols();
     let capacity = (2 * wanted + 16 * BLOCK).min(free + BLOCK);
     let mut krylov = Krylov::new(problem, factor, capacity);
+    krylov.choose_random(1000 * attempt);
     krylov.append_random(BLOCK.min(free), counters);
     let mut checked = 0;
     loop {
@@ -183,15 +190,18 @@ pub(super) fn lowest_modes(
             last += 1;
         }
         let converged = (0..last).take_while(|&i| complete || good(i, tolerance)).count();
-        // One more, loosely: it shows the gap above the last mode.
-        let beyond = complete || (last < size && good(last, 1e-3));
+        // One more, as well as the gap below it needs: it shows that the cluster of the last mode has ended.
+        let beyond = complete
+            || (last < size && {
+                let gap =
+                    if last > 0 { ritz.values[size - last] - ritz.values[size - 1 - last] } else { f64::MAX };
+                good(last, 1e-3) && norms[last] <= 0.1 * gap
+            });
         watch(Event::Fraction(converged as f64 / wanted.max(1) as f64));
         if converged == last && beyond {
             return Ok(RitzPairs {
-                eigenvalues: (0..last).map(lambda).collect(),
                 vectors: krylov.combination(s.as_ref().subcols(0, last)),
                 next: (last..size).take_while(|&i| complete || good(i, 1e-2)).map(lambda).collect(),
-                tau,
             });
         }
         if complete || counters.restarts >= MAX_RESTARTS {

@@ -2,7 +2,7 @@
 
 use super::noise::rounding_residual;
 use super::problem::{Counters, EigenFailure, EigenProblem};
-use crate::linalg::{Cholesky, combine, gram, subtract_combination, symmetric_eigen};
+use crate::linalg::{Solve, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{Mat, MatRef};
 
 /// Refined modes with their products.
@@ -13,23 +13,38 @@ pub(super) struct Refined {
     pub floors: Vec<f64>,
 }
 
-/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the basis.
-pub(super) fn inverse_iteration(
+/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the basis. With
+/// `correct`, one step of iterative refinement follows, which brings the residual of the solve to its rounding floor.
+fn inverse_iteration(
     problem: &EigenProblem<'_>,
-    factor: &Cholesky<'_>,
+    factor: &dyn Solve,
     x: MatRef<'_, f64>,
+    correct: bool,
     counters: &mut Counters,
 ) -> Mat<f64> {
-    counters.mass_columns += x.ncols() as u64;
-    counters.solved_columns += x.ncols() as u64;
-    let mut y = problem.pencil.apply_mass(x);
+    let pencil = &problem.pencil;
+    let k = x.ncols() as u64;
+    counters.mass_columns += k;
+    counters.solved_columns += k;
+    let b = pencil.apply_mass(x);
+    let mut y = b.clone();
     factor.solve_in_place(y.as_mut());
+    if correct {
+        counters.mass_columns += k;
+        counters.stiffness_columns += k;
+        counters.solved_columns += k;
+        let shifted =
+            pencil.apply_stiffness(y.as_ref()) + pencil.apply_mass(y.as_ref()) * faer::Scale(factor.shift());
+        let mut correction = b - shifted;
+        factor.solve_in_place(correction.as_mut());
+        y += correction;
+    }
     y
 }
 
 /// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz vectors
 /// in ascending order of lambda.
-pub(super) fn rayleigh_ritz(
+fn rayleigh_ritz(
     problem: &EigenProblem<'_>,
     mut x: Mat<f64>,
     counters: &mut Counters,
@@ -96,17 +111,17 @@ pub(super) fn residuals(
     (residuals, floors)
 }
 
-/// Refines Lanczos vectors until the K-residuals keep `tolerance` or stand at the rounding floor; at most three times.
+/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor; at most three times.
 pub(super) fn refine(
     problem: &EigenProblem<'_>,
-    factor: &Cholesky<'_>,
+    factor: &dyn Solve,
     mut x: Mat<f64>,
     tolerance: f64,
     counters: &mut Counters,
 ) -> Result<Refined, EigenFailure> {
     let mut best: Option<Refined> = None;
-    for _ in 0..3 {
-        let y = inverse_iteration(problem, factor, x.as_ref(), counters);
+    for round in 0..3 {
+        let y = inverse_iteration(problem, factor, x.as_ref(), round > 0, counters);
         let (eigenvalues, vectors) = rayleigh_ritz(problem, y, counters)?;
         let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
         let worst = |r: &[f64]| r.iter().fold(0.0f64, |m, v| m.max(*v));

@@ -3,13 +3,13 @@
 use super::canonical::{canonical_basis, clusters};
 use super::completeness::{Completeness, Proof, count_below};
 use super::dense;
-use super::lanczos::{self, NOISE_FACTOR, RitzPairs};
+use super::lanczos::{self, Goal, NOISE_FACTOR};
 use super::noise::energy_noise;
 use super::problem::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Wanted,
 };
-use super::refine::{Refined, rayleigh_ritz, refine, residuals};
-use crate::linalg::{Analysis, Cholesky, is_positive_semidefinite};
+use super::refine::{Refined, refine, residuals as residuals_of};
+use crate::linalg::{Analysis, Solve, is_positive_semidefinite};
 use crate::progress::{Event, Watch};
 
 /// Models up to this size are solved densely: all modes take less than a second.
@@ -63,26 +63,18 @@ pub fn solve(
         let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
         (search, Some(finite))
     } else {
-        (search_iteratively(problem, &analysis, wanted, tolerance, watch, &mut counters)?, None)
+        (search_iteratively(problem, &analysis, wanted, tolerance, 0, watch, &mut counters)?, None)
     };
     let mut completeness = prove(problem, settings, &analysis, &search, watch, &mut counters)?;
-    if let Some(missed) = missed(&completeness, rigid) {
+    let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
+    if missed > 0 {
         // Once more, from other directions and for as many modes as there are.
-        search = search_iteratively(problem, &analysis, wanted + missed, tolerance, watch, &mut counters)?;
+        search = search_iteratively(problem, &analysis, wanted + missed, tolerance, 1, watch, &mut counters)?;
         completeness = prove(problem, settings, &analysis, &search, watch, &mut counters)?;
-        if missed_or_spurious(&completeness, rigid) {
-            return Err(EigenFailure::CountDiffers {
-                found: completeness.modes_below,
-                counted: completeness.negative_pivots.unwrap_or(0).saturating_sub(rigid),
-                shift: completeness.shift,
-            });
-        }
-    } else if missed_or_spurious(&completeness, rigid) {
-        return Err(EigenFailure::CountDiffers {
-            found: completeness.modes_below,
-            counted: completeness.negative_pivots.unwrap_or(0).saturating_sub(rigid),
-            shift: completeness.shift,
-        });
+    }
+    let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
+    if found != counted {
+        return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
     }
     finish(problem, search, completeness, wanted, finite_modes, counters)
 }
@@ -107,35 +99,26 @@ fn search_densely(
     let flexible = finite.saturating_sub(problem.rigid.ncols());
     let all = dense::highest_estimate(pencil);
     let highest = if wanted * 5 > flexible { all } else { problem.first_estimate };
-    let mut pairs = dense::lowest_modes(problem, wanted, flexible, highest)?;
-    // The whole of the last cluster.
-    let complete = cluster_end(&pairs);
-    if complete > pairs.eigenvalues.len() {
-        pairs = dense::lowest_modes(problem, complete, flexible, highest)?;
+    let mut tau = dense::shift(problem.first_estimate, highest);
+    let mut spectrum = dense::Spectrum::new(problem, tau)?;
+    let first = spectrum.eigenvalue(0);
+    if wanted * 5 <= flexible && first > 0.0 && first < 0.02 * tau {
+        // The estimate was far off: digits of the lowest modes are lost at so large a shift.
+        tau = dense::shift(first, first);
+        spectrum = dense::Spectrum::new(problem, tau)?;
     }
-    let _ = tolerance;
-    let (eigenvalues, vectors) = rayleigh_ritz(problem, pairs.vectors, counters)?;
-    let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
-    let refined = Refined { eigenvalues, vectors, residuals, floors };
+    let mut last = wanted.min(flexible);
+    while last > 0
+        && last < flexible
+        && spectrum.eigenvalue(last) - spectrum.eigenvalue(last - 1)
+            <= CLUSTER_GAP * spectrum.eigenvalue(last).abs()
+    {
+        last += 1;
+    }
+    let refined = refine(problem, &spectrum.factor, spectrum.vectors(last), tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
-    Ok((Search { refined, next: pairs.next, tau: pairs.tau }, flexible))
-}
-
-/// Number of modes up to the end of the cluster that the last computed one belongs to.
-fn cluster_end(pairs: &RitzPairs) -> usize {
-    let mut last = match pairs.eigenvalues.last() {
-        Some(&last) => last,
-        None => return 0,
-    };
-    let mut end = pairs.eigenvalues.len();
-    for &next in &pairs.next {
-        if next - last > CLUSTER_GAP * last.abs() {
-            break;
-        }
-        last = next;
-        end += 1;
-    }
-    end
+    let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
+    Ok((Search { refined, next, tau }, flexible))
 }
 
 fn search_iteratively(
@@ -143,17 +126,18 @@ fn search_iteratively(
     analysis: &Analysis,
     wanted: usize,
     tolerance: f64,
+    attempt: u64,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Search, EigenFailure> {
     watch(Event::Phase("factorisation"));
-    let (factor, tau): (Cholesky<'_>, f64) = lanczos::shifted_factor(problem, analysis, counters)?;
+    let factor = lanczos::shifted_factor(problem, analysis, counters)?;
     watch(Event::Phase("modes"));
-    let pairs =
-        lanczos::lowest_modes(problem, &factor, tau, wanted, 0.1 * tolerance, CLUSTER_GAP, watch, counters)?;
+    let goal = Goal { wanted, tolerance: 0.1 * tolerance, cluster_gap: CLUSTER_GAP, attempt };
+    let pairs = lanczos::lowest_modes(problem, &factor, &goal, watch, counters)?;
     let refined = refine(problem, &factor, pairs.vectors, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
-    Ok(Search { refined, next: pairs.next, tau: pairs.tau })
+    Ok(Search { refined, next: pairs.next, tau: factor.shift() })
 }
 
 /// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
@@ -216,18 +200,6 @@ fn prove(
     })
 }
 
-/// How many modes the count knows that the search did not find.
-fn missed(completeness: &Completeness, rigid: usize) -> Option<usize> {
-    completeness
-        .negative_pivots
-        .map(|negative| negative.saturating_sub(rigid + completeness.modes_below))
-        .filter(|&missed| missed > 0)
-}
-
-fn missed_or_spurious(completeness: &Completeness, rigid: usize) -> bool {
-    completeness.negative_pivots.is_some_and(|negative| negative != rigid + completeness.modes_below)
-}
-
 /// Canonical form, the wanted number of modes, residuals of what is handed out.
 fn finish(
     problem: &EigenProblem<'_>,
@@ -241,7 +213,7 @@ fn finish(
     let groups = clusters(&eigenvalues, CLUSTER_GAP);
     canonical_basis(vectors.as_mut(), &groups);
     if groups.iter().any(|g| g.len() > 1) {
-        (residuals, floors) = self::residuals(problem, &eigenvalues, vectors.as_ref(), &mut counters);
+        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
     }
     let given = wanted.min(eigenvalues.len());
     let next_eigenvalue = eigenvalues.get(given).copied().or(search.next.first().copied());

@@ -46,7 +46,11 @@ impl Reader for Hdf5 {
                 return Err(vec![Diagnostic::new(Code::FileFormatUnknown, message).with_help(help)]);
             }
             let file = File::open(path).map_err(|e| {
-                vec![Diagnostic::new(Code::FileUnreadable, format!("HDF5 file cannot be opened: {e}"))]
+                let message = format!("HDF5 file cannot be opened: {e}");
+                vec![
+                    Diagnostic::new(Code::FileUnreadable, message)
+                        .with_help("transfer or write the file again"),
+                ]
             })?;
             let (name, group) = match source.group {
                 Some(name) => (name.to_owned(), named(&file, name)?),

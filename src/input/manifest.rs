@@ -262,7 +262,8 @@ impl Walk<'_> {
         let name = self.string(table, "name")?;
         // The name becomes a group of the flex-body file.
         if name.contains('/') || name.chars().all(|c| c == '.') || name.chars().any(char::is_control) {
-            let message = format!("interface is named `{}`", name.escape_debug());
+            let message =
+                format!("interface name `{}` cannot be the name of an HDF5 group", name.escape_debug());
             self.complain(Code::ManifestSyntax, span, message);
             return None;
         }

@@ -84,6 +84,16 @@ fn supernodal_flops(symbolic: &SymbolicCholesky<usize>) -> f64 {
 pub struct Cholesky<'a> {
     analysis: &'a Analysis,
     values: Vec<f64>,
+    tau: f64,
+}
+
+/// Something that solves with K + tau M: the sparse factor, or the dense one of a small model.
+pub trait Solve {
+    /// The shift tau.
+    fn shift(&self) -> f64;
+
+    /// Replaces X (n x k) by (K + tau M)^-1 X.
+    fn solve_in_place(&self, x: MatMut<'_, f64>);
 }
 
 impl<'a> Cholesky<'a> {
@@ -94,7 +104,7 @@ impl<'a> Cholesky<'a> {
         let matrix =
             SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
         let symbolic = &analysis.symbolic;
-        let par = Par::rayon(0);
+        let par = Par::Seq;
         let params = Spec::default();
         let mut values = vec![0.0; symbolic.len_val()];
         let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, params));
@@ -109,12 +119,18 @@ impl<'a> Cholesky<'a> {
                 params,
             )
             .ok()?;
-        Some(Self { analysis, values })
+        Some(Self { analysis, values, tau })
+    }
+}
+
+impl Solve for Cholesky<'_> {
+    fn shift(&self) -> f64 {
+        self.tau
     }
 
-    /// Replaces X (n x k) by (K + tau M)^-1 X. Columns go in blocks of eight, each on one thread: the factor is
+    /// Columns go in blocks of eight, each on one thread: the factor is
     /// streamed once per block, and the sums do not depend on the number of threads.
-    pub fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
+    fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
         let factor = LltRef::new(&self.analysis.symbolic, &self.values);
         let mut memory =
             MemBuffer::new(self.analysis.symbolic.solve_in_place_scratch::<f64>(x.ncols().min(8), Par::Seq));
@@ -163,7 +179,7 @@ impl Inertia {
         let matrix =
             SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
         let symbolic = &analysis.symbolic;
-        let par = Par::rayon(0);
+        let par = Par::Seq;
         let params = Spec::default();
         let mut values = vec![0.0; symbolic.len_val()];
         let mut subdiagonal = vec![0.0; n];

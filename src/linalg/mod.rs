@@ -10,7 +10,7 @@ mod sparse;
 mod tall;
 
 pub use dense::{SymmetricEigen, symmetric_eigen};
-pub use factor::{Analysis, Cholesky, Inertia, is_positive_semidefinite};
+pub use factor::{Analysis, Cholesky, Inertia, Solve, is_positive_semidefinite};
 pub use ordering::{connected_components, nested_dissection};
 pub use pencil::Pencil;
 pub use product::multiply;

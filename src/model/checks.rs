@@ -21,8 +21,8 @@ pub struct CheckedModel {
 ///
 /// # Errors
 /// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and rigid motion.
-pub fn check(raw: RawModel) -> Result<CheckedModel> {
-    let mut found = Vec::new();
+pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
+    let mut found = std::mem::take(&mut raw.diagnostics);
     check_matrix(&raw.stiffness, "stiffness", &mut found);
     check_matrix(&raw.mass, "mass", &mut found);
     let (nk, nm) = (raw.stiffness.matrix.n_cols(), raw.mass.matrix.n_cols());

@@ -1,1 +1,17 @@
-//! (filled below)
+//! The flex-body file: HDF5, one table for writer, reader, validator and documentation. The only room that names
+//! HDF5 for output.
+
+mod assemble;
+mod derived;
+mod hdf5_value;
+mod heap;
+mod names;
+mod read;
+mod scan;
+mod schema;
+mod value;
+mod write;
+
+pub use crate::output::OutputSlot;
+pub use read::{read, validate};
+pub use write::{prepare_output, write, write_to};

@@ -156,11 +156,9 @@ fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Bad> {
     let text = std::str::from_utf8(field).ok();
     match text.and_then(|t| t.parse::<i128>().ok()) {
         Some(index) if index >= 1 && index <= i128::from(n) => Ok((index - 1) as u32),
-        Some(index) => Err((
-            Code::MatrixIndex,
-            format!("{which} {index} is out of range, the matrix has rows 1 to {n}"),
-            None,
-        )),
+        Some(index) => {
+            Err((Code::MatrixIndex, format!("{which} {index} is out of range, expected 1 to {n}"), None))
+        }
         None => {
             Err((Code::MatrixSyntax, format!("{which} `{}` is not a whole number", excerpt(field)), None))
         }

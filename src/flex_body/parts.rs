@@ -1,12 +1,10 @@
-//! The product: a validated flexible body, independent of the files it came from and goes to.
+//! What a flexible body is made of: plain data, not yet checked.
 
-use crate::invariants::Invariants;
+use crate::invariants::{Frame, Invariants};
 use crate::model::Nodes;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
-
-pub use crate::invariants::Frame;
 
 /// Where a body came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,13 +86,9 @@ pub struct Interface {
     pub nodes: Vec<usize>,
 }
 
-/// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FlexBody {
-    parts: Parts,
-}
-
-/// The parts of a [`FlexBody`], public so that makers (pipeline, reader) can fill them; see [`FlexBody::new`].
+/// The parts of a [`FlexBody`](super::FlexBody), public so that makers (pipeline, reader) can fill them.
+///
+/// [`FlexBody::new`](super::FlexBody::new) says what must hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parts {
     /// Provenance.

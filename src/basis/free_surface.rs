@@ -1,0 +1,278 @@
+//! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::eigen::{
+    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Proof, Wanted, energy_noise,
+    solve,
+};
+use crate::error::{Error, Result};
+use crate::linalg::{Pencil, SymmetricMatrix, gram, symmetric_eigen};
+use crate::model::{FeModel, centre_and_length, rigid_fields};
+use crate::progress::Watch;
+use faer::{Mat, MatRef};
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeSettings {
+    /// The lowest so many modes, or all below lambda (1/time^2).
+    pub wanted: Wanted,
+    /// Promise about residuals and completeness.
+    pub accuracy: Accuracy,
+    /// Dense, Lanczos or whichever suits.
+    pub method: Method,
+}
+
+impl Default for ModeSettings {
+    /// 20 modes at `standard` accuracy.
+    fn default() -> Self {
+        let EigenSettings { wanted, accuracy, method } = EigenSettings::default();
+        Self { wanted, accuracy, method }
+    }
+}
+
+/// Free-surface modes of a model, in model axes.
+#[derive(Debug, Clone)]
+pub struct FreeSurfaceModes {
+    /// Eigenvalues, shapes (3n x nf, row 3 i + k), residuals, completeness, work.
+    pub solution: EigenSolution,
+    /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what digits and
+    /// node positions leave of rigid motion.
+    pub rigid_noise: f64,
+    /// For each mode, the standard deviation of lambda that the digits of K explain, relative to lambda.
+    pub input_noise: Vec<f64>,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Relative energy of rigid motion above which the first mode is not a free mode: the body is tied to ground weakly.
+const RIGID_ENERGY: f64 = 0.05;
+
+/// Noise of lambda above which the user is told.
+const NOISE_TOLD: f64 = 1e-6;
+
+/// Computes the free-surface modes of `model`.
+///
+/// # Errors
+/// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
+pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<FreeSurfaceModes> {
+    free_surface_of(model, model.scalar_mass(), settings, watch)
+}
+
+/// The same with another mass matrix Ms (a lumped one) in place of the model's.
+///
+/// # Errors
+/// As [`free_surface`].
+pub fn free_surface_of(
+    model: &FeModel,
+    scalar_mass: &SymmetricMatrix,
+    settings: &ModeSettings,
+    watch: Watch<'_>,
+) -> Result<FreeSurfaceModes> {
+    let pencil = Pencil::new(model.stiffness(), scalar_mass, 3);
+    let positions = &model.nodes().positions;
+    let rigid = rigid_modes(&pencil, positions)?;
+    let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
+    let first_estimate = quadratic_estimate(&pencil, positions, rigid.as_ref());
+    let problem = EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error };
+    let eigen =
+        EigenSettings { wanted: settings.wanted, accuracy: settings.accuracy, method: settings.method };
+    let solution = solve(&problem, &eigen, watch).map_err(|failure| explain(model, failure))?;
+    let mut diagnostics = Vec::new();
+    let first = solution.eigenvalues.first().copied().unwrap_or(f64::INFINITY);
+    let energy = gram(rigid.as_ref(), pencil.apply_stiffness(rigid.as_ref()).as_ref());
+    let rigid_noise = energy.norm_l2() / first;
+    if rigid_noise > RIGID_ENERGY {
+        let message = format!(
+            "rigid motion carries {:.1} % of the energy of the first mode: lambda_rigid / lambda_1 = {rigid_noise:.2e}",
+            100.0 * rigid_noise
+        );
+        return Err(Diagnostic::new(Code::RigidMotionStrained, message)
+            .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
+            .into());
+    }
+    let input_noise: Vec<f64> = energy_noise(model.stiffness(), solution.vectors.as_ref(), input_error)
+        .iter()
+        .zip(&solution.eigenvalues)
+        .map(|(noise, lambda)| noise / lambda)
+        .collect();
+    let noise = input_noise.iter().fold(rigid_noise, |m, n| m.max(*n));
+    if noise > NOISE_TOLD {
+        let message = format!(
+            "the {} digits of the stiffness values leave a relative noise of {noise:.0e} in the lowest eigenvalues",
+            model.digits()
+        );
+        diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
+    }
+    describe(&solution, settings, model.stiffness().n() - 6, &mut diagnostics);
+    Ok(FreeSurfaceModes { solution, rigid_noise, input_noise, diagnostics })
+}
+
+/// Notes about how many modes there are and how they end.
+fn describe(solution: &EigenSolution, settings: &ModeSettings, at_most: usize, notes: &mut Vec<Diagnostic>) {
+    let given = solution.eigenvalues.len();
+    if let Wanted::Lowest(wanted) = settings.wanted
+        && given < wanted
+    {
+        let message = format!(
+            "{wanted} modes were asked for, the model has {given} flexible modes with finite frequency"
+        );
+        notes.push(Diagnostic::new(Code::ModesClamped, message));
+    }
+    if let Some(finite) = solution.finite_modes
+        && finite < at_most
+    {
+        let message =
+            format!("mass matrix is singular: {finite} of {at_most} flexible modes have a finite frequency");
+        notes.push(Diagnostic::new(Code::MassMatrixSingular, message));
+    }
+    let below = solution.completeness.modes_below;
+    if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
+        let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);
+        notes.push(
+            Diagnostic::new(Code::RepeatedSplit, message)
+                .with_help(format!("ask for {below} modes to keep the body's symmetry")),
+        );
+    }
+    if solution.completeness.proof == Proof::NotProved {
+        let message =
+            format!("completeness of the {given} modes is not proved: {}", solution.completeness.remark);
+        notes.push(Diagnostic::new(Code::CompletenessUnproved, message));
+    }
+}
+
+/// Six M-orthonormal rigid modes from the node positions.
+fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> {
+    let (centre, length) = centre_and_length(positions);
+    let fields = rigid_fields(positions, centre, length);
+    let orthonormal = |r: &Mat<f64>| {
+        let mass = gram(r.as_ref(), pencil.apply_mass(r.as_ref()).as_ref());
+        let eigen = symmetric_eigen(mass.as_ref())?;
+        let largest = eigen.values.last().copied().unwrap_or(0.0);
+        // A body on one line has a rotation that moves nothing.
+        if eigen.values[0].is_nan() || eigen.values[0] <= 1e-14 * largest {
+            return None;
+        }
+        let root = Mat::from_fn(6, 6, |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+        Some(r * root)
+    };
+    // Twice: the second pass removes what the condition of the first Gram matrix left.
+    orthonormal(&fields).and_then(|once| orthonormal(&once)).ok_or_else(|| {
+        let message = format!("the {} nodes lie on one line or carry mass on one line only", positions.len());
+        Error::from(Diagnostic::new(Code::BodyDegenerate, message))
+    })
+}
+
+/// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper
+/// bound of the first flexible eigenvalue, within a factor of two for a uniform body.
+fn quadratic_estimate(pencil: &Pencil<'_>, positions: &[[f64; 3]], rigid: MatRef<'_, f64>) -> f64 {
+    let (centre, length) = centre_and_length(positions);
+    let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+    let mut fields = Mat::zeros(pencil.n(), 27);
+    for (i, x) in positions.iter().enumerate() {
+        let r = [0, 1, 2].map(|k| (x[k] - centre[k]) / length);
+        for (e, &(a, b)) in exponents.iter().enumerate() {
+            let value = r[a] * r.get(b).copied().unwrap_or(1.0);
+            for k in 0..3 {
+                fields[(3 * i + k, 3 * e + k)] = value;
+            }
+        }
+    }
+    let mass = |fields: &Mat<f64>| gram(fields.as_ref(), pencil.apply_mass(fields.as_ref()).as_ref());
+    let before = mass(&fields);
+    for _ in 0..2 {
+        let along = gram(rigid, pencil.apply_mass(fields.as_ref()).as_ref());
+        fields -= rigid * along;
+    }
+    let mut m = mass(&fields);
+    for i in 0..m.nrows() {
+        // A rigid field, or one that a singular mass matrix does not see: rounding only.
+        if m[(i, i)] < 1e-10 * before[(i, i)] {
+            m[(i, i)] = 0.0;
+        }
+    }
+    let k = gram(fields.as_ref(), pencil.apply_stiffness(fields.as_ref()).as_ref());
+    smallest_ratio(&k, &m).unwrap_or_else(|| trace_ratio(pencil))
+}
+
+/// Smallest eigenvalue of the small pencil (K, M) on the well-conditioned part of M.
+fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>) -> Option<f64> {
+    let scale: Vec<f64> =
+        (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
+    let scaled = |a: &Mat<f64>| {
+        Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]) * scale[i] * scale[j])
+    };
+    let eigen = symmetric_eigen(scaled(m).as_ref())?;
+    let largest = *eigen.values.last()?;
+    let kept: Vec<usize> = (0..eigen.values.len()).filter(|&i| eigen.values[i] > 1e-6 * largest).collect();
+    let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
+        eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
+    });
+    let ratios = symmetric_eigen((root.transpose() * scaled(k) * &root).as_ref())?;
+    ratios.values.first().copied().filter(|v| *v > 0.0 && v.is_finite())
+}
+
+/// Mean stiffness over mean mass: a scale when nothing better is known.
+fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
+    let k: f64 = pencil.stiffness().diagonal().iter().sum();
+    let m: f64 = pencil.mass().diagonal().iter().sum::<f64>() * pencil.block() as f64;
+    k / m
+}
+
+/// Turns a failure of the eigen-solver into a diagnostic that names nodes.
+fn explain(model: &FeModel, failure: EigenFailure) -> Error {
+    let moving = |vectors: &Mat<f64>| {
+        let mut size: Vec<(usize, f64)> = (0..model.nodes().len())
+            .map(|i| {
+                let square = (0..vectors.ncols())
+                    .flat_map(|j| (0..3).map(move |k| (3 * i + k, j)))
+                    .map(|(r, j)| vectors[(r, j)].powi(2))
+                    .sum::<f64>();
+                (i, square)
+            })
+            .collect();
+        size.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let named: Vec<String> =
+            size.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
+        named.join(", ")
+    };
+    let diagnostic = match failure {
+        EigenFailure::NotConverged { converged, wanted } => {
+            Diagnostic::new(Code::NotConverged, format!("{converged} of {wanted} modes converged"))
+        }
+        EigenFailure::NotPositiveDefinite { shift } => Diagnostic::new(
+            Code::StiffnessIndefinite,
+            format!("K + {shift:.3e} M is not positive definite: K or M is indefinite"),
+        ),
+        EigenFailure::NegativeEigenvalue { eigenvalue, vector } => Diagnostic::new(
+            Code::StiffnessIndefinite,
+            format!("eigenvalue {eigenvalue:.6e} is negative; its mode moves nodes {} most", moving(&vector)),
+        ),
+        EigenFailure::MassIndefinite => {
+            Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
+        }
+        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
+            Code::Mechanism,
+            format!(
+                "{} zero-energy modes: six rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
+                count + 6,
+                eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
+                moving(&vectors)
+            ),
+        ),
+        EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
+            Code::CompletenessFailed,
+            format!(
+                "{found} flexible modes were found below lambda = {shift:.6e}, the inertia count says {counted}"
+            ),
+        ),
+        EigenFailure::Inaccurate { residual } => Diagnostic::new(
+            Code::FactorizationFailed,
+            format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
+        ),
+        EigenFailure::Memory { bytes } => Diagnostic::new(
+            Code::MemoryShort,
+            bytes.map_or_else(|| "memory ran out".to_owned(), |b| format!("{b} bytes are needed")),
+        ),
+    };
+    diagnostic.into()
+}

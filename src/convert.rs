@@ -1,0 +1,313 @@
+//! The main job: from a checked model to a flexible body, with what lumped masses would have given.
+
+use crate::basis::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::eigen::{Counters, Proof, Wanted, canonical_basis};
+use crate::error::Result;
+use crate::flex_body::{
+    Certificate, FlexBody, Frame, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+};
+use crate::invariants::{
+    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame, condense,
+    condense_lumped, error_norms,
+};
+use crate::linalg::{Pencil, SymmetricMatrix, gram};
+use crate::model::{FeModel, Nodes};
+use crate::progress::{Event, Watch};
+use faer::{Mat, MatRef};
+use std::collections::HashMap;
+
+/// A lumped comparator that is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Lumping {
+    /// Row sums of Ms.
+    RowSum,
+    /// Diagonal of Ms scaled to the total mass.
+    DiagonalScaling,
+    /// Nodal masses by node number, as a multibody package would import them.
+    User(Vec<(i64, f64)>),
+}
+
+/// Settings of a conversion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvertSettings {
+    /// Which modes and how good.
+    pub modes: ModeSettings,
+    /// Body frame.
+    pub frame: BodyFrame,
+    /// Comparators.
+    pub lumped: Vec<Lumping>,
+    /// Also compute the modes of each lumped mass.
+    pub lumped_modes: bool,
+}
+
+impl Default for ConvertSettings {
+    /// 20 modes, principal frame, and the two comparators that need nothing but the matrices.
+    fn default() -> Self {
+        Self {
+            modes: ModeSettings::default(),
+            frame: BodyFrame::default(),
+            lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
+            lumped_modes: false,
+        }
+    }
+}
+
+/// The fully lumped pipeline of one scheme: modes from the lumped mass as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LumpedPipeline {
+    /// Scheme.
+    pub scheme: String,
+    /// Its eigenvalues, ascending; empty when it has no real modes.
+    pub eigenvalues: Vec<f64>,
+    /// Smallest singular value of Psi' M Psi_l: the cosine of the largest angle between the two modal subspaces.
+    pub subspace_cosine: f64,
+    /// Error norms of its invariants after the subspaces were aligned.
+    pub comparison: Vec<(String, f64)>,
+    /// Why there is no result; empty when there is one.
+    pub remark: String,
+}
+
+/// A finished conversion.
+#[derive(Debug, Clone)]
+pub struct Conversion {
+    /// The product.
+    pub body: FlexBody,
+    /// Mass properties in model axes.
+    pub mass_properties: MassProperties,
+    /// Fully lumped pipelines, where asked for.
+    pub lumped_modes: Vec<LumpedPipeline>,
+    /// Work of the eigen-solver.
+    pub counters: Counters,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Converts a checked model.
+///
+/// # Errors
+/// Those of [`free_surface`] and [`choose_frame`]; [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not
+/// fit the nodes (found before any work).
+pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
+    let schemes =
+        settings.lumped.iter().map(|lumping| lumped_masses(model, lumping)).collect::<Result<Vec<_>>>()?;
+    let found = free_surface(model, &settings.modes, watch)?;
+    watch(Event::Phase("invariants"));
+    let positions = &model.nodes().positions;
+    let (frame, mass_properties) = choose_frame(model.scalar_mass(), positions, settings.frame)?;
+    let place = Place { frame, positions: frame.to_body(positions) };
+    let (shapes, modal_stiffness) = place.modes(model, &found.solution.vectors);
+    let invariants = condense(model.scalar_mass(), &place.positions, shapes.as_ref(), modal_stiffness);
+    watch(Event::Phase("lumped comparison"));
+    let lumped: Vec<LumpedBody> = schemes
+        .iter()
+        .map(|masses| {
+            let modal_stiffness = invariants.modal_stiffness.clone();
+            let other = condense_lumped(masses, &place.positions, shapes.as_ref(), modal_stiffness);
+            LumpedBody {
+                scheme: masses.scheme().name().to_owned(),
+                comparison: error_norms(&invariants, &other),
+                invariants: other,
+                negative_masses: masses.negative(),
+            }
+        })
+        .collect();
+    let lumped_modes = if settings.lumped_modes {
+        let exact = Exact { model, place: &place, shapes: shapes.as_ref(), invariants: &invariants };
+        schemes
+            .iter()
+            .map(|masses| lumped_pipeline(&exact, masses, settings, watch))
+            .collect::<Result<_>>()?
+    } else {
+        Vec::new()
+    };
+    let certificate = certificate(model, &found);
+    let solution = found.solution;
+    let body = FlexBody::new(Parts {
+        source: Source {
+            name: model.name().to_owned(),
+            files: model.sources().to_vec(),
+            n_dofs: model.stiffness().n(),
+            mass_structure: if model.has_diagonal_mass() {
+                MassStructure::Diagonal
+            } else {
+                MassStructure::RotationInvariant
+            },
+            settings: describe(settings),
+        },
+        units: model.units().clone(),
+        frame,
+        interfaces: interfaces(model),
+        nodes: Nodes { ids: model.nodes().ids.clone(), positions: place.positions },
+        modes: Modes {
+            damping_ratio: vec![0.0; solution.eigenvalues.len()],
+            eigenvalue: solution.eigenvalues,
+            residual: solution.residuals,
+            shape: shapes,
+        },
+        invariants,
+        lumped,
+        certificate,
+    })?;
+    Ok(Conversion {
+        body,
+        mass_properties,
+        lumped_modes,
+        counters: solution.counters,
+        diagnostics: found.diagnostics,
+    })
+}
+
+/// The body frame and the node positions in it.
+struct Place {
+    frame: Frame,
+    positions: Vec<[f64; 3]>,
+}
+
+impl Place {
+    /// Modes in body axes with canonical signs there, and Psi' K Psi.
+    fn modes(&self, model: &FeModel, vectors: &Mat<f64>) -> (Mat<f64>, Mat<f64>) {
+        let mut shapes = vectors.clone();
+        self.frame.rotate_shapes(&mut shapes);
+        let unsigned = shapes.clone();
+        canonical_basis(shapes.as_mut(), &[]);
+        // K lives in model axes: its reduction is taken there, and the signs are carried over.
+        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+        let k = gram(vectors.as_ref(), pencil.apply_stiffness(vectors.as_ref()).as_ref());
+        let flipped: Vec<f64> = (0..shapes.ncols())
+            .map(|j| if (0..shapes.nrows()).all(|i| shapes[(i, j)] == unsigned[(i, j)]) { 1.0 } else { -1.0 })
+            .collect();
+        let modal = Mat::from_fn(k.nrows(), k.ncols(), |i, j| {
+            0.5 * (k[(i, j)] + k[(j, i)]) * flipped[i] * flipped[j]
+        });
+        (shapes, modal)
+    }
+}
+
+fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
+    match lumping {
+        Lumping::RowSum => Ok(LumpedMasses::row_sum(model.scalar_mass())),
+        Lumping::DiagonalScaling => LumpedMasses::diagonal_scaling(model.scalar_mass()),
+        Lumping::User(table) => {
+            let ids = &model.nodes().ids;
+            let by_node: HashMap<i64, f64> = table.iter().copied().collect();
+            let refuse = |message: String| Diagnostic::new(Code::LumpedMassTable, message).into();
+            if by_node.len() < table.len() {
+                return Err(refuse(format!(
+                    "{} nodes are given more than once",
+                    table.len() - by_node.len()
+                )));
+            }
+            let missing: Vec<i64> = ids.iter().filter(|id| !by_node.contains_key(id)).copied().collect();
+            if let Some(first) = missing.first() {
+                return Err(refuse(format!("{} nodes have no mass, node {first} first", missing.len())));
+            }
+            LumpedMasses::user(ids.iter().map(|id| by_node[id]).collect(), ids.len())
+        }
+    }
+}
+
+/// The exact result that a lumped pipeline is compared with.
+struct Exact<'a> {
+    model: &'a FeModel,
+    place: &'a Place,
+    shapes: MatRef<'a, f64>,
+    invariants: &'a Invariants,
+}
+
+/// Modes and invariants from the lumped mass, aligned with the exact subspace before they are compared.
+fn lumped_pipeline(
+    exact: &Exact<'_>,
+    masses: &LumpedMasses,
+    settings: &ConvertSettings,
+    watch: Watch<'_>,
+) -> Result<LumpedPipeline> {
+    let scheme = masses.scheme().name().to_owned();
+    let none = |remark: String| LumpedPipeline {
+        scheme: scheme.clone(),
+        eigenvalues: Vec::new(),
+        subspace_cosine: f64::NAN,
+        comparison: Vec::new(),
+        remark,
+    };
+    if masses.negative() > 0 {
+        return Ok(none(format!("{} nodal masses are negative: no real modes", masses.negative())));
+    }
+    let diagonal: Vec<(u32, u32, f64)> =
+        masses.masses().iter().enumerate().map(|(i, &m)| (i as u32, i as u32, m)).collect();
+    let n = diagonal.len();
+    let matrix = crate::linalg::CscMatrix::from_triplets(n, n, &diagonal);
+    let lumped = SymmetricMatrix::new(matrix).expect("a diagonal matrix is symmetric");
+    let nf = exact.shapes.ncols();
+    let modes = ModeSettings { wanted: Wanted::Lowest(nf), ..settings.modes };
+    let found = match free_surface_of(exact.model, &lumped, &modes, watch) {
+        Ok(found) => found.solution,
+        Err(error) => return Ok(none(error.diagnostics()[0].message().to_owned())),
+    };
+    if found.eigenvalues.len() < nf {
+        return Ok(none(format!("the lumped mass has {} modes only", found.eigenvalues.len())));
+    }
+    let (shapes, modal_stiffness) = exact.place.modes(exact.model, &found.vectors);
+    let pencil = Pencil::new(exact.model.stiffness(), exact.model.scalar_mass(), 3);
+    let cross = gram(exact.shapes, pencil.apply_mass(shapes.as_ref()).as_ref());
+    let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..nf)));
+    let own = condense_lumped(masses, &exact.place.positions, shapes.as_ref(), modal_stiffness);
+    Ok(LumpedPipeline {
+        scheme,
+        eigenvalues: found.eigenvalues,
+        subspace_cosine: alignment.agreement,
+        comparison: error_norms(exact.invariants, &own.with_basis(alignment.basis.as_ref())),
+        remark: String::new(),
+    })
+}
+
+fn certificate(model: &FeModel, found: &FreeSurfaceModes) -> Certificate {
+    let completeness = &found.solution.completeness;
+    let proved = completeness.proof == Proof::InertiaCount;
+    Certificate {
+        proved_modes: proved.then_some(completeness.modes_below),
+        shift: completeness.shift,
+        negative_pivots: completeness.negative_pivots,
+        rigid_modes: 6,
+        remark: completeness.remark.clone(),
+        rigid_noise: found.rigid_noise,
+        rigid_residual: model.rigid_residual(),
+    }
+}
+
+fn interfaces(model: &FeModel) -> Vec<Interface> {
+    let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+    model
+        .interfaces()
+        .iter()
+        .map(|set| Interface {
+            name: set.name.clone(),
+            nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
+        })
+        .collect()
+}
+
+/// The settings that can change the result, for the file.
+fn describe(settings: &ConvertSettings) -> serde_json::Value {
+    let (modes, below) = match settings.modes.wanted {
+        Wanted::Lowest(count) => (Some(count), None),
+        Wanted::Below(lambda) => (None, Some(lambda)),
+    };
+    let schemes: Vec<&str> = settings
+        .lumped
+        .iter()
+        .map(|lumping| match lumping {
+            Lumping::RowSum => LumpedScheme::RowSum.name(),
+            Lumping::DiagonalScaling => LumpedScheme::DiagonalScaling.name(),
+            Lumping::User(_) => LumpedScheme::User.name(),
+        })
+        .collect();
+    serde_json::json!({
+        "accuracy": settings.modes.accuracy.name(),
+        "basis": "free",
+        "frame": settings.frame.name(),
+        "lumped": schemes,
+        "max_eigenvalue": below,
+        "modes": modes,
+    })
+}

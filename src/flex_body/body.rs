@@ -1,0 +1,102 @@
+//! The validated body.
+
+use super::validate::problems;
+use super::{Certificate, Interface, LumpedBody, Modes, Parts, Source};
+use crate::error::{Error, Result};
+use crate::invariants::{Frame, Invariants};
+use crate::model::Nodes;
+use crate::units::UnitSystem;
+
+/// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexBody {
+    parts: Parts,
+}
+
+impl FlexBody {
+    /// Checks `parts` and makes a body of them.
+    ///
+    /// With n nodes and nf modes: n >= 1, 1 <= nf <= 3n; every array has the shape that [`Parts`] states and
+    /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
+    /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
+    /// names of lumping schemes and of interfaces are unique and not empty; interfaces name existing nodes;
+    /// no text contains a NUL character (no file could hold it).
+    ///
+    /// # Errors
+    /// [`BodySchema`](crate::diagnostic::Code::BodySchema), one diagnostic per violation.
+    pub fn new(parts: Parts) -> Result<Self> {
+        let problems = problems(&parts);
+        if problems.is_empty() { Ok(Self { parts }) } else { Err(Error::new(problems)) }
+    }
+
+    /// All parts.
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Gives the parts away, to change them and build a new body.
+    pub fn into_parts(self) -> Parts {
+        self.parts
+    }
+
+    /// Number of nodes n.
+    pub fn n_nodes(&self) -> usize {
+        self.parts.nodes.len()
+    }
+
+    /// Number of modes nf.
+    pub fn n_modes(&self) -> usize {
+        self.parts.modes.eigenvalue.len()
+    }
+
+    /// Provenance.
+    pub fn source(&self) -> &Source {
+        &self.parts.source
+    }
+
+    /// Units of all numbers.
+    pub fn units(&self) -> &UnitSystem {
+        &self.parts.units
+    }
+
+    /// Body frame in model coordinates.
+    pub fn frame(&self) -> &Frame {
+        &self.parts.frame
+    }
+
+    /// Node numbers and positions in the body frame.
+    pub fn nodes(&self) -> &Nodes {
+        &self.parts.nodes
+    }
+
+    /// Modes.
+    pub fn modes(&self) -> &Modes {
+        &self.parts.modes
+    }
+
+    /// f_j = sqrt(lambda_j) / (2 pi) in hertz (nf), whatever the body's unit of time is.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        let hertz = self.parts.units.hertz();
+        self.parts.modes.eigenvalue.iter().map(|l| l.sqrt() / std::f64::consts::TAU * hertz).collect()
+    }
+
+    /// Exact invariants about the frame origin, body axes.
+    pub fn invariants(&self) -> &Invariants {
+        &self.parts.invariants
+    }
+
+    /// Lumped comparators.
+    pub fn lumped(&self) -> &[LumpedBody] {
+        &self.parts.lumped
+    }
+
+    /// Proof of completeness and noise floor.
+    pub fn certificate(&self) -> &Certificate {
+        &self.parts.certificate
+    }
+
+    /// Interfaces.
+    pub fn interfaces(&self) -> &[Interface] {
+        &self.parts.interfaces
+    }
+}

@@ -1,0 +1,9 @@
+//! The product: a validated flexible body, independent of the files it came from and goes to.
+
+mod body;
+mod parts;
+mod validate;
+
+pub use crate::invariants::Frame;
+pub use body::FlexBody;
+pub use parts::{Certificate, Interface, LumpedBody, MassStructure, Modes, Parts, Source};

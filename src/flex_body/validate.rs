@@ -1,0 +1,210 @@
+//! What must hold for the parts of a flexible body, checked once, all violations collected.
+
+use super::Parts;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::invariants::Invariants;
+use faer::{Mat, MatRef};
+use nalgebra::Matrix3;
+use std::collections::HashSet;
+
+/// Axes come out of an eigen-decomposition of a 3x3 matrix: 1e-15 is normal, a typed-in rotation may have 12
+/// digits; anything worse rotates the invariants by more than their own accuracy.
+const AXES_TOLERANCE: f64 = 1e-10;
+
+/// Invariants are sums of products: numbers beyond this overflow in them.
+const LARGEST: f64 = 1e300;
+
+/// Longest name of an interface or lumping scheme in bytes: it names a group in the file.
+const LONGEST_NAME: usize = 1000;
+
+pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
+    let mut check = Check { problems: Vec::new() };
+    let (n, nf) = (parts.nodes.ids.len(), parts.modes.eigenvalue.len());
+    check.sizes(n, nf);
+    check.frame(parts);
+    check.nodes(parts);
+    check.modes(parts, n, nf);
+    if !(parts.units.hertz().is_finite() && parts.units.hertz() * LARGEST.sqrt() <= LARGEST) {
+        check.add(format!(
+            "`units.time` is {} s, too short for frequencies in hertz",
+            parts.units.time.name()
+        ));
+    }
+    check.invariants("invariants", &parts.invariants, nf);
+    if parts.invariants.mass.is_finite() && parts.invariants.mass <= 0.0 {
+        check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass));
+    }
+    check.lumped(parts, nf);
+    let c = &parts.certificate;
+    check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
+    check.interfaces(parts, n);
+    check.text("source.name", &parts.source.name);
+    check.text("certificate.remark", &c.remark);
+    check.problems
+}
+
+struct Check {
+    problems: Vec<Diagnostic>,
+}
+
+impl Check {
+    fn add(&mut self, message: String) {
+        self.problems.push(Diagnostic::new(Code::BodySchema, message));
+    }
+
+    /// Reports the first value that is not finite, or so large that what follows from it would not be.
+    fn finite(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
+        if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > LARGEST) {
+            self.add(format!(
+                "`{name}` has the value {v:e} at index {i}, expected finite numbers up to {LARGEST:e}"
+            ));
+        }
+    }
+
+    fn length(&mut self, name: &str, found: usize, expected: usize, per: &str) {
+        if found != expected {
+            self.add(format!("`{name}` has {found} values, expected {expected}, one per {per}"));
+        }
+    }
+
+    fn matrix(&mut self, name: &str, m: &Mat<f64>, rows: usize, columns: usize) {
+        if (m.nrows(), m.ncols()) != (rows, columns) {
+            let (r, c) = (m.nrows(), m.ncols());
+            self.add(format!("`{name}` is {r} x {c}, expected {rows} x {columns}"));
+        }
+        self.finite(name, values(m.as_ref()));
+    }
+
+    /// A text that the file can hold.
+    fn text(&mut self, name: &str, text: &str) {
+        if text.contains('\0') {
+            self.add(format!("`{name}` contains a NUL character, expected text"));
+        }
+    }
+
+    fn names<'a>(&mut self, what: &str, names: impl Iterator<Item = &'a String>) {
+        let mut seen = HashSet::new();
+        for name in names {
+            if name.is_empty() {
+                self.add(format!("a {what} has an empty name"));
+            } else if name.len() > LONGEST_NAME {
+                self.add(format!(
+                    "a {what} has a name of {} bytes, expected at most {LONGEST_NAME}",
+                    name.len()
+                ));
+            } else if !seen.insert(name) {
+                self.add(format!("{what} `{name}` is given twice"));
+            }
+        }
+    }
+
+    fn sizes(&mut self, n: usize, nf: usize) {
+        if n == 0 {
+            self.add("`nodes` is empty, expected at least one node".to_owned());
+        }
+        if nf == 0 {
+            self.add("`modes` is empty, expected at least one mode".to_owned());
+        } else if n > 0 && nf > 3 * n {
+            self.add(format!("{nf} modes of {n} nodes, expected at most {}", 3 * n));
+        }
+    }
+
+    fn frame(&mut self, parts: &Parts) {
+        let frame = &parts.frame;
+        self.finite("frame.origin", frame.origin.iter().copied());
+        self.finite("frame.axes", frame.axes.iter().copied());
+        let defect = (frame.axes.transpose() * frame.axes - Matrix3::identity()).amax();
+        if defect.is_finite() && defect > AXES_TOLERANCE {
+            self.add(format!(
+                "`frame.axes` are not orthonormal: max |A'A - I| = {defect:.1e}, expected at most {AXES_TOLERANCE:e}"
+            ));
+        } else if frame.axes.determinant() < 0.0 {
+            self.add("`frame.axes` are left-handed, expected right-handed axes".to_owned());
+        }
+    }
+
+    fn nodes(&mut self, parts: &Parts) {
+        let nodes = &parts.nodes;
+        self.length("nodes.positions", nodes.positions.len(), nodes.ids.len(), "node");
+        self.finite("nodes.positions", nodes.positions.iter().flatten().copied());
+        let mut seen = HashSet::with_capacity(nodes.ids.len());
+        if let Some(id) = nodes.ids.iter().find(|&&id| !seen.insert(id)) {
+            self.add(format!("`nodes.ids` has node {id} twice, expected unique node numbers"));
+        }
+    }
+
+    fn modes(&mut self, parts: &Parts, n: usize, nf: usize) {
+        let modes = &parts.modes;
+        self.finite("modes.eigenvalue", modes.eigenvalue.iter().copied());
+        if let Some(j) = modes.eigenvalue.iter().position(|&l| l <= 0.0) {
+            let l = modes.eigenvalue[j];
+            self.add(format!("`modes.eigenvalue` is {l:e} at mode {j}, expected positive values"));
+        }
+        if let Some(j) = modes.eigenvalue.windows(2).position(|w| w[0] > w[1]) {
+            let (a, b) = (modes.eigenvalue[j], modes.eigenvalue[j + 1]);
+            self.add(format!(
+                "`modes.eigenvalue` falls from {a:e} to {b:e} at mode {}, expected ascending values",
+                j + 1
+            ));
+        }
+        for (name, column) in
+            [("modes.residual", &modes.residual), ("modes.damping_ratio", &modes.damping_ratio)]
+        {
+            self.length(name, column.len(), nf, "mode");
+            self.finite(name, column.iter().copied());
+            if let Some(j) = column.iter().position(|&v| v < 0.0) {
+                self.add(format!(
+                    "`{name}` is {:e} at mode {j}, expected values that are not negative",
+                    column[j]
+                ));
+            }
+        }
+        self.matrix("modes.shape", &modes.shape, 3 * n, nf);
+    }
+
+    fn invariants(&mut self, name: &str, invariants: &Invariants, nf: usize) {
+        self.finite(&format!("{name}.mass"), [invariants.mass]);
+        self.finite(&format!("{name}.first_moment"), invariants.first_moment.iter().copied());
+        self.finite(&format!("{name}.second_moment"), invariants.second_moment.iter().copied());
+        self.matrix(&format!("{name}.c1"), &invariants.c1, 3, nf);
+        for k in 0..3 {
+            for l in 0..3 {
+                let block = &invariants.ibar[k][l];
+                self.length(&format!("{name}.ibar[{k}][{l}]"), block.len(), nf, "mode");
+                self.finite(&format!("{name}.ibar[{k}][{l}]"), block.iter().copied());
+                self.matrix(&format!("{name}.s[{k}][{l}]"), &invariants.s[k][l], nf, nf);
+            }
+        }
+        self.matrix(&format!("{name}.modal_stiffness"), &invariants.modal_stiffness, nf, nf);
+    }
+
+    fn lumped(&mut self, parts: &Parts, nf: usize) {
+        self.names("lumping scheme", parts.lumped.iter().map(|l| &l.scheme));
+        for body in &parts.lumped {
+            let name = format!("lumped `{}`", body.scheme);
+            self.invariants(&name, &body.invariants, nf);
+            self.names(&format!("error norm of {name}"), body.comparison.iter().map(|(norm, _)| norm));
+            for (norm, value) in &body.comparison {
+                self.text(&format!("{name} error norm"), norm);
+                self.finite(&format!("{name} {norm}"), [*value]);
+            }
+        }
+    }
+
+    fn interfaces(&mut self, parts: &Parts, n: usize) {
+        self.names("interface", parts.interfaces.iter().map(|i| &i.name));
+        for interface in &parts.interfaces {
+            let name = &interface.name;
+            if interface.nodes.is_empty() {
+                self.add(format!("interface `{name}` has no nodes"));
+            }
+            if let Some(node) = interface.nodes.iter().find(|&&node| node >= n) {
+                self.add(format!("interface `{name}` names node index {node}, expected indices below {n}"));
+            }
+        }
+    }
+}
+
+fn values(m: MatRef<'_, f64>) -> impl Iterator<Item = f64> + '_ {
+    (0..m.ncols()).flat_map(move |j| (0..m.nrows()).map(move |i| m[(i, j)]))
+}

@@ -1,0 +1,183 @@
+//! Puts the values of a file together to the parts of a body.
+
+use super::scan::Scan;
+use super::schema::MASS_STRUCTURES;
+use super::value::Value;
+use crate::flex_body::{Certificate, Frame, Interface, LumpedBody, Modes, Parts, Source};
+use crate::invariants::Invariants;
+use crate::model::Nodes;
+use crate::units::UnitSystem;
+use faer::Mat;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+
+/// The parts; `None` when texts or counts mean nothing, which is then among the problems of `scan`.
+///
+/// `scan` had no problems before, so every required entry is there, of its kind and with its shape.
+pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
+    let mut take = Take { scan };
+    let source = take.source();
+    let frame = Frame {
+        origin: Vector3::from_column_slice(&take.floats("/frame/origin")),
+        axes: Matrix3::from_row_slice(&take.floats("/frame/axes")),
+    };
+    let nodes = Nodes {
+        ids: take.ints("/nodes/id"),
+        positions: take.floats("/nodes/position").as_chunks().0.to_vec(),
+    };
+    let modes = take.modes(nodes.len());
+    let nf = modes.eigenvalue.len();
+    let invariants = take.invariants("/invariants", nf);
+    let lumped = take.lumped(nf);
+    let certificate = take.certificate();
+    let interfaces = take.interfaces(&nodes);
+    let source = source.filter(|_| scan.problems.is_empty())?;
+    Some(Parts { source, units, frame, nodes, modes, invariants, lumped, certificate, interfaces })
+}
+
+/// Moves values out of a scan.
+struct Take<'a> {
+    scan: &'a mut Scan,
+}
+
+impl Take<'_> {
+    fn floats(&mut self, path: &str) -> Vec<f64> {
+        match self.scan.values.remove(path) {
+            Some(Value::Floats(values)) => values,
+            other => unreachable!("scan without problems has {other:?} as {path}"),
+        }
+    }
+
+    fn ints(&mut self, path: &str) -> Vec<i64> {
+        match self.scan.values.remove(path) {
+            Some(Value::Ints(values)) => values,
+            other => unreachable!("scan without problems has {other:?} as {path}"),
+        }
+    }
+
+    fn text(&mut self, path: &str) -> String {
+        match self.scan.values.remove(path) {
+            Some(Value::Text(text)) => text,
+            other => unreachable!("scan without problems has {other:?} as {path}"),
+        }
+    }
+
+    fn float(&mut self, path: &str) -> f64 {
+        match self.scan.values.remove(path) {
+            Some(Value::Float(value)) => value,
+            other => unreachable!("scan without problems has {other:?} as {path}"),
+        }
+    }
+
+    /// A count that may be absent; negative ones are problems.
+    fn optional_count(&mut self, path: &str) -> Option<usize> {
+        let Some(Value::Int(value)) = self.scan.values.remove(path) else { return None };
+        let count = usize::try_from(value).ok();
+        if count.is_none() {
+            self.scan.add(format!("{path}: expected a count, found {value}"));
+        }
+        count
+    }
+
+    /// A count that the table requires; 0 in place of a negative one, which is a problem.
+    fn count(&mut self, path: &str) -> usize {
+        self.optional_count(path).unwrap_or(0)
+    }
+
+    /// Rows of a matrix.
+    fn matrix(&mut self, path: &str, columns: usize) -> Mat<f64> {
+        let values = self.floats(path);
+        Mat::from_fn(values.len() / columns, columns, |i, j| values[i * columns + j])
+    }
+
+    fn json<T: serde::de::DeserializeOwned>(&mut self, path: &str, expected: &str) -> Option<T> {
+        let text = self.text(path);
+        let parsed = serde_json::from_str(&text);
+        if let Err(e) = &parsed {
+            self.scan.add(format!("{path}: expected {expected}, found text that is not ({e})"));
+        }
+        parsed.ok()
+    }
+
+    fn source(&mut self) -> Option<Source> {
+        let name = self.text("/source@model");
+        let files = self.json("/source@files", "a JSON array of files");
+        let n_dofs = self.count("/source@n_dofs");
+        let structure = self.text("/source@mass_structure");
+        let mass_structure = MASS_STRUCTURES.iter().find(|(name, _)| *name == structure).map(|(_, s)| *s);
+        if mass_structure.is_none() {
+            let known = MASS_STRUCTURES.map(|(name, _)| format!("`{name}`")).join(", ");
+            self.scan.add(format!("/source@mass_structure: expected one of {known}, found {structure:?}"));
+        }
+        let settings = self.json("/source@settings", "JSON");
+        Some(Source { name, files: files?, n_dofs, mass_structure: mass_structure?, settings: settings? })
+    }
+
+    fn modes(&mut self, n: usize) -> Modes {
+        let eigenvalue = self.floats("/modes/eigenvalue");
+        let shape = self.floats("/modes/shape");
+        Modes {
+            residual: self.floats("/modes/residual"),
+            damping_ratio: self.floats("/modes/damping_ratio"),
+            shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
+            eigenvalue,
+        }
+    }
+
+    fn invariants(&mut self, place: &str, nf: usize) -> Invariants {
+        let ibar = self.floats(&format!("{place}/Ibar"));
+        let s = self.floats(&format!("{place}/S"));
+        let block = |k: usize, l: usize| 3 * k + l;
+        Invariants {
+            mass: self.floats(&format!("{place}/mass"))[0],
+            first_moment: Vector3::from_column_slice(&self.floats(&format!("{place}/first_moment"))),
+            second_moment: Matrix3::from_row_slice(&self.floats(&format!("{place}/second_moment"))),
+            c1: self.matrix(&format!("{place}/C1"), nf),
+            ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar[block(k, l) * nf..][..nf].to_vec())),
+            s: [0, 1, 2]
+                .map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| s[(block(k, l) * nf + i) * nf + j]))),
+            modal_stiffness: self.matrix(&format!("{place}/modal_stiffness"), nf),
+        }
+    }
+
+    fn lumped(&mut self, nf: usize) -> Vec<LumpedBody> {
+        let mut out = Vec::new();
+        for (scheme, link) in self.scan.instances("/lumped") {
+            let place = format!("/lumped/{link}");
+            let comparison = match self.scan.values.remove(&format!("/comparison/{link}@<norm>")) {
+                Some(Value::Named(values)) => values,
+                other => unreachable!("scan without problems has {other:?} as norms of {link}"),
+            };
+            let negative_masses = self.count(&format!("{place}@negative_masses"));
+            let invariants = self.invariants(&place, nf);
+            out.push(LumpedBody { scheme, invariants, negative_masses, comparison });
+        }
+        out
+    }
+
+    fn certificate(&mut self) -> Certificate {
+        Certificate {
+            proved_modes: self.optional_count("/certificate@proved_modes"),
+            shift: self.float("/certificate@shift"),
+            negative_pivots: self.optional_count("/certificate@negative_pivots"),
+            rigid_modes: self.count("/certificate@rigid_modes"),
+            remark: self.text("/certificate@remark"),
+            rigid_noise: self.float("/certificate@rigid_noise"),
+            rigid_residual: self.float("/certificate@rigid_residual"),
+        }
+    }
+
+    fn interfaces(&mut self, body: &Nodes) -> Vec<Interface> {
+        let index: HashMap<i64, usize> = body.ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+        let mut out = Vec::new();
+        for (name, link) in self.scan.instances("/interfaces") {
+            let path = format!("/interfaces/{link}/node_id");
+            let ids = self.ints(&path);
+            if let Some(id) = ids.iter().find(|id| !index.contains_key(id)) {
+                self.scan.add(format!("{path}: expected nodes of /nodes/id, found {id}"));
+            }
+            out.push(Interface { name, nodes: ids.iter().filter_map(|id| index.get(id).copied()).collect() });
+        }
+        out
+    }
+}

@@ -1,0 +1,545 @@
+//! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
+
+use super::value::{Units, Value, View, count, matrix, rows, small, text};
+use crate::flex_body::{Interface, LumpedBody, MassStructure, Parts};
+use crate::provenance;
+
+/// Version of the format: readers refuse a newer major; a newer minor only adds entries.
+pub(super) const MAJOR: i64 = 1;
+/// See [`MAJOR`].
+pub(super) const MINOR: i64 = 0;
+/// Value of the root attribute `format`.
+pub(super) const FORMAT: &str = "flexbody";
+
+/// One extent of a dataset's shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Extent {
+    Fixed(usize),
+    /// n, the nodes of the body.
+    Nodes,
+    /// nf, the modes.
+    Modes,
+    /// 3 nf.
+    ThreeModes,
+    /// Nodes of the group's interface.
+    InterfaceNodes,
+}
+use Extent::{Fixed, InterfaceNodes, Modes, Nodes, ThreeModes};
+
+/// How an entry is stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    /// Dataset of 64-bit floats.
+    Floats(&'static [Extent]),
+    /// Dataset of 64-bit signed integers.
+    Ints(&'static [Extent]),
+    /// Attribute: UTF-8 text of variable length.
+    Text,
+    /// Attribute: 64-bit signed integer.
+    Int,
+    /// Attribute: 64-bit float.
+    Float,
+    /// Attributes, 64-bit floats, whose names are data.
+    Named,
+}
+use Kind::{Float, Floats, Int, Ints, Named, Text};
+
+/// Takes the value of an entry from a body; `None` only for entries that are not required.
+pub(super) type Get = fn(&View<'_>) -> Option<Value>;
+
+/// Where the value of an entry comes from.
+#[derive(Clone, Copy)]
+pub(super) enum Origin {
+    /// The same text in every file; a reader refuses others.
+    ConstantText(&'static str),
+    /// The same integer in every file; a reader refuses others.
+    ConstantInt(i64),
+    /// Information of its own.
+    Primary(Get),
+    /// Follows from the primary entries; the reader recomputes it. Floats agree to [`DERIVED_TOLERANCE`] of the
+    /// largest magnitude in the named dataset of the same group, everything else exactly.
+    Derived(Get, &'static str),
+}
+use Origin::{ConstantInt, ConstantText, Derived, Primary};
+
+/// This program's files agree to the last bit; other writers may evaluate W1, W2, W3 by themselves, and 1e-12 is what
+/// independent evaluations of the invariants reach.
+pub(super) const DERIVED_TOLERANCE: f64 = 1e-12;
+
+/// How often a group occurs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Per {
+    Body,
+    LumpingScheme,
+    Interface,
+}
+
+/// A dataset or attribute.
+pub(super) struct Item {
+    pub name: &'static str,
+    pub kind: Kind,
+    pub units: Units,
+    pub symbol: &'static str,
+    pub description: &'static str,
+    pub required: bool,
+    /// Minor version of the format that brought it.
+    pub since: i64,
+    pub origin: Origin,
+}
+
+/// A group with its entries. `<scheme>` and `<name>` stand for names that are data.
+pub(super) struct Group {
+    pub path: &'static str,
+    pub per: Per,
+    pub description: &'static str,
+    pub items: &'static [&'static [Item]],
+}
+
+const ONE: Units = Units::One;
+const MASS: Units = Units::Of { mass_halves: 2, length: 0, time: 0 };
+const LENGTH: Units = Units::Of { mass_halves: 0, length: 1, time: 0 };
+const MASS_LENGTH: Units = Units::Of { mass_halves: 2, length: 1, time: 0 };
+const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
+const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
+const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
+const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
+const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
+
+/// A required dataset of version 1.0.
+const fn dataset(
+    name: &'static str,
+    kind: Kind,
+    units: Units,
+    symbol: &'static str,
+    description: &'static str,
+    get: Get,
+) -> Item {
+    Item { name, kind, units, symbol, description, required: true, since: 0, origin: Primary(get) }
+}
+
+/// A required attribute of version 1.0.
+const fn attribute(
+    name: &'static str,
+    kind: Kind,
+    units: Units,
+    description: &'static str,
+    get: Get,
+) -> Item {
+    dataset(name, kind, units, "", description, get)
+}
+
+/// A required attribute of version 1.0 with one value for every file.
+const fn constant(name: &'static str, kind: Kind, origin: Origin, description: &'static str) -> Item {
+    Item { name, kind, units: ONE, symbol: "", description, required: true, since: 0, origin }
+}
+
+impl Item {
+    const fn derived(mut self, from: &'static str) -> Self {
+        if let Primary(get) = self.origin {
+            self.origin = Derived(get, from);
+        }
+        self
+    }
+
+    const fn optional(mut self) -> Self {
+        self.required = false;
+        self
+    }
+
+    /// The entry's value for a body.
+    pub fn value(&self, view: &View<'_>) -> Option<Value> {
+        match self.origin {
+            ConstantText(value) => text(value),
+            ConstantInt(value) => Some(Value::Int(value)),
+            Primary(get) | Derived(get, _) => get(view),
+        }
+    }
+
+    /// Shape of a dataset; `None` for attributes.
+    pub fn shape(&self) -> Option<&'static [Extent]> {
+        match self.kind {
+            Floats(shape) | Ints(shape) => Some(shape),
+            Text | Int | Float | Named => None,
+        }
+    }
+
+    /// Extents of a dataset for a body.
+    pub fn dims(&self, view: &View<'_>) -> Vec<usize> {
+        let nf = view.body.modes.eigenvalue.len();
+        let size = |extent: &Extent| match *extent {
+            Fixed(size) => size,
+            Nodes => view.body.nodes.len(),
+            Modes => nf,
+            ThreeModes => 3 * nf,
+            InterfaceNodes => view.interface_nodes().len(),
+        };
+        self.shape().unwrap_or(&[]).iter().map(size).collect()
+    }
+}
+
+impl Group {
+    /// All entries, in the order of the table.
+    pub fn entries(&self) -> impl Iterator<Item = &'static Item> + use<> {
+        self.items.iter().flat_map(|part| part.iter())
+    }
+
+    /// Path without the last name.
+    pub fn parent(&self) -> &'static str {
+        self.path.rfind('/').map_or(self.path, |i| &self.path[..i])
+    }
+
+    /// The groups of a body that this one stands for, with their names where these are data.
+    pub fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<&'a str>, View<'a>)> {
+        let view = View { body, lumped: None, interface: None };
+        match self.per {
+            Per::Body => vec![(None, view)],
+            Per::LumpingScheme => {
+                let one = |l: &'a LumpedBody| (Some(l.scheme.as_str()), View { lumped: Some(l), ..view });
+                body.lumped.iter().map(one).collect()
+            }
+            Per::Interface => {
+                let one = |i: &'a Interface| (Some(i.name.as_str()), View { interface: Some(i), ..view });
+                body.interfaces.iter().map(one).collect()
+            }
+        }
+    }
+}
+
+const ROOT: &[Item] = &[
+    constant("format", Text, ConstantText(FORMAT), "marks a flex-body file"),
+    constant("format_major", Int, ConstantInt(MAJOR), "version of the format; a reader refuses a newer one"),
+    attribute(
+        "format_minor",
+        Int,
+        ONE,
+        "additions within the major version; a reader ignores what it does not know",
+        |_| Some(Value::Int(MINOR)),
+    ),
+    attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
+        text(provenance::generator())
+    }),
+    constant("dimension", Int, ConstantInt(3), "space dimension; 3 in this version"),
+    attribute(
+        "units_length",
+        Text,
+        ONE,
+        "unit of length: a name (`m mm cm um km in ft`) or its size in m",
+        |v| text(v.body.units.length.name()),
+    ),
+    attribute(
+        "units_mass",
+        Text,
+        ONE,
+        "unit of mass: a name (`kg g t tonne lb slug slinch`) or its size in kg",
+        |v| text(v.body.units.mass.name()),
+    ),
+    attribute("units_time", Text, ONE, "unit of time: a name (`s ms us`) or its size in s", |v| {
+        text(v.body.units.time.name())
+    }),
+    attribute("units_stated", Int, ONE, "1: the user stated the units; 0: m, kg, s were assumed", |v| {
+        Some(Value::Int(v.body.units.stated.into()))
+    }),
+];
+
+const SOURCE: &[Item] = &[
+    attribute("model", Text, ONE, "name of the model", |v| text(v.body.source.name.as_str())),
+    attribute(
+        "files",
+        Text,
+        ONE,
+        "input files as a JSON array of objects with `role`, `name`, `sha256`",
+        |v| text(serde_json::to_string(&v.body.source.files).expect("structs of strings are valid JSON")),
+    ),
+    attribute("n_nodes", Int, ONE, "nodes of the body", |v| count(v.body.nodes.len())).derived(""),
+    attribute("n_dofs", Int, ONE, "rows of the FE matrices", |v| count(v.body.source.n_dofs)),
+    attribute(
+        "mass_structure",
+        Text,
+        ONE,
+        "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither",
+        |v| text(mass_structure_name(v.body.source.mass_structure)),
+    ),
+    attribute("settings", Text, ONE, "settings of the run that can change the result, as JSON", |v| {
+        text(v.body.source.settings.to_string())
+    }),
+];
+
+const FRAME: &[Item] = &[
+    dataset(
+        "origin",
+        Floats(&[Fixed(3)]),
+        LENGTH,
+        "r0",
+        "origin of the body frame in model coordinates",
+        |v| small(v.body.frame.origin),
+    ),
+    dataset(
+        "axes",
+        Floats(&[Fixed(3), Fixed(3)]),
+        ONE,
+        "A0",
+        "columns are the body axes in model axes, right-handed: x_model = r0 + A0 x_body",
+        |v| small(v.body.frame.axes),
+    ),
+];
+
+const NODES: &[Item] = &[
+    dataset("id", Ints(&[Nodes]), ONE, "id", "node numbers of the FE model, unique", |v| {
+        Some(Value::Ints(v.body.nodes.ids.clone()))
+    }),
+    dataset(
+        "position",
+        Floats(&[Nodes, Fixed(3)]),
+        LENGTH,
+        "x",
+        "undeformed node positions in the body frame",
+        |v| Some(Value::Floats(v.body.nodes.positions.as_flattened().to_vec())),
+    ),
+];
+
+const MODES: &[Item] = &[
+    dataset(
+        "eigenvalue",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda",
+        "eigenvalues of K psi = lambda M psi, positive, ascending",
+        |v| Some(Value::Floats(v.body.modes.eigenvalue.clone())),
+    ),
+    dataset(
+        "frequency_hz",
+        Floats(&[Modes]),
+        Units::Hertz,
+        "f",
+        "sqrt(lambda) / (2 pi), in hertz whatever the unit of time",
+        |v| {
+            let hertz = v.body.units.hertz();
+            let frequency = |l: &f64| l.sqrt() / std::f64::consts::TAU * hertz;
+            Some(Value::Floats(v.body.modes.eigenvalue.iter().map(frequency).collect()))
+        },
+    )
+    .derived("frequency_hz"),
+    dataset(
+        "residual",
+        Floats(&[Modes]),
+        ONE,
+        "rho",
+        "|K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), 2-norms",
+        |v| Some(Value::Floats(v.body.modes.residual.clone())),
+    ),
+    dataset(
+        "damping_ratio",
+        Floats(&[Modes]),
+        ONE,
+        "zeta",
+        "modal damping ratios; 0 where none was given",
+        |v| Some(Value::Floats(v.body.modes.damping_ratio.clone())),
+    ),
+    dataset(
+        "shape",
+        Floats(&[Modes, Nodes, Fixed(3)]),
+        PER_ROOT_MASS,
+        "Psi",
+        "mass-normalised mode shapes: displacement of every node in body axes; the largest component of each mode is positive",
+        |v| Some(v.shape_rows(0..v.body.nodes.len())),
+    ),
+];
+
+const INVARIANTS: &[Item] = &[
+    dataset("mass", Floats(&[Fixed(1)]), MASS, "m", "mass, 1' Ms 1", |v| Some(Value::Floats(vec![v.invariants().mass]))),
+    dataset("first_moment", Floats(&[Fixed(3)]), MASS_LENGTH, "c", "first moment about the frame origin, c_k = 1' Ms x_k", |v| {
+        small(v.invariants().first_moment)
+    }),
+    dataset("second_moment", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "J", "second moment about the frame origin, J_kl = x_k' Ms x_l", |v| {
+        small(v.invariants().second_moment)
+    }),
+    dataset("C1", Floats(&[Fixed(3), Modes]), ROOT_MASS, "C1", "linear momentum of the modes, 1' Ms Psi_k", |v| {
+        matrix(v.invariants().c1.as_ref())
+    }),
+    dataset("Ibar", Floats(&[Fixed(3), Fixed(3), Modes]), ROOT_MASS_LENGTH, "Ibar", "Ibar_kl = x_k' Ms Psi_l", |v| {
+        Some(Value::Floats(v.invariants().ibar.as_flattened().iter().flatten().copied().collect()))
+    }),
+    dataset("S", Floats(&[Fixed(3), Fixed(3), Modes, Modes]), ONE, "S", "S_kl = Psi_k' Ms Psi_l", |v| {
+        Some(Value::Floats(v.invariants().s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
+    }),
+    dataset("modal_stiffness", Floats(&[Modes, Modes]), PER_TIME2, "K_ff", "Psi' K Psi", |v| {
+        matrix(v.invariants().modal_stiffness.as_ref())
+    }),
+    dataset("I0", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "I0", "inertia about the frame origin, tr(J) I - J", |v| {
+        small(v.invariants().inertia())
+    })
+    .derived("second_moment"),
+    dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
+        matrix(v.invariants().w1().as_ref())
+    })
+    .derived("Ibar"),
+    dataset("W2", Floats(&[ThreeModes, ThreeModes]), ONE, "W2", "diagonal blocks S_ll + S_mm, block (k,l) = -S_lk; row and column b nf + j", |v| {
+        matrix(v.invariants().w2().as_ref())
+    })
+    .derived("S"),
+    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j", |v| {
+        matrix(v.invariants().w3().as_ref())
+    })
+    .derived("S"),
+    dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]", |v| {
+        matrix(v.invariants().c2().as_ref())
+    })
+    .derived("Ibar"),
+    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33", |v| matrix(v.invariants().modal_mass().as_ref()))
+        .derived("S"),
+];
+
+const LUMPED: &[Item] = &[attribute("negative_masses", Int, ONE, "number of negative nodal masses", |v| {
+    count(v.lumped?.negative_masses)
+})];
+
+const COMPARISON: &[Item] =
+    &[attribute("<norm>", Named, ONE, "one attribute per error norm, in creation order", |v| {
+        Some(Value::Named(v.lumped?.comparison.clone()))
+    })];
+
+const CERTIFICATE: &[Item] = &[
+    attribute(
+        "proved",
+        Int,
+        ONE,
+        "1: the inertia count proves that no mode is missing; 0: not proved",
+        |v| Some(Value::Int(v.body.certificate.proved_modes.is_some().into())),
+    )
+    .derived(""),
+    attribute(
+        "proved_modes",
+        Int,
+        ONE,
+        "flexible modes below `shift` that the count proves; absent: not proved",
+        |v| v.body.certificate.proved_modes.and_then(count),
+    )
+    .optional(),
+    attribute("shift", Float, PER_TIME2, "shift sigma of the count", |v| {
+        Some(Value::Float(v.body.certificate.shift))
+    }),
+    attribute(
+        "negative_pivots",
+        Int,
+        ONE,
+        "negative pivots of K - sigma M: rigid and flexible modes below sigma; absent: not counted",
+        |v| v.body.certificate.negative_pivots.and_then(count),
+    )
+    .optional(),
+    attribute("rigid_modes", Int, ONE, "number of rigid modes", |v| count(v.body.certificate.rigid_modes)),
+    attribute(
+        "remark",
+        Text,
+        ONE,
+        "why the proof is missing or what limits it; empty when nothing does",
+        |v| text(v.body.certificate.remark.as_str()),
+    ),
+    attribute(
+        "rigid_noise",
+        Float,
+        ONE,
+        "largest |lambda| of the exact rigid modes over the first flexible lambda: the input's noise floor",
+        |v| Some(Value::Float(v.body.certificate.rigid_noise)),
+    ),
+    attribute(
+        "rigid_residual",
+        Float,
+        ONE,
+        "max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix",
+        |v| Some(Value::Float(v.body.certificate.rigid_residual)),
+    ),
+];
+
+const TERMS: &[Item] = &[
+    constant("W1", Text, ConstantText("kept"), "kinetic-energy group W1: `kept` in this version"),
+    constant("W2", Text, ConstantText("kept"), "kinetic-energy group W2: `kept` in this version"),
+    constant("W3", Text, ConstantText("kept"), "kinetic-energy group W3: `kept` in this version"),
+    attribute("reason", Text, ONE, "why", |_| text("no scene was given: every term is kept")),
+];
+
+const INTERFACES: &[Item] = &[
+    dataset("node_id", Ints(&[InterfaceNodes]), ONE, "id", "node numbers of the interface", |v| {
+        Some(Value::Ints(v.interface_nodes().iter().map(|&i| v.body.nodes.ids[i]).collect()))
+    }),
+    dataset(
+        "position",
+        Floats(&[InterfaceNodes, Fixed(3)]),
+        LENGTH,
+        "x",
+        "their positions in the body frame",
+        |v| {
+            Some(Value::Floats(v.interface_nodes().iter().flat_map(|&i| v.body.nodes.positions[i]).collect()))
+        },
+    )
+    .derived("position"),
+    dataset(
+        "shape",
+        Floats(&[Modes, InterfaceNodes, Fixed(3)]),
+        PER_ROOT_MASS,
+        "Psi",
+        "their rows of /modes/shape",
+        |v| Some(v.shape_rows(v.interface_nodes().iter().copied())),
+    )
+    .derived("shape"),
+];
+
+/// The groups, in the order in which they are written.
+pub(super) const TABLE: &[Group] = &[
+    Group { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
+    Group { path: "/source", per: Per::Body, description: "Where the body came from.", items: &[SOURCE] },
+    Group { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
+    Group { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
+    Group {
+        path: "/modes",
+        per: Per::Body,
+        description: "Mode shapes and what is known of each mode.",
+        items: &[MODES],
+    },
+    Group {
+        path: "/invariants",
+        per: Per::Body,
+        description: "Exact invariants from the consistent mass, about the frame origin, in body axes.",
+        items: &[INVARIANTS],
+    },
+    Group {
+        path: "/lumped/<scheme>",
+        per: Per::LumpingScheme,
+        description: "The same invariants from lumped masses, with the same modes.",
+        items: &[LUMPED, INVARIANTS],
+    },
+    Group {
+        path: "/comparison/<scheme>",
+        per: Per::LumpingScheme,
+        description: "Errors of the lumped invariants against the exact ones.",
+        items: &[COMPARISON],
+    },
+    Group {
+        path: "/certificate",
+        per: Per::Body,
+        description: "What was proved about the modes, and the digits of the input.",
+        items: &[CERTIFICATE],
+    },
+    Group {
+        path: "/terms",
+        per: Per::Body,
+        description: "Which groups of inertia terms a solver should use.",
+        items: &[TERMS],
+    },
+    Group {
+        path: "/interfaces/<name>",
+        per: Per::Interface,
+        description: "Named node sets.",
+        items: &[INTERFACES],
+    },
+];
+
+/// Names of the mass structures in the file.
+pub(super) const MASS_STRUCTURES: [(&str, MassStructure); 3] = [
+    ("rotation-invariant", MassStructure::RotationInvariant),
+    ("diagonal", MassStructure::Diagonal),
+    ("general", MassStructure::General),
+];
+
+fn mass_structure_name(structure: MassStructure) -> &'static str {
+    MASS_STRUCTURES.iter().find(|(_, s)| *s == structure).map_or("general", |(name, _)| name)
+}

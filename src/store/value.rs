@@ -1,0 +1,122 @@
+//! What an entry of the table holds, and where the writer takes it from.
+
+use crate::flex_body::{Interface, LumpedBody, Parts};
+use crate::invariants::Invariants;
+use crate::units::{Unit, UnitSystem};
+use faer::MatRef;
+
+/// Content of one entry; arrays are row-major in the shape that the table states.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Value {
+    Floats(Vec<f64>),
+    Ints(Vec<i64>),
+    Text(String),
+    Int(i64),
+    Float(f64),
+    /// Attributes whose names are data.
+    Named(Vec<(String, f64)>),
+}
+
+/// What the entries of one group are about.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub body: &'a Parts,
+    pub lumped: Option<&'a LumpedBody>,
+    pub interface: Option<&'a Interface>,
+}
+
+impl<'a> View<'a> {
+    /// The invariants of the group: exact, or those of its lumping scheme.
+    pub fn invariants(&self) -> &'a Invariants {
+        self.lumped.map_or(&self.body.invariants, |l| &l.invariants)
+    }
+
+    /// Node indices of the group's interface.
+    pub fn interface_nodes(&self) -> &'a [usize] {
+        self.interface.map_or(&[], |i| &i.nodes)
+    }
+
+    /// Components of the modes at `nodes`, (nf x nodes x 3).
+    pub fn shape_rows(&self, nodes: impl Iterator<Item = usize> + Clone) -> Value {
+        let shape = &self.body.modes.shape;
+        let mut out = Vec::new();
+        for j in 0..shape.ncols() {
+            out.extend(nodes.clone().flat_map(|i| [0, 1, 2].map(|k| shape[(3 * i + k, j)])));
+        }
+        Value::Floats(out)
+    }
+}
+
+/// A matrix, row by row.
+pub(super) fn rows(m: MatRef<'_, f64>) -> impl Iterator<Item = f64> + '_ {
+    (0..m.nrows()).flat_map(move |i| (0..m.ncols()).map(move |j| m[(i, j)]))
+}
+
+pub(super) fn matrix(m: MatRef<'_, f64>) -> Option<Value> {
+    Some(Value::Floats(rows(m).collect()))
+}
+
+/// A 3-vector or 3x3 matrix of nalgebra, row by row.
+pub(super) fn small<const C: usize>(m: nalgebra::SMatrix<f64, 3, C>) -> Option<Value> {
+    Some(Value::Floats(m.transpose().iter().copied().collect()))
+}
+
+/// A count as the file's integer. Counts of things in memory are far below 2^63.
+pub(super) fn count(value: usize) -> Option<Value> {
+    Some(Value::Int(i64::try_from(value).unwrap_or(i64::MAX)))
+}
+
+pub(super) fn text(value: impl Into<String>) -> Option<Value> {
+    Some(Value::Text(value.into()))
+}
+
+/// Units of an entry in terms of the body's units of mass, length and time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Units {
+    /// Dimensionless, written `1`.
+    One,
+    /// Hertz, whatever the unit of time.
+    Hertz,
+    /// mass^(halves/2) length^b time^c: mass-normalised modes carry mass^(-1/2).
+    Of { mass_halves: i8, length: i8, time: i8 },
+}
+
+impl Units {
+    /// With the unit names of a body: `kg m^2`, `tonne^(1/2) mm`, `s^-2`; a unit that the user gave as a number
+    /// is written in SI: `(0.0254 m)^2`.
+    pub fn concrete(self, system: &UnitSystem) -> String {
+        let name = |unit: &Unit, si: &str| match unit.name().parse::<f64>() {
+            Ok(_) => format!("({} {si})", unit.name()),
+            Err(_) => unit.name().to_owned(),
+        };
+        self.spell([name(&system.mass, "kg"), name(&system.length, "m"), name(&system.time, "s")])
+    }
+
+    /// In words: `mass length^2`.
+    pub fn symbolic(self) -> String {
+        self.spell(["mass", "length", "time"].map(str::to_owned))
+    }
+
+    fn spell(self, [mass, length, time]: [String; 3]) -> String {
+        let (m, l, t) = match self {
+            Units::One => return "1".to_owned(),
+            Units::Hertz => return "Hz".to_owned(),
+            Units::Of { mass_halves, length, time } => (mass_halves, length, time),
+        };
+        let mut factors = Vec::new();
+        match m {
+            0 => {}
+            2 => factors.push(mass),
+            m if m % 2 == 0 => factors.push(format!("{mass}^{}", m / 2)),
+            m => factors.push(format!("{mass}^({m}/2)")),
+        }
+        for (name, power) in [(length, l), (time, t)] {
+            match power {
+                0 => {}
+                1 => factors.push(name),
+                p => factors.push(format!("{name}^{p}")),
+            }
+        }
+        factors.join(" ")
+    }
+}

@@ -1,0 +1,124 @@
+//! Writes a body as the table says.
+
+use super::names;
+use super::scan::place;
+use super::schema::{Extent, Item, Kind, Per, TABLE};
+use super::value::{Value, View};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::flex_body::FlexBody;
+use crate::output::OutputSlot;
+use hdf5::file::LibraryVersion;
+use hdf5::plist::group_create::{AttrCreationOrder, LinkCreationOrder};
+use hdf5::types::VarLenUnicode;
+use hdf5_metno as hdf5;
+use std::path::Path;
+
+/// Mode shapes shrink by 5 to 20 %, almost all of it at the first level; higher levels cost time only.
+const DEFLATE_LEVEL: u8 = 1;
+
+/// Reserves `path` for a body file, so that a long computation does not end at an unwritable output.
+///
+/// # Errors
+/// See [`OutputSlot::prepare`].
+pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
+    OutputSlot::prepare(path)
+}
+
+/// Writes `body` to `path`; the file appears whole or not at all. Equal bodies give equal bytes.
+///
+/// # Errors
+/// See [`prepare_output`] and [`write_to`].
+pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
+    write_to(body, prepare_output(path)?)
+}
+
+/// Writes `body` to a place reserved by [`prepare_output`].
+///
+/// # Errors
+/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
+pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
+    fill(body, slot.temporary()).map_err(|e| {
+        let why = e.to_string();
+        // HDF5 reports the system's error number in its text only; 28 is ENOSPC.
+        let full = why.contains("errno = 28,") || why.contains("No space left");
+        let code = if full { Code::DiskShort } else { Code::OutputUnwritable };
+        Diagnostic::new(code, format!("cannot write {}: {why}", slot.path().display()))
+    })?;
+    slot.commit()
+}
+
+fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
+    let file = hdf5::File::with_options()
+        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums.
+        .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18))
+        // Time stamps would make equal bodies differ.
+        .with_fcpl(|p| p.obj_track_times(false))
+        .create(path)?;
+    for group in TABLE {
+        if group.per != Per::Body {
+            make(&file, group.parent())?;
+        }
+        for (name, view) in group.instances(body.parts()) {
+            let path = place(group, name.map(names::encode).as_deref());
+            let target = if path == "/" { file.as_group()? } else { make(&file, &path)? };
+            for item in group.entries() {
+                if let Some(value) = item.value(&view) {
+                    put(&target, item, &view, value)?;
+                }
+            }
+        }
+    }
+    file.flush()?;
+    file.close()
+}
+
+/// Makes a group that keeps the order of its members and attributes, and no time stamps.
+fn make(parent: &hdf5::Group, name: &str) -> hdf5::Result<hdf5::Group> {
+    parent
+        .create_group_builder()
+        .obj_track_times(false)
+        .with_gcpl(|p| {
+            p.link_creation_order(LinkCreationOrder::Indexed).attr_creation_order(AttrCreationOrder::Indexed)
+        })
+        .create(name)
+}
+
+fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<()> {
+    let shape = item.dims(view);
+    match (item.kind, value) {
+        (Kind::Floats(_), Value::Floats(values)) => {
+            let mut builder = place.new_dataset::<f64>().obj_track_times(false);
+            if let [Extent::Modes, Extent::Nodes, _] = item.shape().unwrap_or(&[]) {
+                // One chunk per mode: a reader of few modes touches only these.
+                builder = builder.chunk(vec![1, shape[1], shape[2]]).shuffle().deflate(DEFLATE_LEVEL);
+            }
+            let dataset = builder.shape(shape).create(item.name)?;
+            dataset.write_raw(&values)?;
+            describe(&dataset, item, view)
+        }
+        (Kind::Ints(_), Value::Ints(values)) => {
+            let dataset = place.new_dataset::<i64>().obj_track_times(false).shape(shape).create(item.name)?;
+            dataset.write_raw(&values)?;
+            describe(&dataset, item, view)
+        }
+        (Kind::Text, Value::Text(text)) => put_text(place, item.name, &text),
+        (Kind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v),
+        (Kind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v),
+        (Kind::Named, Value::Named(values)) => {
+            values.iter().try_for_each(|(n, v)| place.new_attr::<f64>().create(n.as_str())?.write_scalar(v))
+        }
+        (kind, value) => unreachable!("table entry {}: {kind:?} for {value:?}", item.name),
+    }
+}
+
+fn describe(dataset: &hdf5::Dataset, item: &Item, view: &View<'_>) -> hdf5::Result<()> {
+    put_text(dataset, "units", &item.units.concrete(&view.body.units))?;
+    put_text(dataset, "symbol", item.symbol)?;
+    put_text(dataset, "description", item.description)
+}
+
+fn put_text(place: &hdf5::Location, name: &str, text: &str) -> hdf5::Result<()> {
+    let text: VarLenUnicode = text.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+    place.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&text)
+}

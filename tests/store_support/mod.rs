@@ -1,0 +1,183 @@
+//! Random flexible bodies for the tests of the file: not mechanically meaningful, but valid parts.
+#![allow(dead_code)] // every test file uses a part of it
+
+use faer::Mat;
+use flexbody::flex_body::{
+    Certificate, FlexBody, Frame, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+};
+use flexbody::invariants::Invariants;
+use flexbody::model::Nodes;
+use flexbody::provenance::SourceFile;
+use flexbody::units::UnitSystem;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// SplitMix64: small, seeded, the same everywhere.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    /// Mostly of order one; sometimes zero, negative zero, subnormal, tiny or huge.
+    pub fn value(&mut self) -> f64 {
+        let unit = (self.bits() >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0;
+        match self.below(40) {
+            0 => 0.0,
+            1 => -0.0,
+            2 => f64::from_bits(self.bits() % (1 << 52)),
+            3 => unit * 1e-200,
+            4 => unit * 1e200,
+            _ => unit,
+        }
+    }
+
+    pub fn positive(&mut self) -> f64 {
+        self.value().abs().max(1e-300)
+    }
+
+    pub fn matrix(&mut self, rows: usize, columns: usize) -> Mat<f64> {
+        Mat::from_fn(rows, columns, |_, _| self.value())
+    }
+
+    pub fn name(&mut self) -> String {
+        const PARTS: [&str; 12] =
+            ["left", "/", ".", "%", "..", " ", "Lager außen", "\n", "日本", "%2F", "\"quoted\"", "\u{1}"];
+        let mut name = format!("{}", self.below(1000));
+        for _ in 0..self.below(4) {
+            name.insert_str(0, PARTS[self.below(PARTS.len())]);
+        }
+        name
+    }
+
+    pub fn invariants(&mut self, nf: usize) -> Invariants {
+        Invariants {
+            mass: self.positive(),
+            first_moment: Vector3::from_fn(|_, _| self.value()),
+            second_moment: Matrix3::from_fn(|_, _| self.value()),
+            c1: self.matrix(3, nf),
+            ibar: [(); 3].map(|()| [(); 3].map(|()| (0..nf).map(|_| self.value()).collect())),
+            s: [(); 3].map(|()| [(); 3].map(|()| self.matrix(nf, nf))),
+            modal_stiffness: self.matrix(nf, nf),
+        }
+    }
+}
+
+/// A valid body with `n` nodes, `nf` modes, `schemes` lumping schemes and `interfaces` interfaces.
+pub fn parts(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
+    let mut r = Random(seed);
+    let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
+    eigenvalue.sort_by(f64::total_cmp);
+    let units = [
+        UnitSystem::default(),
+        UnitSystem::parse("mm", "tonne", "s").unwrap(),
+        UnitSystem::parse("0.0254", "2.5e-3", "ms").unwrap(),
+    ];
+    let axes = Rotation3::from_euler_angles(0.3, -1.2, 2.5)
+        * Rotation3::from_euler_angles(r.positive().min(1.0), 0.1, 0.2);
+    let structures = [MassStructure::RotationInvariant, MassStructure::Diagonal, MassStructure::General];
+    let lumped = (0..schemes)
+        .map(|i| LumpedBody {
+            scheme: format!("{i}{}", r.name()),
+            invariants: r.invariants(nf),
+            negative_masses: r.below(100),
+            comparison: (0..r.below(5)).map(|k| (format!("{}{k}", r.name()), r.value())).collect(),
+        })
+        .collect();
+    Parts {
+        source: Source {
+            name: r.name(),
+            files: (0..r.below(4))
+                .map(|i| SourceFile {
+                    role: format!("role{i}"),
+                    name: r.name(),
+                    sha256: format!("{:064x}", r.bits()),
+                })
+                .collect(),
+            n_dofs: 3 * n,
+            mass_structure: structures[r.below(3)],
+            settings: serde_json::json!({
+                "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
+            }),
+        },
+        units: units[r.below(3)].clone(),
+        frame: Frame { origin: Vector3::from_fn(|_, _| r.value()), axes: *axes.matrix() },
+        nodes: Nodes {
+            ids: (0..n as i64).map(|i| (i * 7 + 3) * if i % 2 == 0 { 1 } else { -1 }).collect(),
+            positions: (0..n).map(|_| [(); 3].map(|()| r.value())).collect(),
+        },
+        modes: Modes {
+            eigenvalue,
+            residual: (0..nf).map(|_| r.value().abs()).collect(),
+            damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
+            shape: r.matrix(3 * n, nf),
+        },
+        invariants: r.invariants(nf),
+        lumped,
+        certificate: Certificate {
+            proved_modes: (r.below(2) == 0).then(|| r.below(100)),
+            shift: r.value(),
+            negative_pivots: (r.below(2) == 0).then(|| r.below(100)),
+            rigid_modes: 6,
+            remark: if r.below(2) == 0 { String::new() } else { r.name() },
+            rigid_noise: r.value(),
+            rigid_residual: r.value(),
+        },
+        interfaces: (0..interfaces)
+            .map(|i| Interface {
+                name: format!("{}{i}", r.name()),
+                nodes: (0..1 + r.below(2 * n)).map(|_| r.below(n)).collect(),
+            })
+            .collect(),
+    }
+}
+
+pub fn body(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> FlexBody {
+    FlexBody::new(parts(seed, n, nf, schemes, interfaces)).expect("random parts are valid")
+}
+
+/// Every number of a body, bit for bit, and every text.
+pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
+    let p = body.parts();
+    let mut bits: Vec<u64> = Vec::new();
+    let matrix = |bits: &mut Vec<u64>, m: &Mat<f64>| {
+        bits.extend([m.nrows() as u64, m.ncols() as u64]);
+        for j in 0..m.ncols() {
+            bits.extend((0..m.nrows()).map(|i| m[(i, j)].to_bits()));
+        }
+    };
+    let all = [&p.invariants].into_iter().chain(p.lumped.iter().map(|l| &l.invariants));
+    for i in all {
+        bits.push(i.mass.to_bits());
+        bits.extend(i.first_moment.iter().chain(i.second_moment.iter()).map(|v| v.to_bits()));
+        matrix(&mut bits, &i.c1);
+        bits.extend(i.ibar.iter().flatten().flatten().map(|v| v.to_bits()));
+        i.s.iter().flatten().for_each(|m| matrix(&mut bits, m));
+        matrix(&mut bits, &i.modal_stiffness);
+    }
+    matrix(&mut bits, &p.modes.shape);
+    let m = &p.modes;
+    let c = &p.certificate;
+    bits.extend(m.eigenvalue.iter().chain(&m.residual).chain(&m.damping_ratio).map(|v| v.to_bits()));
+    bits.extend(p.nodes.positions.iter().flatten().map(|v| v.to_bits()));
+    bits.extend(p.frame.origin.iter().chain(p.frame.axes.iter()).map(|v| v.to_bits()));
+    bits.extend([c.shift, c.rigid_noise, c.rigid_residual].map(f64::to_bits));
+    bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
+    let texts = format!(
+        "{:?} {:?} {:?} {:?} {:?} {:?}",
+        p.source,
+        p.units,
+        p.nodes.ids,
+        p.interfaces,
+        (c.proved_modes, c.negative_pivots, c.rigid_modes, &c.remark),
+        p.lumped.iter().map(|l| (&l.scheme, l.negative_masses, &l.comparison)).collect::<Vec<_>>(),
+    );
+    (bits, texts)
+}
