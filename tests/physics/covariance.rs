@@ -10,7 +10,7 @@ use flexbody::eigen::Method;
 use flexbody::invariants::{BodyFrame, Invariants, compare_invariants};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::RawModel;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use std::collections::HashMap;
 
 const METHODS: [Method; 2] = [Method::Dense, Method::Lanczos];
@@ -168,7 +168,7 @@ fn units_change_nothing_but_the_numbers() {
             let shapes = &ca.shapes * faer::Scale(mass.sqrt());
             let found = differences(&expected, &cb.invariants, &a, &shapes, &cb.shapes);
             let eigenvalues = eigenvalue_difference(&a, &b, time.powi(-2));
-            let limit = if length == 1024.0 { 0.0 } else { 1e-12 };
+            let limit = if length == 1024.0 && method == Method::Lanczos { 0.0 } else { 1e-12 };
             assert!(largest(&found) <= limit && eigenvalues <= limit, "{length} {mass} {time}: {found:?}");
             let moved = (ca.frame.origin * length - cb.frame.origin).norm();
             assert!(moved <= limit * length, "{length} {mass} {time}: {moved:e}");

@@ -3,12 +3,13 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use support::equations;
+use support::{equations, random};
 
 mod assembler;
 mod beams;
 mod convergence;
 mod covariance;
 mod errata;
+mod real_models;
 mod small_models;
 mod symmetry;

@@ -96,7 +96,7 @@ fn singular_mass_gives_its_finite_modes_and_says_so() {
         assert!(reference.infinite > 0);
         for method in METHODS {
             // All that could be asked for of this size: clamped to the finite ones.
-            eprintln!("{kind:?} {method:?}"); let found = try_modes(body.raw_model(), body.n_dofs() - 6, method).expect("a sound body");
+            let found = try_modes(body.raw_model(), body.n_dofs() - 6, method).expect("a sound body");
             assert_close(found.eigenvalues(), &reference.eigenvalues, 1e-10, &format!("{kind:?} {method:?}"));
             let has = |code| found.modes.diagnostics.iter().any(|d| d.code() == code);
             assert!(
