@@ -16,6 +16,17 @@ pub enum Severity {
     Error,
 }
 
+impl Severity {
+    /// `note`, `warning`, `error`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        }
+    }
+}
+
 macro_rules! codes {
     ($($variant:ident = $id:literal, $severity:ident, $exit:ident, $title:literal, $help:literal;)*) => {
         /// A diagnostic's identity. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model,
@@ -121,6 +132,7 @@ codes! {
     ModesClamped = "FB509", Note, Done, "fewer modes exist than were asked for", "nothing to do";
     NoiseFloor = "FB510", Warning, Done, "digits of the input limit the accuracy of the lowest modes", "write the matrices with 17 significant digits";
     MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common for reduced integration";
+    NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
@@ -137,6 +149,34 @@ codes! {
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";
     LumpedMassTable = "FB803", Error, BadInput, "nodal masses cannot be used", "header `node,mass`, one finite mass for every node";
     Internal = "FB999", Error, Bug, "internal error", "this is a bug: please report it with the input";
+}
+
+/// `docs/codes.md`: the table of codes and the exit codes.
+pub fn codes_markdown() -> String {
+    let mut out = String::from(
+        "<!-- Generated from the table in src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test docs_generated -->\n\n\
+         # Diagnostics and exit codes\n\n\
+         | exit code | meaning |\n|---|---|\n\
+         | 0 | the work was done |\n\
+         | 1 | a check failed or a tolerance was exceeded; the inputs themselves were readable |\n\
+         | 2 | bad input or usage |\n\
+         | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
+         | 4 | not enough memory or disk |\n\
+         | 70 | a bug of ours |\n\n\
+         A process ends with the exit code of its first error; warnings and notes do not change it.\n\n\
+         | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
+    );
+    for code in Code::ALL {
+        let severity = code.severity().name();
+        let exit = if code.severity() == Severity::Error {
+            (code.exit_code() as u8).to_string()
+        } else {
+            String::new()
+        };
+        let (id, title, help) = (code.id(), code.title(), code.help());
+        out.push_str(&format!("| {id} | {severity} | {exit} | {title} | {help} |\n"));
+    }
+    out
 }
 
 /// One finding: what, where, and what to do.
@@ -206,11 +246,7 @@ impl Diagnostic {
 
 impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let severity = match self.severity() {
-            Severity::Note => "note",
-            Severity::Warning => "warning",
-            Severity::Error => "error",
-        };
+        let severity = self.severity().name();
         write!(f, "{severity}[{}]: {}", self.code.id(), self.message)?;
         if let Some(file) = &self.file {
             write!(f, "\n  in {}", file.display())?;

@@ -75,6 +75,11 @@ impl OutputSlot {
         &self.temporary
     }
 
+    /// The error for a write to [`OutputSlot::temporary`] that failed in somebody else's hands.
+    pub(crate) fn failure(&self, error: &std::io::Error) -> Error {
+        io(&self.asked, error)
+    }
+
     /// Writes `bytes` and commits.
     ///
     /// # Errors
@@ -85,7 +90,7 @@ impl OutputSlot {
             .truncate(true)
             .open(&self.temporary)
             .and_then(|mut file| file.write_all(bytes));
-        written.map_err(|e| io(&self.asked, &e))?;
+        written.map_err(|e| self.failure(&e))?;
         self.commit()
     }
 

@@ -72,6 +72,16 @@ impl UnitSystem {
     pub fn hertz(&self) -> f64 {
         1.0 / self.time.to_si()
     }
+
+    /// f = sqrt(lambda) / (2 pi) in hertz, for an eigenvalue lambda in 1/time^2.
+    pub fn frequency_of(&self, eigenvalue: f64) -> f64 {
+        eigenvalue.sqrt() / std::f64::consts::TAU * self.hertz()
+    }
+
+    /// lambda = (2 pi f)^2 in 1/time^2, for a frequency f in hertz.
+    pub fn eigenvalue_of(&self, frequency_hz: f64) -> f64 {
+        (std::f64::consts::TAU * frequency_hz / self.hertz()).powi(2)
+    }
 }
 
 impl Default for UnitSystem {

@@ -6,7 +6,7 @@ use crate::eigen::{
     solve,
 };
 use crate::error::{Error, Result};
-use crate::linalg::{Pencil, SymmetricMatrix, gram, symmetric_eigen};
+use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
 use crate::model::{FeModel, centre_and_length, rigid_fields};
 use crate::progress::Watch;
 use faer::{Mat, MatRef};
@@ -77,6 +77,16 @@ pub fn free_surface_of(
     let eigen =
         EigenSettings { wanted: settings.wanted, accuracy: settings.accuracy, method: settings.method };
     let solution = solve(&problem, &eigen, watch).map_err(|failure| explain(model, failure))?;
+    if solution.eigenvalues.is_empty() {
+        let message = match (settings.wanted, solution.next_eigenvalue) {
+            (Wanted::Below(_), Some(next)) => {
+                let hertz = model.units().frequency_of(next);
+                format!("the first flexible mode has {hertz:.6} Hz, above the limit that was given")
+            }
+            _ => "no flexible mode has a finite frequency".to_owned(),
+        };
+        return Err(Diagnostic::new(Code::NoModes, message).into());
+    }
     let mut diagnostics = Vec::new();
     let first = solution.eigenvalues.first().copied().unwrap_or(f64::INFINITY);
     let energy = gram(rigid.as_ref(), pencil.apply_stiffness(rigid.as_ref()).as_ref());
@@ -153,7 +163,7 @@ fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> 
             return None;
         }
         let root = Mat::from_fn(6, 6, |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
-        Some(r * root)
+        Some(combine(r.as_ref(), root.as_ref()))
     };
     // Twice: the second pass removes what the condition of the first Gram matrix left.
     orthonormal(&fields).and_then(|once| orthonormal(&once)).ok_or_else(|| {
@@ -181,7 +191,7 @@ fn quadratic_estimate(pencil: &Pencil<'_>, positions: &[[f64; 3]], rigid: MatRef
     let before = mass(&fields);
     for _ in 0..2 {
         let along = gram(rigid, pencil.apply_mass(fields.as_ref()).as_ref());
-        fields -= rigid * along;
+        subtract_combination(fields.as_mut(), rigid, along.as_ref());
     }
     let mut m = mass(&fields);
     for i in 0..m.nrows() {
@@ -207,7 +217,8 @@ fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>) -> Option<f64> {
     let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
         eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
     });
-    let ratios = symmetric_eigen((root.transpose() * scaled(k) * &root).as_ref())?;
+    let projected = gram(root.as_ref(), combine(scaled(k).as_ref(), root.as_ref()).as_ref());
+    let ratios = symmetric_eigen(projected.as_ref())?;
     ratios.values.first().copied().filter(|v| *v > 0.0 && v.is_finite())
 }
 

@@ -1,6 +1,7 @@
 //! A canonical basis inside repeated eigenvalues and canonical signs, so that the same body gives the same modes
 //! whatever path computed them.
 
+use crate::linalg::combine;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
 use std::ops::Range;
@@ -73,7 +74,7 @@ fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
     u[0] += if u[0] < 0.0 { -norm } else { norm };
     let square = u.iter().map(|v| v * v).sum::<f64>();
     let coefficients = Mat::from_fn(k, 1, |j, _| u[j]);
-    let along = block.rb() * &coefficients;
+    let along = combine(block.rb(), coefficients.as_ref());
     for j in 0..k {
         let factor = 2.0 * u[j] / square;
         for i in 0..block.nrows() {

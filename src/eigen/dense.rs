@@ -1,11 +1,10 @@
 //! All finite modes of a small pencil by one dense symmetric eigenproblem.
 
 use super::problem::{EigenFailure, EigenProblem};
-use crate::linalg::{Pencil, Solve, SymmetricEigen, SymmetricMatrix, symmetric_eigen};
-use faer::linalg::solvers::Llt;
+use crate::linalg::{Pencil, Solve, SymmetricEigen, SymmetricMatrix, dense_cholesky, gram, symmetric_eigen};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::ReborrowMut;
-use faer::{Mat, MatMut, Par, Side};
+use faer::{Mat, MatMut, Par};
 
 /// Scaled eigenvalues of Ms below this are zero: files with 10 digits leave less.
 const NULL: f64 = 1e-10;
@@ -60,15 +59,13 @@ impl Spectrum {
         let m = dense_mass(pencil);
         let k = dense(pencil.stiffness());
         let a = Mat::from_fn(n, n, |i, j| k[(i, j)] + tau * m[(i, j)]);
-        let llt = Llt::new(a.as_ref(), Side::Lower)
-            .map_err(|_| EigenFailure::NotPositiveDefinite { shift: tau })?;
-        let l = llt.L().to_owned();
+        let l = dense_cholesky(a).ok_or(EigenFailure::NotPositiveDefinite { shift: tau })?;
         let mut s = m;
         solve_lower_triangular_in_place(l.as_ref(), s.as_mut(), Par::Seq);
         let mut s = s.transpose().to_owned();
         solve_lower_triangular_in_place(l.as_ref(), s.as_mut(), Par::Seq);
         // Deflation: a rigid mode r has S y = y / tau with the unit vector y = L' r / sqrt(tau).
-        let y = l.transpose() * problem.rigid;
+        let y = gram(l.as_ref(), problem.rigid);
         let s = Mat::from_fn(n, n, |i, j| {
             let rigid: f64 = (0..y.ncols()).map(|c| y[(i, c)] * y[(j, c)]).sum();
             0.5 * (s[(i, j)] + s[(j, i)]) - rigid / (tau * tau)

@@ -78,7 +78,7 @@ impl<'a> Krylov<'a> {
     pub(super) fn residual_norms(&self, s: MatRef<'_, f64>) -> Vec<f64> {
         let last = self.coupling.ncols();
         let tail = s.subrows(self.projected() - last, last);
-        let r = &self.coupling * tail;
+        let r = combine(self.coupling.as_ref(), tail);
         (0..s.ncols()).map(|j| r.col(j).norm_l2()).collect()
     }
 
@@ -172,9 +172,9 @@ impl<'a> Krylov<'a> {
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
             subtract_combination(w.as_mut(), basis, part.as_ref());
-            h += &part * &b;
+            h += combine(part.as_ref(), b.as_ref());
             mw = pencil.apply_mass(w.as_ref());
-            b = gram_schmidt(&mut w, &mut mw, &norms) * &b;
+            b = combine(gram_schmidt(&mut w, &mut mw, &norms).as_ref(), b.as_ref());
         }
         let room = self.room();
         if w.ncols() > room {

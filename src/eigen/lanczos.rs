@@ -20,9 +20,17 @@ const MAX_RESTARTS: u64 = 100;
 /// Energy this many standard deviations above the noise of the entries of K is real.
 pub(super) const NOISE_FACTOR: f64 = 30.0;
 
-/// The shift tau lies between these parts of the first flexible eigenvalue: larger ones need more iterations,
-/// smaller ones lose digits.
-const SHIFT_RANGE: (f64, f64) = (0.02, 1.0);
+/// A first flexible eigenvalue below this part of the shift asks for a smaller shift: iterations grow and digits of
+/// the lowest modes go.
+const SMALLEST_PART: f64 = 0.02;
+
+/// How a search ended.
+pub(super) enum Search {
+    /// With the modes.
+    Found(RitzPairs),
+    /// Early: with this shift it would be shorter and more accurate.
+    ShiftTooLarge(f64),
+}
 
 /// Lowest Ritz pairs, ascending in lambda.
 pub(super) struct RitzPairs {
@@ -30,24 +38,6 @@ pub(super) struct RitzPairs {
     pub vectors: Mat<f64>,
     /// Further Ritz values, loosely converged.
     pub next: Vec<f64>,
-}
-
-/// A factor of K + tau M with tau from the flexible spectrum; refactors when the first estimate was far off.
-pub(super) fn shifted_factor<'a>(
-    problem: &EigenProblem<'_>,
-    analysis: &'a Analysis,
-    counters: &mut Counters,
-) -> Result<Cholesky<'a>, EigenFailure> {
-    let mut tau = 0.3 * problem.first_estimate;
-    loop {
-        let factor = factorise(problem, analysis, tau, counters)?;
-        let lowest = probe_lowest(problem, &factor, tau, counters)?;
-        // A Ritz value is an upper bound: the shift is far too large when it is below a small part of tau.
-        if lowest > SHIFT_RANGE.0 * tau {
-            return Ok(factor);
-        }
-        tau = 0.5 * SHIFT_RANGE.1 * lowest;
-    }
 }
 
 /// Cholesky factor with a probe of its accuracy.
@@ -74,36 +64,34 @@ pub(super) fn factorise<'a>(
     Ok(factor)
 }
 
-/// Upper bound of the first flexible eigenvalue by three block steps; an error when it is zero to noise.
-fn probe_lowest(
+/// Block steps after which the shift is judged: the lowest Ritz value is then near the first eigenvalue.
+const STEPS_TO_JUDGE: usize = 3;
+
+/// Judges the shift by the lowest Ritz pair so far, an upper bound of the first eigenvalue: the shift to use instead
+/// when it is far too large for that; an error when there is no strain energy at all.
+fn better_shift(
     problem: &EigenProblem<'_>,
+    krylov: &Krylov<'_>,
     factor: &Cholesky<'_>,
-    tau: f64,
     counters: &mut Counters,
-) -> Result<f64, EigenFailure> {
-    let mut krylov = Krylov::new(problem, factor, 4 * 4);
-    krylov.append_random(4, counters);
-    for _ in 0..3 {
-        if krylov.exhausted() {
-            break;
-        }
-        krylov.step(counters);
+) -> Result<Option<f64>, EigenFailure> {
+    let tau = factor.shift();
+    let ritz = descending(krylov)?;
+    let (lambda, vectors) = best(krylov, &ritz, 1, tau);
+    let Some(&lowest) = lambda.first() else { return Ok(None) };
+    if lowest > SMALLEST_PART * tau {
+        return Ok(None);
     }
-    let ritz = descending(&krylov)?;
-    let (lambda, vectors) = best(&krylov, &ritz, 1, tau);
-    let Some(&lowest) = lambda.first() else {
-        return Err(EigenFailure::NotConverged { converged: 0, wanted: 1 });
-    };
     let noise =
         NOISE_FACTOR * energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error)[0];
-    // Far below the shift and within noise: no shift can resolve it, there is no strain energy.
-    if lowest < SHIFT_RANGE.0 * tau && lowest.abs() <= noise {
+    if lowest.abs() <= noise {
+        // Far below the shift and within noise: no shift can resolve it, there is no strain energy.
         return Err(zero_energy(problem, factor, tau, counters)?);
     }
-    if lowest < 0.0 && lowest < -noise {
+    if lowest < 0.0 {
         return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lowest, vector: vectors });
     }
-    Ok(lowest.max(noise))
+    Ok(Some(0.5 * lowest))
 }
 
 /// Counts and resolves the modes without strain energy.
@@ -149,7 +137,7 @@ pub(super) fn lowest_modes(
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<RitzPairs, EigenFailure> {
+) -> Result<Search, EigenFailure> {
     let Goal { wanted, tolerance, cluster_gap, attempt } = *goal;
     let tau = factor.shift();
     let free = problem.pencil.n() - problem.rigid.ncols();
@@ -157,7 +145,7 @@ pub(super) fn lowest_modes(
     let mut krylov = Krylov::new(problem, factor, capacity);
     krylov.choose_random(1000 * attempt);
     krylov.append_random(BLOCK.min(free), counters);
-    let mut checked = 0;
+    let (mut checked, mut steps) = (0, 0);
     loop {
         if krylov.exhausted() {
             // An invariant subspace: go on with new directions, or everything is found.
@@ -166,6 +154,12 @@ pub(super) fn lowest_modes(
         let complete = krylov.exhausted();
         if !complete {
             krylov.step(counters);
+            steps += 1;
+        }
+        if steps == STEPS_TO_JUDGE
+            && let Some(shift) = better_shift(problem, &krylov, factor, counters)?
+        {
+            return Ok(Search::ShiftTooLarge(shift));
         }
         let size = krylov.projected();
         let full = krylov.room() < BLOCK;
@@ -199,10 +193,10 @@ pub(super) fn lowest_modes(
             });
         watch(Event::Fraction(converged as f64 / wanted.max(1) as f64));
         if converged == last && beyond {
-            return Ok(RitzPairs {
+            return Ok(Search::Found(RitzPairs {
                 vectors: krylov.combination(s.as_ref().subcols(0, last)),
                 next: (last..size).take_while(|&i| complete || good(i, 1e-2)).map(lambda).collect(),
-            });
+            }));
         }
         if complete || counters.restarts >= MAX_RESTARTS {
             return Err(EigenFailure::NotConverged { converged, wanted });

@@ -78,10 +78,10 @@ fn rayleigh_ritz(
         return Err(EigenFailure::Inaccurate { residual: eigen.values[0] });
     }
     let root = Mat::from_fn(gm.nrows(), gm.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
-    let to_orthonormal = &root * eigen.vectors.transpose();
-    let projected = to_orthonormal.transpose() * &gk * &to_orthonormal;
+    let to_orthonormal = combine(root.as_ref(), eigen.vectors.transpose());
+    let projected = gram(to_orthonormal.as_ref(), combine(gk.as_ref(), to_orthonormal.as_ref()).as_ref());
     let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
-    let coefficients = &to_orthonormal * &ritz.vectors;
+    let coefficients = combine(to_orthonormal.as_ref(), ritz.vectors.as_ref());
     let coefficients =
         Mat::from_fn(coefficients.nrows(), coefficients.ncols(), |i, j| scale[i] * coefficients[(i, j)]);
     Ok((ritz.values, combine(x.as_ref(), coefficients.as_ref())))

@@ -86,12 +86,9 @@ impl Check {
         let mut seen = HashSet::new();
         for name in names {
             if name.is_empty() {
-                self.add(format!("a {what} has an empty name"));
+                self.add(format!("empty name of {what}"));
             } else if name.len() > LONGEST_NAME {
-                self.add(format!(
-                    "a {what} has a name of {} bytes, expected at most {LONGEST_NAME}",
-                    name.len()
-                ));
+                self.add(format!("name of {what} has {} bytes, expected at most {LONGEST_NAME}", name.len()));
             } else if !seen.insert(name) {
                 self.add(format!("{what} `{name}` is given twice"));
             }
@@ -179,11 +176,11 @@ impl Check {
     }
 
     fn lumped(&mut self, parts: &Parts, nf: usize) {
-        self.names("lumping scheme", parts.lumped.iter().map(|l| &l.scheme));
+        self.names("a lumping scheme", parts.lumped.iter().map(|l| &l.scheme));
         for body in &parts.lumped {
             let name = format!("lumped `{}`", body.scheme);
             self.invariants(&name, &body.invariants, nf);
-            self.names(&format!("error norm of {name}"), body.comparison.iter().map(|(norm, _)| norm));
+            self.names(&format!("an error norm of {name}"), body.comparison.iter().map(|(norm, _)| norm));
             for (norm, value) in &body.comparison {
                 self.text(&format!("{name} error norm"), norm);
                 self.finite(&format!("{name} {norm}"), [*value]);
@@ -192,7 +189,7 @@ impl Check {
     }
 
     fn interfaces(&mut self, parts: &Parts, n: usize) {
-        self.names("interface", parts.interfaces.iter().map(|i| &i.name));
+        self.names("an interface", parts.interfaces.iter().map(|i| &i.name));
         for interface in &parts.interfaces {
             let name = &interface.name;
             if interface.nodes.is_empty() {

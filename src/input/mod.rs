@@ -17,5 +17,5 @@ mod tables;
 pub use bytes::InputFile;
 pub use manifest::read_manifest;
 pub use model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles};
-pub use read_model::{read_matrix, read_model};
+pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{MatrixRole, MatrixSource, READERS, Reader};

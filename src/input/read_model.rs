@@ -4,7 +4,7 @@ use super::bytes::InputFile;
 use super::compression::Compression;
 use super::model_files::{InterfaceNodes, MatrixLocation, ModelFiles};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
-use super::tables::{read_dofs, read_node_list, read_nodes};
+use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::model::{NodeSet, RawMatrix, RawModel};
@@ -63,6 +63,14 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         sources: sources(files, &fingerprints),
         diagnostics,
     })
+}
+
+/// Reads nodal masses, `node,mass`: what a multibody package would have imported.
+///
+/// # Errors
+/// FB101 to FB106, FB203 to FB205 and FB803.
+pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
+    read_masses(&InputFile::open(path)?).map_err(Error::new)
 }
 
 type Found<T> = std::result::Result<T, Vec<Diagnostic>>;

@@ -106,6 +106,26 @@ pub(super) fn read_node_list(file: &InputFile) -> Found<Vec<i64>> {
     Ok(rows.into_iter().map(|r| r.0).collect())
 }
 
+/// Reads `node,mass`.
+pub(super) fn read_masses(file: &InputFile) -> Found<Vec<(i64, f64)>> {
+    let columns = [column("node", true), column("mass", true)];
+    let table = Table::open(file, &columns)
+        .map_err(|d| vec![d.with_help("the first line names the columns: `node,mass`")])?;
+    let rows = table.rows(|line, fields| {
+        let node = node_number(fields[0])?;
+        match fast_float2::parse::<f64, _>(fields[1]) {
+            Ok(mass) if mass.is_finite() => Ok((node, line, mass)),
+            _ => {
+                let message =
+                    format!("mass of node {node} is `{}`, expected a finite number", printable(fields[1]));
+                Err(Diagnostic::new(Code::LumpedMassTable, message))
+            }
+        }
+    })?;
+    no_duplicates(file, rows.iter().map(|&(node, line, _)| (node, line)))?;
+    Ok(rows.into_iter().map(|(node, _, mass)| (node, mass)).collect())
+}
+
 fn node_number(field: &[u8]) -> Result<i64, Diagnostic> {
     integer(field).ok_or_else(|| {
         Diagnostic::new(

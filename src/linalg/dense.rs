@@ -1,6 +1,10 @@
 //! Dense symmetric eigenproblems of moderate size.
 
+use super::combine;
 use dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{
+    LltParams, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
+};
 use faer::linalg::evd::{
     ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch,
 };
@@ -26,6 +30,9 @@ pub struct SymmetricEigen {
 /// iteration takes over where it fails.
 pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
     let n = a.nrows();
+    if n == 0 {
+        return Some(SymmetricEigen { values: Vec::new(), vectors: Mat::zeros(0, 0) });
+    }
     let full = Mat::from_fn(n, n, |i, j| a[(i.max(j), i.min(j))]);
     if !full.norm_max().is_finite() {
         return None;
@@ -56,11 +63,26 @@ fn decompose(a: &Mat<f64>, params: SelfAdjointEvdParams) -> Option<SymmetricEige
     Some(SymmetricEigen { values: values.iter().copied().collect(), vectors })
 }
 
+/// Lower Cholesky factor of the dense symmetric matrix whose lower triangle is that of `a`; `None` when it is not
+/// positive definite.
+pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
+    let params = <LltParams as Auto<f64>>::auto().into();
+    let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, params));
+    cholesky_in_place(a.as_mut(), LltRegularization::default(), Par::Seq, MemStack::new(&mut memory), params)
+        .ok()?;
+    for j in 1..a.ncols() {
+        for i in 0..j {
+            a[(i, j)] = 0.0;
+        }
+    }
+    Some(a)
+}
+
 /// |A V - V L| / |A|.
 fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     let n = a.nrows();
     let scaled = Mat::from_fn(n, n, |i, j| eigen.vectors[(i, j)] * eigen.values[j]);
-    let difference = a * &eigen.vectors - scaled;
+    let difference = combine(a.as_ref(), eigen.vectors.as_ref()) - scaled;
     difference.norm_max() / a.norm_max().max(f64::MIN_POSITIVE)
 }
 

@@ -54,6 +54,12 @@ impl Analysis {
         self.symbolic.perm().map_or(&[], |perm| perm.arrays().0)
     }
 
+    /// Threads for a factorisation: only its dense kernels are parallel, and below this work their barriers cost more
+    /// than they gain. The bits are the same either way.
+    fn parallelism(&self) -> Par {
+        if self.flops > 3e11 { Par::rayon(0) } else { Par::Seq }
+    }
+
     /// Numbers stored in a factor.
     pub fn factor_len(&self) -> usize {
         self.symbolic.len_val()
@@ -104,7 +110,7 @@ impl<'a> Cholesky<'a> {
         let matrix =
             SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
         let symbolic = &analysis.symbolic;
-        let par = Par::Seq;
+        let par = analysis.parallelism();
         let params = Spec::default();
         let mut values = vec![0.0; symbolic.len_val()];
         let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, params));
@@ -179,7 +185,7 @@ impl Inertia {
         let matrix =
             SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
         let symbolic = &analysis.symbolic;
-        let par = Par::Seq;
+        let par = analysis.parallelism();
         let params = Spec::default();
         let mut values = vec![0.0; symbolic.len_val()];
         let mut subdiagonal = vec![0.0; n];

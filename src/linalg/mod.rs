@@ -9,7 +9,7 @@ mod product;
 mod sparse;
 mod tall;
 
-pub use dense::{SymmetricEigen, symmetric_eigen};
+pub use dense::{SymmetricEigen, dense_cholesky, symmetric_eigen};
 pub use factor::{Analysis, Cholesky, Inertia, Solve, is_positive_semidefinite};
 pub use ordering::{connected_components, nested_dissection};
 pub use pencil::Pencil;

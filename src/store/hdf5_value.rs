@@ -103,6 +103,9 @@ impl Element for i64 {
     const NAME: &'static str = "64-bit integers";
 }
 
+/// Values in row-major order, and the extents.
+pub(super) type Array<T> = (Vec<T>, Vec<usize>);
+
 /// Reads a dataset of the stated shape, with its extents.
 pub(super) fn dataset<T: Element>(
     place: &hdf5::Group,
@@ -110,7 +113,7 @@ pub(super) fn dataset<T: Element>(
     shape: &[Extent],
     sizes: &mut Sizes,
     stored: &mut Stored,
-) -> Result<Option<(Vec<T>, Vec<usize>)>, String> {
+) -> Result<Option<Array<T>>, String> {
     let Some(dataset) = open_dataset(place, name)? else { return Ok(None) };
     let found = dataset.dtype().and_then(|t| t.to_descriptor());
     if !matches!(&found, Ok(found) if *found == T::TYPE) {
@@ -153,7 +156,7 @@ impl Sizes {
             Extent::Fixed(expected) => size == expected,
             Extent::Nodes => size == *self.nodes.get_or_insert(size),
             Extent::Modes => size == *self.modes.get_or_insert(size),
-            Extent::ThreeModes => size % 3 == 0 && size / 3 == *self.modes.get_or_insert(size / 3),
+            Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
         }
     }

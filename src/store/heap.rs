@@ -39,23 +39,17 @@ fn collections(file: &mut (impl Read + Seek)) -> Result<Vec<u64>> {
 
 fn sound(file: &mut (impl Read + Seek), position: u64) -> Result<bool> {
     let end = file.seek(SeekFrom::End(0))?;
-    let header = read16(file, position)?;
-    let Some(size) =
-        header.map(|h| u64::from_le_bytes([h[8], h[9], h[10], h[11], h[12], h[13], h[14], h[15]]))
-    else {
-        return Ok(false);
-    };
+    let Some((_, size)) = header(file, position)? else { return Ok(false) };
     if size < HEADER || size > end - position {
         return Ok(false);
     }
     let mut at = HEADER;
     while size - at >= HEADER {
-        let Some(h) = read16(file, position + at)? else { return Ok(false) };
-        let length = u64::from_le_bytes([h[8], h[9], h[10], h[11], h[12], h[13], h[14], h[15]]);
+        let Some((object, length)) = header(file, position + at)? else { return Ok(false) };
         let rest = size - at;
-        at += match (h[0], h[1]) {
-            (0, 0) if length >= HEADER && length <= rest => length,
-            (0, 0) => return Ok(false),
+        at += match object {
+            0 if length >= HEADER && length <= rest => length,
+            0 => return Ok(false),
             _ if length <= rest - HEADER => HEADER + length.next_multiple_of(8),
             _ => return Ok(false),
         };
@@ -66,12 +60,53 @@ fn sound(file: &mut (impl Read + Seek), position: u64) -> Result<bool> {
     Ok(true)
 }
 
-fn read16(file: &mut (impl Read + Seek), position: u64) -> Result<Option<[u8; 16]>> {
-    let mut bytes = [0; 16];
+/// First two and last eight bytes of a header of 16 bytes: index (objects) and size; `None` at the end of the file.
+fn header(file: &mut (impl Read + Seek), position: u64) -> Result<Option<(u16, u64)>> {
+    let mut bytes = [0; HEADER as usize];
     file.seek(SeekFrom::Start(position))?;
     match file.read_exact(&mut bytes) {
-        Ok(()) => Ok(Some(bytes)),
-        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
-        Err(e) => Err(e),
+        Ok(()) => {}
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(None),
+        Err(e) => return Err(e),
+    }
+    let [i0, i1, _, _, _, _, _, _, size @ ..] = bytes;
+    Ok(Some((u16::from_le_bytes([i0, i1]), u64::from_le_bytes(size))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    /// A collection of 64 bytes at `position`: object 1 with `size` bytes, then free space of `free` bytes.
+    fn file(position: usize, size: u64, free: u64) -> Cursor<Vec<u8>> {
+        let mut bytes = vec![0u8; position + 64 + 32];
+        bytes[position..position + 8].copy_from_slice(&MAGIC);
+        bytes[position + 8] = 64;
+        bytes[position + 16] = 1;
+        bytes[position + 24..position + 32].copy_from_slice(&size.to_le_bytes());
+        bytes[position + 48..position + 56].copy_from_slice(&free.to_le_bytes());
+        Cursor::new(bytes)
+    }
+
+    /// The layout above has its free space at 40 + 8 of the collection only for objects of 1 to 8 bytes.
+    #[test]
+    fn sound_heaps_pass_wherever_they_lie() {
+        for position in (BLOCK - 9..BLOCK + 3).chain([0, 1, 2 * BLOCK - 14, 3 * BLOCK]) {
+            assert_eq!(collections(&mut file(position, 5, 24)).unwrap(), [position as u64]);
+            assert_eq!(first_broken(&mut file(position, 5, 24)).unwrap(), None, "{position}");
+        }
+    }
+
+    #[test]
+    fn sizes_that_loop_or_leave_the_heap_are_found() {
+        for (size, free) in
+            [(5, 0), (5, 15), (5, 25), (5, u64::MAX), (u64::MAX, 24), (u64::MAX - 7, 24), (33, 24)]
+        {
+            assert_eq!(first_broken(&mut file(100, size, free)).unwrap(), Some(100), "{size} {free}");
+        }
+        let mut cut = file(100, 5, 24).into_inner();
+        cut.truncate(150);
+        assert_eq!(first_broken(&mut Cursor::new(cut)).unwrap(), Some(100));
     }
 }

@@ -3,15 +3,19 @@
 
 mod assemble;
 mod derived;
+mod document;
 mod hdf5_value;
 mod heap;
 mod names;
 mod read;
 mod scan;
 mod schema;
+mod structure;
 mod value;
 mod write;
 
 pub use crate::output::OutputSlot;
+pub use document::{format_markdown, format_schema};
 pub use read::{read, validate};
+pub use structure::structure;
 pub use write::{prepare_output, write, write_to};

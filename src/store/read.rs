@@ -8,6 +8,7 @@ use super::{hdf5_value, heap};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
+use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -31,8 +32,7 @@ pub fn validate(path: impl AsRef<Path>) -> Vec<Diagnostic> {
 }
 
 fn examine(path: &Path) -> Result<(Option<FlexBody>, Vec<Diagnostic>)> {
-    let (file, bytes) = open(path)?;
-    check_format(&file, path)?;
+    let (file, bytes) = open_checked(path)?;
     let mut scan = Scan::new(&file, path, bytes);
     let units = scan.units().cloned().filter(|_| scan.problems.is_empty());
     let Some(parts) = units.and_then(|units| assemble(&mut scan, units)) else {
@@ -47,7 +47,8 @@ fn examine(path: &Path) -> Result<(Option<FlexBody>, Vec<Diagnostic>)> {
     }
 }
 
-fn open(path: &Path) -> Result<(hdf5::File, u64)> {
+/// Opens a file of this program and of a format that this version knows; also gives its size in bytes.
+pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the flexible body: {why}")).in_file(path))
     };
@@ -61,6 +62,13 @@ fn open(path: &Path) -> Result<(hdf5::File, u64)> {
         return Err(unreadable(Code::BodyUnreadable, why));
     }
     let file = hdf5::File::open(path).map_err(|e| unreadable(Code::BodyUnreadable, e.to_string()))?;
+    // The check of the heaps knows 8-byte sizes only; nothing else is in use.
+    let sizes = file.create_plist().and_then(|p| p.get_sizes());
+    if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
+        let why = "its addresses or sizes do not have 8 bytes".to_owned();
+        return Err(unreadable(Code::BodyUnreadable, why));
+    }
+    check_format(&file, path)?;
     Ok((file, meta.len()))
 }
 

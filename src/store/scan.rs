@@ -241,10 +241,8 @@ impl Scan {
                 Some(units)
             }
             Err(unknown) => {
-                self.add(format!(
-                    "/@units_{}: expected a known unit or a number",
-                    unknown.replace(" `", ": found `")
-                ));
+                let (what, found) = unknown.split_once(' ').unwrap_or(("", &unknown));
+                self.add(format!("/@units_{what}: expected a known unit or a number, found {found}"));
                 None
             }
         }

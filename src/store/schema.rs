@@ -218,7 +218,7 @@ const ROOT: &[Item] = &[
     attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
         text(provenance::generator())
     }),
-    constant("dimension", Int, ConstantInt(3), "space dimension; 3 in this version"),
+    constant("dimension", Int, ConstantInt(3), "space dimension in this version"),
     attribute(
         "units_length",
         Text,
@@ -451,9 +451,9 @@ const CERTIFICATE: &[Item] = &[
 ];
 
 const TERMS: &[Item] = &[
-    constant("W1", Text, ConstantText("kept"), "kinetic-energy group W1: `kept` in this version"),
-    constant("W2", Text, ConstantText("kept"), "kinetic-energy group W2: `kept` in this version"),
-    constant("W3", Text, ConstantText("kept"), "kinetic-energy group W3: `kept` in this version"),
+    constant("W1", Text, ConstantText("kept"), "kinetic-energy group W1 in this version"),
+    constant("W2", Text, ConstantText("kept"), "kinetic-energy group W2 in this version"),
+    constant("W3", Text, ConstantText("kept"), "kinetic-energy group W3 in this version"),
     attribute("reason", Text, ONE, "why", |_| text("no scene was given: every term is kept")),
 ];
 

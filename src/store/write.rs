@@ -20,9 +20,14 @@ const DEFLATE_LEVEL: u8 = 1;
 /// Reserves `path` for a body file, so that a long computation does not end at an unwritable output.
 ///
 /// # Errors
-/// See [`OutputSlot::prepare`].
+/// See [`OutputSlot::prepare`]; also [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot take.
 pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
-    OutputSlot::prepare(path)
+    let slot = OutputSlot::prepare(path)?;
+    if slot.temporary().to_str().is_none() {
+        let message = format!("cannot write {}: HDF5 needs a path in UTF-8", slot.path().display());
+        return Err(Diagnostic::new(Code::OutputUnwritable, message).into());
+    }
+    Ok(slot)
 }
 
 /// Writes `body` to `path`; the file appears whole or not at all. Equal bodies give equal bytes.
@@ -38,14 +43,17 @@ pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
 /// # Errors
 /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
 pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
-    fill(body, slot.temporary()).map_err(|e| {
-        let why = e.to_string();
-        // HDF5 reports the system's error number in its text only; 28 is ENOSPC.
-        let full = why.contains("errno = 28,") || why.contains("No space left");
-        let code = if full { Code::DiskShort } else { Code::OutputUnwritable };
-        Diagnostic::new(code, format!("cannot write {}: {why}", slot.path().display()))
-    })?;
+    fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))?;
     slot.commit()
+}
+
+/// HDF5 tells the system's error number in its text only.
+fn system_error(text: &str) -> std::io::Error {
+    let number = text.split_once("errno = ").and_then(|(_, rest)| {
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).map_or(rest, |end| &rest[..end]);
+        digits.parse().ok()
+    });
+    number.map_or_else(|| std::io::Error::other(text), std::io::Error::from_raw_os_error)
 }
 
 fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
@@ -121,4 +129,23 @@ fn describe(dataset: &hdf5::Dataset, item: &Item, view: &View<'_>) -> hdf5::Resu
 fn put_text(place: &hdf5::Location, name: &str, text: &str) -> hdf5::Result<()> {
     let text: VarLenUnicode = text.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
     place.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::system_error;
+    use std::io::ErrorKind;
+
+    #[test]
+    fn the_number_of_the_system_error_is_found() {
+        let text =
+            "H5Dwrite(): file write failed: file descriptor = 3, errno = 28, error message = 'No space'";
+        assert_eq!(system_error(text).raw_os_error(), Some(28));
+        #[cfg(unix)]
+        assert_eq!(system_error(text).kind(), ErrorKind::StorageFull);
+        for text in ["H5Fcreate(): unable", "errno = ", "errno = 99999999999"] {
+            assert_eq!(system_error(text).kind(), ErrorKind::Other);
+            assert_eq!(system_error(text).to_string(), text);
+        }
+    }
 }

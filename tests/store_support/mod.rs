@@ -12,12 +12,19 @@ use flexbody::units::UnitSystem;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// SplitMix64: small, seeded, the same everywhere.
-pub struct Random(pub u64);
+pub struct Random {
+    state: u64,
+    wild: bool,
+}
 
 impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self { state: seed, wild: false }
+    }
+
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
@@ -26,9 +33,12 @@ impl Random {
         (self.bits() % n as u64) as usize
     }
 
-    /// Mostly of order one; sometimes zero, negative zero, subnormal, tiny or huge.
+    /// Within -1 .. 1; of wild generators sometimes zero, negative zero, subnormal, tiny or huge.
     pub fn value(&mut self) -> f64 {
         let unit = (self.bits() >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0;
+        if !self.wild {
+            return unit;
+        }
         match self.below(40) {
             0 => 0.0,
             1 => -0.0,
@@ -71,8 +81,7 @@ impl Random {
 }
 
 /// A valid body with `n` nodes, `nf` modes, `schemes` lumping schemes and `interfaces` interfaces.
-pub fn parts(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
-    let mut r = Random(seed);
+pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
     eigenvalue.sort_by(f64::total_cmp);
     let units = [
@@ -139,8 +148,15 @@ pub fn parts(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) 
     }
 }
 
+/// A body of moderate numbers.
 pub fn body(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> FlexBody {
-    FlexBody::new(parts(seed, n, nf, schemes, interfaces)).expect("random parts are valid")
+    FlexBody::new(parts(Random::new(seed), n, nf, schemes, interfaces)).expect("random parts are valid")
+}
+
+/// A body with every kind of finite number.
+pub fn wild_body(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> FlexBody {
+    let random = Random { state: seed, wild: true };
+    FlexBody::new(parts(random, n, nf, schemes, interfaces)).expect("random parts are valid")
 }
 
 /// Every number of a body, bit for bit, and every text.

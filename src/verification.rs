@@ -1,0 +1,97 @@
+//! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::flex_body::FlexBody;
+use crate::invariants::{IdentityCheck, condense, primary_differences};
+use crate::linalg::{Pencil, gram};
+use crate::model::FeModel;
+use faer::{Mat, Scale};
+
+/// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
+const RECOMPUTED: f64 = 1e-12;
+
+/// A stored K-residual may be undercut or exceeded by rounding of another evaluation.
+const RESIDUAL: f64 = 1e-6;
+
+/// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) when the nodes differ.
+pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
+    if body.nodes().ids != model.nodes().ids {
+        let message = format!(
+            "the body has {} nodes, the model {} with other numbers or in another order",
+            body.nodes().ids.len(),
+            model.nodes().ids.len()
+        );
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    }
+    let check = |name, formula, value: f64, limit: f64| IdentityCheck {
+        name,
+        formula,
+        value,
+        limit,
+        passed: value <= limit,
+    };
+    let frame = body.frame();
+    let positions = frame.to_body(&model.nodes().positions);
+    let size = positions.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+    let moved = positions
+        .iter()
+        .flatten()
+        .zip(body.nodes().positions.iter().flatten())
+        .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+    let shapes = &body.modes().shape;
+    let in_model = in_model_axes(shapes, &frame.axes);
+    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+    let kx = pencil.apply_stiffness(in_model.as_ref());
+    let mx = pencil.apply_mass(in_model.as_ref());
+    let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());
+    let own = condense(model.scalar_mass(), &positions, shapes.as_ref(), modal_stiffness);
+    let differences = primary_differences(body.invariants(), &own);
+    let worst =
+        differences.iter().fold(0.0f64, |m, (_, d)| if d.is_nan() { f64::INFINITY } else { m.max(*d) });
+    let mut residual = 0.0f64;
+    for (j, &lambda) in body.modes().eigenvalue.iter().enumerate() {
+        let r = kx.col(j) - mx.col(j) * Scale(lambda);
+        residual = residual.max(r.norm_l2() / (kx.col(j).norm_l2() + lambda.abs() * mx.col(j).norm_l2()));
+    }
+    let orthonormality =
+        gram(in_model.as_ref(), mx.as_ref()) - Mat::<f64>::identity(in_model.ncols(), in_model.ncols());
+    Ok(vec![
+        check("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12),
+        check("invariants_recomputed", "m, c, J, C1, Ibar, S, K_ff from the matrices", worst, RECOMPUTED),
+        check(
+            "residual_recomputed",
+            "|K psi - lambda M psi| / (|K psi| + |lambda M psi|)",
+            residual,
+            RESIDUAL,
+        ),
+        check("orthonormal_recomputed", "Psi' M Psi = I", orthonormality.norm_max(), 1e-9),
+    ])
+}
+
+/// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.
+pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
+    body.source()
+        .files
+        .iter()
+        .filter_map(|file| {
+            let now = model.sources().iter().find(|other| other.role == file.role)?;
+            (now.sha256 != file.sha256).then(|| {
+                let message =
+                    format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);
+                Diagnostic::new(Code::BodySourceChanged, message)
+            })
+        })
+        .collect()
+}
+
+/// Shapes (3n x nf) from body axes to model axes.
+fn in_model_axes(shapes: &Mat<f64>, axes: &nalgebra::Matrix3<f64>) -> Mat<f64> {
+    Mat::from_fn(shapes.nrows(), shapes.ncols(), |row, j| {
+        let (node, k) = (row / 3, row % 3);
+        (0..3).map(|l| axes[(k, l)] * shapes[(3 * node + l, j)]).sum()
+    })
+}

@@ -1,0 +1,135 @@
+//! Output files appear whole or not at all, and an unusable place is known before the work.
+
+mod store_support;
+
+use flexbody::diagnostic::Code;
+use flexbody::error::ExitCode;
+use flexbody::output::OutputSlot;
+use flexbody::store;
+use std::path::Path;
+use store_support::body;
+
+fn members(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_dropped_slot_leaves_nothing_and_keeps_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.flex.h5");
+    drop(store::prepare_output(&path).unwrap());
+    assert!(members(folder.path()).is_empty());
+    std::fs::write(&path, "old").unwrap();
+    let slot = store::prepare_output(&path).unwrap();
+    std::fs::write(slot.temporary(), "half of the n").unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old", "replaced before the commit");
+    drop(slot);
+    assert_eq!(members(folder.path()), ["body.flex.h5"]);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+}
+
+#[test]
+fn a_commit_replaces_the_old_file_and_leaves_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.flex.h5");
+    std::fs::write(&path, "old").unwrap();
+    store::write(&body(1, 3, 2, 0, 0), &path).unwrap();
+    assert_eq!(members(folder.path()), ["body.flex.h5"]);
+    assert_eq!(store::read(&path).unwrap(), body(1, 3, 2, 0, 0));
+    let report = folder.path().join("report.txt");
+    OutputSlot::prepare(&report).unwrap().write(b"ten seconds").unwrap();
+    assert_eq!(std::fs::read(&report).unwrap(), b"ten seconds");
+    assert_eq!(members(folder.path()), ["body.flex.h5", "report.txt"]);
+}
+
+#[test]
+fn a_shorter_text_leaves_nothing_of_what_the_slot_held() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("report.txt");
+    let slot = OutputSlot::prepare(&path).unwrap();
+    std::fs::write(slot.temporary(), "a long first attempt").unwrap();
+    slot.write(b"short").unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), b"short");
+}
+
+#[test]
+fn a_missing_folder_is_known_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = store::prepare_output(folder.path().join("no/such/body.flex.h5")).unwrap_err();
+    assert!(error.has(Code::OutputFolderMissing), "{error}");
+    assert_eq!(error.exit_code(), ExitCode::BadInput);
+    std::fs::write(folder.path().join("file"), "").unwrap();
+    let error = store::prepare_output(folder.path().join("file/body.flex.h5")).unwrap_err();
+    assert!(error.has(Code::OutputFolderMissing) || error.has(Code::OutputUnwritable), "{error}");
+}
+
+#[test]
+fn folders_and_empty_names_are_no_outputs() {
+    let folder = tempfile::tempdir().unwrap();
+    for path in [folder.path().to_path_buf(), "".into(), "/".into(), folder.path().join("..")] {
+        let error = store::prepare_output(&path).unwrap_err();
+        assert!(error.has(Code::OutputUnwritable), "{path:?}: {error}");
+        assert_eq!(error.exit_code(), ExitCode::Resources);
+    }
+}
+
+#[cfg(unix)]
+mod unix {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn devices_are_not_replaced() {
+        let error = store::prepare_output("/dev/null").unwrap_err();
+        assert!(error.has(Code::OutputUnwritable), "{error}");
+        assert!(error.to_string().contains("not a regular file"), "{error}");
+    }
+
+    #[test]
+    fn write_protected_files_are_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("body.flex.h5");
+        std::fs::write(&path, "reference").unwrap();
+        std::fs::set_permissions(&path, PermissionsExt::from_mode(0o444)).unwrap();
+        let error = store::prepare_output(&path).unwrap_err();
+        assert!(error.has(Code::OutputUnwritable), "{error}");
+        assert_eq!(members(folder.path()), ["body.flex.h5"]);
+    }
+
+    #[test]
+    fn a_link_stays_a_link_and_its_target_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (target, link) = (folder.path().join("target.h5"), folder.path().join("link.h5"));
+        std::fs::write(&target, "old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        OutputSlot::prepare(&link).unwrap().write(b"new").unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::read(&target).unwrap(), b"new");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_path_that_hdf5_cannot_take_is_known_before_the_work() {
+        use std::os::unix::ffi::OsStrExt;
+        let folder = tempfile::tempdir().unwrap();
+        let odd = folder.path().join(std::ffi::OsStr::from_bytes(b"caf\xe9"));
+        std::fs::create_dir(&odd).unwrap();
+        let error = store::prepare_output(odd.join("body.flex.h5")).unwrap_err();
+        assert!(error.has(Code::OutputUnwritable) && error.to_string().contains("UTF-8"), "{error}");
+        OutputSlot::prepare(odd.join("report.txt")).unwrap().write(b"fine").unwrap();
+        assert_eq!(members(&odd), ["report.txt"]);
+    }
+
+    #[test]
+    fn outputs_have_the_permissions_of_ordinary_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let (ordinary, output) = (folder.path().join("ordinary"), folder.path().join("output"));
+        std::fs::write(&ordinary, "").unwrap();
+        OutputSlot::prepare(&output).unwrap().write(b"").unwrap();
+        let mode = |path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&output), mode(&ordinary));
+    }
+}
