@@ -117,7 +117,6 @@ codes! {
     BodiesSeveral = "FB414", Error, Untrustworthy, "model falls into separate bodies", "connect them, or convert each by itself";
     DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
     BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
-    StiffnessDiagonalZero = "FB417", Warning, Done, "mass without stiffness", "check the connection of these nodes";
     ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more than six degrees of freedom";
     DimensionUnsupported = "FB419", Error, BadInput, "dimension not supported", "this version handles bodies in three dimensions";
     // FB5xx: numerics

@@ -8,7 +8,7 @@
 //! Rooms and the arrows between them: `ARCHITECTURE.md`; `tests/architecture.rs` holds them.
 
 pub mod basis;
-//pub mod cli;
+pub mod cli;
 pub mod convert;
 pub mod diagnostic;
 pub mod eigen;

@@ -1,1 +1,13 @@
-//! Command line.
+//! The command line: arguments, one file per command, progress. The only room that prints or exits; no arithmetic.
+
+mod arguments;
+mod check;
+mod compare;
+mod convert;
+mod inspect;
+mod output;
+mod resources;
+mod watcher;
+
+pub use arguments::Arguments;
+pub use output::run;

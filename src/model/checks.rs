@@ -47,6 +47,7 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
         let message = "a node coordinate is not a finite number";
         found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
     }
+    check_names(&raw, &mut found);
     for set in &raw.interfaces {
         let unknown: Vec<i64> = set.nodes.iter().filter(|id| !nodes.ids.contains(id)).copied().collect();
         if !unknown.is_empty() {
@@ -102,6 +103,28 @@ fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
         return Err(Error::new(std::mem::take(found)));
     }
     Ok(())
+}
+
+/// Names that no file could hold, before the long run rather than after it.
+fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
+    let mut seen = std::collections::HashSet::new();
+    for set in &raw.interfaces {
+        let name = &set.name;
+        let wrong = match name.as_str() {
+            "" => Some("an interface has no name".to_owned()),
+            _ if !seen.insert(name) => Some(format!("interface `{name}` is given twice")),
+            _ if name.len() > 200 || name.contains(['\0', '/']) => Some(format!(
+                "interface name `{}` is too long or has a slash or a NUL in it",
+                name.escape_debug()
+            )),
+            _ if set.nodes.is_empty() => Some(format!("interface `{name}` has no nodes")),
+            _ => None,
+        };
+        found.extend(wrong.map(|message| Diagnostic::new(Code::ManifestSyntax, message)));
+    }
+    if raw.name.contains('\0') {
+        found.push(Diagnostic::new(Code::ManifestSyntax, "the model name has a NUL character in it"));
+    }
 }
 
 /// Relative size below which a difference is rounding of values with `digits` significant digits.

@@ -1,1 +1,21 @@
-//! (filled below)
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies.
+
+mod bar_chart;
+mod clusters;
+mod comparison;
+mod completeness;
+mod facts;
+mod html;
+mod identities;
+mod lumped;
+mod mass_properties;
+mod numbers;
+mod render;
+mod run_data;
+mod text;
+
+pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
+pub use facts::Facts;
+pub use identities::{diagnostics_json, identities_json, identities_text};
+pub use render::{Format, render};
+pub use run_data::{LumpedModes, Phase, RunData};

@@ -1,0 +1,184 @@
+//! What can be said on the command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100, disable_help_subcommand = false)]
+#[command(
+    after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
+    numerical result; 4 not enough memory or disk; 70 internal error. Codes of all messages: docs/codes.md."
+)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Make a flexible body from the matrices of an FE model
+    #[command(
+        after_help = "Examples:\n  flexbody convert model.toml -o rod.flex.h5\n  flexbody convert --stiffness K.mtx \
+        --mass M.mtx.gz --nodes nodes.csv --units mm,t,s --modes 40 -o rod.flex.h5 --report rod.html"
+    )]
+    Convert(Box<ConvertArguments>),
+    /// Show what a flex-body file holds
+    Inspect(InspectArguments),
+    /// Check a flex-body file: its schema and every identity that must hold
+    Check(CheckArguments),
+    /// Compare two flex-body files, whatever the signs and bases of their modes
+    Compare(CompareArguments),
+}
+
+/// Arguments of `convert`.
+#[derive(Debug, Args)]
+pub struct ConvertArguments {
+    /// Manifest of the model (see docs/input.md)
+    #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "units"])]
+    pub model: Option<PathBuf>,
+    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
+    #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
+    pub stiffness: Option<PathBuf>,
+    /// Mass matrix, consistent
+    #[arg(long, value_name = "FILE", requires = "stiffness")]
+    pub mass: Option<PathBuf>,
+    /// Node table: node,x,y,z
+    #[arg(long, value_name = "FILE", requires = "stiffness")]
+    pub nodes: Option<PathBuf>,
+    /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
+    #[arg(long, value_name = "FILE", requires = "stiffness")]
+    pub dofs: Option<PathBuf>,
+    /// Units of length, mass and time [default: m,kg,s, not checked]
+    #[arg(long, value_name = "L,M,T", requires = "stiffness")]
+    pub units: Option<String>,
+    /// Flex-body file to write
+    #[arg(short, long, value_name = "BODY.flex.h5")]
+    pub output: PathBuf,
+    /// Number of flexible modes, up to all of them
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
+    pub modes: u32,
+    /// All flexible modes up to this frequency instead
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub max_frequency: Option<f64>,
+    /// Promise about the modes
+    #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
+    pub accuracy: AccuracyName,
+    /// Frame of the body
+    #[arg(long, value_enum, default_value_t = FrameName::Principal)]
+    pub frame: FrameName,
+    /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
+    #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
+    pub lumped: String,
+    /// Compute the modes of each lumped mass too, and compare after aligning the subspaces
+    #[arg(long)]
+    pub lumped_modes: bool,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Threads; results do not depend on it [default: all processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Print groups, datasets, shapes and attributes as JSON instead (schemas/flexbody-file.schema.json)
+    #[arg(long)]
+    pub structure: bool,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Also recompute invariants and residuals from the matrices of this model
+    #[arg(long, value_name = "MODEL.toml")]
+    pub against: Option<PathBuf>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// Reference
+    #[arg(value_name = "A.flex.h5")]
+    pub a: PathBuf,
+    /// What is compared with it
+    #[arg(value_name = "B.flex.h5")]
+    pub b: PathBuf,
+    /// Largest relative difference of a frequency
+    #[arg(long, value_name = "REL", value_parser = positive)]
+    pub frequency: Option<f64>,
+    /// Largest relative difference of the mass
+    #[arg(long, value_name = "REL", value_parser = positive)]
+    pub mass: Option<f64>,
+    /// Largest difference of the centre of mass relative to the radius of gyration
+    #[arg(long, value_name = "REL", value_parser = positive)]
+    pub centre_of_mass: Option<f64>,
+    /// Largest relative difference of the inertia
+    #[arg(long, value_name = "REL", value_parser = positive)]
+    pub inertia: Option<f64>,
+    /// Largest difference of an invariant relative to its Cauchy-Schwarz bound
+    #[arg(long, value_name = "REL", value_parser = positive)]
+    pub invariants: Option<f64>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// How to print.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Printing {
+    /// Print results and diagnostics as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Names of the accuracy levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum AccuracyName {
+    /// Residual 1e-6, completeness not proved
+    Fast,
+    /// Residual 1e-9 or the rounding floor, completeness proved
+    Standard,
+    /// Residual at the rounding floor, completeness proved
+    Certified,
+}
+
+/// Names of the frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FrameName {
+    /// Origin at the centre of mass, principal axes
+    Principal,
+    /// Origin at the centre of mass, model axes
+    Com,
+    /// The model's own frame
+    Model,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("a positive number is expected".to_owned()),
+    }
+}

@@ -1,0 +1,26 @@
+//! `flexbody compare`.
+
+use super::arguments::CompareArguments;
+use super::output::Outcome;
+use crate::error::Result;
+use crate::report::{Tolerances, compare};
+use crate::store;
+
+pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
+    let a = store::read(&arguments.a)?;
+    let b = store::read(&arguments.b)?;
+    let usual = Tolerances::default();
+    let tolerances = Tolerances {
+        frequency: arguments.frequency.unwrap_or(usual.frequency),
+        mass: arguments.mass.unwrap_or(usual.mass),
+        centre_of_mass: arguments.centre_of_mass.unwrap_or(usual.centre_of_mass),
+        inertia: arguments.inertia.unwrap_or(usual.inertia),
+        invariants: arguments.invariants.unwrap_or(usual.invariants),
+    };
+    let comparison = compare(&a, &b, &tolerances)?;
+    Ok(Outcome {
+        text: comparison.text(),
+        json: format!("{:#}", comparison.json()),
+        passed: comparison.passed(),
+    })
+}

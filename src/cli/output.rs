@@ -1,0 +1,70 @@
+//! Printing of results and diagnostics, and the exit code.
+
+use super::arguments::{Arguments, Command, Printing};
+use super::{check, compare, convert, inspect};
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::error::{ExitCode, Result};
+use crate::report::diagnostics_json;
+use std::io::Write;
+
+/// What a command found: text for stdout (or JSON with `--json`), and whether its checks passed.
+pub(super) struct Outcome {
+    pub text: String,
+    pub json: String,
+    pub passed: bool,
+}
+
+/// Runs the command and prints its outcome.
+pub fn run(arguments: &Arguments) -> ExitCode {
+    let (printing, outcome) = match &arguments.command {
+        Command::Convert(arguments) => (arguments.printing, convert::run(arguments)),
+        Command::Inspect(arguments) => (arguments.printing, inspect::run(arguments)),
+        Command::Check(arguments) => (arguments.printing, check::run(arguments)),
+        Command::Compare(arguments) => (arguments.printing, compare::run(arguments)),
+    };
+    finish(printing, outcome)
+}
+
+fn finish(printing: Printing, outcome: Result<Outcome>) -> ExitCode {
+    match outcome {
+        Ok(outcome) => {
+            if printing.json {
+                print(&outcome.json);
+            } else if !printing.quiet {
+                print(&outcome.text);
+            }
+            if outcome.passed { ExitCode::Done } else { ExitCode::CheckFailed }
+        }
+        Err(error) => {
+            let code = error.exit_code();
+            if printing.json {
+                let mut json = diagnostics_json(error.diagnostics());
+                json["exit_code"] = (code as u8).into();
+                print(&format!("{json:#}"));
+            } else {
+                tell(printing, error.diagnostics());
+            }
+            code
+        }
+    }
+}
+
+/// Prints diagnostics to stderr: all of them, or errors only when quiet; none with `--json`, whose output has them.
+pub(super) fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
+    if printing.json {
+        return;
+    }
+    let mut stderr = std::io::stderr().lock();
+    for diagnostic in diagnostics.iter().filter(|d| !printing.quiet || d.severity() == Severity::Error) {
+        // Nobody is left to tell when stderr is closed.
+        let _ = writeln!(stderr, "{diagnostic}");
+    }
+}
+
+/// Prints to stdout; a reader that went away (`| head`) is not an error.
+fn print(text: &str) {
+    let mut stdout = std::io::stdout().lock();
+    let newline = if text.ends_with('\n') { "" } else { "\n" };
+    let _ = write!(stdout, "{text}{newline}");
+    let _ = stdout.flush();
+}

@@ -1,0 +1,210 @@
+//! The facts of a body and of the run that made it, computed once; every format renders these.
+
+use super::completeness::Completeness;
+use super::lumped::{LumpedFacts, LumpedModesFacts};
+use super::mass_properties::MassProperties;
+use super::run_data::{Phase, RunData};
+use crate::diagnostic::Diagnostic;
+use crate::flex_body::{FlexBody, MassStructure};
+use crate::provenance::{self, SourceFile};
+use serde::{Serialize, Serializer};
+
+/// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
+const MAJOR: u32 = 1;
+const MINOR: u32 = 0;
+
+/// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
+///
+/// Numbers are in the units of the model, frequencies in hertz, times in seconds. A number that is not finite is
+/// `null` in JSON.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Facts {
+    format: &'static str,
+    format_major: u32,
+    format_minor: u32,
+    pub(super) generator: String,
+    pub(super) model: ModelFacts,
+    pub(super) body: MassProperties,
+    pub(super) modes: ModeFacts,
+    pub(super) completeness: Completeness,
+    pub(super) lumped: Vec<LumpedFacts>,
+    pub(super) lumped_modes: Vec<LumpedModesFacts>,
+    /// `None` for a body read from a file.
+    pub(super) run: Option<RunFacts>,
+    pub(super) diagnostics: Vec<Diagnostic>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct ModelFacts {
+    pub name: String,
+    pub dimension: u8,
+    pub n_nodes: usize,
+    pub n_dofs: usize,
+    pub mass_structure: &'static str,
+    pub units: UnitFacts,
+    pub files: Vec<SourceFile>,
+    pub interfaces: Vec<InterfaceFacts>,
+    pub settings: serde_json::Value,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct UnitFacts {
+    pub length: String,
+    pub mass: String,
+    pub time: String,
+    pub stated: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct InterfaceFacts {
+    pub name: String,
+    pub n_nodes: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct ModeFacts {
+    pub count: usize,
+    pub frequency_hz: Vec<f64>,
+    /// Unit: 1/time^2.
+    pub eigenvalue: Vec<f64>,
+    pub residual: Vec<f64>,
+    pub damping_ratio: Vec<f64>,
+    pub worst_residual: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct RunFacts {
+    pub accuracy: String,
+    pub threads: usize,
+    pub wall_seconds: f64,
+    pub cpu_seconds: f64,
+    pub phases: Vec<Phase>,
+    pub peak_memory_bytes: Option<u64>,
+    #[serde(serialize_with = "as_map")]
+    pub counters: Vec<(String, u64)>,
+    pub output: Option<OutputFacts>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct OutputFacts {
+    pub name: String,
+    pub bytes: u64,
+}
+
+fn as_map<S: Serializer>(pairs: &[(String, u64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, value)| (name, value)))
+}
+
+impl Facts {
+    /// Collects the facts of `body` and of the `run` that made it; [`RunData::default`] for a body whose run is
+    /// not known (read from a file).
+    pub fn new(body: &FlexBody, run: &RunData) -> Self {
+        let frequency_hz = body.frequencies_hz();
+        let lumped_modes = run.lumped_modes.iter().map(|l| LumpedModesFacts::of(l, &frequency_hz)).collect();
+        let known = RunData { diagnostics: Vec::new(), lumped_modes: Vec::new(), ..run.clone() };
+        Self {
+            format: "flexbody-report",
+            format_major: MAJOR,
+            format_minor: MINOR,
+            generator: provenance::generator(),
+            model: ModelFacts::of(body),
+            body: MassProperties::of(body),
+            modes: ModeFacts {
+                count: body.n_modes(),
+                frequency_hz,
+                eigenvalue: body.modes().eigenvalue.clone(),
+                residual: body.modes().residual.clone(),
+                damping_ratio: body.modes().damping_ratio.clone(),
+                worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
+            },
+            completeness: Completeness::of(body),
+            lumped: body.lumped().iter().map(LumpedFacts::of).collect(),
+            lumped_modes,
+            run: (known != RunData::default()).then(|| RunFacts::of(&known)),
+            diagnostics: run.diagnostics.clone(),
+        }
+    }
+}
+
+impl ModelFacts {
+    fn of(body: &FlexBody) -> Self {
+        let (source, units) = (body.source(), body.units());
+        Self {
+            name: source.name.clone(),
+            dimension: 3,
+            n_nodes: body.n_nodes(),
+            n_dofs: source.n_dofs,
+            mass_structure: match source.mass_structure {
+                MassStructure::RotationInvariant => "rotation-invariant",
+                MassStructure::Diagonal => "diagonal",
+                MassStructure::General => "general",
+            },
+            units: UnitFacts {
+                length: units.length.name().to_owned(),
+                mass: units.mass.name().to_owned(),
+                time: units.time.name().to_owned(),
+                stated: units.stated,
+            },
+            files: source.files.clone(),
+            interfaces: body
+                .interfaces()
+                .iter()
+                .map(|i| InterfaceFacts { name: i.name.clone(), n_nodes: i.nodes.len() })
+                .collect(),
+            settings: source.settings.clone(),
+        }
+    }
+
+    /// What the structure of the mass matrix means for `exact`.
+    pub fn mass_in_words(&self) -> &'static str {
+        match self.mass_structure {
+            "rotation-invariant" => "consistent mass",
+            "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",
+            _ => "general mass matrix",
+        }
+    }
+}
+
+impl UnitFacts {
+    pub fn mass(&self) -> String {
+        named(&self.mass, "kg")
+    }
+
+    pub fn length(&self) -> String {
+        named(&self.length, "m")
+    }
+
+    pub fn inertia(&self) -> String {
+        format!("{} {}^2", self.mass(), self.length())
+    }
+
+    /// All three, and whether they are a guess.
+    pub fn in_words(&self) -> String {
+        let time = named(&self.time, "s");
+        let assumed = if self.stated { "" } else { " assumed, none stated" };
+        format!("{}, {}, {time}{assumed}", self.length(), self.mass())
+    }
+}
+
+/// A unit given by its size is written as that size.
+fn named(unit: &str, si: &str) -> String {
+    if unit.parse::<f64>().is_ok() { format!("[{unit} {si}]") } else { unit.to_owned() }
+}
+
+impl RunFacts {
+    fn of(run: &RunData) -> Self {
+        Self {
+            accuracy: run.accuracy.clone(),
+            threads: run.threads,
+            wall_seconds: run.phases.iter().map(|p| p.wall_seconds).sum(),
+            cpu_seconds: run.phases.iter().map(|p| p.cpu_seconds).sum(),
+            phases: run.phases.clone(),
+            peak_memory_bytes: run.peak_memory_bytes,
+            counters: run.counters.clone(),
+            output: run
+                .output
+                .as_ref()
+                .map(|(name, bytes)| OutputFacts { name: name.clone(), bytes: *bytes }),
+        }
+    }
+}

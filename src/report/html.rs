@@ -1,0 +1,361 @@
+//! The report as one web page: no scripts, nothing loaded from elsewhere, readable on screen and on paper.
+
+use super::Facts;
+use super::bar_chart::bar_chart;
+use super::numbers::{bytes, counted, duration, percent, plain, significant};
+use crate::diagnostic::Severity;
+use crate::invariants::ERROR_NORMS;
+
+const STYLE: &str = include_str!("report.css");
+
+pub(super) fn render(facts: &Facts) -> String {
+    let mut html = String::new();
+    let name = escape(&facts.model.name);
+    html.push_str(&format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name}: flexible body report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p class=\"quiet\">Flexible body report, {}</p>\n</header>\n<main>\n",
+        escape(&facts.generator)
+    ));
+    verdict(&mut html, facts);
+    body(&mut html, facts);
+    modes(&mut html, facts);
+    lumped(&mut html, facts);
+    lumped_modes(&mut html, facts);
+    diagnostics(&mut html, facts);
+    run(&mut html, facts);
+    origin(&mut html, facts);
+    html.push_str("</main>\n</body>\n</html>\n");
+    html
+}
+
+/// Text for element content and quoted attributes.
+pub(super) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in plain(text).chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+fn section(html: &mut String, title: &str) {
+    html.push_str(&format!("<h2>{title}</h2>\n"));
+}
+
+/// A list of terms; the values are markup.
+fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a str, String)>) {
+    html.push_str("<dl>\n");
+    for (term, value) in items {
+        html.push_str(&format!("<dt>{}</dt><dd>{value}</dd>\n", escape(term)));
+    }
+    html.push_str("</dl>\n");
+}
+
+/// A table: head cells, then rows whose first cell is their head; cells are markup, `text` columns are left-aligned.
+fn table(html: &mut String, caption: &str, head: &[String], text: &[usize], rows: &[Vec<String>]) {
+    let class = |column: usize| if text.contains(&column) { " class=\"text\"" } else { "" };
+    html.push_str(&format!("<div class=\"scroll\"><table>\n<caption>{caption}</caption>\n<thead><tr>"));
+    for (i, cell) in head.iter().enumerate() {
+        html.push_str(&format!("<th scope=\"col\"{}>{cell}</th>", class(i)));
+    }
+    html.push_str("</tr></thead>\n<tbody>\n");
+    for row in rows {
+        html.push_str("<tr>");
+        for (i, cell) in row.iter().enumerate() {
+            if i == 0 {
+                html.push_str(&format!("<th scope=\"row\">{cell}</th>"));
+            } else {
+                html.push_str(&format!("<td{}>{cell}</td>", class(i)));
+            }
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</tbody>\n</table></div>\n");
+}
+
+fn texts<const N: usize>(cells: [&str; N]) -> Vec<String> {
+    cells.map(str::to_owned).to_vec()
+}
+
+fn verdict(html: &mut String, facts: &Facts) {
+    let c = &facts.completeness;
+    let (class, head) =
+        if c.proved { ("", "No mode is missing.") } else { (" open", "Not proved complete.") };
+    html.push_str(&format!(
+        "<p class=\"verdict{class}\"><strong>{head}</strong> {} flexible modes, {} to {} Hz. {}.</p>\n",
+        facts.modes.count,
+        facts.modes.frequency_hz.first().map_or_else(String::new, |f| significant(*f, 5)),
+        facts.modes.frequency_hz.last().map_or_else(String::new, |f| significant(*f, 5)),
+        escape(&sentence(&c.sentence)),
+    ));
+}
+
+fn sentence(fragment: &str) -> String {
+    let mut characters = fragment.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
+}
+
+fn body(html: &mut String, facts: &Facts) {
+    let (model, body) = (&facts.model, &facts.body);
+    let units = &model.units;
+    let triple = |values: &[f64; 3], unit: &str| {
+        let [x, y, z] = values.map(|v| significant(v, 7));
+        format!("{x}, &ensp;{y}, &ensp;{z} {}", escape(unit))
+    };
+    let [x, y, z] = body.frame_axes.map(|row| row.map(|v| significant(v, 6)).join(", "));
+    section(html, "Body");
+    terms(
+        html,
+        [
+            ("Mass", format!("{} {}", significant(body.mass, 7), escape(&units.mass()))),
+            ("Centre of mass", format!("{} (model axes)", triple(&body.centre_of_mass, &units.length()))),
+            (
+                "Principal inertia",
+                format!("{} (about the centre of mass)", triple(&body.principal_inertia, &units.inertia())),
+            ),
+            ("Radii of gyration", triple(&body.radii_of_gyration, &units.length())),
+            (
+                "Body frame",
+                format!("{}; origin {}", escape(&body.frame), triple(&body.frame_origin, &units.length())),
+            ),
+            ("Body axes", format!("columns of [{x}; {y}; {z}]")),
+            (
+                "Model",
+                format!(
+                    "{} nodes, {} degrees of freedom, {}",
+                    model.n_nodes,
+                    model.n_dofs,
+                    model.mass_in_words()
+                ),
+            ),
+            ("Units", escape(&units.in_words())),
+        ],
+    );
+    if !model.interfaces.is_empty() {
+        let rows: Vec<_> =
+            model.interfaces.iter().map(|i| vec![escape(&i.name), i.n_nodes.to_string()]).collect();
+        table(html, "Interfaces", &texts(["Name", "Nodes"]), &[0], &rows);
+    }
+}
+
+fn modes(html: &mut String, facts: &Facts) {
+    let (modes, c) = (&facts.modes, &facts.completeness);
+    section(html, "Completeness of the modes");
+    let count = |n: Option<usize>| n.map_or_else(|| "not counted".to_owned(), |n| n.to_string());
+    let shift =
+        c.shift_hz.map_or_else(|| "no frequency".to_owned(), |hz| format!("{} Hz", significant(hz, 6)));
+    let mut items = vec![
+        ("Negative pivots", format!("{} of K &minus; &sigma;M at {shift}", count(c.negative_pivots))),
+        ("Rigid modes", c.rigid_modes.to_string()),
+        ("Flexible modes proved", c.proved_modes.map_or_else(|| "none".to_owned(), |n| n.to_string())),
+        (
+            "Worst residual",
+            format!("{} of |K&psi;| + |&lambda;M&psi;|", significant(modes.worst_residual, 3)),
+        ),
+        (
+            "Noise of the input",
+            format!(
+                "rigid eigenvalues {} of the first flexible one; |K R| {} of |K| |R|",
+                significant(c.rigid_noise, 3),
+                significant(c.rigid_residual, 3)
+            ),
+        ),
+    ];
+    if !c.remark.is_empty() {
+        items.push(("Remark", escape(&c.remark)));
+    }
+    terms(html, items);
+    section(html, "Frequencies");
+    let rows: Vec<_> = (0..modes.count)
+        .map(|j| {
+            vec![
+                (j + 1).to_string(),
+                significant(modes.frequency_hz[j], 8),
+                significant(modes.eigenvalue[j], 8),
+                significant(modes.residual[j], 2),
+                significant(modes.damping_ratio[j], 4),
+            ]
+        })
+        .collect();
+    let eigenvalue = format!("Eigenvalue (1/{}^2)", escape(&facts.model.units.time));
+    let head = ["Mode", "Frequency (Hz)", &eigenvalue, "Residual", "Damping ratio"];
+    table(html, "Flexible modes, ascending", &texts(head), &[], &rows);
+}
+
+fn lumped(html: &mut String, facts: &Facts) {
+    if facts.lumped.is_empty() {
+        return;
+    }
+    section(html, "What lumped masses would have cost");
+    html.push_str("<p>The same modes with nodal masses instead of the mass matrix: relative errors of the inertia invariants, the worst norm of each.</p>\n");
+    let chart = bar_chart(&facts.lumped);
+    if !chart.is_empty() {
+        html.push_str(&format!(
+            "<figure>\n{chart}<figcaption>Logarithmic axis; what is below its left end is rounding.</figcaption>\n</figure>\n"
+        ));
+    }
+    let rows: Vec<_> = facts
+        .lumped
+        .iter()
+        .map(|l| {
+            let worst = l.errors.worst.as_ref();
+            vec![
+                escape(&l.scheme),
+                if l.negative_masses > 0 {
+                    format!("<span class=\"error\">{}</span>", l.negative_masses)
+                } else {
+                    "0".to_owned()
+                },
+                worst.map_or_else(|| "not compared".to_owned(), |n| percent(n.value)),
+                worst.map_or_else(String::new, |n| escape(&format!("{}, {}", n.invariant, n.kind()))),
+            ]
+        })
+        .collect();
+    table(html, "Schemes", &texts(["Scheme", "Negative masses", "Worst error", "Of"]), &[0, 3], &rows);
+
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in facts.lumped.iter().flat_map(|l| &l.errors.error_norms.0) {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    let head: Vec<String> = std::iter::once("Norm".to_owned())
+        .chain(facts.lumped.iter().map(|l| escape(&l.scheme)))
+        .chain(["Meaning (X exact, D lumped minus exact)".to_owned()])
+        .collect();
+    let row = |name: &&str| {
+        let value = |l: &super::lumped::LumpedFacts| {
+            let found = l.errors.error_norms.0.iter().find(|(known, _)| known == name);
+            found.map_or_else(String::new, |(_, value)| percent(*value))
+        };
+        let meaning = ERROR_NORMS.iter().find(|(known, _)| known == name).map_or("", |(_, meaning)| meaning);
+        std::iter::once(escape(name)).chain(facts.lumped.iter().map(value)).chain([escape(meaning)]).collect()
+    };
+    let rows: Vec<Vec<String>> = names.iter().map(row).collect();
+    table(html, "All error norms", &head, &[0, head.len() - 1], &rows);
+}
+
+fn lumped_modes(html: &mut String, facts: &Facts) {
+    if facts.lumped_modes.is_empty() {
+        return;
+    }
+    section(html, "Modes from the lumped masses too");
+    let rows: Vec<_> = facts
+        .lumped_modes
+        .iter()
+        .map(|l| {
+            if !l.done {
+                return vec![
+                    escape(&l.scheme),
+                    String::new(),
+                    String::new(),
+                    String::new(),
+                    escape(&l.remark),
+                ];
+            }
+            let change = l.worst_frequency_change.zip(l.worst_frequency_mode);
+            vec![
+                escape(&l.scheme),
+                change.map_or_else(String::new, |(c, mode)| format!("{} (mode {mode})", percent(c))),
+                significant(l.subspace_cosine, 5),
+                l.errors.worst.as_ref().map_or_else(String::new, |n| percent(n.value)),
+                l.errors
+                    .worst
+                    .as_ref()
+                    .map_or_else(String::new, |n| escape(&format!("{}, {}", n.invariant, n.kind()))),
+            ]
+        })
+        .collect();
+    let head = ["Scheme", "Worst frequency", "Subspace cosine", "Worst error", "Of, or why not done"];
+    table(
+        html,
+        "Frequencies in ascending order; invariants after alignment of the subspaces",
+        &texts(head),
+        &[0, 4],
+        &rows,
+    );
+}
+
+fn diagnostics(html: &mut String, facts: &Facts) {
+    section(html, "Diagnostics");
+    if facts.diagnostics.is_empty() {
+        html.push_str("<p>None.</p>\n");
+        return;
+    }
+    let rows: Vec<_> = facts
+        .diagnostics
+        .iter()
+        .map(|d| {
+            let severity = match d.severity() {
+                Severity::Error => "<span class=\"error\">error</span>",
+                Severity::Warning => "<span class=\"warning\">warning</span>",
+                Severity::Note => "note",
+            };
+            let line = d.line().map_or_else(String::new, |line| format!(", line {line}"));
+            let place = d.file().map_or_else(String::new, |f| format!(" ({}{line})", f.display()));
+            vec![
+                d.code().id().to_owned(),
+                severity.to_owned(),
+                escape(&format!("{}{place}", d.message())),
+                escape(d.help()),
+            ]
+        })
+        .collect();
+    table(
+        html,
+        "In the order in which they were found",
+        &texts(["Code", "Severity", "Finding", "Help"]),
+        &[0, 1, 2, 3],
+        &rows,
+    );
+}
+
+fn run(html: &mut String, facts: &Facts) {
+    let Some(run) = &facts.run else { return };
+    section(html, "Run");
+    let mut items = vec![
+        ("Time", format!("{} wall, {} CPU", duration(run.wall_seconds), duration(run.cpu_seconds))),
+        ("Threads", run.threads.to_string()),
+        ("Peak memory", run.peak_memory_bytes.map_or_else(|| "not known".to_owned(), bytes)),
+        ("Accuracy", escape(&run.accuracy)),
+    ];
+    if let Some(output) = &run.output {
+        items.push(("Flex-body file", format!("{}, {}", escape(&output.name), bytes(output.bytes))));
+    }
+    terms(html, items);
+    if !run.phases.is_empty() {
+        let row = |p: &super::Phase| vec![escape(&p.name), duration(p.wall_seconds), duration(p.cpu_seconds)];
+        let rows: Vec<_> = run.phases.iter().map(row).collect();
+        table(html, "Phases", &texts(["Phase", "Wall", "CPU"]), &[0], &rows);
+    }
+    if !run.counters.is_empty() {
+        let rows: Vec<_> = run.counters.iter().map(|(name, n)| vec![escape(name), n.to_string()]).collect();
+        table(html, "Work", &texts(["Counter", "Count"]), &[0], &rows);
+    }
+}
+
+fn origin(html: &mut String, facts: &Facts) {
+    section(html, "How to reproduce");
+    let model = &facts.model;
+    html.push_str(&format!(
+        "<p>{} with {} and these settings gives the same numbers.</p>\n",
+        escape(&facts.generator),
+        counted(model.files.len(), "input file"),
+    ));
+    let rows: Vec<_> = model
+        .files
+        .iter()
+        .map(|f| vec![escape(&f.role), escape(&f.name), format!("<code>{}</code>", escape(&f.sha256))])
+        .collect();
+    if !rows.is_empty() {
+        table(html, "Input files", &texts(["Role", "Name", "SHA-256"]), &[0, 1, 2], &rows);
+    }
+    let settings = serde_json::to_string_pretty(&model.settings).expect("a JSON value is JSON");
+    let lines: Vec<String> = settings.lines().map(escape).collect();
+    html.push_str(&format!("<p>Settings:</p>\n<pre>{}</pre>\n", lines.join("\n")));
+}

@@ -1,0 +1,39 @@
+//! The formats of a report.
+
+use super::{Facts, html, text};
+use std::path::Path;
+
+/// How a report is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// For programs: `schemas/report.schema.json`; floats round-trip.
+    Json,
+    /// For a terminal: at most 80 columns.
+    Text,
+    /// For people and archives: one file, no scripts, nothing loaded from elsewhere.
+    Html,
+}
+
+impl Format {
+    /// The format that a file name asks for: `.json`, `.txt` or `.html`, in any case.
+    pub fn from_path(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "json" => Some(Self::Json),
+            "txt" => Some(Self::Text),
+            "html" => Some(Self::Html),
+            _ => None,
+        }
+    }
+}
+
+/// Writes the facts, ending with a line break.
+pub fn render(facts: &Facts, format: Format) -> String {
+    match format {
+        Format::Json => {
+            let json = serde_json::to_string_pretty(facts);
+            json.expect("keys are strings and numbers that are not finite become null") + "\n"
+        }
+        Format::Text => text::render(facts),
+        Format::Html => html::render(facts),
+    }
+}

@@ -1,0 +1,217 @@
+//! The summary that an engineer reads in ten seconds.
+
+use super::Facts;
+use super::facts::RunFacts;
+use super::lumped::{Errors, LumpedModesFacts};
+use super::numbers::{bytes, counted, duration, percent, plain, significant};
+use crate::diagnostic::Severity;
+
+/// Columns of a terminal that every terminal has.
+const WIDTH: usize = 80;
+/// Columns of the labels.
+const LABEL: usize = 12;
+/// Lines that one entry may take: long names end in an ellipsis.
+const LINES: usize = 4;
+/// Frequencies shown before the last.
+const FIRST_FREQUENCIES: usize = 6;
+/// Entries of a list that are shown.
+const LISTED: usize = 6;
+
+pub(super) fn render(facts: &Facts) -> String {
+    let mut page = Page(String::new());
+    heading(&mut page, facts);
+    modes(&mut page, facts);
+    lumped(&mut page, facts);
+    if let Some(run) = &facts.run {
+        timing(&mut page, run);
+    }
+    diagnostics(&mut page, facts);
+    page.0
+}
+
+/// Lines of a label and its text.
+pub(super) struct Page(pub String);
+
+impl Page {
+    /// Adds a text under a label, wrapped at spaces.
+    pub fn entry(&mut self, label: &str, text: &str) {
+        let mut lines = wrapped(text, WIDTH - LABEL);
+        if lines.len() > LINES {
+            lines.truncate(LINES);
+            if let Some(last) = lines.last_mut() {
+                *last = last.chars().take(WIDTH - LABEL - 2).collect::<String>() + " …";
+            }
+        }
+        for (i, line) in lines.iter().enumerate() {
+            let label = if i == 0 { label } else { "" };
+            let padded = format!("{label:LABEL$}{line}");
+            self.0.push_str(padded.trim_end());
+            self.0.push('\n');
+        }
+    }
+
+    /// Adds a list, its rest counted.
+    fn list<T>(&mut self, label: &str, items: &[T], text: impl Fn(&T) -> String) {
+        for (i, item) in items.iter().take(LISTED).enumerate() {
+            self.entry(if i == 0 { label } else { "" }, &text(item));
+        }
+        if items.len() > LISTED {
+            self.entry("", &format!("and {} more", items.len() - LISTED));
+        }
+    }
+}
+
+/// Lines of at most `width` characters; words that are longer are broken.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    let mut used = 0;
+    for word in text.split(' ') {
+        let characters: Vec<char> = word.chars().collect();
+        let chunks: Vec<&[char]> =
+            if characters.is_empty() { vec![&[]] } else { characters.chunks(width).collect() };
+        for chunk in chunks {
+            let gap = usize::from(used > 0);
+            if used + gap + chunk.len() > width {
+                lines.push(String::new());
+                used = 0;
+            }
+            let line = lines.last_mut().expect("never empty");
+            if used > 0 {
+                line.push(' ');
+                used += 1;
+            }
+            line.extend(chunk);
+            used += chunk.len();
+        }
+    }
+    lines
+}
+
+fn triple(values: &[f64; 3], unit: &str) -> String {
+    let [x, y, z] = values.map(|v| significant(v, 6));
+    format!("{x}, {y}, {z} {unit}")
+}
+
+/// Three coordinates; what is rounding compared with `size` is zero.
+fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
+    triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
+}
+
+fn heading(page: &mut Page, facts: &Facts) {
+    let (model, body) = (&facts.model, &facts.body);
+    let units = &model.units;
+    page.entry("body", &format!("{} ({})", plain(&model.name), units.in_words()));
+    page.entry(
+        "model",
+        &format!("{} nodes, {} degrees of freedom, {}", model.n_nodes, model.n_dofs, model.mass_in_words()),
+    );
+    page.entry("mass", &format!("{} {}", significant(body.mass, 6), units.mass()));
+    let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
+    let centre = coordinates(&body.centre_of_mass, size, &units.length());
+    page.entry("centre", &format!("{centre} (of mass, model axes)"));
+    page.entry("inertia", &format!("{} (principal)", triple(&body.principal_inertia, &units.inertia())));
+    page.entry("gyration", &format!("{} (radii)", triple(&body.radii_of_gyration, &units.length())));
+    page.entry("frame", &body.frame);
+}
+
+fn modes(page: &mut Page, facts: &Facts) {
+    let modes = &facts.modes;
+    let hz = &modes.frequency_hz;
+    let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
+    let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
+    let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
+    let last = last.map_or(String::new(), |f| format!("{dots} {}", significant(*f, 5)));
+    page.entry(
+        "modes",
+        &format!("{} flexible, worst residual {}", modes.count, significant(modes.worst_residual, 2)),
+    );
+    page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
+    let completeness = &facts.completeness;
+    page.entry("complete", &completeness.sentence);
+    if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {
+        page.entry("", &plain(&completeness.remark));
+    }
+    let noise = significant(completeness.rigid_noise, 2);
+    let residual = significant(completeness.rigid_residual, 2);
+    page.entry(
+        "noise",
+        &format!("rigid modes at {noise} of the first eigenvalue; |K R| {residual} of |K| |R|"),
+    );
+}
+
+fn lumped(page: &mut Page, facts: &Facts) {
+    let column = facts.lumped.iter().map(|l| l.scheme.chars().count()).max().unwrap_or(0).min(20);
+    page.list("lumped", &facts.lumped, |l| {
+        let negative = match l.negative_masses {
+            0 => String::new(),
+            1 => ", 1 NEGATIVE mass".to_owned(),
+            count => format!(", {count} NEGATIVE masses"),
+        };
+        format!("{:column$}  {}{negative}", plain(&l.scheme), worst(&l.errors))
+    });
+    page.list("own modes", &facts.lumped_modes, |l| {
+        format!("{:column$}  {}", plain(&l.scheme), own_modes(l))
+    });
+}
+
+fn worst(errors: &Errors) -> String {
+    match &errors.worst {
+        None => "not compared".to_owned(),
+        Some(norm) => {
+            format!("off by up to {} ({}, {})", percent(norm.value), plain(&norm.invariant), norm.kind())
+        }
+    }
+}
+
+fn own_modes(lumped: &LumpedModesFacts) -> String {
+    if !lumped.done {
+        return format!("not done: {}", plain(&lumped.remark));
+    }
+    let (Some(change), Some(mode)) = (lumped.worst_frequency_change, lumped.worst_frequency_mode) else {
+        return "no modes".to_owned();
+    };
+    let cosine = significant(lumped.subspace_cosine, 4);
+    format!("frequency {mode} off by {}, subspace cosine {cosine}", percent(change))
+}
+
+fn timing(page: &mut Page, run: &RunFacts) {
+    let phase = |p: &super::Phase| {
+        format!("{} {}/{}", plain(&p.name), significant(p.wall_seconds, 3), significant(p.cpu_seconds, 3))
+    };
+    if !run.phases.is_empty() {
+        let phases: Vec<String> = run.phases.iter().map(phase).collect();
+        page.entry("phases", &format!("{} s (wall/CPU)", phases.join(", ")));
+    }
+    let memory = run.peak_memory_bytes.map_or(String::new(), |m| format!(", peak memory {}", bytes(m)));
+    let (wall, cpu) = (duration(run.wall_seconds), duration(run.cpu_seconds));
+    let accuracy =
+        if run.accuracy.is_empty() { String::new() } else { format!(", {} accuracy", plain(&run.accuracy)) };
+    page.entry(
+        "total",
+        &format!("{wall} wall, {cpu} CPU, {}{memory}{accuracy}", counted(run.threads, "thread")),
+    );
+    if let Some(output) = &run.output {
+        page.entry("output", &format!("{}, {}", plain(&output.name), bytes(output.bytes)));
+    }
+}
+
+fn diagnostics(page: &mut Page, facts: &Facts) {
+    for (severity, label) in
+        [(Severity::Error, "errors"), (Severity::Warning, "warnings"), (Severity::Note, "notes")]
+    {
+        let found: Vec<_> = facts.diagnostics.iter().filter(|d| d.severity() == severity).collect();
+        page.list(label, &found, |d| format!("{} {}", d.code().id(), plain(d.message())));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_wrap_and_long_words_break() {
+        assert_eq!(wrapped("ab cd efghijklm", 5), ["ab cd", "efghi", "jklm"]);
+        assert_eq!(wrapped("a   b", 80), ["a   b"], "columns of a table stay");
+        assert_eq!(wrapped("", 5), [""]);
+    }
+}
