@@ -24,6 +24,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("basis", &["eigen", "linalg", "model"]),
     ("invariants", &["basis", "linalg", "model"]),
     ("flex_body", &["invariants", "model"]),
+    ("verification", &["flex_body", "invariants", "linalg", "model"]),
     ("dynamics", &["flex_body", "invariants", "linalg", "model"]),
     ("scene", &["dynamics", "flex_body", "invariants"]),
     ("output", &[]),
@@ -65,6 +66,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "report",
             "scene",
             "store",
+            "verification",
         ],
     ),
 ];

@@ -10,6 +10,7 @@ mod beams;
 mod convergence;
 mod covariance;
 mod errata;
+mod precision;
 mod real_models;
 mod small_models;
 mod symmetry;

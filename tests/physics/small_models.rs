@@ -82,7 +82,7 @@ fn dense_and_sparse_paths_agree_with_the_reference() {
                     &format!("{what} {count} {method:?}"),
                 );
                 let residual = found.modes.solution.residuals.iter().fold(0.0f64, |m, r| m.max(*r));
-                eprintln!("{what} {count} {method:?} residual {residual:e}");
+                assert!(residual < 1e-11, "{what} {count} {method:?}: residual {residual:e}");
             }
         }
     }
@@ -99,11 +99,9 @@ fn singular_mass_gives_its_finite_modes_and_says_so() {
             let found = try_modes(body.raw_model(), body.n_dofs() - 6, method).expect("a sound body");
             assert_close(found.eigenvalues(), &reference.eigenvalues, 1e-10, &format!("{kind:?} {method:?}"));
             let has = |code| found.modes.diagnostics.iter().any(|d| d.code() == code);
-            assert!(
-                has(Code::ModesClamped) && has(Code::MassMatrixSingular),
-                "{:?}",
-                found.modes.diagnostics
-            );
+            assert!(has(Code::ModesClamped), "{method:?}: {:?}", found.modes.diagnostics);
+            // Only the dense path, the one that is chosen here, looks at M itself.
+            assert!(has(Code::MassMatrixSingular) || method == Method::Lanczos, "{method:?}");
         }
     }
 }

@@ -101,6 +101,13 @@ impl Mesh {
         Self::from_cells(kind, &cells, |p| p)
     }
 
+    /// The elements whose first node fulfils `kept`, on all nodes.
+    pub fn part(&self, kept: impl Fn([f64; 3]) -> bool) -> Self {
+        let elements =
+            self.elements.iter().filter(|(_, nodes)| kept(self.nodes[nodes[0]])).cloned().collect();
+        Self { nodes: self.nodes.clone(), elements }
+    }
+
     /// The mesh at x' = R x + d.
     pub fn moved(&self, rotation: &Matrix3<f64>, shift: [f64; 3]) -> Self {
         let place = |x: &[f64; 3]| (rotation * Vector3::from(*x) + Vector3::from(shift)).into();
@@ -141,6 +148,20 @@ impl Mesh {
 }
 
 impl Assembly {
+    /// The sum of two bodies on the same nodes: parts of different material.
+    pub fn plus(&self, other: &Self) -> Self {
+        assert_eq!(self.nodes, other.nodes, "bodies on the same nodes");
+        let sum = |a: &CscMatrix, b: &CscMatrix| {
+            let all: Vec<_> = entries(a).chain(entries(b)).collect();
+            CscMatrix::from_triplets(a.n_rows(), a.n_cols(), &all)
+        };
+        Self {
+            nodes: self.nodes.clone(),
+            stiffness: sum(&self.stiffness, &other.stiffness),
+            scalar_mass: sum(&self.scalar_mass, &other.scalar_mass),
+        }
+    }
+
     pub fn n_dofs(&self) -> usize {
         3 * self.nodes.len()
     }

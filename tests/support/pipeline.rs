@@ -62,12 +62,16 @@ impl Body {
     }
 }
 
+/// The flexible modes that `settings` ask for.
+pub fn solve(raw: RawModel, settings: &ModeSettings) -> Result<Body> {
+    let model = check(raw)?.model;
+    let modes = free_surface(&model, settings, SILENT)?;
+    Ok(Body { model, modes })
+}
+
 /// The lowest `count` flexible modes at certified accuracy by `method`.
 pub fn try_modes(raw: RawModel, count: usize, method: Method) -> Result<Body> {
-    let model = check(raw)?.model;
-    let settings = ModeSettings { wanted: Wanted::Lowest(count), accuracy: Accuracy::Certified, method };
-    let modes = free_surface(&model, &settings, SILENT)?;
-    Ok(Body { model, modes })
+    solve(raw, &ModeSettings { wanted: Wanted::Lowest(count), accuracy: Accuracy::Certified, method })
 }
 
 /// The lowest `count` flexible modes of a sound body, with their completeness proved: the inertia count says that
