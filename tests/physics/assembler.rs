@@ -72,8 +72,8 @@ fn rigid_motion_makes_no_force() {
 fn matrices_are_symmetric_to_the_last_bit() {
     for kind in KINDS {
         let body = assemble(&distorted(kind));
-        assert_eq!(body.stiffness, body.stiffness.transpose(), "{kind:?}");
-        assert_eq!(body.scalar_mass, body.scalar_mass.transpose(), "{kind:?}");
+        assert!(body.stiffness == body.stiffness.transpose(), "{kind:?}");
+        assert!(body.scalar_mass == body.scalar_mass.transpose(), "{kind:?}");
     }
 }
 

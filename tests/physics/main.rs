@@ -10,6 +10,7 @@ mod beams;
 mod convergence;
 mod covariance;
 mod errata;
+mod model_files;
 mod precision;
 mod real_models;
 mod small_models;

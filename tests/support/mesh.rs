@@ -114,12 +114,6 @@ impl Mesh {
         Self { nodes: self.nodes.iter().map(place).collect(), elements: self.elements.clone() }
     }
 
-    /// The mesh with every length multiplied by `factor`.
-    pub fn scaled(&self, factor: f64) -> Self {
-        let nodes = self.nodes.iter().map(|x| x.map(|v| factor * v)).collect();
-        Self { nodes, elements: self.elements.clone() }
-    }
-
     pub fn assemble(&self, material: &Material, rule: MassRule) -> Assembly {
         let n = self.nodes.len();
         let (mut stiffness, mut mass) = (Vec::new(), Vec::new());

@@ -5,9 +5,7 @@ use faer::Mat;
 use flexbody::basis::{FreeSurfaceModes, ModeSettings, free_surface};
 use flexbody::eigen::{Accuracy, Method, Proof, Wanted};
 use flexbody::error::Result;
-use flexbody::invariants::{
-    BodyFrame, Frame, Invariants, LumpedMasses, choose_frame, condense, condense_lumped,
-};
+use flexbody::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
 use flexbody::model::{FeModel, RawModel, check};
 use flexbody::progress::SILENT;
 
@@ -49,11 +47,6 @@ impl Body {
         frame.rotate_shapes(&mut shapes);
         let invariants = condense(mass, &positions, shapes.as_ref(), self.modal_stiffness());
         Condensed { frame, positions, shapes, invariants }
-    }
-
-    /// What lumped masses make of the same modes in the same frame.
-    pub fn lumped(&self, body: &Condensed, masses: &LumpedMasses) -> Invariants {
-        condense_lumped(masses, &body.positions, body.shapes.as_ref(), self.modal_stiffness())
     }
 
     fn modal_stiffness(&self) -> Mat<f64> {

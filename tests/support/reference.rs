@@ -1,10 +1,9 @@
-//! Independent oracle: the dense generalised eigenproblem and invariants summed from their definitions.
+//! Independent oracle: the dense generalised eigenproblem, and mass properties summed from their definitions.
 //!
-//! Nothing of the library's eigen-solver or condensation is used, only its matrix and result types.
+//! Nothing of the library's eigen-solver or condensation is used, only its matrix type.
 
 use super::mesh::{Assembly, entries};
 use faer::{Mat, MatRef, Par, Side};
-use flexbody::invariants::Invariants;
 use flexbody::linalg::CscMatrix;
 use nalgebra::{Matrix3, Vector3};
 
@@ -98,32 +97,6 @@ pub fn rigid_data(nodes: &[[f64; 3]], scalar_mass: &CscMatrix) -> (f64, Vector3<
         inertia += v * (Matrix3::identity() * a.dot(&b) - a * b.transpose());
     }
     (mass, com, inertia)
-}
-
-/// The invariants about `origin` in model axes, entry by entry from theory section 2.
-pub fn invariants(assembly: &Assembly, shapes: MatRef<f64>, origin: [f64; 3]) -> Invariants {
-    let n = assembly.nodes.len();
-    let nf = shapes.ncols();
-    let ms = dense(&assembly.scalar_mass);
-    let x = Mat::from_fn(n, 3, |i, k| assembly.nodes[i][k] - origin[k]);
-    let psi: [Mat<f64>; 3] = std::array::from_fn(|k| Mat::from_fn(n, nf, |i, j| shapes[(3 * i + k, j)]));
-    let ones = Mat::from_fn(n, 1, |_, _| 1.0);
-    let v = &ms * &ones;
-    let z = &ms * &x;
-    let y: [Mat<f64>; 3] = std::array::from_fn(|k| &ms * &psi[k]);
-    let second = x.transpose() * &z;
-    let first = v.transpose() * &x;
-    Invariants {
-        mass: (0..n).map(|i| v[(i, 0)]).sum(),
-        first_moment: Vector3::from_fn(|k, _| first[(0, k)]),
-        second_moment: Matrix3::from_fn(|k, l| second[(k, l)]),
-        c1: Mat::from_fn(3, nf, |k, j| (0..n).map(|i| v[(i, 0)] * psi[k][(i, j)]).sum()),
-        ibar: std::array::from_fn(|k| {
-            std::array::from_fn(|l| (0..nf).map(|j| (0..n).map(|i| x[(i, k)] * y[l][(i, j)]).sum()).collect())
-        }),
-        s: std::array::from_fn(|k| std::array::from_fn(|l| psi[k].transpose() * &y[l])),
-        modal_stiffness: shapes.transpose() * dense(&assembly.stiffness) * shapes,
-    }
 }
 
 /// The 18 flexible eigenvalues, ascending, of a free unit cube of unit density that is one trilinear element with
