@@ -20,9 +20,12 @@ const MAX_RESTARTS: u64 = 100;
 /// Energy this many standard deviations above the noise of the entries of K is real.
 pub(super) const NOISE_FACTOR: f64 = 30.0;
 
-/// A first flexible eigenvalue below this part of the shift asks for a smaller shift: iterations grow and digits of
-/// the lowest modes go.
+/// A first flexible eigenvalue below this part of the shift asks for a smaller shift: iterations grow.
 const SMALLEST_PART: f64 = 0.02;
+
+/// The shift stays above this part of the last eigenvalue wanted, however soft the first modes are: the last ones
+/// would lose as many digits. The refinement separates a few much softer modes.
+const DIGITS_PART: f64 = 1e-3;
 
 /// How a search ended.
 pub(super) enum Search {
@@ -55,10 +58,12 @@ pub(super) fn factorise<'a>(
     let mut x = b.clone();
     factor.solve_in_place(x.as_mut());
     let residual = &b - pencil.apply_stiffness(x.as_ref()) - pencil.apply_mass(x.as_ref()) * faer::Scale(tau);
-    let scale = b.norm_max() + 1e-3 * pencil.apply_stiffness(x.as_ref()).norm_max();
+    // The backward error: what matters of a factor, however ill-conditioned the matrix.
+    let row_sum = |i: usize| pencil.stiffness().row(i).1.iter().map(|v| v.abs()).sum::<f64>();
+    let scale = b.norm_max() + (0..pencil.n()).map(row_sum).fold(0.0, f64::max) * x.norm_max();
     let relative = residual.norm_max() / scale;
-    // Backward stable factors leave 1e-12 or so here; a wrong one leaves O(1).
-    if relative.is_nan() || relative > 1e-4 {
+    // Backward stable factors leave 1e-15 or so here; a wrong one leaves O(1).
+    if relative.is_nan() || relative > 1e-8 {
         return Err(EigenFailure::Inaccurate { residual: relative });
     }
     Ok(factor)
@@ -67,31 +72,41 @@ pub(super) fn factorise<'a>(
 /// Block steps after which the shift is judged: the lowest Ritz value is then near the first eigenvalue.
 const STEPS_TO_JUDGE: usize = 3;
 
-/// Judges the shift by the lowest Ritz pair so far, an upper bound of the first eigenvalue: the shift to use instead
-/// when it is far too large for that; an error when there is no strain energy at all.
+/// Judges the shift by the Ritz values so far, upper bounds of the eigenvalues: the shift to use instead when it is far
+/// too large for them; an error when there is no strain energy at all.
 fn better_shift(
     problem: &EigenProblem<'_>,
     krylov: &Krylov<'_>,
     factor: &Cholesky<'_>,
+    wanted: usize,
     counters: &mut Counters,
 ) -> Result<Option<f64>, EigenFailure> {
     let tau = factor.shift();
     let ritz = descending(krylov)?;
-    let (lambda, vectors) = best(krylov, &ritz, 1, tau);
+    let (lambda, vectors) = best(krylov, &ritz, wanted.max(1), tau);
     let Some(&lowest) = lambda.first() else { return Ok(None) };
     if lowest > SMALLEST_PART * tau {
         return Ok(None);
     }
-    let noise =
-        NOISE_FACTOR * energy_noise(problem.pencil.stiffness(), vectors.as_ref(), problem.input_error)[0];
+    let noise = NOISE_FACTOR
+        * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
     if lowest.abs() <= noise {
         // Far below the shift and within noise: no shift can resolve it, there is no strain energy.
         return Err(zero_energy(problem, factor, tau, counters)?);
     }
     if lowest < 0.0 {
-        return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lowest, vector: vectors });
+        return Err(EigenFailure::NegativeEigenvalue {
+            eigenvalue: lowest,
+            vector: vectors.as_ref().subcols(0, 1).to_owned(),
+        });
     }
-    Ok(Some(0.5 * lowest))
+    Ok(suited_shift(lowest, *lambda.last().expect("it has a first"), tau))
+}
+
+/// The shift for modes from `first` to `last`, when that is much smaller than `tau`.
+fn suited_shift(first: f64, last: f64, tau: f64) -> Option<f64> {
+    let suited = (0.5 * first).max(DIGITS_PART * last);
+    (first < SMALLEST_PART * tau && suited < 0.1 * tau).then_some(suited)
 }
 
 /// Counts and resolves the modes without strain energy.
@@ -157,7 +172,7 @@ pub(super) fn lowest_modes(
             steps += 1;
         }
         if steps == STEPS_TO_JUDGE
-            && let Some(shift) = better_shift(problem, &krylov, factor, counters)?
+            && let Some(shift) = better_shift(problem, &krylov, factor, wanted, counters)?
         {
             return Ok(Search::ShiftTooLarge(shift));
         }
@@ -183,7 +198,12 @@ pub(super) fn lowest_modes(
         {
             last += 1;
         }
-        let converged = (0..last).take_while(|&i| complete || good(i, tolerance)).count();
+        // The inverse iteration that follows shrinks what is left of the next mode by theta_next / theta_i: close
+        // to the end of the wanted modes that is nothing, far below it ten times the tolerance will do.
+        let next = if last < size { ritz.values[size - 1 - last] } else { 0.0 };
+        let enough =
+            |i: usize| (0.1 * ritz.values[size - 1 - i] / next.max(f64::MIN_POSITIVE)).min(10.0) * tolerance;
+        let converged = (0..last).take_while(|&i| complete || good(i, enough(i))).count();
         // One more, as well as the gap below it needs: it shows that the cluster of the last mode has ended.
         let beyond = complete
             || (last < size && {
@@ -202,6 +222,9 @@ pub(super) fn lowest_modes(
             return Err(EigenFailure::NotConverged { converged, wanted });
         }
         if full {
+            if let Some(shift) = suited_shift(lambda(0), lambda(last.max(1) - 1), tau) {
+                return Ok(Search::ShiftTooLarge(shift));
+            }
             counters.restarts += 1;
             let keep = (last + (capacity - last) / 3).min(size.saturating_sub(BLOCK));
             let theta: Vec<f64> = (0..keep).map(|i| ritz.values[size - 1 - i]).collect();

@@ -87,7 +87,9 @@ fn rayleigh_ritz(
     Ok((ritz.values, combine(x.as_ref(), coefficients.as_ref())))
 }
 
-/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that rounding explains.
+/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be helped:
+/// rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as well as the node positions
+/// are known.
 pub(super) fn residuals(
     problem: &EigenProblem<'_>,
     eigenvalues: &[f64],
@@ -100,13 +102,14 @@ pub(super) fn residuals(
     let mx = pencil.apply_mass(x);
     let kx = pencil.apply_stiffness(x);
     let rounding = rounding_residual(pencil.stiffness(), x);
+    let rigid = pencil.apply_mass(problem.rigid) * gram(problem.rigid, kx.as_ref());
     let mut residuals = Vec::with_capacity(x.ncols());
     let mut floors = Vec::with_capacity(x.ncols());
     for (j, &lambda) in eigenvalues.iter().enumerate() {
         let r = kx.col(j) - mx.col(j) * faer::Scale(lambda);
         let scale = kx.col(j).norm_l2() + lambda.abs() * mx.col(j).norm_l2();
         residuals.push(if scale > 0.0 { r.norm_l2() / scale } else { 0.0 });
-        floors.push(if scale > 0.0 { rounding[j] / scale } else { 0.0 });
+        floors.push(if scale > 0.0 { (rounding[j] + rigid.col(j).norm_l2()) / scale } else { 0.0 });
     }
     (residuals, floors)
 }
@@ -120,17 +123,19 @@ pub(super) fn refine(
     counters: &mut Counters,
 ) -> Result<Refined, EigenFailure> {
     let mut best: Option<Refined> = None;
+    let mut least = f64::INFINITY;
     for round in 0..3 {
         let y = inverse_iteration(problem, factor, x.as_ref(), round > 0, counters);
         let (eigenvalues, vectors) = rayleigh_ritz(problem, y, counters)?;
         let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
-        let worst = |r: &[f64]| r.iter().fold(0.0f64, |m, v| m.max(*v));
-        let done = residuals.iter().zip(&floors).all(|(r, f)| *r <= tolerance.max(*f));
-        let stalled = best.as_ref().is_some_and(|b| worst(&residuals) > 0.5 * worst(&b.residuals));
-        if best.as_ref().is_none_or(|b| worst(&residuals) < worst(&b.residuals)) {
+        // What is left above the tolerance or the floor of each mode: residuals at their floor hide none of the others.
+        let excess = residuals.iter().zip(&floors).fold(0.0f64, |m, (r, f)| m.max(r / tolerance.max(*f)));
+        let stalled = excess > 0.5 * least;
+        if excess < least || best.is_none() {
             best = Some(Refined { eigenvalues, vectors: vectors.clone(), residuals, floors });
+            least = excess;
         }
-        if done || stalled {
+        if excess <= 1.0 || stalled {
             break;
         }
         x = vectors;

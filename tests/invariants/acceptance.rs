@@ -2,41 +2,12 @@
 //! accelerations sum to, for random motions of bodies with random and smooth shapes, in any basis and any frame.
 
 use crate::bodies::{Body, orthonormalised, random_matrix, smooth_shapes};
-use crate::equations::{Coriolis, State};
+use crate::equations::Coriolis;
 use crate::models::{self, Model};
-use crate::nodal::{inertia_forces, reduced};
+use crate::nodal::{deviation, inertia_forces, random_state, reduced};
 use crate::random::Random;
 use faer::Mat;
 use flexbody::invariants::{BodyFrame, choose_frame, condense};
-use nalgebra::{DVector, Vector3};
-
-fn random_state(random: &mut Random, modes: usize, displacement: f64) -> (State, DVector<f64>) {
-    let mut numbers = |n: usize, scale: f64| DVector::from_fn(n, |_, _| scale * random.signed());
-    let (q, qd) = (numbers(modes, displacement), numbers(modes, displacement));
-    let mut accelerations = numbers(6 + modes, 1.0);
-    accelerations.rows_mut(6, modes).scale_mut(displacement);
-    let state = State {
-        origin: Vector3::from(random.vector::<3>()),
-        axes: random.rotation(),
-        velocity: Vector3::from(random.vector::<3>()),
-        omega: Vector3::from(random.vector::<3>()) * 3.0,
-        q,
-        qd,
-    };
-    (state, accelerations)
-}
-
-/// Largest relative deviation over the groups translation, rotation, modes.
-fn deviation(nodal: &DVector<f64>, reduced: &DVector<f64>) -> f64 {
-    let nf = nodal.len() - 6;
-    [(0, 3), (3, 3), (6, nf)]
-        .map(|(start, rows)| {
-            let (a, b) = (nodal.rows(start, rows), reduced.rows(start, rows));
-            if rows == 0 { 0.0 } else { (a - b).norm() / a.norm() }
-        })
-        .into_iter()
-        .fold(0.0, f64::max)
-}
 
 /// Deviation of the reduced forces and, for comparison, of the forces with the misprinted Coriolis terms.
 fn deviations(body: &Body, random: &mut Random, displacement: f64) -> (f64, f64) {

@@ -1,6 +1,7 @@
 //! The unreduced nodal body: the oracle of every reduction. M is used as 3n x 3n entries, never as Ms.
 
 use crate::equations::{ReducedBody, State};
+use crate::random::Random;
 use faer::Mat;
 use flexbody::invariants::Invariants;
 use flexbody::linalg::SymmetricMatrix;
@@ -145,4 +146,33 @@ pub fn reduced(body: &Invariants) -> ReducedBody {
         modal_mass: dense(body.modal_mass()),
         modal_stiffness: dense(body.modal_stiffness.clone()),
     }
+}
+
+/// A random motion: displacements and modal rates of size `displacement`, rates of rotation of a few radians.
+pub fn random_state(random: &mut Random, modes: usize, displacement: f64) -> (State, DVector<f64>) {
+    let mut numbers = |n: usize, scale: f64| DVector::from_fn(n, |_, _| scale * random.signed());
+    let (q, qd) = (numbers(modes, displacement), numbers(modes, displacement));
+    let mut accelerations = numbers(6 + modes, 1.0);
+    accelerations.rows_mut(6, modes).scale_mut(displacement);
+    let state = State {
+        origin: Vector3::from(random.vector::<3>()),
+        axes: random.rotation(),
+        velocity: Vector3::from(random.vector::<3>()),
+        omega: Vector3::from(random.vector::<3>()) * 3.0,
+        q,
+        qd,
+    };
+    (state, accelerations)
+}
+
+/// Largest relative deviation over the groups translation, rotation, modes.
+pub fn deviation(nodal: &DVector<f64>, reduced: &DVector<f64>) -> f64 {
+    let nf = nodal.len() - 6;
+    [(0, 3), (3, 3), (6, nf)]
+        .map(|(start, rows)| {
+            let (a, b) = (nodal.rows(start, rows), reduced.rows(start, rows));
+            if rows == 0 { 0.0 } else { (a - b).norm() / a.norm() }
+        })
+        .into_iter()
+        .fold(0.0, f64::max)
 }

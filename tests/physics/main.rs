@@ -1,0 +1,17 @@
+//! Properties of bodies that mechanics dictates: closed forms, symmetry, convergence, covariance, conservation.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+use support::{equations, random};
+
+mod assembler;
+mod beams;
+mod convergence;
+mod covariance;
+mod errata;
+mod model_files;
+mod precision;
+mod real_models;
+mod small_models;
+mod symmetry;

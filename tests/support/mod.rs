@@ -1,0 +1,13 @@
+//! What tests share: exact small FE models, a dense eigen-solver as independent oracle, random numbers.
+//! Every test binary uses its own part of it.
+#![allow(dead_code)]
+
+pub mod elements;
+pub mod equations;
+pub mod files;
+pub mod integrate;
+pub mod mesh;
+pub mod nodal;
+pub mod pipeline;
+pub mod random;
+pub mod reference;
