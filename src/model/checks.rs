@@ -7,6 +7,7 @@ use super::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{SymmetricMatrix, connected_components};
+use std::collections::HashSet;
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -48,8 +49,9 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
         found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
     }
     check_names(&raw, &mut found);
+    let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     for set in &raw.interfaces {
-        let unknown: Vec<i64> = set.nodes.iter().filter(|id| !nodes.ids.contains(id)).copied().collect();
+        let unknown: Vec<i64> = set.nodes.iter().filter(|id| !known.contains(id)).copied().collect();
         if !unknown.is_empty() {
             let message = format!(
                 "interface `{}` names {} unknown nodes: {}",
@@ -107,7 +109,7 @@ fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
 
 /// Names that no file could hold, before the long run rather than after it.
 fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
-    let mut seen = std::collections::HashSet::new();
+    let mut seen = HashSet::new();
     for set in &raw.interfaces {
         let name = &set.name;
         let wrong = match name.as_str() {
@@ -285,7 +287,7 @@ fn check_rigid_motion(
             residuals.len(),
             name_some(&named)
         );
-        let help = if rows.len() * 4 < residuals.len() {
+        let help = if rows.len() * 2 < residuals.len() {
             "these degrees of freedom are supported or tied to ground: export the free body"
         } else {
             "nearly all rows fail: coordinates in other units or another node order than the matrices, or rotations labelled as displacements"
