@@ -17,9 +17,9 @@ pub struct Invariants {
     pub second_moment: Matrix3<f64>,
     /// C1 (3 x nf) = 1' Ms Psi_k.
     pub c1: Mat<f64>,
-    /// Ibar[k][l] (nf) = x_k' Ms Psi_l.
+    /// `Ibar[k][l]` (nf) = x_k' Ms Psi_l.
     pub ibar: [[Vec<f64>; 3]; 3],
-    /// S[k][l] (nf x nf) = Psi_k' Ms Psi_l.
+    /// `S[k][l]` (nf x nf) = Psi_k' Ms Psi_l.
     pub s: [[Mat<f64>; 3]; 3],
     /// K_ff (nf x nf) = Psi' K Psi.
     pub modal_stiffness: Mat<f64>,

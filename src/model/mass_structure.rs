@@ -60,7 +60,7 @@ pub(super) fn scalar_mass(
                     touched.push(other as u32);
                 }
                 if k == l {
-                    block[other][k] = v;
+                    block[other][l] = v;
                 } else {
                     // Massless nodes have no scale of their own: compare with the mean nodal mass.
                     let deviation =
