@@ -1,6 +1,7 @@
 //! Compressed sparse matrices: a general one as readers deliver it, and the symmetric one that all work uses.
 
-/// Sparse matrix in compressed column form, rows ascending within each column, no duplicates, no stored zeros.
+/// Sparse matrix in compressed column form, rows ascending within each column, no duplicates, no zeros
+/// unless [`CscMatrix::from_parts`] brought them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CscMatrix {
     n_rows: usize,
@@ -11,7 +12,7 @@ pub struct CscMatrix {
 }
 
 impl CscMatrix {
-    /// Takes the three arrays as they are.
+    /// Takes the three arrays as they are, zeros included.
     ///
     /// # Panics
     /// When they do not describe a matrix: lengths that disagree, rows out of range or not strictly
@@ -35,8 +36,8 @@ impl CscMatrix {
         Self { n_rows, n_cols, col_ptr, row_idx, values }
     }
 
-    /// Builds a matrix from (row, column, value) triplets: duplicates are summed in the order given, entries
-    /// that are zero before summing are dropped.
+    /// Builds a matrix from (row, column, value) triplets: duplicates are summed in the order given, zeros are
+    /// dropped, sums that cancel among them.
     ///
     /// # Panics
     /// When an index is out of range.
@@ -63,14 +64,11 @@ impl CscMatrix {
         for j in 0..n_cols {
             let column = &mut entries[count[j]..count[j + 1]];
             column.sort_by_key(|e| e.0); // stable: duplicates keep their order
-            let start = row_idx.len();
-            for &(r, v) in column.iter() {
-                if row_idx.len() > start && row_idx[row_idx.len() - 1] == r {
-                    let last = values.len() - 1;
-                    values[last] += v;
-                } else {
-                    row_idx.push(r);
-                    values.push(v);
+            for same in column.chunk_by(|a, b| a.0 == b.0) {
+                let sum: f64 = same.iter().map(|e| e.1).sum();
+                if sum != 0.0 {
+                    row_idx.push(same[0].0);
+                    values.push(sum);
                 }
             }
             col_ptr.push(row_idx.len());
@@ -223,8 +221,10 @@ impl SymmetricMatrix {
                     sum += vb[b];
                     b += 1;
                 }
-                row_idx.push(row);
-                values.push(0.5 * sum);
+                if sum != 0.0 {
+                    row_idx.push(row);
+                    values.push(0.5 * sum);
+                }
             }
             col_ptr.push(row_idx.len());
         }
@@ -263,5 +263,19 @@ impl SymmetricMatrix {
             triplets.push((j as u32, j as u32, if diagonal > 0.0 { diagonal * factor } else { 1.0 }));
         }
         Self(CscMatrix::from_triplets(self.n(), self.n(), &triplets))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_that_cancel_are_not_stored() {
+        let entries = [(0, 0, 2.0), (1, 0, 0.5), (1, 0, -0.5), (1, 1, 0.0), (0, 1, 0.25), (0, 1, 0.25)];
+        let matrix = CscMatrix::from_triplets(2, 2, &entries);
+        assert_eq!((matrix.nnz(), matrix.get(0, 0), matrix.get(0, 1)), (2, 2.0, 0.5));
+        let skew = CscMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (0, 1, 3.0), (1, 0, -3.0)]);
+        assert_eq!(SymmetricMatrix::symmetrised(&skew).as_csc().nnz(), 1);
     }
 }
