@@ -4,72 +4,38 @@
 //! under `#[cfg(test)]`.
 
 use proc_macro2::{Delimiter, Ident, Spacing, TokenStream, TokenTree};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Used by every room: errors, the table of diagnostics, units, provenance, progress.
-const BASE: &[&str] = &["diagnostic", "error", "progress", "provenance", "units"];
+/// Rows of the table of rooms in `ARCHITECTURE.md`: the rooms of a row, and what each of them uses.
+fn table() -> Vec<(Vec<String>, BTreeSet<String>)> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md");
+    let text = std::fs::read_to_string(path).expect("ARCHITECTURE.md");
+    let section = text.split("\n## ").find(|s| s.starts_with("Rooms")).expect("a section about rooms");
+    let names = |cell: &str| -> Vec<String> {
+        cell.split('`').skip(1).step_by(2).map(|name| name.trim_end_matches('/').to_owned()).collect()
+    };
+    let rows: Vec<Vec<&str>> = section
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
+        .collect();
+    let all: BTreeSet<String> = rows.iter().flat_map(|row| names(row[0])).collect();
+    let uses = |row: &[&str]| match row[2] {
+        "all" => all.clone(),
+        "each other" => names(row[0]).into_iter().collect(),
+        uses => names(uses).into_iter().collect(),
+    };
+    rows.iter().map(|row| (names(row[0]), uses(row))).collect()
+}
 
-/// Each room and what it may use besides [`BASE`] and itself.
-const ROOMS: &[(&str, &[&str])] = &[
-    ("diagnostic", &[]),
-    ("error", &[]),
-    ("progress", &[]),
-    ("provenance", &[]),
-    ("units", &[]),
-    ("linalg", &[]),
-    ("model", &["linalg"]),
-    ("input", &["linalg", "model"]),
-    ("eigen", &["linalg"]),
-    ("basis", &["eigen", "linalg", "model"]),
-    ("invariants", &["basis", "linalg", "model"]),
-    ("flex_body", &["invariants", "model"]),
-    ("verification", &["flex_body", "invariants", "linalg", "model"]),
-    ("dynamics", &["flex_body", "invariants", "linalg", "model"]),
-    ("scene", &["dynamics", "flex_body", "invariants"]),
-    ("output", &[]),
-    ("store", &["flex_body", "invariants", "model", "output"]),
-    ("export", &["flex_body", "invariants", "model", "output"]),
-    ("report", &["flex_body", "invariants", "model", "output", "scene"]),
-    (
-        "convert",
-        &[
-            "basis",
-            "dynamics",
-            "eigen",
-            "export",
-            "flex_body",
-            "input",
-            "invariants",
-            "linalg",
-            "model",
-            "output",
-            "report",
-            "scene",
-            "store",
-        ],
-    ),
-    (
-        "cli",
-        &[
-            "basis",
-            "convert",
-            "dynamics",
-            "eigen",
-            "export",
-            "flex_body",
-            "input",
-            "invariants",
-            "linalg",
-            "model",
-            "output",
-            "report",
-            "scene",
-            "store",
-            "verification",
-        ],
-    ),
-];
+/// Each room and what it may use besides itself and [`BASE`].
+fn rooms() -> BTreeMap<String, BTreeSet<String>> {
+    table().into_iter().flat_map(|(names, uses)| names.into_iter().map(move |n| (n, uses.clone()))).collect()
+}
+
+/// What every room may use.
+const BASE: &[&str] = &["diagnostic", "error"];
 
 /// Crates, or parts of crates, that only these rooms may name.
 const OWNED: &[(&[&str], &[&str])] = &[
@@ -96,25 +62,20 @@ struct Written {
 
 /// Every finding in one file of `room`, as `line: what`.
 fn findings(room: &str, depth: usize, source: &str) -> Vec<String> {
-    let tokens: TokenStream = source.parse().expect("the file compiles");
-    let tokens = without_tests(tokens);
+    let rooms = rooms();
+    let tokens = tokens(source);
     let mut found = Vec::new();
     let mut say = |line: usize, what: String| found.push(format!("{line}: {what}"));
-    let mut paths = Vec::new();
-    written_paths(&tokens, &[], &mut paths);
-    let allowed = ROOMS.iter().find(|(name, _)| *name == room).map_or(&[][..], |(_, uses)| uses);
-    for Written { path, line } in &paths {
+    for Written { path, line } in &all_paths(&tokens) {
         let names: Vec<&str> = path.iter().map(String::as_str).collect();
         let supers = names.iter().take_while(|n| **n == "super").count();
         if supers > 0 && supers >= depth {
             say(*line, "leaves its room through `super`: write `crate::` instead".to_owned());
         }
-        let target = match names[..] {
-            ["crate" | "flexbody", target, ..] => target,
-            _ => "",
-        };
-        let is_room = ROOMS.iter().any(|(name, _)| *name == target);
-        if is_room && target != room && !BASE.contains(&target) && !allowed.contains(&target) {
+        if let Some(target) = room_used(path, room, &rooms)
+            && !BASE.contains(&target)
+            && !rooms.get(room).is_some_and(|uses| uses.contains(target))
+        {
             say(*line, format!("`{room}` may not use `{target}`"));
         }
         for (owned, owners) in OWNED {
@@ -140,6 +101,28 @@ fn findings(room: &str, depth: usize, source: &str) -> Vec<String> {
         }
     });
     found
+}
+
+/// The other room that a path leads into.
+fn room_used<'a>(
+    path: &'a [String],
+    room: &str,
+    rooms: &BTreeMap<String, BTreeSet<String>>,
+) -> Option<&'a str> {
+    let [first, target, ..] = path else { return None };
+    let own = first == "crate" || first == "flexbody";
+    (own && target != room && rooms.contains_key(target)).then_some(target)
+}
+
+/// The tokens of a source file, without its tests.
+fn tokens(source: &str) -> Vec<TokenTree> {
+    without_tests(source.parse().expect("the file compiles"))
+}
+
+fn all_paths(tokens: &[TokenTree]) -> Vec<Written> {
+    let mut paths = Vec::new();
+    written_paths(tokens, &[], &mut paths);
+    paths
 }
 
 /// Drops every item under `#[cfg(test)]`: its attribute, and all up to its braces or semicolon.
@@ -292,37 +275,43 @@ fn rooms_use_only_what_they_may_and_the_library_never_prints_exits_or_unwraps() 
 }
 
 #[test]
-fn every_room_is_in_the_table() {
-    let known: BTreeSet<&str> = ROOMS.iter().map(|(name, _)| *name).collect();
-    assert_eq!(known.len(), ROOMS.len(), "a room stands twice in the table");
-    for (room, uses) in ROOMS {
-        let unknown: Vec<_> = uses.iter().filter(|u| !known.contains(*u)).collect();
-        assert!(unknown.is_empty(), "{room}: {unknown:?}");
+fn the_table_of_rooms_says_what_the_sources_do() {
+    let rooms = rooms();
+    assert_eq!(rooms.len(), table().iter().map(|(names, _)| names.len()).sum(), "a room stands twice");
+    let mut used: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for file in rust_files(&source_root()) {
+        let Some((room, _)) = room_of(file.strip_prefix(source_root()).expect("below src")) else { continue };
+        let source = std::fs::read_to_string(&file).expect("source file");
+        let all = used.entry(room.clone()).or_default();
+        for Written { path, .. } in all_paths(&tokens(&source)) {
+            all.extend(room_used(&path, &room, &rooms).map(str::to_owned));
+        }
     }
-    let unlisted: BTreeSet<String> = rust_files(&source_root())
-        .iter()
-        .filter_map(|f| room_of(f.strip_prefix(source_root()).expect("below src")))
-        .map(|(room, _)| room)
-        .filter(|room| !known.contains(room.as_str()))
-        .collect();
-    assert!(unlisted.is_empty(), "give these rooms their arrows: {unlisted:?}");
+    let named: Vec<_> = rooms.keys().collect();
+    assert_eq!(named, used.keys().collect::<Vec<_>>(), "rooms of the table, rooms of src/");
+    for (room, uses) in &rooms {
+        // The command line stands on everything; everything may report errors.
+        let listed = uses.iter().filter(|u| *u != room && room != "cli" && !BASE.contains(&u.as_str()));
+        let idle: Vec<_> = listed.filter(|u| !used[room].contains(*u)).collect();
+        assert!(idle.is_empty(), "the table says that `{room}` uses {idle:?}, but it does not");
+    }
 }
 
 #[test]
 fn arrows_make_no_circle() {
-    // Rooms in the order of the table use only rooms above them.
-    for (i, (room, uses)) in ROOMS.iter().enumerate() {
-        for used in *uses {
-            let at = ROOMS.iter().position(|(name, _)| name == used).expect("checked by another test");
-            assert!(at < i, "`{room}` uses `{used}`, which stands below it");
-        }
+    // Rooms use only rooms of their own row or of rows above.
+    let mut above = BTreeSet::new();
+    for (names, uses) in table() {
+        above.extend(names.iter().cloned());
+        let below: Vec<_> = uses.difference(&above).collect();
+        assert!(below.is_empty(), "{names:?} use {below:?}, which stand below");
     }
 }
 
 #[test]
 fn files_stay_short() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let long: Vec<String> = ["src", "tests", "benches"]
+    let long: Vec<String> = ["src", "tests", "benches", "examples"]
         .iter()
         .map(|folder| root.join(folder))
         .filter(|folder| folder.is_dir())
@@ -339,8 +328,7 @@ fn files_stay_short() {
 fn mod_files_hold_no_code() {
     for file in rust_files(&source_root()).iter().filter(|f| f.ends_with("mod.rs")) {
         let source = std::fs::read_to_string(file).expect("source file");
-        let tokens = without_tests(source.parse().expect("the file compiles"));
-        for token in tokens {
+        for token in tokens(&source) {
             if let TokenTree::Ident(ident) = token {
                 let word = ident.to_string();
                 let code = ["fn", "impl", "struct", "enum", "trait", "macro_rules"].contains(&word.as_str());
