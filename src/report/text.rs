@@ -2,7 +2,7 @@
 
 use super::Facts;
 use super::facts::RunFacts;
-use super::lumped::{Errors, LumpedModesFacts};
+use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
 
@@ -10,12 +10,16 @@ use crate::diagnostic::Severity;
 const WIDTH: usize = 80;
 /// Columns of the labels.
 const LABEL: usize = 12;
+/// Stands for a space at which a line must not end.
+const KEEP: &str = "\u{a0}";
 /// Lines that one entry may take: long names end in an ellipsis.
 const LINES: usize = 4;
 /// Frequencies shown before the last.
 const FIRST_FREQUENCIES: usize = 6;
 /// Entries of a list that are shown.
 const LISTED: usize = 6;
+/// Errors up to this are rounding.
+const NEGLIGIBLE: f64 = 1e-9;
 
 pub(super) fn render(facts: &Facts) -> String {
     let mut page = Page(String::new());
@@ -44,7 +48,7 @@ impl Page {
         }
         for (i, line) in lines.iter().enumerate() {
             let label = if i == 0 { label } else { "" };
-            let padded = format!("{label:LABEL$}{line}");
+            let padded = format!("{label:LABEL$}{line}").replace(KEEP, " ");
             self.0.push_str(padded.trim_end());
             self.0.push('\n');
         }
@@ -137,27 +141,30 @@ fn modes(page: &mut Page, facts: &Facts) {
 }
 
 fn lumped(page: &mut Page, facts: &Facts) {
-    let column = facts.lumped.iter().map(|l| l.scheme.chars().count()).max().unwrap_or(0).min(20);
     page.list("lumped", &facts.lumped, |l| {
         let negative = match l.negative_masses {
             0 => String::new(),
-            1 => ", 1 NEGATIVE mass".to_owned(),
-            count => format!(", {count} NEGATIVE masses"),
+            1 => "; 1 NEGATIVE mass".to_owned(),
+            count => format!("; {count} NEGATIVE masses"),
         };
-        format!("{:column$}  {}{negative}", plain(&l.scheme), worst(&l.errors))
+        format!("{}: {}{negative}", plain(&l.scheme), errors(&l.errors))
     });
+    let column = facts.lumped_modes.iter().map(|l| l.scheme.chars().count()).max().unwrap_or(0).min(20);
     page.list("own modes", &facts.lumped_modes, |l| {
         format!("{:column$}  {}", plain(&l.scheme), own_modes(l))
     });
 }
 
-fn worst(errors: &Errors) -> String {
-    match &errors.worst {
-        None => "not compared".to_owned(),
-        Some(norm) => {
-            format!("worst {} ({}, {})", percent(norm.value), plain(&norm.invariant), norm.kind())
-        }
+/// The worst norm of every invariant that differs.
+fn errors(errors: &Errors) -> String {
+    if errors.worst.is_none() {
+        return "not compared".to_owned();
     }
+    // NaN, an error that is not known, is told too.
+    let told = errors.worst_by_invariant.iter().filter(|n| n.value.is_nan() || n.value > NEGLIGIBLE);
+    let text = |n: &ErrorNorm| format!("{} {}", plain(&n.invariant).replace('_', " "), percent(n.value));
+    let told: Vec<String> = told.map(|n| text(n).replace(' ', KEEP)).collect();
+    if told.is_empty() { "no error above 1e-9".to_owned() } else { format!("errors {}", told.join(", ")) }
 }
 
 fn own_modes(lumped: &LumpedModesFacts) -> String {
