@@ -113,13 +113,21 @@ pub fn free_surface_of(
         );
         diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
     }
-    describe(&solution, settings, model.stiffness().n() - 6, &mut diagnostics);
+    describe(&solution, settings, scalar_mass, &mut diagnostics);
     Ok(FreeSurfaceModes { solution, rigid_noise, input_noise, diagnostics })
 }
 
 /// Notes about how many modes there are and how they end.
-fn describe(solution: &EigenSolution, settings: &ModeSettings, at_most: usize, notes: &mut Vec<Diagnostic>) {
+fn describe(
+    solution: &EigenSolution,
+    settings: &ModeSettings,
+    scalar_mass: &SymmetricMatrix,
+    notes: &mut Vec<Diagnostic>,
+) {
     let given = solution.eigenvalues.len();
+    let at_most = 3 * scalar_mass.n() - 6;
+    // Known from the rank of Ms, or because all there are were found.
+    let mut finite = solution.finite_modes;
     if let Wanted::Lowest(wanted) = settings.wanted
         && given < wanted
     {
@@ -127,14 +135,24 @@ fn describe(solution: &EigenSolution, settings: &ModeSettings, at_most: usize, n
             "{wanted} modes were asked for, the model has {given} flexible modes with finite frequency"
         );
         notes.push(Diagnostic::new(Code::ModesClamped, message));
+        finite = finite.or(Some(given));
     }
-    if let Some(finite) = solution.finite_modes
-        && finite < at_most
-    {
-        let message =
-            format!("mass matrix is singular: {finite} of {at_most} flexible modes have a finite frequency");
-        notes.push(Diagnostic::new(Code::MassMatrixSingular, message));
-    }
+    let massless = (0..scalar_mass.n()).filter(|&i| scalar_mass.row(i).0.is_empty()).count();
+    let singular = match finite {
+        Some(finite) if finite < at_most => {
+            Some(format!("{finite} of {at_most} flexible modes have a finite frequency"))
+        }
+        None if massless > 0 => Some(format!(
+            "nodes without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
+            at_most - 3 * massless
+        )),
+        _ => None,
+    };
+    notes.extend(
+        singular.map(|what| {
+            Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {what}"))
+        }),
+    );
     let below = solution.completeness.modes_below;
     if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
         let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);

@@ -90,7 +90,7 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     let rigid_residual = check_rigid_motion(&stiffness, &nodes, &raw, label, &mut found);
     stop_on_error(&mut found)?;
     let ScalarMass { matrix: scalar_mass, deviation } = scalar.expect("a missing mass comes with an error");
-    let diagonal_mass = scalar_mass.as_csc().nnz() == scalar_mass.n();
+    let diagonal_mass = (0..scalar_mass.n()).all(|i| scalar_mass.row(i).0.iter().all(|&j| j as usize == i));
     if diagonal_mass {
         let message = "mass matrix is diagonal: it was lumped before it came here";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));

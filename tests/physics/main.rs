@@ -3,7 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use support::{equations, random};
+use support::equations;
 
 mod assembler;
 mod beams;
