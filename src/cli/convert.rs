@@ -9,7 +9,7 @@ use crate::convert::{Conversion, ConvertSettings, Lumping, convert};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Method, Wanted};
 use crate::error::Result;
-use crate::input::{ModelFiles, read_manifest, read_model, read_nodal_masses};
+use crate::input::{InterfaceNodes, ModelFiles, read_manifest, read_model, read_nodal_masses};
 use crate::invariants::BodyFrame;
 use crate::model::FeModel;
 use crate::output::OutputSlot;
@@ -23,7 +23,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     let files = model_files(arguments)?;
-    refuse_overwriting(arguments, &files)?;
+    refuse_overwriting(arguments, &files, &schemes)?;
     let slot = store::prepare_output(&arguments.output)?;
     let report_slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let threads = use_threads(arguments.threads);
@@ -132,19 +132,23 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
 }
 
 /// No output may replace an input or another output.
-fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles) -> Result<()> {
-    let inputs = [
-        Some(&files.stiffness.path),
-        Some(&files.mass.path),
-        Some(&files.nodes),
-        files.dofs.as_ref(),
-        files.manifest.as_ref(),
-    ];
+fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles, schemes: &[Scheme]) -> Result<()> {
+    let matrices = [Some(&files.stiffness.path), Some(&files.mass.path)];
+    let tables = [Some(&files.nodes), files.dofs.as_ref(), files.manifest.as_ref()];
+    let masses = schemes.iter().map(|scheme| match scheme {
+        Scheme::User(path) => Some(path),
+        Scheme::Ready(_) => None,
+    });
+    let interfaces = files.interfaces.iter().map(|interface| match &interface.nodes {
+        InterfaceNodes::File(path) => Some(path),
+        InterfaceNodes::Listed(_) => None,
+    });
+    let inputs = matrices.into_iter().chain(tables).chain(masses).chain(interfaces);
     let place = |path: &Path| {
         std::fs::canonicalize(path)
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
     };
-    let mut taken: Vec<_> = inputs.into_iter().flatten().map(|path| place(path)).collect();
+    let mut taken: Vec<_> = inputs.flatten().map(|path| place(path)).collect();
     for output in std::iter::once(&arguments.output).chain(&arguments.report) {
         let path = place(output);
         if taken.contains(&path) {

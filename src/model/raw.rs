@@ -47,4 +47,27 @@ pub struct RawModel {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+impl RawModel {
+    /// A model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all digits valid, units
+    /// m, kg, s not stated. Whatever else is known about it is set in the fields. `examples/from_memory.rs` goes on
+    /// from here to a written file.
+    pub fn in_memory(name: impl Into<String>, stiffness: CscMatrix, mass: CscMatrix, nodes: Nodes) -> Self {
+        let matrix = |matrix| RawMatrix { matrix, digits: 17, path: PathBuf::new() };
+        Self {
+            name: name.into(),
+            dimension: 3,
+            units: UnitSystem::default(),
+            stiffness: matrix(stiffness),
+            mass: matrix(mass),
+            nodes,
+            nodes_path: PathBuf::new(),
+            dofs: None,
+            dofs_path: PathBuf::new(),
+            interfaces: Vec::new(),
+            sources: Vec::new(),
+            diagnostics: Vec::new(),
+        }
+    }
+}
+
 pub use crate::provenance::SourceFile;

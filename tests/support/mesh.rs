@@ -5,11 +5,9 @@
 
 use super::elements::{Kind, MassRule, Material, TET_EDGES};
 use flexbody::linalg::CscMatrix;
-use flexbody::model::{Nodes, RawMatrix, RawModel};
-use flexbody::units::UnitSystem;
+use flexbody::model::{Nodes, RawModel};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// Nodes and elements.
 #[derive(Debug, Clone)]
@@ -179,21 +177,8 @@ impl Assembly {
 
     /// The model with node numbers 1, 2, ... and no row labels: node-major.
     pub fn raw_model(&self) -> RawModel {
-        let matrix = |matrix| RawMatrix { matrix, digits: 17, path: PathBuf::new() };
-        RawModel {
-            name: "test body".to_owned(),
-            dimension: 3,
-            units: UnitSystem::default(),
-            stiffness: matrix(self.stiffness.clone()),
-            mass: matrix(self.mass()),
-            nodes: Nodes { ids: (1..=self.nodes.len() as i64).collect(), positions: self.nodes.clone() },
-            nodes_path: PathBuf::new(),
-            dofs: None,
-            dofs_path: PathBuf::new(),
-            interfaces: Vec::new(),
-            sources: Vec::new(),
-            diagnostics: Vec::new(),
-        }
+        let nodes = Nodes { ids: (1..=self.nodes.len() as i64).collect(), positions: self.nodes.clone() };
+        RawModel::in_memory("test body", self.stiffness.clone(), self.mass(), nodes)
     }
 }
 

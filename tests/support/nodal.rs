@@ -1,7 +1,7 @@
 //! The unreduced nodal body: the oracle of every reduction. M is used as 3n x 3n entries, never as Ms.
 
-use crate::equations::{ReducedBody, State};
-use crate::random::Random;
+use super::equations::{ReducedBody, State};
+use super::random::Random;
 use faer::Mat;
 use flexbody::invariants::Invariants;
 use flexbody::linalg::SymmetricMatrix;
