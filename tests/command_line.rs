@@ -325,6 +325,20 @@ fn check_passes_on_what_convert_wrote_and_recomputes_it_from_the_matrices() {
 }
 
 #[test]
+fn check_allows_for_what_rounding_takes_from_a_slender_body() {
+    // The stiffest element is 1e9 times as stiff as the first bending mode: so many digits of psi' K psi are lost.
+    let folder = tempfile::tempdir().unwrap();
+    let beam = Mesh::block(Kind::Hex20, [40, 1, 1], [4.0, 0.03, 0.02]);
+    let raw = beam.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    write_model(folder.path(), &raw, Triangle::Lower);
+    done(folder.path(), "convert model.toml -o b.h5 --quiet");
+    let json = done(folder.path(), "check b.h5 --against model.toml --json").json();
+    let check = json.as_array().unwrap().iter().find(|c| c["name"] == "stiffness_recomputed").unwrap();
+    assert!(check["value"].as_f64().unwrap() > 1e-12, "no rounding to allow for: {check}");
+    assert!(check["limit"].as_f64().unwrap() < 1e-5, "{check}");
+}
+
+#[test]
 fn check_finds_a_model_that_changed() {
     let folder = model();
     done(folder.path(), "convert model.toml -o b.h5 --quiet");
