@@ -67,6 +67,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         let size = kx.col(j).norm_l2() + lambda.abs() * mx.col(j).norm_l2();
         residual = residual.max(r.norm_l2() / size);
         stored = stored.max(body.modes().residual[j]).max(ROUNDING * rounding[j] / size);
+        // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
         long = long.max(in_model.col(j).norm_l2() / lambda.sqrt());
         loose = loose.max(rounding[j] / lambda.sqrt());
     }
