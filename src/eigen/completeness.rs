@@ -5,7 +5,7 @@ use super::problem::{Counters, EigenFailure, EigenProblem};
 use crate::linalg::{Analysis, Inertia};
 
 /// A probe residual above this means that element growth may have spoilt the count.
-const PROBE_LIMIT: f64 = 1e-4;
+const GROWTH_LIMIT: f64 = 1e-4;
 
 /// How complete the modes are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,8 +47,8 @@ pub(super) fn count_below(
 ) -> Result<usize, EigenFailure> {
     counters.factorizations += 1;
     let inertia = Inertia::new(analysis, &problem.pencil, sigma);
-    if inertia.zero > 0 || inertia.probe_residual.is_nan() || inertia.probe_residual > PROBE_LIMIT {
-        return Err(EigenFailure::Inaccurate { residual: inertia.probe_residual });
+    if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
+        return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });
     }
     Ok(inertia.negative)
 }

@@ -38,7 +38,7 @@ pub fn solve(
     watch(Event::Phase("ordering"));
     let analysis = Analysis::new(pencil).ok_or(EigenFailure::Memory { bytes: None })?;
     counters.factor_len = analysis.factor_len() as u64;
-    if !is_positive_semidefinite(pencil.mass(), &analysis, pencil.block()) {
+    if !is_positive_semidefinite(pencil.mass(), &analysis) {
         return Err(EigenFailure::MassIndefinite);
     }
     let rigid = problem.rigid.ncols();

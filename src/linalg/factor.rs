@@ -1,96 +1,136 @@
-//! Sparse Cholesky of K + tau M, and the inertia of K - sigma M by Bunch-Kaufman pivoting inside supernodes; both
-//! share one symbolic analysis.
+//! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu, SIAM
+//! Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
 
-use super::{Pencil, SymmetricMatrix, nested_dissection};
-use dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::perm::PermRef;
+use super::assembly_tree::AssemblyTree;
+use super::front::{self, Real, Trapezoid, extend_add};
+use super::ordering::{nested_dissection, node_graph};
+use super::tree_walk::Walk;
+use super::{Pencil, SymmetricMatrix};
+use faer::MatMut;
 use faer::prelude::ReborrowMut;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side, Spec};
 
 /// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
 #[derive(Debug)]
 pub struct Analysis {
-    symbolic: SymbolicCholesky<usize>,
+    pub(super) tree: AssemblyTree,
+    pub(super) walk: Walk,
+    /// Rows per vertex of the tree.
+    pub(super) block: usize,
     flops: f64,
+    len: usize,
 }
 
 impl Analysis {
     /// Orders and analyses the pencil; `None` when memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        let forward = nested_dissection(pencil.stiffness(), pencil.block())?;
-        Self::with_order(pencil, forward)
+        let mut graph = node_graph(pencil);
+        let order = nested_dissection(&mut graph)?;
+        Some(Self::with_tree(AssemblyTree::new(&graph, &order, pencil.block()), pencil.block()))
     }
 
-    fn with_order(pencil: &Pencil<'_>, forward: Vec<usize>) -> Option<Self> {
-        let (pointers, rows, _) = pencil.shifted_lower(-1.0);
-        let n = pencil.n();
-        let mut inverse = vec![0; n];
-        for (new, &old) in forward.iter().enumerate() {
-            inverse[old] = new;
-        }
-        let symbolic = factorize_symbolic_cholesky(
-            SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows),
-            Side::Lower,
-            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n)),
-            CholeskySymbolicParams {
-                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-                ..Default::default()
-            },
-        )
-        .ok()?;
-        let flops = supernodal_flops(&symbolic);
-        Some(Self { symbolic, flops })
-    }
-
-    /// Row that is eliminated as the i-th, for each i.
-    fn elimination_order(&self) -> &[usize] {
-        self.symbolic.perm().map_or(&[], |perm| perm.arrays().0)
-    }
-
-    /// Threads for a factorisation: only its dense kernels are parallel, and below this work their barriers cost more
-    /// than they gain. The bits are the same either way.
-    fn parallelism(&self) -> Par {
-        if self.flops > 3e11 { Par::rayon(0) } else { Par::Seq }
+    fn with_tree(tree: AssemblyTree, block: usize) -> Self {
+        let shape = |s: usize| (tree.columns(s).len() * block, tree.rows(s).len() * block);
+        let work: Vec<f64> = (0..tree.len()).map(|s| elimination_flops(shape(s))).collect();
+        let walk = Walk::new(&tree, &work);
+        let len = (0..tree.len()).map(shape).map(|(w, r)| Trapezoid::<f64>::stored(w + r, w)).sum();
+        Self { walk, block, flops: work.iter().sum(), len, tree }
     }
 
     /// Numbers stored in a factor.
     pub fn factor_len(&self) -> usize {
-        self.symbolic.len_val()
+        self.len
     }
 
     /// Multiplications and additions of one Cholesky factorisation.
     pub fn flops(&self) -> f64 {
         self.flops
     }
-}
 
-/// Sum over supernodes of w columns and r rows below: w^3/3 + w^2 r + w r^2.
-fn supernodal_flops(symbolic: &SymbolicCholesky<usize>) -> f64 {
-    match symbolic.raw() {
-        SymbolicCholeskyRaw::Simplicial(_) => 0.0,
-        SymbolicCholeskyRaw::Supernodal(s) => (0..s.n_supernodes())
-            .map(|i| {
-                let w = (s.supernode_end()[i] - s.supernode_begin()[i]) as f64;
-                let r = s.supernode(i).pattern().len() as f64;
-                w * w * w / 3.0 + w * w * r + w * r * r
-            })
-            .sum(),
+    /// Zeros for the columns of a front, and for its Schur complement.
+    pub(super) fn new_front<T: Real>(&self, s: usize) -> (Trapezoid<T>, Trapezoid<T>) {
+        let width = self.tree.columns(s).len() * self.block;
+        let rest = self.tree.rows(s).len() * self.block;
+        (Trapezoid::zeros(width + rest, width), Trapezoid::zeros(rest, rest))
+    }
+
+    /// Row of the parent's front for each row below the columns of `s`.
+    pub(super) fn places(&self, s: usize) -> Vec<usize> {
+        let rows = |&place: &u32| (0..self.block).map(move |b| place as usize * self.block + b);
+        self.tree.places(s).iter().flat_map(rows).collect()
+    }
+
+    /// K - sigma M, scaled to a diagonal of about one by powers of two: exact, and within the range of single precision
+    /// in any units.
+    pub(super) fn scaled<'a>(&'a self, pencil: &'a Pencil<'a>, sigma: f64) -> Scaled<'a> {
+        let scale = (0..pencil.n()).map(|i| {
+            let diagonal = pencil.stiffness_diagonal(i).abs() + (sigma * pencil.mass_diagonal(i)).abs();
+            if diagonal > 0.0 && diagonal.is_finite() { (-0.5 * diagonal.log2()).round().exp2() } else { 1.0 }
+        });
+        Scaled { analysis: self, pencil, sigma, scale: scale.collect() }
     }
 }
 
-/// Cholesky factor of K + tau M.
-#[derive(Debug)]
-pub struct Cholesky<'a> {
+/// Multiplications and additions that eliminate `width` columns with `rest` rows below them.
+fn elimination_flops((width, rest): (usize, usize)) -> f64 {
+    let (w, r) = (width as f64, rest as f64);
+    w * w * w / 3.0 + w * w * r + w * r * r
+}
+
+/// S (K - sigma M) S with the diagonal S, row by row.
+pub(super) struct Scaled<'a> {
     analysis: &'a Analysis,
-    values: Vec<f64>,
-    tau: f64,
+    pencil: &'a Pencil<'a>,
+    sigma: f64,
+    scale: Vec<f64>,
+}
+
+impl Scaled<'_> {
+    /// Adds the columns of supernode `s` to its front.
+    pub(super) fn assemble<T: Real>(&self, s: usize, front: &mut Trapezoid<T>) {
+        let (tree, block) = (&self.analysis.tree, self.analysis.block);
+        let columns = tree.columns(s);
+        let below = tree.rows(s);
+        // Row of the front of a vertex, if it is eliminated not before `column`.
+        let place = |vertex: usize, column: usize| {
+            let position = tree.position()[vertex] as usize;
+            if position < column {
+                None
+            } else if position < columns.end {
+                Some((position - columns.start) * block)
+            } else {
+                let at = below.binary_search(&(position as u32)).expect("the structure holds every entry");
+                Some((columns.len() + at) * block)
+            }
+        };
+        for column in columns.clone() {
+            let vertex = tree.order()[column] as usize;
+            for b in 0..block {
+                let (j, local) = (vertex * block + b, (column - columns.start) * block + b);
+                let (rows, values) = self.pencil.stiffness().row(j);
+                let mut last = (usize::MAX, None);
+                for (&i, &value) in rows.iter().zip(values) {
+                    let (other, component) = (i as usize / block, i as usize % block);
+                    if other != last.0 {
+                        last = (other, place(other, column));
+                    }
+                    if let Some(row) = last.1.map(|row| row + component)
+                        && row >= local
+                    {
+                        front.add(row, local, T::of(value * self.scale[i as usize] * self.scale[j]));
+                    }
+                }
+            }
+            let (nodes, masses) = self.pencil.mass().row(vertex);
+            for (&other, &mass) in nodes.iter().zip(masses) {
+                let Some(row) = place(other as usize, column) else { continue };
+                for b in 0..block {
+                    let (i, j) = (other as usize * block + b, vertex * block + b);
+                    let value = -self.sigma * mass * self.scale[i] * self.scale[j];
+                    front.add(row + b, (column - columns.start) * block + b, T::of(value));
+                }
+            }
+        }
+    }
 }
 
 /// Something that solves with K + tau M: the sparse factor, or the dense one of a small model.
@@ -102,177 +142,118 @@ pub trait Solve {
     fn solve_in_place(&self, x: MatMut<'_, f64>);
 }
 
-impl<'a> Cholesky<'a> {
+/// Cholesky factor of K + tau M with numbers of type `T`.
+#[derive(Debug)]
+pub struct Cholesky<'a, T = f64> {
+    analysis: &'a Analysis,
+    fronts: Vec<Trapezoid<T>>,
+    /// Scale of each row.
+    scale: Vec<f64>,
+    tau: f64,
+}
+
+impl<'a, T: Real> Cholesky<'a, T> {
     /// Factors K + tau M; `None` when the matrix is not positive definite.
     pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, tau: f64) -> Option<Self> {
-        let (pointers, rows, a) = pencil.shifted_lower(-tau);
-        let n = pencil.n();
-        let matrix =
-            SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
-        let symbolic = &analysis.symbolic;
-        let par = analysis.parallelism();
-        let params = Spec::default();
-        let mut values = vec![0.0; symbolic.len_val()];
-        let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, params));
-        symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                matrix,
-                Side::Lower,
-                LltRegularization::default(),
-                par,
-                MemStack::new(&mut memory),
-                params,
-            )
-            .ok()?;
-        Some(Self { analysis, values, tau })
+        let tree = &analysis.tree;
+        let matrix = analysis.scaled(pencil, -tau);
+        let mut fronts: Vec<Trapezoid<T>> = (0..tree.len()).map(|_| Trapezoid::default()).collect();
+        let visit = |s: usize, slot: &mut Trapezoid<T>, children: Vec<Trapezoid<T>>| {
+            let (mut pivots, mut rest) = analysis.new_front::<T>(s);
+            matrix.assemble(s, &mut pivots);
+            for (&c, child) in tree.children(s).iter().zip(children) {
+                extend_add(&mut pivots, &mut rest, &child, &analysis.places(c as usize));
+            }
+            front::cholesky(&mut pivots, &mut rest).ok_or(())?;
+            *slot = pivots;
+            Ok::<_, ()>(rest)
+        };
+        analysis.walk.up(tree, &mut fronts, &visit).ok()?;
+        Some(Self { analysis, fronts, scale: matrix.scale, tau })
+    }
+
+    /// Solves for the columns of `x`, at most [`COLUMNS`], in the precision of the factor.
+    fn solve_block(&self, mut x: MatMut<'_, f64>) {
+        let (analysis, tree, block) = (self.analysis, &self.analysis.tree, self.analysis.block);
+        let k = x.ncols();
+        // Row of the pencil at each row of the elimination order.
+        let row = |i: usize| tree.order()[i / block] as usize * block + i % block;
+        let mut values = vec![T::default(); x.nrows() * k];
+        for (i, to) in values.chunks_exact_mut(k).enumerate() {
+            let from = row(i);
+            for (j, to) in to.iter_mut().enumerate() {
+                *to = T::of(x[(from, j)] * self.scale[from]);
+            }
+        }
+        let mut slots: Vec<&mut [T]> = Vec::with_capacity(tree.len());
+        let mut rest = values.as_mut_slice();
+        for s in 0..tree.len() {
+            let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block * k);
+            slots.push(own);
+            rest = tail;
+        }
+        let add = |front: &mut [T], places: &[u32], update: &[T]| {
+            for (&place, from) in places.iter().zip(update.chunks_exact(block * k)) {
+                let to = &mut front[place as usize * block * k..][..block * k];
+                to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+            }
+        };
+        let forward = |s: usize, own: &mut &mut [T], children: Vec<Vec<T>>| {
+            let l = &self.fronts[s];
+            let mut front = vec![T::default(); l.height() * k];
+            front[..own.len()].copy_from_slice(own);
+            for (&c, update) in tree.children(s).iter().zip(&children) {
+                add(&mut front, tree.places(c as usize), update);
+            }
+            front::forward(l, &mut front, k);
+            own.copy_from_slice(&front[..own.len()]);
+            Ok::<_, std::convert::Infallible>(front.split_off(own.len()))
+        };
+        let Ok(()) = analysis.walk.up(tree, &mut slots, &forward);
+        let backward = |s: usize, own: &mut &mut [T], below: Option<Vec<T>>| {
+            let mut front = own.to_vec();
+            front.extend(below.unwrap_or_default());
+            front::backward(&self.fronts[s], &mut front, k);
+            own.copy_from_slice(&front[..own.len()]);
+            let rows = |c: u32| tree.places(c as usize).iter();
+            let gather =
+                |c| rows(c).flat_map(|&p| &front[p as usize * block * k..][..block * k]).copied().collect();
+            tree.children(s).iter().map(|&c| gather(c)).collect()
+        };
+        analysis.walk.down(tree, &mut slots, &backward);
+        for (i, from) in values.chunks_exact(k).enumerate() {
+            let to = row(i);
+            for (j, from) in from.iter().enumerate() {
+                x[(to, j)] = from.wide() * self.scale[to];
+            }
+        }
     }
 }
 
-impl Solve for Cholesky<'_> {
+/// Columns solved at once: the factor is streamed once for all of them.
+const COLUMNS: usize = 8;
+
+impl<T: Real> Solve for Cholesky<'_, T> {
     fn shift(&self) -> f64 {
         self.tau
     }
 
-    /// Columns go in blocks of eight, each on one thread: the factor is
-    /// streamed once per block, and the sums do not depend on the number of threads.
     fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
-        let factor = LltRef::new(&self.analysis.symbolic, &self.values);
-        let mut memory =
-            MemBuffer::new(self.analysis.symbolic.solve_in_place_scratch::<f64>(x.ncols().min(8), Par::Seq));
         let mut start = 0;
         while start < x.ncols() {
-            let width = 8.min(x.ncols() - start);
-            factor.solve_in_place_with_conj(
-                Conj::No,
-                x.rb_mut().subcols_mut(start, width),
-                Par::Seq,
-                MemStack::new(&mut memory),
-            );
+            let width = COLUMNS.min(x.ncols() - start);
+            self.solve_block(x.rb_mut().subcols_mut(start, width));
             start += width;
         }
     }
 }
 
 /// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has
-/// been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Uses the node order of `analysis`, whose pencil has `block` rows per node.
-pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis, block: usize) -> bool {
+/// been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Uses the node
+/// order of `analysis`, whose pencil has `block` rows per node.
+pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
     let raised = mass.with_raised_diagonal(1.0 + 1e-9);
     let pencil = Pencil::new(&raised, &raised, 1);
-    let nodes = analysis.elimination_order().iter().filter(|&row| row % block == 0).map(|row| row / block);
-    Analysis::with_order(&pencil, nodes.collect())
-        .is_some_and(|analysis| Cholesky::new(&analysis, &pencil, 0.0).is_some())
-}
-
-/// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma when M
-/// is positive semidefinite (Sylvester).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inertia {
-    /// Eigenvalues below zero: modes below sigma.
-    pub negative: usize,
-    /// Zero pivots.
-    pub zero: usize,
-    /// |b - (K - sigma M) x| / (|b| + |K - sigma M| |x|) of a solved probe: a large one means that element growth
-    /// spoilt the factor and with it the count.
-    pub probe_residual: f64,
-}
-
-impl Inertia {
-    /// Factors K - sigma M as L B L' (B of 1x1 and 2x2 blocks) and counts.
-    pub fn new(analysis: &Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
-        let (pointers, rows, a) = pencil.shifted_lower(sigma);
-        let n = pencil.n();
-        let matrix =
-            SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &pointers, None, &rows), &a);
-        let symbolic = &analysis.symbolic;
-        let par = analysis.parallelism();
-        let params = Spec::default();
-        let mut values = vec![0.0; symbolic.len_val()];
-        let mut subdiagonal = vec![0.0; n];
-        let (mut forward, mut inverse) = (vec![0usize; n], vec![0usize; n]);
-        let mut memory =
-            MemBuffer::new(symbolic.factorize_numeric_intranode_lblt_scratch::<f64>(par, params));
-        let factor = symbolic.factorize_numeric_intranode_lblt(
-            &mut values,
-            &mut subdiagonal,
-            &mut forward,
-            &mut inverse,
-            matrix,
-            Side::Lower,
-            par,
-            MemStack::new(&mut memory),
-            params,
-        );
-        drop(memory);
-        let mut probe = faer::Mat::from_fn(n, 1, |i, _| if i % 3 == i % 2 { 1.0 } else { -0.5 });
-        let b = probe.clone();
-        let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        factor.solve_in_place_with_conj(Conj::No, probe.as_mut(), Par::Seq, MemStack::new(&mut memory));
-        let probe_residual = relative_residual(&pointers, &rows, &a, &probe, &b);
-        let (negative, zero) = count_pivots(symbolic, &values, &subdiagonal);
-        Self { negative, zero, probe_residual }
-    }
-}
-
-/// Negative and zero eigenvalues of the block diagonal B, read from the supernodes' diagonals.
-fn count_pivots(symbolic: &SymbolicCholesky<usize>, values: &[f64], subdiagonal: &[f64]) -> (usize, usize) {
-    let SymbolicCholeskyRaw::Supernodal(s) = symbolic.raw() else {
-        unreachable!("the analysis asks for supernodes")
-    };
-    let (mut negative, mut zero) = (0, 0);
-    for i in 0..s.n_supernodes() {
-        let (start, end) = (s.supernode_begin()[i], s.supernode_end()[i]);
-        let height = end - start + s.supernode(i).pattern().len();
-        let at = s.col_ptr_for_val()[i];
-        let diagonal = |j: usize| values[at + (j - start) * (height + 1)];
-        let mut j = start;
-        while j < end {
-            let off = subdiagonal[j];
-            if off == 0.0 || j + 1 == end {
-                negative += usize::from(diagonal(j) < 0.0);
-                zero += usize::from(diagonal(j) == 0.0 || diagonal(j).is_nan());
-                j += 1;
-            } else {
-                let (d1, d2) = (diagonal(j), diagonal(j + 1));
-                // Signs of the two eigenvalues, by determinant and trace; scaled against overflow.
-                let determinant = (d1 / off) * (d2 / off) - 1.0;
-                if determinant < 0.0 {
-                    negative += 1;
-                } else if determinant > 0.0 {
-                    negative += 2 * usize::from(d1 < 0.0);
-                } else {
-                    negative += usize::from(d1 + d2 < 0.0);
-                    zero += 1;
-                }
-                j += 2;
-            }
-        }
-    }
-    (negative, zero)
-}
-
-/// |b - A x| / (|b| + |A| |x|) in the maximum norm, A given by its lower triangle.
-fn relative_residual(
-    pointers: &[usize],
-    rows: &[usize],
-    values: &[f64],
-    x: &faer::Mat<f64>,
-    b: &faer::Mat<f64>,
-) -> f64 {
-    let n = x.nrows();
-    let mut r: Vec<f64> = (0..n).map(|i| b[(i, 0)]).collect();
-    let mut scale: Vec<f64> = (0..n).map(|i| b[(i, 0)].abs()).collect();
-    for j in 0..n {
-        for k in pointers[j]..pointers[j + 1] {
-            let (i, v) = (rows[k], values[k]);
-            r[i] -= v * x[(j, 0)];
-            scale[i] += (v * x[(j, 0)]).abs();
-            if i != j {
-                r[j] -= v * x[(i, 0)];
-                scale[j] += (v * x[(i, 0)]).abs();
-            }
-        }
-    }
-    let worst = r.iter().fold(0.0f64, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v.abs()) });
-    worst / scale.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(*v))
+    let tree = AssemblyTree::new(&node_graph(&pencil), analysis.tree.order(), 1);
+    Cholesky::<f64>::new(&Analysis::with_tree(tree, 1), &pencil, 0.0).is_some()
 }

@@ -3,7 +3,7 @@
 use super::{SymmetricMatrix, multiply};
 use faer::{Mat, MatRef};
 
-/// Stiffness K (N x N) and mass M = Ms kron I_block (Ms: N/block x N/block): products and shifted combinations.
+/// Stiffness K (N x N) and mass M = Ms kron I_block (Ms: N/block x N/block): products.
 #[derive(Debug, Clone, Copy)]
 pub struct Pencil<'a> {
     stiffness: &'a SymmetricMatrix,
@@ -55,44 +55,13 @@ impl<'a> Pencil<'a> {
         y
     }
 
-    /// Lower triangle of K - sigma M in compressed column form (column pointers, rows, values). The pattern is the
-    /// union of both and does not depend on sigma.
-    pub(super) fn shifted_lower(&self, sigma: f64) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
-        let n = self.n();
-        let capacity = self.stiffness.as_csc().nnz() / 2 + n;
-        let mut pointers = Vec::with_capacity(n + 1);
-        let (mut rows, mut values) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-        pointers.push(0);
-        for j in 0..n {
-            let (node, component) = (j / self.block, j % self.block);
-            let (kr, kv) = self.stiffness.row(j);
-            let (mr, mv) = self.mass.row(node);
-            let mass_row = |i: usize| mr[i] as usize * self.block + component;
-            let mut a = kr.partition_point(|&r| (r as usize) < j);
-            let mut b = mr.partition_point(|&r| (r as usize) < node);
-            loop {
-                let k_row = kr.get(a).map(|&r| r as usize);
-                let m_row = (b < mr.len()).then(|| mass_row(b));
-                let row = match (k_row, m_row) {
-                    (Some(k), Some(m)) => k.min(m),
-                    (Some(k), None) => k,
-                    (None, Some(m)) => m,
-                    (None, None) => break,
-                };
-                let mut value = 0.0;
-                if k_row == Some(row) {
-                    value += kv[a];
-                    a += 1;
-                }
-                if m_row == Some(row) {
-                    value -= sigma * mv[b];
-                    b += 1;
-                }
-                rows.push(row);
-                values.push(value);
-            }
-            pointers.push(rows.len());
-        }
-        (pointers, rows, values)
+    /// Entry i of the diagonal of K.
+    pub(super) fn stiffness_diagonal(&self, i: usize) -> f64 {
+        self.stiffness.as_csc().get(i, i)
+    }
+
+    /// Entry i of the diagonal of M.
+    pub(super) fn mass_diagonal(&self, i: usize) -> f64 {
+        self.mass.as_csc().get(i / self.block, i / self.block)
     }
 }

@@ -1,0 +1,340 @@
+//! Dense fronts: trapezoids cut into panels of columns, each panel row-major, and the kernels that eliminate the
+//! leading columns of a front. Work is cut into fixed pieces of rows, so that the bits do not depend on the number
+//! of threads.
+
+use faer::linalg::cholesky::llt;
+use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, Mat, MatMut, MatRef, Par, Spec};
+use rayon::prelude::*;
+use std::ops::{AddAssign, DivAssign, Mul, MulAssign, SubAssign};
+
+/// Columns of a panel: large enough for products at full speed, small enough for its triangles to cost little.
+pub(super) const PANEL: usize = 128;
+
+/// Rows of a piece of parallel work.
+const ROWS: usize = 256;
+
+/// Multiplications below which a piece of work is not worth a task.
+const WORTH_A_TASK: usize = 4_000_000;
+
+/// The numbers of a factor.
+pub trait Real:
+    faer::traits::RealField
+    + Copy
+    + Default
+    + Send
+    + Sync
+    + PartialOrd
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+    + Mul<Output = Self>
+{
+    /// Rounded from double precision.
+    fn of(x: f64) -> Self;
+    /// In double precision.
+    fn wide(self) -> f64;
+}
+
+impl Real for f64 {
+    fn of(x: f64) -> Self {
+        x
+    }
+    fn wide(self) -> f64 {
+        self
+    }
+}
+
+impl Real for f32 {
+    fn of(x: f64) -> Self {
+        x as f32
+    }
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+/// Columns 0..width of the lower triangle of a symmetric matrix with `height` rows. Panel p holds the columns from
+/// p [`PANEL`] and the rows from there down, row by row; above the diagonal of its leading square stands nothing of use.
+#[derive(Debug, Default)]
+pub struct Trapezoid<T> {
+    height: usize,
+    width: usize,
+    pub(super) panels: Vec<Vec<T>>,
+}
+
+impl<T: Real> Trapezoid<T> {
+    pub fn zeros(height: usize, width: usize) -> Self {
+        let panel = |p: usize| vec![T::default(); (height - p * PANEL) * PANEL.min(width - p * PANEL)];
+        Self { height, width, panels: (0..width.div_ceil(PANEL)).map(panel).collect() }
+    }
+
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of entries stored for this shape.
+    pub fn stored(height: usize, width: usize) -> usize {
+        (0..width.div_ceil(PANEL)).map(|p| (height - p * PANEL) * PANEL.min(width - p * PANEL)).sum()
+    }
+
+    pub(super) fn panel_width(&self, p: usize) -> usize {
+        PANEL.min(self.width - p * PANEL)
+    }
+
+    pub fn add(&mut self, row: usize, column: usize, value: T) {
+        let p = column / PANEL;
+        let at = (row - p * PANEL) * self.panel_width(p) + column - p * PANEL;
+        self.panels[p][at] += value;
+    }
+
+    /// Rows `from..` (counted in the trapezoid) of panel `p`.
+    pub(super) fn below(&self, p: usize, from: usize) -> MatRef<'_, T> {
+        let width = self.panel_width(p);
+        let skipped = from - p * PANEL;
+        MatRef::from_row_major_slice(&self.panels[p][skipped * width..], self.height - from, width)
+    }
+}
+
+/// Adds `source`, whose rows and columns are `places` of the front with columns `pivots` and Schur complement `rest`.
+pub(super) fn extend_add<T: Real>(
+    pivots: &mut Trapezoid<T>,
+    rest: &mut Trapezoid<T>,
+    source: &Trapezoid<T>,
+    places: &[usize],
+) {
+    let w = pivots.width;
+    for (p, panel) in source.panels.iter().enumerate() {
+        let (first, width) = (p * PANEL, source.panel_width(p));
+        let runs = runs(&places[first..first + width], w);
+        for (i, row) in panel.chunks_exact(width).enumerate() {
+            let place = places[first + i];
+            // Columns of the leading square above the diagonal hold nothing.
+            let used = (i + 1).min(width);
+            for run in &runs {
+                if run.source >= used {
+                    break;
+                }
+                let length = run.length.min(used - run.source);
+                let (target, row_place) =
+                    if run.rest { (&mut *rest, place - w) } else { (&mut *pivots, place) };
+                let target_width = target.panel_width(run.panel);
+                let at = (row_place - run.panel * PANEL) * target_width + run.column;
+                let to = &mut target.panels[run.panel][at..at + length];
+                for (to, from) in to.iter_mut().zip(&row[run.source..run.source + length]) {
+                    *to += *from;
+                }
+            }
+        }
+    }
+}
+
+/// Consecutive columns that go to consecutive columns of one panel.
+struct Run {
+    source: usize,
+    length: usize,
+    rest: bool,
+    panel: usize,
+    column: usize,
+}
+
+fn runs(places: &[usize], pivots: usize) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (source, &place) in places.iter().enumerate() {
+        let rest = place >= pivots;
+        let column = if rest { place - pivots } else { place };
+        let (panel, column) = (column / PANEL, column % PANEL);
+        match runs.last_mut() {
+            Some(run) if run.rest == rest && run.panel == panel && run.column + run.length == column => {
+                run.length += 1;
+            }
+            _ => runs.push(Run { source, length: 1, rest, panel, column }),
+        }
+    }
+    runs
+}
+
+/// Runs `work(index, piece)` on pieces of [`ROWS`] rows of a row-major block, at the same time when that pays.
+pub(super) fn by_rows<T: Real>(
+    block: &mut [T],
+    width: usize,
+    cost: usize,
+    work: impl Fn(usize, &mut [T]) + Sync,
+) {
+    if cost < WORTH_A_TASK {
+        block.chunks_mut(ROWS * width).enumerate().for_each(|(i, piece)| work(i, piece));
+    } else {
+        block.par_chunks_mut(ROWS * width).enumerate().for_each(|(i, piece)| work(i, piece));
+    }
+}
+
+/// C -= A B' on the lower triangle of a square C.
+fn subtract_lower<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
+    triangular::matmul(
+        c,
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        a,
+        BlockStructure::Rectangular,
+        b.transpose(),
+        BlockStructure::Rectangular,
+        T::of(-1.0),
+        Par::Seq,
+    );
+}
+
+/// C -= A B'.
+fn subtract<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
+    matmul(c, Accum::Add, a, b.transpose(), T::of(-1.0), Par::Seq);
+}
+
+/// Subtracts from one panel (rows from its own first column on) the product of the eliminated panels `left` with
+/// `right`: A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B. `offset` is the row of the
+/// eliminated trapezoid at which the panel starts.
+pub(super) fn subtract_eliminated<T: Real>(
+    target: &mut [T],
+    width: usize,
+    left: &[MatRef<'_, T>],
+    right: &[MatRef<'_, T>],
+) {
+    let depth: usize = left.iter().map(|l| l.ncols()).sum();
+    let cost = target.len() * depth;
+    let (square, below) = target.split_at_mut(width * width);
+    by_rows(below, width, cost, |piece, rows| {
+        let count = rows.len() / width;
+        let mut c = MatMut::from_row_major_slice_mut(rows, count, width);
+        for (l, r) in left.iter().zip(right) {
+            subtract(c.as_mut(), l.subrows(width + piece * ROWS, count), r.subrows(0, width));
+        }
+    });
+    let mut c = MatMut::from_row_major_slice_mut(square, width, width);
+    for (l, r) in left.iter().zip(right) {
+        subtract_lower(c.as_mut(), l.subrows(0, width), r.subrows(0, width));
+    }
+}
+
+/// X <- X L^-T for the rows of a panel below its square; L is lower triangular.
+pub(super) fn divide_rows<T: Real>(below: &mut [T], l: MatRef<'_, T>, unit: bool) {
+    let width = l.ncols();
+    by_rows(below, width, below.len() * width, |_, rows| {
+        let count = rows.len() / width;
+        let x = MatMut::from_row_major_slice_mut(rows, count, width).transpose_mut();
+        if unit {
+            faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place(l, x, Par::Seq);
+        } else {
+            solve_lower_triangular_in_place(l, x, Par::Seq);
+        }
+    });
+}
+
+/// Cholesky of the columns `pivots` of a front; their contribution is subtracted from `rest`. `None` when a pivot is
+/// not positive.
+pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<T>) -> Option<()> {
+    let mut memory = dyn_stack::MemBuffer::new(llt::factor::cholesky_in_place_scratch::<T>(
+        PANEL.min(pivots.width),
+        Par::Seq,
+        Spec::default(),
+    ));
+    for p in 0..pivots.panels.len() {
+        let (first, width) = (p * PANEL, pivots.panel_width(p));
+        let mut panel = std::mem::take(&mut pivots.panels[p]);
+        let left: Vec<MatRef<'_, T>> = (0..p).map(|q| pivots.below(q, first)).collect();
+        subtract_eliminated(&mut panel, width, &left, &left);
+        let (square, below) = panel.split_at_mut(width * width);
+        let mut diagonal = MatRef::from_row_major_slice(&*square, width, width).to_owned();
+        let stack = dyn_stack::MemStack::new(&mut memory);
+        llt::factor::cholesky_in_place(
+            diagonal.as_mut(),
+            Default::default(),
+            Par::Seq,
+            stack,
+            Spec::default(),
+        )
+        .ok()?;
+        // A failed pivot may also show as something that is not a number.
+        if (0..width).any(|j| !(diagonal[(j, j)] > T::default())) {
+            return None;
+        }
+        MatMut::from_row_major_slice_mut(square, width, width).copy_from_triangular_lower(&diagonal);
+        divide_rows(below, diagonal.as_ref(), false);
+        pivots.panels[p] = panel;
+    }
+    subtract_from_rest(pivots, pivots, rest);
+    Some(())
+}
+
+/// Schur complement: rest -= L R' of all eliminated columns.
+pub(super) fn subtract_from_rest<T: Real>(
+    left: &Trapezoid<T>,
+    right: &Trapezoid<T>,
+    rest: &mut Trapezoid<T>,
+) {
+    let (w, total) = (left.width, rest.width);
+    let work = |p: usize, panel: &mut Vec<T>| {
+        let from = w + p * PANEL;
+        let l: Vec<MatRef<'_, T>> = (0..left.panels.len()).map(|q| left.below(q, from)).collect();
+        let r: Vec<MatRef<'_, T>> = (0..right.panels.len()).map(|q| right.below(q, from)).collect();
+        subtract_eliminated(panel, PANEL.min(total - p * PANEL), &l, &r);
+    };
+    if total * total * w / 2 < WORTH_A_TASK {
+        rest.panels.iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
+    } else {
+        rest.panels.par_iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
+    }
+}
+
+/// Forward substitution with the columns of a Cholesky factor: `front` holds all rows of the front, k numbers each.
+pub(super) fn forward<T: Real>(l: &Trapezoid<T>, front: &mut [T], k: usize) {
+    for p in 0..l.panels.len() {
+        let (first, width) = (p * PANEL, l.panel_width(p));
+        let (head, tail) = front[first * k..].split_at_mut(width * k);
+        let mut x = MatMut::from_row_major_slice_mut(head, width, k);
+        solve_lower_triangular_in_place(l.below(p, first).subrows(0, width), x.as_mut(), Par::Seq);
+        let below = l.below(p, first + width);
+        by_rows(tail, k, below.nrows() * width * k, |piece, rows| {
+            let count = rows.len() / k;
+            let y = MatMut::from_row_major_slice_mut(rows, count, k);
+            matmul(y, Accum::Add, below.subrows(piece * ROWS, count), x.as_ref(), T::of(-1.0), Par::Seq);
+        });
+    }
+}
+
+/// Back substitution with the transpose, for the leading rows of `front`; the rows below hold their solution.
+pub(super) fn backward<T: Real>(l: &Trapezoid<T>, front: &mut [T], k: usize) {
+    for p in (0..l.panels.len()).rev() {
+        let (first, width) = (p * PANEL, l.panel_width(p));
+        let (head, tail) = front[first * k..].split_at_mut(width * k);
+        let mut x = MatMut::from_row_major_slice_mut(head, width, k);
+        let below = l.below(p, first + width);
+        let part = |piece: usize, rows: &[T]| {
+            let count = rows.len() / k;
+            let y = MatRef::from_row_major_slice(rows, count, k);
+            let mut sum = Mat::zeros(k, width);
+            let l = below.subrows(piece * ROWS, count);
+            matmul(sum.as_mut(), Accum::Replace, y.transpose(), l, T::of(1.0), Par::Seq);
+            sum
+        };
+        let pieces = tail.chunks(ROWS * k).enumerate();
+        let sums: Vec<Mat<T>> = if below.nrows() * width * k < WORTH_A_TASK {
+            pieces.map(|(i, rows)| part(i, rows)).collect()
+        } else {
+            tail.par_chunks(ROWS * k).enumerate().map(|(i, rows)| part(i, rows)).collect()
+        };
+        for sum in &sums {
+            for i in 0..width {
+                for j in 0..k {
+                    x[(i, j)] -= sum[(j, i)];
+                }
+            }
+        }
+        let square = l.below(p, first).subrows(0, width);
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(square.transpose(), x, Par::Seq);
+    }
+}

@@ -1,0 +1,202 @@
+//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front; the factor is not kept.
+
+use super::Pencil;
+use super::factor::Analysis;
+use super::front::{
+    PANEL, Trapezoid, by_rows, divide_rows, extend_add, subtract_eliminated, subtract_from_rest,
+};
+use dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::lblt::factor as lblt;
+use faer::{Mat, MatRef, Par, Spec};
+use std::convert::Infallible;
+
+/// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma when M
+/// is positive semidefinite (Sylvester).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inertia {
+    /// Eigenvalues below zero: modes below sigma.
+    pub negative: usize,
+    /// Zero pivots.
+    pub zero: usize,
+    /// Backward error of the factorisation relative to the scaled matrix: the unit roundoff times the largest
+    /// diagonal entry of |L| |B| |L|', which bounds all others (Higham, Accuracy and Stability, section 11.1). A large
+    /// one means that element growth spoilt the factor and with it the count.
+    pub backward_error: f64,
+}
+
+/// What a front hands to its parent.
+struct Contribution {
+    schur: Trapezoid<f64>,
+    /// Diagonal of |L| |B| |L|' so far, for its rows.
+    growth: Vec<f64>,
+}
+
+impl Inertia {
+    /// Factors K - sigma M as L B L' (B of 1x1 and 2x2 blocks), counts, and forgets the factor.
+    pub fn new(analysis: &Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
+        let tree = &analysis.tree;
+        let matrix = analysis.scaled(pencil, sigma);
+        let mut counts = vec![(0usize, 0usize, 0.0f64); tree.len()];
+        let visit = |s: usize, count: &mut (usize, usize, f64), children: Vec<Contribution>| {
+            let (mut pivots, mut rest) = analysis.new_front::<f64>(s);
+            matrix.assemble(s, &mut pivots);
+            let mut growth = vec![0.0; pivots.height()];
+            for (&c, child) in tree.children(s).iter().zip(children) {
+                let places = analysis.places(c as usize);
+                extend_add(&mut pivots, &mut rest, &child.schur, &places);
+                for (&place, g) in places.iter().zip(&child.growth) {
+                    growth[place] += g;
+                }
+            }
+            let width = pivots.width();
+            let (negative, zero) = eliminate(&mut pivots, &mut rest, &mut growth);
+            let worst =
+                growth[..width].iter().fold(0.0f64, |m, g| if g.is_nan() { f64::NAN } else { m.max(*g) });
+            *count = (negative, zero, worst);
+            Ok::<_, Infallible>(Contribution { schur: rest, growth: growth.split_off(width) })
+        };
+        let Ok(()) = analysis.walk.up(tree, &mut counts, &visit);
+        let growth =
+            counts.iter().fold(0.0f64, |m, c| if c.2.is_nan() || m.is_nan() { f64::NAN } else { m.max(c.2) });
+        Self {
+            negative: counts.iter().map(|c| c.0).sum(),
+            zero: counts.iter().map(|c| c.1).sum(),
+            backward_error: growth * f64::EPSILON,
+        }
+    }
+}
+
+/// Eliminates the columns `pivots` of a front. Returns the numbers of negative and of zero pivots.
+fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mut [f64]) -> (usize, usize) {
+    let (height, width) = (pivots.height(), pivots.width());
+    // L B beside L.
+    let mut scaled = Trapezoid::zeros(height, width);
+    let (mut negative, mut zero) = (0, 0);
+    for p in 0..pivots.panels.len() {
+        let (first, width) = (p * PANEL, pivots.panel_width(p));
+        let mut panel = std::mem::take(&mut pivots.panels[p]);
+        let left: Vec<MatRef<'_, f64>> = (0..p).map(|q| pivots.below(q, first)).collect();
+        let right: Vec<MatRef<'_, f64>> = (0..p).map(|q| scaled.below(q, first)).collect();
+        subtract_eliminated(&mut panel, width, &left, &right);
+        let (square, below) = panel.split_at_mut(width * width);
+        let blocks = Blocks::new(MatRef::from_row_major_slice(&*square, width, width));
+        negative += blocks.negative;
+        zero += blocks.zero;
+        by_rows(below, width, 0, |_, rows| {
+            let mut old = vec![0.0; width];
+            for row in rows.chunks_exact_mut(width) {
+                old.copy_from_slice(row);
+                for (new, &from) in row.iter_mut().zip(&blocks.order) {
+                    *new = old[from];
+                }
+            }
+        });
+        divide_rows(below, blocks.l.as_ref(), true);
+        scaled.panels[p][width * width..].copy_from_slice(below);
+        for (row, g) in below.chunks_exact_mut(width).zip(&mut growth[first + width..]) {
+            blocks.divide(row);
+            *g += blocks.growth(row);
+        }
+        for (i, &place) in blocks.order.iter().enumerate() {
+            let row: Vec<f64> = (0..width)
+                .map(|j| if j < i { blocks.l[(i, j)] } else { f64::from(u8::from(i == j)) })
+                .collect();
+            growth[first + place] += blocks.growth(&row);
+        }
+        pivots.panels[p] = panel;
+    }
+    subtract_from_rest(pivots, &scaled, rest);
+    (negative, zero)
+}
+
+/// P A P' = L B L' of the leading square of a panel.
+struct Blocks {
+    /// Unit lower triangle below the diagonal.
+    l: Mat<f64>,
+    /// Row of A at each place.
+    order: Vec<usize>,
+    diagonal: Vec<f64>,
+    /// Nonzero where a 2x2 block of B starts.
+    coupling: Vec<f64>,
+    negative: usize,
+    zero: usize,
+}
+
+impl Blocks {
+    fn new(square: MatRef<'_, f64>) -> Self {
+        let n = square.nrows();
+        let mut l = square.to_owned();
+        let mut subdiagonal = faer::Mat::<f64>::zeros(n, 1);
+        let (mut order, mut inverse) = (vec![0usize; n], vec![0usize; n]);
+        let params = Spec::default();
+        let mut memory = MemBuffer::new(lblt::cholesky_in_place_scratch::<usize, f64>(n, Par::Seq, params));
+        lblt::cholesky_in_place(
+            l.as_mut(),
+            subdiagonal.as_mut().col_mut(0).as_diagonal_mut(),
+            &mut order,
+            &mut inverse,
+            Par::Seq,
+            MemStack::new(&mut memory),
+            params,
+        );
+        let diagonal: Vec<f64> = (0..n).map(|j| l[(j, j)]).collect();
+        let coupling: Vec<f64> = (0..n).map(|j| if j + 1 < n { subdiagonal[(j, 0)] } else { 0.0 }).collect();
+        let (negative, zero) = count(&diagonal, &coupling);
+        Self { l, order, diagonal, coupling, negative, zero }
+    }
+
+    /// Row of L from a row of L B.
+    fn divide(&self, row: &mut [f64]) {
+        let mut j = 0;
+        while j < row.len() {
+            let off = self.coupling[j];
+            if off == 0.0 {
+                row[j] /= self.diagonal[j];
+                j += 1;
+            } else {
+                // Scaled by the coupling, which dominates such a block.
+                let (a, d) = (self.diagonal[j] / off, self.diagonal[j + 1] / off);
+                let determinant = a * d - 1.0;
+                let (x, y) = (row[j] / off, row[j + 1] / off);
+                row[j] = (d * x - y) / determinant;
+                row[j + 1] = (a * y - x) / determinant;
+                j += 2;
+            }
+        }
+    }
+
+    /// |l|' |B| |l| of a row of L.
+    fn growth(&self, row: &[f64]) -> f64 {
+        let pairs = row.windows(2).zip(&self.coupling).map(|(l, off)| 2.0 * (l[0] * l[1] * off).abs());
+        let squares = row.iter().zip(&self.diagonal).map(|(l, d)| l * l * d.abs());
+        pairs.sum::<f64>() + squares.sum::<f64>()
+    }
+}
+
+/// Negative and zero eigenvalues of the block diagonal B.
+fn count(diagonal: &[f64], coupling: &[f64]) -> (usize, usize) {
+    let (mut negative, mut zero) = (0, 0);
+    let mut j = 0;
+    while j < diagonal.len() {
+        let off = coupling[j];
+        if off == 0.0 {
+            negative += usize::from(diagonal[j] < 0.0);
+            zero += usize::from(diagonal[j] == 0.0 || diagonal[j].is_nan());
+            j += 1;
+            continue;
+        }
+        let (d1, d2) = (diagonal[j], diagonal[j + 1]);
+        // Signs of the two eigenvalues, by determinant and trace; scaled against overflow.
+        let determinant = (d1 / off) * (d2 / off) - 1.0;
+        if determinant < 0.0 {
+            negative += 1;
+        } else if determinant > 0.0 {
+            negative += 2 * usize::from(d1 < 0.0);
+        } else {
+            negative += usize::from(d1 + d2 < 0.0);
+            zero += 1;
+        }
+        j += 2;
+    }
+    (negative, zero)
+}
