@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-SHAPES = {"block": (1.0, 0.2, 0.2), "cube": (0.1, 0.1, 0.1), "plate": (1.0, 1.0, 0.01)}
+SHAPES = {"block": (1.0, 0.2, 0.2), "cube": (0.1, 0.1, 0.1), "plate": (1.0, 1.0, 0.01), "thin-plate": (1.0, 1.0, 0.002)}
 CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
 OFFSETS = np.array([(x, y, z) for z in (-1, 0, 1) for y in (-1, 0, 1) for x in (-1, 0, 1)])  # ascending node numbers
 
