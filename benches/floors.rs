@@ -53,7 +53,8 @@ fn main() {
     let memory = vec![1.0; 1 << 27];
     let rates = |rate: &(dyn Fn(usize) -> f64 + Sync)| {
         [1, 2].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+            let pool =
+                rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
             pool.install(|| rate(threads))
         })
     };

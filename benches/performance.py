@@ -124,7 +124,7 @@ def run_flexbody(args, folder, threads):
                           "--threads", threads, "--json", "--quiet"])
     report = parsed(text)
     worst = report["modes"]["worst_residual"]  # over |K x| + lambda |M x|; what it can be over |K x| alone
-    detail = {key: value for key, value in report["run"].items() if key not in ("output", "threads", "wall_seconds", "cpu_seconds")}
+    detail = {key: report["run"][key] for key in ("phases", "counters")}
     return run | {"residual": 2 * worst / (1 - worst), "frequencies_hz": report["modes"]["frequency_hz"], "detail": detail,
                   "versions": {"flexbody": report["generator"].split()[-1]}, "completeness": report["completeness"]["sentence"]}
 
@@ -137,7 +137,9 @@ def run_peer(args, name, folder, threads, tolerance):
     charged = {key: value for key, value in found["phases"].items() if key not in peer.free}
     return {"cpu_s": sum(p["cpu_s"] for p in charged.values()), "wall_s": sum(p["wall_s"] for p in charged.values()),
             "memory_mb": found["peak_rss_mib"] * 1.048576, "residual": found["residual_max"], "floor": found["residual_floor"],
-            "frequencies_hz": found["frequencies_hz"], "detail": {"phases": charged, "tolerance": tolerance}, "versions": found["versions"]}
+            "frequencies_hz": found["frequencies_hz"], "versions": {k: v for k, v in found["versions"].items() if k != "shift"},
+            "detail": {"phases": [{"name": key, "wall_seconds": p["wall_s"], "cpu_seconds": p["cpu_s"]} for key, p in charged.items()],
+                       "tolerance": tolerance}}
 
 
 def interpreter(args, name):
@@ -224,12 +226,10 @@ def run_case(args, name, peers):
 
 
 def floors(args):
-    """Rates of matrix products and of reading memory; OpenBLAS too where numpy is installed, since the better one is the floor."""
-    found = {"faer": parsed(measured(["cargo", "bench", "--quiet", "--locked", "--bench", "floors"])[0])}
-    if installed(args, "scipy"):
-        rates = [parsed(measured([args.python, BENCHES / "peers" / "gemm.py"], threads)[0]) for threads in (1, 2)]
-        found["openblas"] = {f"gemm_{kind}": [rate[kind] for rate in rates] for kind in ("f64", "f32")}
-    return found
+    """Rates of matrix products, by faer and by numpy's OpenBLAS since the better one is the floor, and of reading memory."""
+    rates = [parsed(measured([args.python, BENCHES / "peers" / "gemm.py"], threads)[0]) for threads in (1, 2)]
+    return {"faer": parsed(measured(["cargo", "bench", "--quiet", "--locked", "--bench", "floors"])[0]),
+            "openblas": {f"gemm_{kind}": [rate[kind] for rate in rates] for kind in ("f64", "f32")}}
 
 
 def machine():
@@ -239,6 +239,24 @@ def machine():
     memory = entry("/proc/meminfo", "MemTotal").split()
     return {"processor": entry("/proc/cpuinfo", "model name"), "cores": len(os.sched_getaffinity(0)),
             "memory_gb": round(int(memory[0]) * 1024 / 1e9, 1) if len(memory) == 2 else None, "system": f"{platform.system()} {platform.machine()}"}
+
+
+def command_line(args):
+    """Options that shape the measurement; where programs and folders are does not."""
+    shown = [(f"--cases {' '.join(args.cases)}", args.cases != list(CASES)), (f"--peers {' '.join(args.peers)}", args.peers != list(PEERS)),
+             (f"--runs {args.runs}", args.runs != 5), ("--no-floors", args.no_floors), ("--quick", args.quick)]
+    return " ".join(["python3 benches/performance.py"] + [text for text, told in shown if told])
+
+
+def commit():
+    """Of the working tree; with + when sources were changed since."""
+    def git(*words):
+        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
+    try:
+        changed = git("diff", "--quiet", "HEAD", "--", "src", "Cargo.lock").returncode != 0
+        return git("rev-parse", "--short", "HEAD").stdout.strip() + ("+" if changed else "")
+    except OSError:
+        return "unknown"
 
 
 def doubts(case, records):
@@ -258,16 +276,18 @@ def arguments():
     parser.add_argument("--peers", nargs="*", choices=PEERS, default=list(PEERS), metavar="PEER", help=f"of {', '.join(PEERS)} (default: all)")
     parser.add_argument("--runs", type=int, default=5, help="runs of each program; slow peers make fewer (default: 5)")
     parser.add_argument("--quick", action="store_true", help="models of a thirtieth of the size, one run; page and results go to the models folder")
-    parser.add_argument("--keep", action="store_true", help="leave the models where they are (30k: 50 MB, 1M: 3 GB)")
+    parser.add_argument("--keep", action="store_true", help="leave the models where they are (30k: 50 MB, 300k: 1 GB, 1M: 2 GB)")
     parser.add_argument("--no-floors", action="store_true", help="do not measure the machine's floors again")
     parser.add_argument("--render-only", action="store_true", help="write the page from the results, measure nothing")
-    parser.add_argument("--models", type=Path, default=target / "bench-models", help="folder for the models (needs 3 GB)")
+    parser.add_argument("--models", type=Path, default=target / "bench-models", help="folder for the models (needs 2 GB)")
     parser.add_argument("--program", type=Path, default=target / "release" / "flexbody", help="flexbody (default: the release build)")
-    parser.add_argument("--python", default=ROOT / "target" / "peers" / "bin" / "python", help="interpreter with numpy and scipy, for Exudyn and CHOLMOD too")
+    parser.add_argument("--python", default=ROOT / "target" / "peers" / "bin" / "python", help="interpreter with numpy, scipy and the peers (default: target/peers)")
     parser.add_argument("--slepc-python", default="/usr/bin/python3", help="interpreter with slepc4py")
     args = parser.parse_args()
     if args.runs < 1:
         parser.error("at least one run")
+    if not args.render_only and not installed(args, "scipy"):
+        parser.error(f"{args.python} cannot import numpy and scipy; benches/peers/README.md says how to make it")
     if args.quick:
         args.runs = 1
     args.models = args.models.resolve()
@@ -282,21 +302,33 @@ def main():
     results = json.loads(store.read_text()) if store.exists() else {"cases": {}}
 
     def save():
+        used = {record["session"] for case in results["cases"].values() for record in case["programs"].values()}
+        used.add(results.get("floors", {}).get("session"))
+        results["sessions"] = {key: value for key, value in results.get("sessions", {}).items() if key in used}
         store.write_text(json.dumps(results, indent=1) + "\n")
         page.write_text(performance_page.render(results), encoding="utf-8")
 
     found = []
-    if not args.render_only:
+    if args.render_only:
+        if not store.exists():
+            sys.exit(f"{store} is not there: measure first")
+    else:
         peers = [name for name in args.peers if installed(args, name)]
         for name in set(args.peers) - set(peers):
             log(f"{name}: left out, {interpreter(args, name)} cannot import {PEERS[name].imports}")
         session = {"session": datetime.datetime.now().isoformat(timespec="seconds")}
+        results.setdefault("sessions", {})[session["session"]] = {"command": command_line(args), "commit": commit()}
         results["machine"] = machine()
         if not args.no_floors:
             results["floors"] = session | floors(args)
         for name in args.cases:
             load = round(os.getloadavg()[0], 1)
-            model, records = run_case(args, name, peers)
+            try:
+                model, records = run_case(args, name, peers)
+            except RuntimeError as error:  # flexbody or a maker; the other cases may still be worth their hours
+                log(f"  {error}")
+                found.append(f"{name}: {str(error).splitlines()[0]}")
+                continue
             case = results["cases"].setdefault(name, {"programs": {}})
             if case.get("model", model)["dofs"] != model["dofs"]:
                 case["programs"] = {}  # figures of another model

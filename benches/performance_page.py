@@ -7,6 +7,7 @@ TITLES = {"flexbody": "flexbody", "exudyn": "Exudyn", "scipy": "scipy eigsh, Sup
 SCOPE = {"flexbody": "whole process", "exudyn": "whole conversion, arrays in", "scipy": "modes alone", "cholmod": "modes alone", "slepc": "modes alone"}
 LIBRARIES = {"faer": "faer", "openblas": "OpenBLAS of numpy"}
 MODES = 20
+SOLVE_BLOCK = 8  # columns that flexbody solves at a time
 HEAD = """<!-- Written by benches/performance.py; edit that -->
 
 # Performance
@@ -64,19 +65,23 @@ class Results:
         """The better of the two libraries, GF/s."""
         if not self.floors:
             return None
-        return max(self.floors[library][f"gemm_{kind}"][threads - 1] for library in LIBRARIES if library in self.floors)
+        return max(self.floors[library][f"gemm_{kind}"][threads - 1] for library in LIBRARIES)
+
+    def factor_bytes(self, case):
+        """Double precision where the counters do not tell."""
+        entries = self.counter(case, "factor_len")
+        return self.counter(case, "factor_bytes") or (entries and 8 * entries)
 
     def precision(self, case):
-        """Of the factor, by its bytes per entry; double where the counters do not tell."""
-        size, entries = self.counter(case, "factor_bytes"), self.counter(case, "factor_len")
-        return "f32" if size and entries and size < 6 * entries else "f64"
+        """Of the factor, by its bytes per entry."""
+        return "f32" if self.factor_bytes(case) < 6 * self.counter(case, "factor_len") else "f64"
 
     def factor_rate(self, case, threads):
         """GF/s of the factorisation, and its part of the matrix product's rate."""
         flops, wall = self.counter(case, "factor_flops"), self.phase(case, f"flexbody-{threads}", "factorisation", "wall_seconds")
-        gemm = self.gemm(self.precision(case), threads)
         if not flops or not wall:
             return None, None
+        gemm = self.gemm(self.precision(case), threads)
         return flops / wall / 1e9, gemm and flops / wall / 1e9 / gemm
 
 
@@ -119,7 +124,7 @@ def target_lines(r):
         if found is not None:
             met = found >= bound if more else found <= bound
             rows.append((name, ("at least " if more else "at most ") + f"{bound:,g}", number(found), "yes" if met else "**no**"))
-    return ["## Targets", "", *table(("", "wanted", "found", "met"), rows), ""]
+    return rows and ["## Targets", "", *table(("", "wanted", "found", "met"), rows), ""]
 
 
 def spread(runs, what):
@@ -169,7 +174,7 @@ def floor_lines(r):
     if not r.floors:
         return []
     rows = [[f"matrix product, {kind}, GF/s ({title})", *map(number, r.floors[library][f"gemm_{kind}"])]
-            for kind in ("f64", "f32") for library, title in LIBRARIES.items() if library in r.floors]
+            for kind in ("f64", "f32") for library, title in LIBRARIES.items()]
     rows.append(["reading memory, GB/s", *map(number, r.floors["faer"]["read"])])
     lines = ["## Floors of this machine", "", f"Measured {r.floors['session'].replace('T', ' ')}; best of five.", "", *table(("", "1 thread", "2 threads"), rows), ""]
     rates = []
@@ -179,8 +184,21 @@ def floor_lines(r):
             if rate:
                 rates.append((case, threads, r.precision(case), number(r.counter(case, "factor_flops") / 1e9), number(rate), f"{100 * part:.0f} %" if part else ""))
     if rates:
-        lines += ["The factorisation of K - shift M against the matrix product (the better library, same precision and threads):", "",
+        lines += ["Numeric factorisation of K - shift M against the matrix product (the better library, same precision and threads):", "",
                   *table(("case", "threads", "factor", "GFLOP", "GF/s", "of matrix product"), rates), ""]
+    passes = []
+    for case in r.cases:
+        size, columns = r.factor_bytes(case), r.counter(case, "solved_columns")
+        for threads in (1, 2):
+            wall = r.phase(case, f"flexbody-{threads}", "modes", "wall_seconds")
+            if size and columns and wall:
+                moved = 2 * size * math.ceil(columns / SOLVE_BLOCK) / 1e9
+                floor = moved / r.floors["faer"]["read"][threads - 1]
+                passes.append((case, threads, number(size / 1e9), columns, number(moved), number(floor), number(wall)))
+    if passes:
+        lines += [f"Solves against reading memory: the factor passes through twice for {SOLVE_BLOCK} columns, which takes the floor's seconds; the phase `modes` is the "
+                  "solves, the products, the orthogonalisation and the final refinement. Factors that fit in the cache go below the floor.", "",
+                  *table(("case", "threads", "factor, GB", "columns", "read, GB", "floor, s", "modes, s"), passes), ""]
     return lines
 
 
@@ -211,17 +229,17 @@ def growth_lines(r):
 
 def render(stored):
     r, machine = Results(stored), stored.get("machine", {})
-    versions, sessions, loads = {}, set(), []
+    versions, loads = {}, []
     for content in r.cases.values():
         for record in content["programs"].values():
-            sessions.add(record["session"][:10])
             loads.append(record["load"])
-            versions |= {k: v for k, v in record.get("versions", {}).items() if k != "shift"}
+            versions |= record.get("versions", {})
     lines = [HEAD.format(modes=MODES)]
     if machine:
         lines += [f"Machine: {machine['processor']}, {machine['cores']} cores, {machine['memory_gb']} GB, {machine['system']}; load average when a case began: "
-                  f"{min(loads, default=0)} to {max(loads, default=0)}. Measured {', '.join(sorted(sessions))}.", "",
-                  "Versions: " + ", ".join(f"{name} {version}" for name, version in sorted(versions.items())) + ".", ""]
+                  f"{min(loads, default=0)} to {max(loads, default=0)}.", "",
+                  "Versions: " + ", ".join(f"{name} {version}" for name, version in sorted(versions.items())) + ".", "", "Measured by:", ""]
+        lines += [f"* {when.replace('T', ' ')}, commit {session['commit']}: `{session['command']}`" for when, session in stored["sessions"].items()] + [""]
     lines += target_lines(r) + ["## Cases", ""]
     for case in r.cases:
         lines += case_lines(r, case)
