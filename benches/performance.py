@@ -243,7 +243,7 @@ def machine():
 
 def command_line(args):
     """Options that shape the measurement; where programs and folders are does not."""
-    shown = [(f"--cases {' '.join(args.cases)}", args.cases != list(CASES)), (f"--peers {' '.join(args.peers)}", args.peers != list(PEERS)),
+    shown = [(" ".join(["--cases", *args.cases]), args.cases != list(CASES)), (" ".join(["--peers", *args.peers]), args.peers != list(PEERS)),
              (f"--runs {args.runs}", args.runs != 5), ("--no-floors", args.no_floors), ("--quick", args.quick)]
     return " ".join(["python3 benches/performance.py"] + [text for text, told in shown if told])
 
