@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-SHAPES = {"block": (1.0, 0.2, 0.2), "cube": (0.1, 0.1, 0.1), "plate": (1.0, 1.0, 0.01)}
+SHAPES = {"block": (1.0, 0.2, 0.2), "cube": (0.1, 0.1, 0.1), "plate": (1.0, 1.0, 0.01), "thin-plate": (1.0, 1.0, 0.002)}
 CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
 OFFSETS = np.array([(x, y, z) for z in (-1, 0, 1) for y in (-1, 0, 1) for x in (-1, 0, 1)])  # ascending node numbers
 
@@ -150,12 +150,13 @@ def write_hdf5(path, grid, matrices):
             group["indptr"] = pointer
 
 
-def write_tables(folder, grid):
+def write_tables(folder, chunks, positions):
+    """Nodes and DOFs, node by node; `positions(first, last)` gives those of a chunk."""
     with open(folder / "nodes.csv", "w") as nodes, open(folder / "dofs.csv", "w") as dofs:
         nodes.write("node,x,y,z\n")
         dofs.write("node,dir\n")
-        for first, last in grid.chunks():
-            at = grid.positions(first, last).tolist()
+        for first, last in chunks:
+            at = positions(first, last).tolist()
             nodes.write("".join([f"{n},{x!r},{y!r},{z!r}\n" for n, (x, y, z) in enumerate(at, first + 1)]))
             dofs.write("".join([f"{n},1\n{n},2\n{n},3\n" for n in range(first + 1, last + 1)]))
 
@@ -204,7 +205,7 @@ def main():
         write_matrix_market(args.folder / f"K{suffix}", grid, k, f"stiffness of {name}")
         write_matrix_market(args.folder / f"M{suffix}", grid, m, f"consistent mass of {name}")
         write_manifest(args.folder, name, f"K{suffix}", f"M{suffix}")
-    write_tables(args.folder, grid)
+    write_tables(args.folder, grid.chunks(), grid.positions)
     json.dump({"folder": str(args.folder), "lengths": list(map(float, lengths)), "cells": grid.cells.tolist(), "nodes": grid.nodes,
                "dofs": 3 * grid.nodes, "stiffness_entries": count_entries(grid, k, False),
                "mass_entries": count_entries(grid, m, False), "mass": args.density * float(np.prod(grid.lengths)),

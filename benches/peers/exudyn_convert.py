@@ -32,9 +32,9 @@ def main():
     with phases.phase("write"), tempfile.TemporaryDirectory() as scratch:
         body.SaveToFile(str(Path(scratch) / "body.npz"))
     peak = peak_mib()  # before the residuals, which are no part of the job
-    worst = residual(stiffness, mass, fem.eigenValues, fem.modeBasis["matrix"])
+    residuals = residual(stiffness, mass, fem.eigenValues, fem.modeBasis["matrix"])
     versions = {"exudyn": exudyn.__version__, "scipy": scipy.__version__, "numpy": numpy.__version__}
-    report("exudyn", versions, args.folder, stiffness, args.modes, phases, peak, fem.eigenValues, worst)
+    report("exudyn", versions, args.folder, stiffness, args.modes, phases, peak, fem.eigenValues, residuals)
 
 
 if __name__ == "__main__":
