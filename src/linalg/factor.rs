@@ -4,10 +4,12 @@
 use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
 use super::ordering::{nested_dissection, node_graph};
+use super::substitution;
 use super::tree_walk::Walk;
 use super::{Pencil, SymmetricMatrix};
 use faer::MatMut;
 use faer::prelude::ReborrowMut;
+use std::convert::Infallible;
 
 /// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
 #[derive(Debug)]
@@ -172,58 +174,60 @@ impl<'a, T: Real> Cholesky<'a, T> {
         Some(Self { analysis, fronts, scale: matrix.scale, tau })
     }
 
-    /// Solves for the columns of `x`, at most [`COLUMNS`], in the precision of the factor.
-    fn solve_block(&self, mut x: MatMut<'_, f64>) {
+    /// Solves for the columns of `x`, of which there are at most `K`, in the precision of the factor.
+    fn solve_block<const K: usize>(&self, mut x: MatMut<'_, f64>) {
         let (analysis, tree, block) = (self.analysis, &self.analysis.tree, self.analysis.block);
-        let k = x.ncols();
         // Row of the pencil at each row of the elimination order.
         let row = |i: usize| tree.order()[i / block] as usize * block + i % block;
-        let mut values = vec![T::default(); x.nrows() * k];
-        for (i, to) in values.chunks_exact_mut(k).enumerate() {
+        let mut values = vec![[T::default(); K]; x.nrows()];
+        for (i, to) in values.iter_mut().enumerate() {
             let from = row(i);
-            for (j, to) in to.iter_mut().enumerate() {
+            for (j, to) in to.iter_mut().take(x.ncols()).enumerate() {
                 *to = T::of(x[(from, j)] * self.scale[from]);
             }
         }
-        let mut slots: Vec<&mut [T]> = Vec::with_capacity(tree.len());
+        let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
         let mut rest = values.as_mut_slice();
         for s in 0..tree.len() {
-            let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block * k);
+            let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block);
             slots.push(own);
             rest = tail;
         }
-        let add = |front: &mut [T], places: &[u32], update: &[T]| {
-            for (&place, from) in places.iter().zip(update.chunks_exact(block * k)) {
-                let to = &mut front[place as usize * block * k..][..block * k];
-                to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
-            }
-        };
-        let forward = |s: usize, own: &mut &mut [T], children: Vec<Vec<T>>| {
+        let forward = |s: usize, own: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
             let l = &self.fronts[s];
-            let mut front = vec![T::default(); l.height() * k];
+            let mut front = vec![[T::default(); K]; l.height()];
             front[..own.len()].copy_from_slice(own);
             for (&c, update) in tree.children(s).iter().zip(&children) {
-                add(&mut front, tree.places(c as usize), update);
+                for (&place, update) in tree.places(c as usize).iter().zip(update.chunks_exact(block)) {
+                    for (to, from) in front[place as usize * block..].iter_mut().zip(update) {
+                        to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+                    }
+                }
             }
-            front::forward(l, &mut front, k);
+            substitution::forward(l, &mut front);
             own.copy_from_slice(&front[..own.len()]);
-            Ok::<_, std::convert::Infallible>(front.split_off(own.len()))
+            Ok::<_, Infallible>(front.split_off(own.len()))
         };
         let Ok(()) = analysis.walk.up(tree, &mut slots, &forward);
-        let backward = |s: usize, own: &mut &mut [T], below: Option<Vec<T>>| {
+        let backward = |s: usize, own: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
             let mut front = own.to_vec();
             front.extend(below.unwrap_or_default());
-            front::backward(&self.fronts[s], &mut front, k);
+            substitution::backward(&self.fronts[s], &mut front);
             own.copy_from_slice(&front[..own.len()]);
-            let rows = |c: u32| tree.places(c as usize).iter();
-            let gather =
-                |c| rows(c).flat_map(|&p| &front[p as usize * block * k..][..block * k]).copied().collect();
-            tree.children(s).iter().map(|&c| gather(c)).collect()
+            let message = |c: u32| {
+                let places = tree.places(c as usize);
+                let mut rows = Vec::with_capacity(places.len() * block);
+                for &place in places {
+                    rows.extend_from_slice(&front[place as usize * block..][..block]);
+                }
+                rows
+            };
+            tree.children(s).iter().map(|&c| message(c)).collect()
         };
         analysis.walk.down(tree, &mut slots, &backward);
-        for (i, from) in values.chunks_exact(k).enumerate() {
+        for (i, from) in values.iter().enumerate() {
             let to = row(i);
-            for (j, from) in from.iter().enumerate() {
+            for (j, from) in from.iter().take(x.ncols()).enumerate() {
                 x[(to, j)] = from.wide() * self.scale[to];
             }
         }
@@ -242,7 +246,12 @@ impl<T: Real> Solve for Cholesky<'_, T> {
         let mut start = 0;
         while start < x.ncols() {
             let width = COLUMNS.min(x.ncols() - start);
-            self.solve_block(x.rb_mut().subcols_mut(start, width));
+            let columns = x.rb_mut().subcols_mut(start, width);
+            if width > COLUMNS / 2 {
+                self.solve_block::<COLUMNS>(columns);
+            } else {
+                self.solve_block::<{ COLUMNS / 2 }>(columns);
+            }
             start += width;
         }
     }

@@ -6,9 +6,9 @@ use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Accum, Mat, MatMut, MatRef, Par, Spec};
+use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
-use std::ops::{AddAssign, DivAssign, Mul, MulAssign, SubAssign};
+use std::ops::{AddAssign, DivAssign, Mul, MulAssign, Neg, SubAssign};
 
 /// Columns of a panel: large enough for products at full speed, small enough for its triangles to cost little.
 pub(super) const PANEL: usize = 128;
@@ -32,11 +32,14 @@ pub trait Real:
     + MulAssign
     + DivAssign
     + Mul<Output = Self>
+    + Neg<Output = Self>
 {
     /// Rounded from double precision.
     fn of(x: f64) -> Self;
     /// In double precision.
     fn wide(self) -> f64;
+    /// self a + b, rounded once.
+    fn times_plus(self, a: Self, b: Self) -> Self;
 }
 
 impl Real for f64 {
@@ -46,6 +49,10 @@ impl Real for f64 {
     fn wide(self) -> f64 {
         self
     }
+    #[inline(always)]
+    fn times_plus(self, a: Self, b: Self) -> Self {
+        self.mul_add(a, b)
+    }
 }
 
 impl Real for f32 {
@@ -54,6 +61,10 @@ impl Real for f32 {
     }
     fn wide(self) -> f64 {
         f64::from(self)
+    }
+    #[inline(always)]
+    fn times_plus(self, a: Self, b: Self) -> Self {
+        self.mul_add(a, b)
     }
 }
 
@@ -287,54 +298,5 @@ pub(super) fn subtract_from_rest<T: Real>(
         rest.panels.iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
     } else {
         rest.panels.par_iter_mut().enumerate().for_each(|(p, panel)| work(p, panel));
-    }
-}
-
-/// Forward substitution with the columns of a Cholesky factor: `front` holds all rows of the front, k numbers each.
-pub(super) fn forward<T: Real>(l: &Trapezoid<T>, front: &mut [T], k: usize) {
-    for p in 0..l.panels.len() {
-        let (first, width) = (p * PANEL, l.panel_width(p));
-        let (head, tail) = front[first * k..].split_at_mut(width * k);
-        let mut x = MatMut::from_row_major_slice_mut(head, width, k);
-        solve_lower_triangular_in_place(l.below(p, first).subrows(0, width), x.as_mut(), Par::Seq);
-        let below = l.below(p, first + width);
-        by_rows(tail, k, below.nrows() * width * k, |piece, rows| {
-            let count = rows.len() / k;
-            let y = MatMut::from_row_major_slice_mut(rows, count, k);
-            matmul(y, Accum::Add, below.subrows(piece * ROWS, count), x.as_ref(), T::of(-1.0), Par::Seq);
-        });
-    }
-}
-
-/// Back substitution with the transpose, for the leading rows of `front`; the rows below hold their solution.
-pub(super) fn backward<T: Real>(l: &Trapezoid<T>, front: &mut [T], k: usize) {
-    for p in (0..l.panels.len()).rev() {
-        let (first, width) = (p * PANEL, l.panel_width(p));
-        let (head, tail) = front[first * k..].split_at_mut(width * k);
-        let mut x = MatMut::from_row_major_slice_mut(head, width, k);
-        let below = l.below(p, first + width);
-        let part = |piece: usize, rows: &[T]| {
-            let count = rows.len() / k;
-            let y = MatRef::from_row_major_slice(rows, count, k);
-            let mut sum = Mat::zeros(k, width);
-            let l = below.subrows(piece * ROWS, count);
-            matmul(sum.as_mut(), Accum::Replace, y.transpose(), l, T::of(1.0), Par::Seq);
-            sum
-        };
-        let pieces = tail.chunks(ROWS * k).enumerate();
-        let sums: Vec<Mat<T>> = if below.nrows() * width * k < WORTH_A_TASK {
-            pieces.map(|(i, rows)| part(i, rows)).collect()
-        } else {
-            tail.par_chunks(ROWS * k).enumerate().map(|(i, rows)| part(i, rows)).collect()
-        };
-        for sum in &sums {
-            for i in 0..width {
-                for j in 0..k {
-                    x[(i, j)] -= sum[(j, i)];
-                }
-            }
-        }
-        let square = l.below(p, first).subrows(0, width);
-        faer::linalg::triangular_solve::solve_upper_triangular_in_place(square.transpose(), x, Par::Seq);
     }
 }

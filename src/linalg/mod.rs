@@ -10,6 +10,7 @@ mod ordering;
 mod pencil;
 mod product;
 mod sparse;
+mod substitution;
 mod tall;
 mod tree_walk;
 
