@@ -103,6 +103,26 @@ fn what_is_not_a_flex_body_file() {
 }
 
 #[test]
+fn guarantees_that_contradict_the_modes_or_themselves_are_refused() {
+    let error = damaged(|f| replace(f, "modes/eigenvalue_upper", &[3], &[1e-9, 1e-9, 1e-9]));
+    assert_says(&error, Code::BodySchema, &["of mode 0 has the bounds", "of mode 1 has", "of mode 2 has"]);
+    let error = damaged(|f| replace(f, "modes/shape_error", &[3], &[0.5, -0.5, 2.0]));
+    assert_says(&error, Code::BodySchema, &["`guarantee.shape_error` is -5e-1 at mode 1, expected 0 to 1"]);
+    let error = damaged(|f| {
+        f.group("certificate").unwrap().attr("digits_W2").unwrap().write_scalar(&17.5).unwrap();
+    });
+    assert_says(&error, Code::BodySchema, &["guaranteed digits of `W2` are 1.75e1, expected 0 to 16"]);
+    let error = damaged(|f| set_int(f, "certificate", "negative_pivots_below", 7));
+    assert_says(&error, Code::BodySchema, &["counts 7 eigenvalues below the modes, expected the 6 rigid modes"]);
+    let error = damaged(|f| f.unlink("modes/eigenvalue_lower").unwrap());
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &["/modes/eigenvalue_lower: expected with the other entries of accuracy `certified`, found nothing"],
+    );
+}
+
+#[test]
 fn a_newer_format_is_refused_by_naming_the_program_that_wrote_it() {
     let error = damaged(|f| {
         set_int(f, "/", "format_major", 2);

@@ -280,6 +280,11 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             Code::FactorizationFailed,
             format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
         ),
+        EigenFailure::NotCertified => Diagnostic::new(
+            Code::FactorizationFailed,
+            "K + tau M is positive definite by less than the rounding of its factors: no bound can be guaranteed",
+        )
+        .with_help("use --accuracy standard"),
         EigenFailure::Memory { bytes } => Diagnostic::new(
             Code::MemoryShort,
             bytes.map_or_else(|| "memory ran out".to_owned(), |b| format!("{b} bytes are needed")),

@@ -1,6 +1,9 @@
 //! Sparse and dense kernels: symmetric matrices, block products, ordering, factorisation, M-orthogonalisation.
 //! The only room that names the linear-algebra crates' sparse solvers.
 
+mod compensated;
+mod compensated_pencil;
+mod compensated_product;
 mod dense;
 mod factor;
 mod ordering;
@@ -9,6 +12,9 @@ mod product;
 mod sparse;
 mod tall;
 
+pub use compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
+pub use compensated_pencil::small_pencil_eigenvalues;
+pub use compensated_product::{CompensatedBlock, LANES, gram_compensated, multiply_compensated, sum_length};
 pub use dense::{SymmetricEigen, dense_cholesky, symmetric_eigen};
 pub use factor::{Analysis, Cholesky, Inertia, Solve, is_positive_semidefinite};
 pub use ordering::{connected_components, nested_dissection};

@@ -1,0 +1,11 @@
+//! The guarantees of accuracy `certified`, tested against exact rational arithmetic.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+use support::{equations, random};
+
+mod bodies;
+mod eigenvalues;
+mod exact;
+mod invariants;
