@@ -74,12 +74,13 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         let stored = &body.nodes().positions;
         let own =
             condense_certified(model.scalar_mass(), stored, shapes.as_ref(), model.stiffness(), &frame.axes);
-        let excess = primary_differences(body.invariants(), &own.invariants)
-            .iter()
-            .zip(&guarantee.digits)
-            .fold(0.0f64, |m, ((_, d), digits)| {
-                if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * 10f64.powf(*digits)) }
-            });
+        let excess =
+            primary_differences(body.invariants(), &own.invariants).iter().zip(&guarantee.digits).fold(
+                0.0f64,
+                |m, ((_, d), digits)| {
+                    if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * 10f64.powf(*digits)) }
+                },
+            );
         // Stored modes are rounded: their quotients follow the eigenvalues to what any other check of modes allows.
         let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
         let modal_mass = own.invariants.modal_mass();

@@ -113,7 +113,11 @@ fn guarantees_that_contradict_the_modes_or_themselves_are_refused() {
     });
     assert_says(&error, Code::BodySchema, &["guaranteed digits of `W2` are 1.75e1, expected 0 to 16"]);
     let error = damaged(|f| set_int(f, "certificate", "negative_pivots_below", 7));
-    assert_says(&error, Code::BodySchema, &["counts 7 eigenvalues below the modes, expected the 6 rigid modes"]);
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &["counts 7 eigenvalues below the modes, expected the 6 rigid modes"],
+    );
     let error = damaged(|f| f.unlink("modes/eigenvalue_lower").unwrap());
     assert_says(
         &error,

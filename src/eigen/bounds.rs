@@ -70,7 +70,9 @@ pub(super) fn enclose(
     let count = eigenvalues.len();
     let bounds = |side: Option<Vec<Option<DoubleDouble>>>, trivial: f64, round: fn(DoubleDouble) -> f64| {
         let side = side.unwrap_or_else(|| vec![None; count]);
-        side.into_iter().map(|omega| omega.map_or(trivial, |omega| round(lambda(omega)))).collect::<Vec<f64>>()
+        side.into_iter()
+            .map(|omega| omega.map_or(trivial, |omega| round(lambda(omega))))
+            .collect::<Vec<f64>>()
     };
     let mut lower = bounds(below, low, DoubleDouble::below);
     let mut upper = bounds(above, high, DoubleDouble::above);
@@ -181,9 +183,8 @@ impl<'a> ProvedFactor<'a> {
                 let (z, r, e) = (z.col(c), r.col(c), e.col(c));
                 let along: f64 = z.iter().zip(r.iter()).map(|(z, r)| z * r).sum();
                 // z'Az = z'r - z'e; the sum itself may be off by n u of its magnitudes.
-                let slack: f64 = (0..n)
-                    .map(|i| z[i].abs() * (e[i].abs() + (n as f64 + 2.0) * U * r[i].abs()))
-                    .sum();
+                let slack: f64 =
+                    (0..n).map(|i| z[i].abs() * (e[i].abs() + (n as f64 + 2.0) * U * r[i].abs())).sum();
                 // e was rounded to f64 and evaluated to 8 u^2 of its terms.
                 let left = self.dual_norm(e.iter().copied())
                     + 8.0 * U * U * (self.row + 16.0) * self.size * self.norm(z.iter().copied());
@@ -242,14 +243,14 @@ impl Trial {
                 (0..width).map(|c| DoubleDouble::sum(tau, -trial.omega[start + c])).collect();
             let r = Mat::from_fn(n, width, |i, c| (kx.get(i, c) + mx.get(i, c) * shifts[c]).hi);
             let norms = factor.residual_norms(r.as_ref(), counters);
-            for c in 0..width {
+            for (c, norm) in norms.into_iter().enumerate() {
                 let size = factor.norm(x.col(start + c).iter().copied());
                 trial.error.push((2.0 * terms).sqrt() * size);
                 // The residual was rounded to f64, after an evaluation in double-double.
                 let ratio = 1.0 + trial.omega[start + c] / tau;
                 let rounding = U * factor.dual_norm(r.col(c).iter().copied())
                     + 8.0 * U * U * (factor.row + 16.0) * ratio * factor.size * size;
-                let norm = norms[c].sqrt() + ROOM * rounding / factor.margin.sqrt();
+                let norm = norm.sqrt() + ROOM * rounding / factor.margin.sqrt();
                 trial.residual.push(ROOM * norm * norm);
             }
         }
@@ -278,20 +279,20 @@ impl Trial {
                 p[i][j] = scaled(a - s * m) * sign;
                 q[i][j] = scaled(a - s * m * 2.0) + s * s * t;
                 // Entries of the Gram matrices, and 32 u^2 of all terms for these lines themselves.
-                let (da, dm) =
-                    (self.error[i] * self.error[j], self.error[i] * self.error[j] / self.tau);
+                let (da, dm) = (self.error[i] * self.error[j], self.error[i] * self.error[j] / self.tau);
                 let da = da + 32.0 * U * U * a.hi.abs();
                 let dm = dm + 32.0 * U * U * m.hi.abs();
                 p_error[i][j] = ROOM * wi * wj * (da + s.hi * dm);
-                q_error[i][j] =
-                    ROOM * (wi * wj * (da + 2.0 * s.hi * dm) + s.hi * s.hi * ((wi + wj) * dm + da + 32.0 * U * U * own));
+                q_error[i][j] = ROOM
+                    * (wi * wj * (da + 2.0 * s.hi * dm)
+                        + s.hi * s.hi * ((wi + wj) * dm + da + 32.0 * U * U * own));
             }
         }
         let (p_slack, q_slack) = (Slack::of(&p, &p_error)?, Slack::of(&q, &q_error)?);
         for matrix in [&mut p, &mut q] {
-            for i in 0..count {
-                for j in 0..count {
-                    matrix[i][j] = matrix[i][j] * q_slack.scale[i] * q_slack.scale[j];
+            for (row, si) in matrix.iter_mut().zip(&q_slack.scale) {
+                for (value, sj) in row.iter_mut().zip(&q_slack.scale) {
+                    *value = *value * *si * *sj;
                 }
             }
         }

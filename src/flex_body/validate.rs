@@ -218,7 +218,10 @@ impl Check {
             }
         }
         if let Some(j) = g.shape_error.iter().position(|e| !(0.0..=1.0).contains(e)) {
-            self.add(format!("`guarantee.shape_error` is {:e} at mode {j}, expected 0 to 1", g.shape_error[j]));
+            self.add(format!(
+                "`guarantee.shape_error` is {:e} at mode {j}, expected 0 to 1",
+                g.shape_error[j]
+            ));
         }
         for (name, digits) in DIGITS.iter().zip(g.digits) {
             if !(0.0..=16.0).contains(&digits) {

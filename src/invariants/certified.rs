@@ -103,9 +103,8 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
     let longest = (0..n).map(|i| mass.row(i).0.len()).max().unwrap_or(0);
     let group = group_length(n);
     let terms = 8.0 * U * U * (group + MAX_GROUPS + longest + 16) as f64;
-    let error = Mat::from_fn(count, count, |i, j| {
-        ROOM * (U * gram[(i, j)].abs() + terms * size[i] * size[j])
-    });
+    let error =
+        Mat::from_fn(count, count, |i, j| ROOM * (U * gram[(i, j)].abs() + terms * size[i] * size[j]));
     (gram, error)
 }
 
@@ -189,7 +188,8 @@ fn modal_stiffness(
         for row in 0..n {
             let value = turned(row, p);
             (hi[(row, p)], lo[(row, p)]) = (value.hi, value.lo);
-            let terms: f64 = (0..3).map(|l| (axes[(row % 3, l)] * shapes[(row - row % 3 + l, p)]).abs()).sum();
+            let terms: f64 =
+                (0..3).map(|l| (axes[(row % 3, l)] * shapes[(row - row % 3 + l, p)]).abs()).sum();
             size[p] += weights[row] * terms * terms;
         }
         size[p] = size[p].sqrt();
@@ -199,9 +199,11 @@ fn modal_stiffness(
     let mut value = Mat::<f64>::zeros(nf, nf);
     for start in (0..nf).step_by(LANES) {
         let width = LANES.min(nf - start);
-        let mut product: CompensatedBlock = multiply_compensated(stiffness, 1, hi.as_ref().subcols(start, width));
+        let mut product: CompensatedBlock =
+            multiply_compensated(stiffness, 1, hi.as_ref().subcols(start, width));
         product.add(&multiply_compensated(stiffness, 1, lo.as_ref().subcols(start, width)));
-        let (large, small) = (gram_compensated(hi.as_ref(), &product), gram_compensated(lo.as_ref(), &product));
+        let (large, small) =
+            (gram_compensated(hi.as_ref(), &product), gram_compensated(lo.as_ref(), &product));
         for c in 0..width {
             for i in 0..=start + c {
                 value[(i, start + c)] = (large[i][c] + small[i][c]).hi;
@@ -258,9 +260,8 @@ fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
         let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
         (s(&[(l, m), (m, l)], p, q), bound.s(p, q))
     };
-    let stiffness = |p: usize, q: usize| {
-        (e.modal_stiffness[(p, q)], (k_ff[(p, p)].abs() * k_ff[(q, q)].abs()).sqrt())
-    };
+    let stiffness =
+        |p: usize, q: usize| (e.modal_stiffness[(p, q)], (k_ff[(p, p)].abs() * k_ff[(q, q)].abs()).sqrt());
     let ratios = [
         over(1, 1, &|_, _| (e.mass, value.mass.abs())),
         over(3, 1, &|k, _| (e.first_moment[k], bound.first_moment(k))),

@@ -22,15 +22,15 @@ pub fn small_pencil_eigenvalues(
     let l = cholesky(q)?;
     // Rows, then columns, of P are solved with L.
     for _ in 0..2 {
-        for i in 0..n {
+        for (i, factors) in l.iter().enumerate() {
             let (above, below) = p.split_at_mut(i);
-            for (k, row) in above.iter().enumerate() {
+            for (row, &factor) in above.iter().zip(factors) {
                 for (target, &value) in below[0].iter_mut().zip(row) {
-                    *target = *target - l[i][k] * value;
+                    *target = *target - factor * value;
                 }
             }
             for value in &mut below[0] {
-                *value = *value / l[i][i];
+                *value = *value / factors[i];
             }
         }
         p = (0..n).map(|i| p.iter().map(|row| row[i]).collect()).collect();
@@ -46,10 +46,8 @@ fn cholesky(a: &[Vec<DoubleDouble>]) -> Option<Vec<Vec<DoubleDouble>>> {
     let mut l = vec![vec![DoubleDouble::default(); n]; n];
     for i in 0..n {
         for j in 0..=i {
-            let mut sum = a[i][j];
-            for k in 0..j {
-                sum = sum - l[i][k] * l[j][k];
-            }
+            let known = l[i][..j].iter().zip(&l[j][..j]);
+            let sum = known.fold(a[i][j], |sum, (&x, &y)| sum - x * y);
             if i == j {
                 if !(sum.hi > 0.0 && sum.hi.is_finite()) {
                     return None;

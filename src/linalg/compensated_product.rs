@@ -1,7 +1,7 @@
 //! Block products in double-double arithmetic: A X and X'Y of exact entries, with fixed partitions.
 
-use super::compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
 use super::SymmetricMatrix;
+use super::compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
 use faer::MatRef;
 use rayon::prelude::*;
 

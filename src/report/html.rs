@@ -184,7 +184,9 @@ fn modes(html: &mut String, facts: &Facts) {
     let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue, "Residual"]);
     head.extend(damped.then(|| "Damping ratio".to_owned()));
     let guarantee = facts.guarantee.as_ref();
-    head.extend(guarantee.iter().flat_map(|_| texts(["Lower bound", "Upper bound", "Digits", "Shape error"])));
+    head.extend(
+        guarantee.iter().flat_map(|_| texts(["Lower bound", "Upper bound", "Digits", "Shape error"])),
+    );
     let row = |j: usize| {
         let mut cells = vec![
             (j + 1).to_string(),

@@ -177,7 +177,9 @@ impl Take<'_> {
         let missing: Vec<&String> = names().filter(|name| !self.scan.values.contains_key(*name)).collect();
         if let Some(first) = missing.first() {
             if missing.len() < names().count() {
-                self.scan.add(format!("{first}: expected with the other entries of accuracy `certified`, found nothing"));
+                self.scan.add(format!(
+                    "{first}: expected with the other entries of accuracy `certified`, found nothing"
+                ));
             }
             return None;
         }

@@ -26,14 +26,16 @@ fn model(kind: Kind, cells: [i32; 3], rule: MassRule) -> FeModel {
 /// A (kron I_block) as rows.
 fn dense(a: &SymmetricMatrix, block: usize) -> Vec<Vec<f64>> {
     let n = a.n() * block;
-    let entry = |i: usize, j: usize| if i % block == j % block { a.as_csc().get(i / block, j / block) } else { 0.0 };
+    let entry =
+        |i: usize, j: usize| if i % block == j % block { a.as_csc().get(i / block, j / block) } else { 0.0 };
     (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect()
 }
 
 #[test]
 fn eigenvalues_of_a_cuboid_of_tetrahedra_lie_between_their_bounds() {
     let model = model(Kind::Tet4, [1, 1, 1], MassRule::Consistent);
-    let conversion = convert(&model, &settings(Accuracy::Certified, 18, BodyFrame::Principal), SILENT).expect("sound");
+    let conversion =
+        convert(&model, &settings(Accuracy::Certified, 18, BodyFrame::Principal), SILENT).expect("sound");
     let guarantee = conversion.body.certificate().guarantee.as_ref().expect("certified");
     let (k, m) = (dense(model.stiffness(), 1), dense(model.scalar_mass(), 3));
     assert_eq!(count_below(&k, &m, guarantee.shift_below), 6);
@@ -77,7 +79,8 @@ fn certified_bodies_keep_their_guarantees_through_file_and_check() {
 #[test]
 fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
     let model = model(Kind::Hex8, [2, 1, 1], MassRule::Consistent);
-    let conversion = convert(&model, &settings(Accuracy::Certified, 6, BodyFrame::Principal), SILENT).expect("sound");
+    let conversion =
+        convert(&model, &settings(Accuracy::Certified, 6, BodyFrame::Principal), SILENT).expect("sound");
     let failed = |change: &dyn Fn(&mut flexbody::flex_body::Parts)| -> Vec<&'static str> {
         let mut parts = conversion.body.clone().into_parts();
         change(&mut parts);
@@ -86,10 +89,15 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
         checks.iter().filter(|c| !c.passed).map(|c| c.name).collect()
     };
     assert!(failed(&|_| {}).is_empty());
-    assert_eq!(failed(&|parts| parts.invariants.ibar[0][1][2] += 1e-14 * parts.invariants.mass.sqrt()), ["digits_recomputed"]);
+    assert_eq!(
+        failed(&|parts| parts.invariants.ibar[0][1][2] += 1e-14 * parts.invariants.mass.sqrt()),
+        ["digits_recomputed"]
+    );
     let moved = failed(&|parts| {
         let guarantee = parts.certificate.guarantee.as_mut().expect("certified");
-        for column in [&mut parts.modes.eigenvalue, &mut guarantee.eigenvalue_lower, &mut guarantee.eigenvalue_upper] {
+        for column in
+            [&mut parts.modes.eigenvalue, &mut guarantee.eigenvalue_lower, &mut guarantee.eigenvalue_upper]
+        {
             column.iter_mut().for_each(|v| *v *= 1.0 + 1e-8);
         }
     });
@@ -99,6 +107,7 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
 #[test]
 fn other_levels_store_no_guarantees() {
     let model = model(Kind::Hex8, [2, 1, 1], MassRule::Consistent);
-    let conversion = convert(&model, &settings(Accuracy::Standard, 6, BodyFrame::Principal), SILENT).expect("sound");
+    let conversion =
+        convert(&model, &settings(Accuracy::Standard, 6, BodyFrame::Principal), SILENT).expect("sound");
     assert_eq!(conversion.body.certificate().guarantee, None);
 }

@@ -4,7 +4,8 @@
 use crate::exact::count_below;
 use faer::Mat;
 use flexbody::eigen::{
-    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Wanted, solve,
+    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Wanted,
+    solve,
 };
 use flexbody::linalg::{CscMatrix, Pencil, SymmetricMatrix};
 use flexbody::progress::SILENT;
@@ -87,7 +88,12 @@ impl Body {
             // Eigenvalues below the bounds, the rigid one included. `next_up`: an eigenvalue on the bound itself.
             let below = count_below(&self.k, &self.m, lower[j].next_down());
             let up_to = count_below(&self.k, &self.m, upper[j].next_up());
-            assert!(below <= j + 1 && up_to >= j + 2, "{j}: {below} and {up_to} around [{}, {}]", lower[j], upper[j]);
+            assert!(
+                below <= j + 1 && up_to >= j + 2,
+                "{j}: {below} and {up_to} around [{}, {}]",
+                lower[j],
+                upper[j]
+            );
             widest = widest.max((upper[j] - lower[j]) / lambda);
         }
         widest
@@ -131,7 +137,11 @@ fn a_long_chain_keeps_its_digits_by_the_iterative_path() {
         let exact = 4.0 * angle.sin().powi(2);
         let rounding = 1e-15 * exact;
         assert!(bounds.lower[j] <= exact + rounding && exact - rounding <= bounds.upper[j], "{j}");
-        assert!((bounds.upper[j] - bounds.lower[j]) / exact < 1e-13, "{j}: {:e}", bounds.upper[j] - bounds.lower[j]);
+        assert!(
+            (bounds.upper[j] - bounds.lower[j]) / exact < 1e-13,
+            "{j}: {:e}",
+            bounds.upper[j] - bounds.lower[j]
+        );
     }
 }
 

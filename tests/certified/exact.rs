@@ -22,7 +22,8 @@ pub fn count_below(k: &[Vec<f64>], m: &[Vec<f64>], sigma: f64) -> usize {
         let one = left.iter().position(|&i| a[i][i] != zero);
         if one.is_none() {
             // Only off-diagonal entries are left: add a row and column to another, which is a congruence.
-            let pair = left.iter().flat_map(|&i| left.iter().map(move |&j| (i, j))).find(|&(i, j)| a[i][j] != zero);
+            let pair =
+                left.iter().flat_map(|&i| left.iter().map(move |&j| (i, j))).find(|&(i, j)| a[i][j] != zero);
             let Some((i, j)) = pair else { break };
             for &c in &left {
                 let value = a[j][c].clone();

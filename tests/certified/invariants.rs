@@ -31,7 +31,8 @@ impl Case {
             // B B' with graded rows: symmetric to the last bit, positive semidefinite up to rounding.
             let scale: Vec<f64> = (0..n).map(|_| 10f64.powf(0.5 * decades * r.signed())).collect();
             let b: Vec<Vec<f64>> = (0..n).map(|_| (0..n).map(|_| r.signed()).collect()).collect();
-            let entry = |i: usize, j: usize| (0..n).map(|c| b[i][c] * b[j][c]).sum::<f64>() * scale[i] * scale[j];
+            let entry =
+                |i: usize, j: usize| (0..n).map(|c| b[i][c] * b[j][c]).sum::<f64>() * scale[i] * scale[j];
             (0..n).map(|i| (0..n).map(|j| entry(i.max(j), i.min(j))).collect()).collect::<Vec<Vec<f64>>>()
         };
         let (mass, stiffness) = (gram(N), gram(3 * N));
@@ -219,7 +220,8 @@ fn the_certified_condensation_equals_the_plain_one_up_to_rounding() {
         .collect();
     let mass = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric");
     let diagonal: Vec<(u32, u32, f64)> = (0..3 * n as u32).map(|i| (i, i, 1.0 + f64::from(i % 7))).collect();
-    let stiffness = SymmetricMatrix::new(CscMatrix::from_triplets(3 * n, 3 * n, &diagonal)).expect("symmetric");
+    let stiffness =
+        SymmetricMatrix::new(CscMatrix::from_triplets(3 * n, 3 * n, &diagonal)).expect("symmetric");
     let positions: Vec<[f64; 3]> = (0..n).map(|_| [(); 3].map(|()| r.signed())).collect();
     let shapes = Mat::from_fn(3 * n, nf, |_, _| r.signed());
     let modal = Mat::from_fn(nf, nf, |p, q| {

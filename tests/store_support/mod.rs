@@ -198,7 +198,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     bits.extend(p.nodes.positions.iter().flatten().map(|v| v.to_bits()));
     bits.extend(p.frame.origin.iter().chain(p.frame.axes.iter()).map(|v| v.to_bits()));
     bits.extend([c.shift, c.rigid_noise, c.rigid_residual].map(f64::to_bits));
-    for g in &c.guarantee {
+    if let Some(g) = &c.guarantee {
         let columns = [&g.eigenvalue_lower, &g.eigenvalue_upper, &g.shape_error];
         bits.extend(columns.into_iter().flatten().chain(&g.digits).map(|v| v.to_bits()));
         bits.extend([g.shift_below.to_bits(), g.pivots_below as u64]);
