@@ -91,7 +91,7 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
     }
 }
 
-/// A valid body with `n` nodes, `nf` modes (certified when odd), `schemes` lumping schemes and `interfaces` interfaces.
+/// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
     eigenvalue.sort_by(f64::total_cmp);
@@ -150,7 +150,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             remark: if r.below(2) == 0 { String::new() } else { r.name() },
             rigid_noise: r.value(),
             rigid_residual: r.value(),
-            guarantee: (nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
+            guarantee: (n * nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
         },
         interfaces: (0..interfaces)
             .map(|i| Interface {
