@@ -105,6 +105,18 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
 }
 
 #[test]
+fn guarantees_do_not_depend_on_the_number_of_threads() {
+    // More rows than one task takes.
+    let model = model(Kind::Hex8, [10, 6, 4], MassRule::Consistent);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let settings = settings(Accuracy::Certified, 12, BodyFrame::Principal);
+        pool.install(|| convert(&model, &settings, SILENT)).expect("sound").body
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
 fn other_levels_store_no_guarantees() {
     let model = model(Kind::Hex8, [2, 1, 1], MassRule::Consistent);
     let conversion =

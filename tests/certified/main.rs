@@ -5,6 +5,7 @@ mod support;
 
 use support::{equations, random};
 
+mod arithmetic;
 mod bodies;
 mod eigenvalues;
 mod exact;
