@@ -280,9 +280,9 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             Code::FactorizationFailed,
             format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
         ),
-        EigenFailure::NotCertified => Diagnostic::new(
+        EigenFailure::NotCertified { why } => Diagnostic::new(
             Code::FactorizationFailed,
-            "K + tau M is positive definite by less than the rounding of its factors: no bound can be guaranteed",
+            format!("eigenvalue bounds cannot be guaranteed: {why}"),
         )
         .with_help("use --accuracy standard"),
         EigenFailure::Memory { bytes } => Diagnostic::new(

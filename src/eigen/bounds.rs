@@ -39,7 +39,7 @@ const SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 ///
 /// # Errors
 /// [`EigenFailure::CountDiffers`] when there are others than the rigid modes below half the first eigenvalue,
-/// [`EigenFailure::NotCertified`] when K + tau M cannot be proved positive definite in f64.
+/// [`EigenFailure::NotCertified`] when K + tau M cannot be proved positive definite in f64 or the counts are wrong.
 pub(super) fn enclose(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
@@ -59,7 +59,7 @@ pub(super) fn enclose(
     let factor = SHIFTS
         .iter()
         .find_map(|part| ProvedFactor::new(analysis, pencil, part * eigenvalues[0], counters))
-        .ok_or(EigenFailure::NotCertified)?;
+        .ok_or(EigenFailure::NotCertified { why: "K + tau M is positive definite by less than rounding" })?;
     let tau = factor.tau;
     let omega: Vec<f64> = eigenvalues.iter().map(|lambda| lambda + tau).collect();
     let trial = Trial::new(&factor, vectors, omega, counters);
@@ -82,6 +82,10 @@ pub(super) fn enclose(
     }
     for j in (0..count).rev() {
         upper[j] = upper[j].min(high).min(if j + 1 < count { upper[j + 1] } else { high });
+    }
+    if lower.iter().zip(&upper).any(|(lower, upper)| lower > upper) {
+        // Bounds are right if the counts are.
+        return Err(EigenFailure::NotCertified { why: "bounds of the eigenvalues contradict their counts" });
     }
     let shape_error = trial.shape_errors(&lower, &upper, (low, high), tau, &clusters(eigenvalues, gap));
     Ok(EigenvalueBounds { lower, upper, shape_error, shift_below: low, pivots_below })
@@ -140,7 +144,7 @@ impl<'a> ProvedFactor<'a> {
         Some(Self { pencil: *pencil, factor, tau, diagonal, margin, size, row: row as f64 })
     }
 
-    /// A upper bound of |x| in the norm of D.
+    /// An upper bound of |x| in the norm of D.
     fn norm(&self, x: impl Iterator<Item = f64>) -> f64 {
         ROOM * x.zip(&self.diagonal).map(|(x, d)| x * x * d).sum::<f64>().sqrt()
     }

@@ -191,8 +191,11 @@ pub enum EigenFailure {
         /// Probe residual.
         residual: f64,
     },
-    /// K + tau M is positive definite by less than the rounding of its factorisation: no bounds of eigenvalues.
-    NotCertified,
+    /// The modes are sound, but no bounds of the eigenvalues can be guaranteed.
+    NotCertified {
+        /// The reason.
+        why: &'static str,
+    },
     /// The pencil is too large for the memory of the machine.
     Memory {
         /// Bytes needed, where known.

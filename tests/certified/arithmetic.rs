@@ -1,4 +1,5 @@
 //! The double-double kernels against rational arithmetic: they err no more than their documentation says.
+#![allow(clippy::needless_range_loop)] // eliminations read best with their indices
 
 use crate::exact::exact;
 use crate::random::Random;
