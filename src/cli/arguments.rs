@@ -157,11 +157,11 @@ pub struct Printing {
 /// Names of the accuracy levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum AccuracyName {
-    /// Residual 1e-6, completeness not proved
+    /// Residual 1e-6, completeness may be not proved
     Fast,
     /// Residual 1e-9 or the rounding floor, completeness proved
     Standard,
-    /// Residual at the rounding floor, completeness proved
+    /// Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every eigenvalue and digits of every invariant
     Certified,
 }
 

@@ -15,9 +15,9 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows per dense product: the longest plain sum. Shorter chunks cost time, longer ones digits.
-const CHUNK: usize = 128;
+pub(super) const CHUNK: usize = 128;
 /// Upper bound of the number of partial sums kept until they are added in order.
-const MAX_GROUPS: usize = 64;
+pub(super) const MAX_GROUPS: usize = 64;
 /// Columns per pass over the mass matrix: one gathered row is four cache lines.
 const WIDTH: usize = 32;
 
@@ -105,8 +105,14 @@ pub(super) fn condense_with<M: NodalMass + ?Sized>(
         "modal stiffness: one row per mode"
     );
     let gram = weighted_gram::<WIDTH, M>(mass, Columns { positions, shapes });
+    from_gram(gram.as_ref(), modal_stiffness)
+}
+
+/// The primary data from the Gram matrix of [`Columns`].
+pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Invariants {
+    let nf = modal_stiffness.ncols();
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
-    let (mass, first_moment, second_moment) = rigid_part(gram.as_ref());
+    let (mass, first_moment, second_moment) = rigid_part(gram);
     Invariants {
         mass,
         first_moment,
@@ -139,18 +145,18 @@ fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
 
 /// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...].
 #[derive(Clone, Copy)]
-struct Columns<'a> {
-    positions: &'a [[f64; 3]],
-    shapes: MatRef<'a, f64>,
+pub(super) struct Columns<'a> {
+    pub positions: &'a [[f64; 3]],
+    pub shapes: MatRef<'a, f64>,
 }
 
 impl Columns<'_> {
-    fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         4 + 3 * self.shapes.ncols()
     }
 
     #[inline]
-    fn get(&self, i: usize, column: usize) -> f64 {
+    pub fn get(&self, i: usize, column: usize) -> f64 {
         match column {
             0 => 1.0,
             1..4 => self.positions[i][column - 1],
@@ -159,7 +165,7 @@ impl Columns<'_> {
     }
 
     /// Node-wise copy of a block of at most W columns, padded with zeros.
-    fn by_node<const W: usize>(&self, block: Range<usize>) -> Vec<[f64; W]> {
+    pub fn by_node<const W: usize>(&self, block: Range<usize>) -> Vec<[f64; W]> {
         let mut rows = vec![[0.0; W]; self.positions.len()];
         rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
             for (slot, column) in block.clone().enumerate() {
@@ -172,7 +178,7 @@ impl Columns<'_> {
     }
 
     /// Column-wise copy of the rows `nodes` into the columns of `target`.
-    fn by_column(&self, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
+    pub fn by_column(&self, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
         for column in 0..target.ncols() {
             for (row, i) in nodes.clone().enumerate() {
                 target[(row, column)] = self.get(i, column);

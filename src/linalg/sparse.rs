@@ -251,6 +251,16 @@ impl SymmetricMatrix {
         (0..self.n()).map(|i| self.0.get(i, i)).collect()
     }
 
+    /// The matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` when one is not stored.
+    pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
+        let mut matrix = self.clone();
+        for i in 0..self.n() {
+            let at = self.0.col_ptr[i] + self.row(i).0.binary_search(&(i as u32)).ok()?;
+            matrix.0.values[at] = f(i, self.0.values[at]);
+        }
+        Some(matrix)
+    }
+
     /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every other.
     pub(super) fn with_raised_diagonal(&self, factor: f64) -> Self {
         let mut triplets = Vec::with_capacity(self.0.nnz() + self.n());
