@@ -14,5 +14,6 @@ pub use factor::{Analysis, Cholesky, Inertia, Solve, is_positive_semidefinite};
 pub use ordering::{connected_components, nested_dissection};
 pub use pencil::Pencil;
 pub use product::multiply;
+pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{combine, gram, subtract_combination};
