@@ -4,39 +4,74 @@
 //! freedom in half the time, and a quarter of the factorisation work of minimum degree on compact solids.
 
 use super::SymmetricMatrix;
+use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// METIS seeds and uses one random state per process: one call at a time keeps the ordering reproducible.
 static METIS: Mutex<()> = Mutex::new(());
 
-/// Graph of the `block x block` blocks of a matrix: adjacency lists without self loops, ascending.
-fn block_graph(a: &SymmetricMatrix, block: usize) -> (Vec<i32>, Vec<i32>) {
-    let vertices = a.n() / block;
-    let mut pointers = Vec::with_capacity(vertices + 1);
-    let mut neighbours: Vec<i32> = Vec::with_capacity(a.as_csc().nnz() / (block * block));
-    let mut seen = vec![u32::MAX; vertices];
-    pointers.push(0);
-    for vertex in 0..vertices {
-        let start = neighbours.len();
-        for b in 0..block {
-            for &column in a.row(vertex * block + b).0 {
-                let other = column as usize / block;
-                if other != vertex && seen[other] != vertex as u32 {
-                    seen[other] = vertex as u32;
-                    neighbours.push(other as i32);
-                }
+/// Calls `take` with every neighbour of a block of rows, ascending.
+fn neighbours(a: &SymmetricMatrix, block: u32, vertex: u32, mut take: impl FnMut(u32)) {
+    let row = |b: u32| a.row((vertex * block + b) as usize).0;
+    // Blocks of up to three rows are merged without a list of what has been met.
+    let mut rest: [&[u32]; 3] = std::array::from_fn(|b| if (b as u32) < block { row(b as u32) } else { &[] });
+    while let Some(next) = rest.iter().filter_map(|row| row.first()).min().map(|&column| column / block) {
+        let end = (next + 1) * block;
+        for row in &mut rest {
+            // At most `block` columns belong to one neighbour.
+            while let Some((&column, after)) = row.split_first()
+                && column < end
+            {
+                *row = after;
             }
         }
-        neighbours[start..].sort_unstable();
-        pointers.push(neighbours.len() as i32);
+        if next != vertex {
+            take(next);
+        }
     }
-    (pointers, neighbours)
+}
+
+/// Graph of the `block x block` blocks of a matrix: adjacency lists without self loops, ascending. `None` when it is too
+/// large for the 32-bit numbers of the ordering library.
+fn block_graph(a: &SymmetricMatrix, block: usize) -> Option<(Vec<i32>, Vec<i32>)> {
+    /// Vertices per parallel task.
+    const VERTICES: usize = 1024;
+    let (vertices, block) = (a.n() / block, block as u32);
+    let mut pointers = vec![0i32; vertices + 1];
+    pointers[1..].par_iter_mut().with_min_len(VERTICES).enumerate().for_each(|(vertex, count)| {
+        neighbours(a, block, vertex as u32, |_| *count += 1);
+    });
+    for vertex in 0..vertices {
+        pointers[vertex + 1] = pointers[vertex].checked_add(pointers[vertex + 1])?;
+    }
+    let mut lists = vec![0i32; pointers[vertices] as usize];
+    let mut shares = Vec::with_capacity(vertices / VERTICES + 1);
+    let mut rest = lists.as_mut_slice();
+    for first in (0..vertices).step_by(VERTICES) {
+        let end = (first + VERTICES).min(vertices);
+        let (share, after) = rest.split_at_mut((pointers[end] - pointers[first]) as usize);
+        shares.push((first as u32..end as u32, share));
+        rest = after;
+    }
+    shares.into_par_iter().for_each(|(range, share)| {
+        let mut places = share.iter_mut();
+        for vertex in range {
+            neighbours(a, block, vertex, |other| {
+                *places.next().expect("as many neighbours as were counted") = other as i32;
+            });
+        }
+    });
+    Some((pointers, lists))
 }
 
 /// Elimination order of the rows of `a`, whose consecutive `block` rows form one node: entry i is the row that is
-/// eliminated as the i-th. `None` when the ordering library fails (it runs out of memory).
+/// eliminated as the i-th. `None` when the ordering library fails (it runs out of memory or of its 32-bit numbers).
+///
+/// # Panics
+/// When `block` is not 1, 2 or 3.
 pub fn nested_dissection(a: &SymmetricMatrix, block: usize) -> Option<Vec<usize>> {
-    let (mut pointers, mut neighbours) = block_graph(a, block);
+    assert!((1..=3).contains(&block), "blocks of 1, 2 or 3 rows, not {block}");
+    let (mut pointers, mut neighbours) = block_graph(a, block)?;
     let vertices = pointers.len() - 1;
     let order = if neighbours.is_empty() || vertices < 3 {
         (0..vertices as i32).collect()
@@ -82,9 +117,15 @@ pub fn connected_components(a: &SymmetricMatrix, block: usize) -> Vec<usize> {
         component[first] = count;
         stack.push(first);
         while let Some(vertex) = stack.pop() {
-            for b in 0..block {
-                for &column in a.row(vertex * block + b).0 {
+            for row in vertex * block..(vertex + 1) * block {
+                // Entries of one block stand side by side: it is looked up once.
+                let mut known = vertex * block..(vertex + 1) * block;
+                for &column in a.row(row).0 {
+                    if known.contains(&(column as usize)) {
+                        continue;
+                    }
                     let other = column as usize / block;
+                    known = other * block..(other + 1) * block;
                     if component[other] == usize::MAX {
                         component[other] = count;
                         stack.push(other);
@@ -95,4 +136,55 @@ pub fn connected_components(a: &SymmetricMatrix, block: usize) -> Vec<usize> {
         count += 1;
     }
     component
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::CscMatrix;
+    use std::collections::BTreeSet;
+
+    /// Blocks of three rows, coupled through any one of their nine entries; the last two blocks stand alone.
+    fn scattered(vertices: u32) -> (SymmetricMatrix, Vec<BTreeSet<i32>>) {
+        let mut entries = Vec::new();
+        let mut adjacent = vec![BTreeSet::new(); vertices as usize];
+        for i in 0..3 * vertices {
+            entries.push((i, i, 4.0));
+        }
+        for v in 0..vertices - 2 {
+            for step in [1, 7, 300] {
+                let w = v + step;
+                if w < vertices - 2 {
+                    let (r, c) = (3 * v + (v + step) % 3, 3 * w + v % 3);
+                    entries.extend([(r, c, 1.0), (c, r, 1.0)]);
+                    adjacent[v as usize].insert(w as i32);
+                    adjacent[w as usize].insert(v as i32);
+                }
+            }
+        }
+        let n = 3 * vertices as usize;
+        let matrix = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric");
+        (matrix, adjacent)
+    }
+
+    #[test]
+    fn the_graph_has_one_vertex_per_block_and_every_neighbour_once() {
+        let (matrix, adjacent) = scattered(2500);
+        let (pointers, lists) = block_graph(&matrix, 3).expect("small");
+        for (v, expected) in adjacent.iter().enumerate() {
+            let list = &lists[pointers[v] as usize..pointers[v + 1] as usize];
+            assert!(list.iter().eq(expected), "vertex {v}");
+        }
+        let order = nested_dissection(&matrix, 3).expect("small");
+        assert_eq!(order.iter().collect::<BTreeSet<_>>().len(), 7500);
+        assert!(order.chunks(3).all(|b| b[0] % 3 == 0 && b[1] == b[0] + 1 && b[2] == b[0] + 2));
+    }
+
+    #[test]
+    fn components_are_numbered_in_the_order_of_their_first_block() {
+        let (matrix, _) = scattered(500);
+        let component = connected_components(&matrix, 3);
+        assert!(component[..498].iter().all(|&c| c == 0));
+        assert_eq!(component[498..], [1, 2]);
+    }
 }
