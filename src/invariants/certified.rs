@@ -11,7 +11,7 @@ use crate::linalg::{
     CompensatedBlock, DoubleDouble, LANES, SymmetricMatrix, accumulate, accumulate_pair, gram_compensated,
     multiply_compensated, sum_length, with_fma,
 };
-use faer::{Mat, MatRef};
+use faer::{Mat, MatMut, MatRef};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -113,6 +113,28 @@ fn group_length(n: usize) -> usize {
     CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
 }
 
+/// Node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
+fn by_node(columns: Columns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
+    let mut rows = vec![[0.0; WIDTH]; columns.positions.len()];
+    rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
+        for (slot, column) in block.clone().enumerate() {
+            for (i, row) in rows.iter_mut().enumerate() {
+                row[slot] = columns.get(CHUNK * chunk + i, column);
+            }
+        }
+    });
+    rows
+}
+
+/// Column-wise copy of the rows `nodes` into the columns of `target`.
+fn by_column(columns: Columns<'_>, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
+    for column in 0..target.ncols() {
+        for (row, i) in nodes.clone().enumerate() {
+            target[(row, column)] = columns.get(i, column);
+        }
+    }
+}
+
 /// Columns 0..block.end of X against Ms X[block]: block.end rows.
 fn gram_block(
     mass: &SymmetricMatrix,
@@ -120,7 +142,7 @@ fn gram_block(
     block: Range<usize>,
 ) -> Vec<[DoubleDouble; WIDTH]> {
     let (n, n_left) = (mass.n(), block.end);
-    let x = columns.by_node::<WIDTH>(block);
+    let x = by_node(columns, block);
     let group = group_length(n);
     let partial: Vec<Vec<[[f64; WIDTH]; 2]>> = (0..n.div_ceil(group))
         .into_par_iter()
@@ -132,7 +154,7 @@ fn gram_block(
             for first in nodes.clone().step_by(CHUNK) {
                 let chunk = first..(first + CHUNK).min(nodes.end);
                 let rows = chunk.len();
-                columns.by_column(chunk.clone(), left.subrows_mut(0, rows));
+                by_column(columns, chunk.clone(), left.subrows_mut(0, rows));
                 with_fma(
                     #[inline(always)]
                     || {

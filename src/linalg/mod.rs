@@ -25,5 +25,6 @@ pub use inertia::Inertia;
 pub use ordering::connected_components;
 pub use pencil::Pencil;
 pub use product::multiply;
+pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{combine, gram, subtract_combination};

@@ -3,7 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use support::{equations, random};
+use support::random;
 
 mod arithmetic;
 mod bodies;
