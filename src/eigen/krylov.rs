@@ -1,7 +1,7 @@
 //! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
 
 use super::problem::{Counters, EigenProblem};
-use crate::linalg::{Cholesky, Solve, combine, gram, subtract_combination};
+use crate::linalg::{Solve, combine, gram, subtract_combination};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
@@ -11,7 +11,7 @@ const VANISHED: f64 = 1e-13;
 /// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
-    factor: &'a Cholesky<'a>,
+    factor: &'a dyn Solve,
     v: Mat<f64>,
     m: usize,
     t: Mat<f64>,
@@ -35,7 +35,7 @@ struct Block {
 
 impl<'a> Krylov<'a> {
     /// An empty basis for at most `capacity` vectors.
-    pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a Cholesky<'a>, capacity: usize) -> Self {
+    pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a dyn Solve, capacity: usize) -> Self {
         Self {
             problem,
             factor,
@@ -80,6 +80,18 @@ impl<'a> Krylov<'a> {
         let tail = s.subrows(self.projected() - last, last);
         let r = combine(self.coupling.as_ref(), tail);
         (0..s.ncols()).map(|j| r.col(j).norm_l2()).collect()
+    }
+
+    /// OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected x k) with
+    /// values theta: one inverse iteration on them that needs no solve, because OP V = V T + V_fresh B E' holds already.
+    /// It damps what is left of higher modes, and removes what a singular M does not see of the basis.
+    pub(super) fn inverse_iterated(&self, s: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
+        let (size, last) = (self.projected(), self.coupling.ncols());
+        let residual = combine(self.coupling.as_ref(), s.subrows(size - last, last));
+        let coefficients = Mat::from_fn(size + residual.nrows(), s.ncols(), |i, j| {
+            if i < size { s[(i, j)] } else { residual[(i - size, j)] / theta[j] }
+        });
+        combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref())
     }
 
     /// V S for S (projected x k).
