@@ -104,8 +104,8 @@ mod tests {
         });
         let mut a = basis.clone();
         let mut b = &basis * &rotation;
-        canonical_basis(a.as_mut(), &[0..3]);
-        canonical_basis(b.as_mut(), &[0..3]);
+        canonical_basis(a.as_mut(), std::slice::from_ref(&(0..3)));
+        canonical_basis(b.as_mut(), std::slice::from_ref(&(0..3)));
         assert!((&a - &b).norm_max() < 1e-14, "{a:?} {b:?}");
     }
 
