@@ -12,7 +12,9 @@ const VANISHED: f64 = 1e-13;
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
+    /// Grows with the basis inside memory reserved for `capacity` columns: what is not reached is never touched.
     v: Mat<f64>,
+    capacity: usize,
     m: usize,
     t: Mat<f64>,
     /// Columns of the newest block, not yet multiplied by the operator.
@@ -36,10 +38,14 @@ struct Block {
 impl<'a> Krylov<'a> {
     /// An empty basis for at most `capacity` vectors.
     pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a dyn Solve, capacity: usize) -> Self {
+        let n = problem.pencil.n();
+        let mut v = Mat::with_capacity(n, capacity);
+        v.resize_with(n, 0, |_, _| 0.0);
         Self {
             problem,
             factor,
-            v: Mat::zeros(problem.pencil.n(), capacity),
+            v,
+            capacity,
             m: 0,
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
@@ -61,7 +67,7 @@ impl<'a> Krylov<'a> {
 
     /// Room left for new vectors.
     pub(super) fn room(&self) -> usize {
-        self.v.ncols() - self.m
+        self.capacity - self.m
     }
 
     /// Whether the newest block is empty: the basis spans an invariant subspace.
@@ -160,6 +166,8 @@ impl<'a> Krylov<'a> {
 
     fn push(&mut self, block: Block) {
         let width = block.w.ncols();
+        let columns = self.v.ncols().max(self.m + width);
+        self.v.resize_with(self.problem.pencil.n(), columns, |_, _| 0.0);
         self.v.as_mut().subcols_mut(self.m, width).copy_from(&block.w);
         self.m += width;
         self.fresh = width;
