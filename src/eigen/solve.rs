@@ -119,7 +119,8 @@ fn search_densely(
     {
         last += 1;
     }
-    let refined = refine(problem, &spectrum.factor, spectrum.vectors(last), tolerance, counters)?;
+    let found = Refined::new(problem, spectrum.vectors(last), counters)?;
+    let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
     let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
     Ok((Search { refined, next, tau }, flexible))
@@ -136,18 +137,18 @@ fn search_iteratively(
 ) -> Result<Search, EigenFailure> {
     let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, attempt };
     let mut tau = 0.3 * problem.first_estimate;
-    let (factor, pairs) = loop {
+    let (factor, found, next) = loop {
         watch(Event::Phase("factorisation"));
         let factor = lanczos::factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
         match lanczos::lowest_modes(problem, &factor, &goal, watch, counters)? {
-            lanczos::Search::Found(pairs) => break (factor, pairs),
+            lanczos::Search::Found { modes, next } => break (factor, modes, next),
             lanczos::Search::ShiftTooLarge(shift) => tau = shift,
         }
     };
-    let refined = refine(problem, &factor, pairs.vectors, tolerance, counters)?;
+    let refined = refine(problem, &factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
-    Ok(Search { refined, next: pairs.next, tau: factor.shift() })
+    Ok(Search { refined, next, tau: factor.shift() })
 }
 
 /// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
