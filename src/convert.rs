@@ -2,14 +2,14 @@
 
 use crate::basis::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Counters, Proof, Wanted, canonical_basis};
+use crate::eigen::{Accuracy, Counters, Proof, Wanted, canonical_basis};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Frame, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+    Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
 };
 use crate::invariants::{
     BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame, condense,
-    condense_lumped, error_norms,
+    condense_certified, condense_lumped, error_norms,
 };
 use crate::linalg::{Pencil, SymmetricMatrix, gram};
 use crate::model::{FeModel, Nodes};
@@ -97,7 +97,22 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) ->
     let (frame, mass_properties) = choose_frame(model.scalar_mass(), positions, settings.frame)?;
     let place = Place { frame, positions: frame.to_body(positions) };
     let (shapes, modal_stiffness) = place.modes(model, &found.solution.vectors);
-    let invariants = condense(model.scalar_mass(), &place.positions, shapes.as_ref(), modal_stiffness);
+    let (mass, positions) = (model.scalar_mass(), &place.positions);
+    let (invariants, guarantee) = match &found.solution.bounds {
+        None => (condense(mass, positions, shapes.as_ref(), modal_stiffness), None),
+        Some(bounds) => {
+            let own = condense_certified(mass, positions, shapes.as_ref(), model.stiffness(), &frame.axes);
+            let guarantee = Guarantee {
+                shift_below: bounds.shift_below,
+                pivots_below: bounds.pivots_below,
+                eigenvalue_lower: bounds.lower.clone(),
+                eigenvalue_upper: bounds.upper.clone(),
+                shape_error: bounds.shape_error.clone(),
+                digits: own.digits,
+            };
+            (own.invariants, Some(guarantee))
+        }
+    };
     watch(Event::Phase("lumped comparison"));
     let lumped: Vec<LumpedBody> = schemes
         .iter()
@@ -121,7 +136,7 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) ->
     } else {
         Vec::new()
     };
-    let certificate = certificate(model, &found);
+    let certificate = certificate(model, &found, guarantee);
     let solution = found.solution;
     let body = FlexBody::new(Parts {
         source: Source {
@@ -239,7 +254,12 @@ fn lumped_pipeline(
     let matrix = crate::linalg::CscMatrix::from_triplets(n, n, &diagonal);
     let lumped = SymmetricMatrix::new(matrix).expect("a diagonal matrix is symmetric");
     let nf = exact.shapes.ncols();
-    let modes = ModeSettings { wanted: Wanted::Lowest(nf), ..settings.modes };
+    // A comparison needs no guarantees.
+    let accuracy = match settings.modes.accuracy {
+        Accuracy::Certified => Accuracy::Standard,
+        other => other,
+    };
+    let modes = ModeSettings { wanted: Wanted::Lowest(nf), accuracy, ..settings.modes };
     let found = match free_surface_of(exact.model, &lumped, &modes, watch) {
         Ok(found) => found.solution,
         Err(error) => return Ok(none(error.diagnostics()[0].message().to_owned())),
@@ -261,7 +281,7 @@ fn lumped_pipeline(
     })
 }
 
-fn certificate(model: &FeModel, found: &FreeSurfaceModes) -> Certificate {
+fn certificate(model: &FeModel, found: &FreeSurfaceModes, guarantee: Option<Guarantee>) -> Certificate {
     let completeness = &found.solution.completeness;
     let proved = completeness.proof == Proof::InertiaCount;
     Certificate {
@@ -272,6 +292,7 @@ fn certificate(model: &FeModel, found: &FreeSurfaceModes) -> Certificate {
         remark: completeness.remark.clone(),
         rigid_noise: found.rigid_noise,
         rigid_residual: model.rigid_residual(),
+        guarantee,
     }
 }
 

@@ -161,7 +161,8 @@ pub fn codes_markdown() -> String {
          | 2 | bad input or usage |\n\
          | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
          | 4 | not enough memory or disk |\n\
-         | 70 | a bug of ours |\n\n\
+         | 70 | a bug of ours |\n\
+         | 130 | interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left |\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
     );

@@ -18,6 +18,8 @@ pub enum ExitCode {
     Resources = 4,
     /// A bug of ours.
     Bug = 70,
+    /// Interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left.
+    Interrupted = 130,
 }
 
 /// A failed operation: every diagnostic collected until it had to stop.

@@ -4,13 +4,26 @@ use clap::Parser;
 use flexbody::cli::{Arguments, run};
 use flexbody::diagnostic::{Code, Diagnostic};
 use flexbody::error::ExitCode;
+use std::io::{IsTerminal, Write};
 
 fn main() -> std::process::ExitCode {
     let arguments = Arguments::parse();
+    // Where no handler can be set the work is done all the same: an interruption then leaves a temporary file.
+    let _ = ctrlc::set_handler(interrupted);
     let code = std::panic::catch_unwind(|| run(&arguments)).unwrap_or_else(|_| {
         // The panic itself has been printed; this says what it means and what to do.
         eprintln!("{}", Diagnostic::new(Code::Internal, "the program stopped at a contradiction of its own"));
         ExitCode::Bug
     });
     std::process::ExitCode::from(code as u8)
+}
+
+/// Ctrl-C, or SIGTERM: ends the process at once, whatever it is doing.
+fn interrupted() {
+    flexbody::output::abandon_unfinished();
+    let mut stderr = std::io::stderr();
+    // A progress bar may stand on the line.
+    let line_end = if stderr.is_terminal() { "\n" } else { "" };
+    let _ = writeln!(stderr, "{line_end}interrupted: no unfinished file is left");
+    std::process::exit(ExitCode::Interrupted as i32);
 }

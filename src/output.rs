@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::TempPath;
 
 /// A place for one output file, reserved before the work starts.
@@ -15,7 +16,59 @@ use tempfile::TempPath;
 pub struct OutputSlot {
     asked: PathBuf,
     target: PathBuf,
-    temporary: TempPath,
+    temporary: Temporary,
+}
+
+/// The temporary files of this process, for the case that it is interrupted.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary file of every slot, for a process that ends at once: from here on it can neither reserve nor
+/// finish an output file, and a thread that tries to waits for the end.
+pub fn abandon_unfinished() {
+    let files = unfinished();
+    for file in files.iter() {
+        // Nothing is left to do about a file that cannot be removed.
+        let _ = std::fs::remove_file(file);
+    }
+    std::mem::forget(files);
+}
+
+/// A temporary file that [`UNFINISHED`] knows as long as it exists.
+#[derive(Debug)]
+struct Temporary(Option<TempPath>);
+
+impl Temporary {
+    fn make(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> std::io::Result<Self> {
+        let mut known = unfinished();
+        let path = builder.tempfile_in(folder)?.into_temp_path();
+        known.push(path.to_path_buf());
+        Ok(Self(Some(path)))
+    }
+
+    fn path(&self) -> &Path {
+        self.0.as_ref().expect("there until it is finished")
+    }
+
+    fn finish(mut self, target: &Path) -> std::io::Result<()> {
+        let mut known = unfinished();
+        let path = self.0.take().expect("there until it is finished");
+        known.retain(|other| *other != *path);
+        path.persist(target).map_err(|e| e.error)
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some(path) = self.0.take() {
+            let mut known = unfinished();
+            known.retain(|other| *other != *path);
+            drop(path); // removes the file, while nobody abandons
+        }
+    }
 }
 
 impl OutputSlot {
@@ -61,7 +114,7 @@ impl OutputSlot {
         // Temporary files are private by default; this one becomes the output: mode 666 less the umask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let temporary = builder.tempfile_in(folder).map_err(|e| io(&asked, &e))?.into_temp_path();
+        let temporary = Temporary::make(&builder, folder).map_err(|e| io(&asked, &e))?;
         Ok(Self { asked, target, temporary })
     }
 
@@ -72,7 +125,7 @@ impl OutputSlot {
 
     /// The temporary file, for writers that need a path of their own.
     pub fn temporary(&self) -> &Path {
-        &self.temporary
+        self.temporary.path()
     }
 
     /// The error for a write to [`OutputSlot::temporary`] that failed in somebody else's hands.
@@ -88,7 +141,7 @@ impl OutputSlot {
         let written = OpenOptions::new()
             .write(true)
             .truncate(true)
-            .open(&self.temporary)
+            .open(self.temporary())
             .and_then(|mut file| file.write_all(bytes));
         written.map_err(|e| self.failure(&e))?;
         self.commit()
@@ -102,11 +155,11 @@ impl OutputSlot {
         let Self { asked, target, temporary } = self;
         OpenOptions::new()
             .write(true)
-            .open(&temporary)
+            .open(temporary.path())
             .and_then(|file| file.sync_all())
             .map_err(|e| io(&asked, &e))?;
-        let folder = temporary.parent().map(Path::to_path_buf);
-        temporary.persist(&target).map_err(|e| io(&asked, &e.error))?;
+        let folder = temporary.path().parent().map(Path::to_path_buf);
+        temporary.finish(&target).map_err(|e| io(&asked, &e))?;
         // The rename itself is durable once the folder is synced; where folders cannot be opened it is so already
         // or cannot be made so, and the file is in place either way.
         if let Some(folder) = folder.and_then(|f| File::open(f).ok()) {

@@ -4,7 +4,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::rounding_residual;
 use crate::error::Result;
 use crate::flex_body::FlexBody;
-use crate::invariants::{IdentityCheck, condense, primary_differences};
+use crate::invariants::{IdentityCheck, condense, condense_certified, primary_differences};
 use crate::linalg::{Pencil, gram};
 use crate::model::FeModel;
 use faer::{Mat, Scale};
@@ -73,7 +73,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     }
     let orthonormality =
         gram(in_model.as_ref(), mx.as_ref()) - Mat::<f64>::identity(in_model.ncols(), in_model.ncols());
-    Ok(vec![
+    let mut checks = vec![
         check("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12),
         check(
             "invariants_recomputed",
@@ -94,7 +94,34 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
             2.0 * stored,
         ),
         check("orthonormal_recomputed", "Psi' M Psi = I", orthonormality.norm_max(), 1e-9),
-    ])
+    ];
+    if let Some(guarantee) = &body.certificate().guarantee {
+        let stored = &body.nodes().positions;
+        let own =
+            condense_certified(model.scalar_mass(), stored, shapes.as_ref(), model.stiffness(), &frame.axes);
+        let excess =
+            primary_differences(body.invariants(), &own.invariants).iter().zip(&guarantee.digits).fold(
+                0.0f64,
+                |m, ((_, d), digits)| {
+                    if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * 10f64.powf(*digits)) }
+                },
+            );
+        // Stored modes are rounded: their quotients follow the eigenvalues to what any other check of modes allows.
+        let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
+        let modal_mass = own.invariants.modal_mass();
+        let outside = bounds.enumerate().fold(0.0f64, |m, (j, (lower, upper))| {
+            let quotient = own.invariants.modal_stiffness[(j, j)] / modal_mass[(j, j)];
+            m.max((lower - quotient) / lower).max((quotient - upper) / upper)
+        });
+        checks.push(check("digits_recomputed", "invariants to their guaranteed digits", excess, 1.0));
+        checks.push(check(
+            "bounds_recomputed",
+            "psi' K psi / psi' M psi between the bounds of lambda",
+            outside,
+            1e-9 + body.certificate().rigid_noise,
+        ));
+    }
+    Ok(checks)
 }
 
 /// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.

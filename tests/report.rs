@@ -6,8 +6,8 @@ mod store_support;
 
 use bodies::{engine_mount, run_data};
 use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::flex_body::{FlexBody, Parts};
-use flexbody::invariants::{BodyFrame, ERROR_NORMS, Expected, identities};
+use flexbody::flex_body::{FlexBody, Guarantee, Parts};
+use flexbody::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, identities};
 use flexbody::report::{
     Facts, Format, LumpedModes, RunData, diagnostics_json, identities_json, identities_text, render,
 };
@@ -59,6 +59,45 @@ fn the_three_formats_are_these_bytes() {
     golden("report.txt", &render(&facts, Format::Text));
     golden("report.json", &render(&facts, Format::Json));
     golden("report.html", &render(&facts, Format::Html));
+}
+
+#[test]
+fn guarantees_are_said_with_no_more_digits_than_they_have() {
+    let body = changed(|parts| {
+        let eigenvalue = &parts.modes.eigenvalue;
+        // The fourth mode is known worst, and from above only.
+        let width = |j: usize| if j == 3 { 2e-9 } else { 1e-14 };
+        let mut digits = DIGITS.map(|_| 15.75);
+        digits[8] = 15.29;
+        parts.certificate.guarantee = Some(Guarantee {
+            shift_below: eigenvalue[0] / 4.0,
+            pivots_below: 6,
+            eigenvalue_lower: eigenvalue.clone(),
+            eigenvalue_upper: eigenvalue.iter().enumerate().map(|(j, l)| l * (1.0 + width(j))).collect(),
+            shape_error: (0..eigenvalue.len()).map(|j| 1e-12 * (j + 1) as f64).collect(),
+            digits,
+        });
+    });
+    let words = text(&body, &RunData::default()).split_whitespace().collect::<Vec<_>>().join(" ");
+    let half = 0.5 * body.frequencies_hz()[0];
+    assert!(words.contains("guaranteed every eigenvalue to 8.6 digits or more (mode 4 worst)"), "{words}");
+    assert!(words.contains("only 6 rigid modes below") && words.contains("(inertia count 6)"), "{words}");
+    assert!(words.contains("to 15.2 digits or more (W1 worst); modes within 8e-12 of exact ones"), "{words}");
+    let json = json(&body, &RunData::default());
+    assert!(
+        schema().is_valid(&json),
+        "{:?}",
+        schema().iter_errors(&json).map(|e| e.to_string()).collect::<Vec<_>>()
+    );
+    let guarantee = &json["guarantee"];
+    assert!((guarantee["eigenvalue_digits"][3].as_f64().unwrap() - 8.699).abs() < 1e-3);
+    assert_eq!(guarantee["invariant_digits"]["W1"], 15.29);
+    assert!((guarantee["shift_below_hz"].as_f64().unwrap() / half - 1.0).abs() < 1e-15);
+    let html = render(&Facts::new(&body, &RunData::default()), Format::Html);
+    for cell in ["Lower bound</th>", "<td>8.6</td>", "<th scope=\"row\">W1</th><td>15.2</td>"] {
+        assert_eq!(html.matches(cell).count(), 1, "{cell}");
+    }
+    assert!(self::json(&engine_mount(), &RunData::default())["guarantee"].is_null());
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod store_support;
 
 use flexbody::diagnostic::Code;
 use flexbody::error::Error;
+use flexbody::flex_body::FlexBody;
 use flexbody::store;
 use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
@@ -17,9 +18,13 @@ struct Case {
 
 /// A valid file: 4 nodes, 3 modes, one lumping scheme, one interface.
 fn valid() -> Case {
+    stored(&body(5, 4, 3, 1, 1))
+}
+
+fn stored(body: &FlexBody) -> Case {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
-    store::write(&body(5, 4, 3, 1, 1), &path).unwrap();
+    store::write(body, &path).unwrap();
     Case { _folder: folder, path }
 }
 
@@ -32,7 +37,10 @@ fn refusal(path: &Path) -> Error {
 
 /// Damages a valid file and returns the refusal.
 fn damaged(damage: impl FnOnce(&hdf5::File)) -> Error {
-    let case = valid();
+    refused(valid(), damage)
+}
+
+fn refused(case: Case, damage: impl FnOnce(&hdf5::File)) -> Error {
     let file = hdf5::File::open_rw(&case.path).unwrap();
     damage(&file);
     file.close().unwrap();
@@ -100,6 +108,31 @@ fn what_is_not_a_flex_body_file() {
     assert_says(&refusal(&path), Code::BodyUnreadable, &["sizes do not have 8 bytes"]);
     let other = damaged(|f| set_text(f, "format", "SDynPy"));
     assert_says(&other, Code::BodyUnreadable, &["attribute `format` is \"SDynPy\", expected `flexbody`"]);
+}
+
+#[test]
+fn guarantees_that_contradict_the_modes_or_themselves_are_refused() {
+    let certified = |damage: &dyn Fn(&hdf5::File)| refused(stored(&body(5, 5, 3, 1, 1)), damage);
+    let error = certified(&|f| replace(f, "modes/eigenvalue_upper", &[3], &[1e-9, 1e-9, 1e-9]));
+    assert_says(&error, Code::BodySchema, &["of mode 0 has the bounds", "of mode 1 has", "of mode 2 has"]);
+    let error = certified(&|f| replace(f, "modes/shape_error", &[3], &[0.5, -0.5, 2.0]));
+    assert_says(&error, Code::BodySchema, &["`guarantee.shape_error` is -5e-1 at mode 1, expected 0 to 1"]);
+    let error = certified(&|f| {
+        f.group("certificate").unwrap().attr("digits_W2").unwrap().write_scalar(&17.5).unwrap();
+    });
+    assert_says(&error, Code::BodySchema, &["guaranteed digits of `W2` are 1.75e1, expected 0 to 16"]);
+    let error = certified(&|f| set_int(f, "certificate", "negative_pivots_below", 7));
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &["counts 7 eigenvalues below the modes, expected the 6 rigid modes"],
+    );
+    let error = certified(&|f| f.unlink("modes/eigenvalue_lower").unwrap());
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &["/modes/eigenvalue_lower: expected with the other entries of accuracy `certified`, found nothing"],
+    );
 }
 
 #[test]

@@ -298,6 +298,11 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             Code::FactorizationFailed,
             format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
         ),
+        EigenFailure::NotCertified { why } => Diagnostic::new(
+            Code::FactorizationFailed,
+            format!("eigenvalue bounds cannot be guaranteed: {why}"),
+        )
+        .with_help("use --accuracy standard"),
         EigenFailure::Memory { bytes } => Diagnostic::new(
             Code::MemoryShort,
             bytes.map_or_else(|| "memory ran out".to_owned(), |b| format!("{b} bytes are needed")),

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[command(version, about, max_term_width = 100, disable_help_subcommand = false)]
 #[command(
     after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
-    numerical result; 4 not enough memory or disk; 70 internal error. Codes of all messages: docs/codes.md."
+    numerical result; 4 not enough memory or disk; 70 internal error; 130 interrupted, no unfinished file is left. Codes of all messages: docs/codes.md."
 )]
 pub struct Arguments {
     /// What to do.
@@ -157,11 +157,11 @@ pub struct Printing {
 /// Names of the accuracy levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum AccuracyName {
-    /// Residual 1e-6, completeness not proved
+    /// Residual 1e-6, completeness may be not proved
     Fast,
     /// Residual 1e-9 or the rounding floor, completeness proved
     Standard,
-    /// Residual at the rounding floor, completeness proved
+    /// Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every eigenvalue and digits of every invariant
     Certified,
 }
 

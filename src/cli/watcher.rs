@@ -1,9 +1,10 @@
-//! Progress on a terminal, and the time of each phase.
+//! Progress on a terminal with the time that is left of each phase, and the time that each phase took.
 
 use super::resources::cpu_seconds;
 use crate::progress::Event;
 use crate::report::Phase;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use std::fmt::Write;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -24,8 +25,14 @@ impl Watcher {
     /// Starts with the phase `first`. A hidden bar when `quiet`, or when stderr is not a terminal.
     pub(super) fn new(quiet: bool, first: &str) -> Self {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
-        let style = ProgressStyle::with_template("{spinner} {msg:<22} {bar:30} {elapsed}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = ProgressStyle::with_template("{spinner} {msg:<22} {bar:30} {elapsed} {left}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .with_key("left", |state: &ProgressState, out: &mut dyn Write| {
+                if let Some(left) = time_left(state.elapsed(), state.fraction().into()) {
+                    // A line of progress that cannot be written is no loss.
+                    let _ = write!(out, "{left}");
+                }
+            });
         bar.set_style(style);
         bar.set_message(first.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
@@ -41,7 +48,7 @@ impl Watcher {
                 self.close();
                 self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).name = name.to_owned();
                 self.bar.set_message(name.to_owned());
-                self.bar.set_position(0);
+                self.bar.reset();
             }
             Event::Fraction(part) => self.bar.set_position((1000.0 * part) as u64),
         }
@@ -72,5 +79,34 @@ impl Watcher {
             None => state.phases.push(Phase { name, wall_seconds, cpu_seconds }),
         }
         (state.wall, state.cpu) = (wall, cpu);
+    }
+}
+
+/// What is left of a phase of which `fraction` took `elapsed`, in words; nothing when it cannot be told yet.
+fn time_left(elapsed: Duration, fraction: f64) -> Option<String> {
+    if !(0.02..1.0).contains(&fraction) || elapsed < Duration::from_secs(1) {
+        return None;
+    }
+    let seconds = elapsed.as_secs_f64() * (1.0 - fraction) / fraction;
+    Some(match seconds.ceil() as u64 {
+        seconds @ 0..100 => format!("about {seconds} s left"),
+        seconds @ 100..6000 => format!("about {} min left", seconds.div_ceil(60)),
+        seconds => format!("about {:.1} h left", seconds as f64 / 3600.0),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_told_when_there_is_something_to_tell_it_from() {
+        let left = |seconds, fraction| time_left(Duration::from_secs(seconds), fraction);
+        assert_eq!(left(10, 0.25).as_deref(), Some("about 30 s left"));
+        assert_eq!(left(100, 0.25).as_deref(), Some("about 5 min left"));
+        assert_eq!(left(3600, 0.25).as_deref(), Some("about 3.0 h left"));
+        for (seconds, fraction) in [(0, 0.5), (10, 0.0), (10, 0.01), (10, 1.0), (10, f64::NAN)] {
+            assert_eq!(left(seconds, fraction), None, "{seconds} {fraction}");
+        }
     }
 }

@@ -104,9 +104,8 @@ mod tests {
         });
         let mut a = basis.clone();
         let mut b = &basis * &rotation;
-        let cluster = 0..3;
-        canonical_basis(a.as_mut(), std::slice::from_ref(&cluster));
-        canonical_basis(b.as_mut(), std::slice::from_ref(&cluster));
+        canonical_basis(a.as_mut(), std::slice::from_ref(&(0..3)));
+        canonical_basis(b.as_mut(), std::slice::from_ref(&(0..3)));
         assert!((&a - &b).norm_max() < 1e-14, "{a:?} {b:?}");
     }
 

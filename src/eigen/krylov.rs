@@ -1,7 +1,7 @@
 //! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
 
 use super::problem::{Counters, EigenProblem};
-use crate::linalg::{Cholesky, Solve, combine, gram, subtract_combination};
+use crate::linalg::{Solve, combine, gram, subtract_combination};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
@@ -11,8 +11,10 @@ const VANISHED: f64 = 1e-13;
 /// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
-    factor: &'a Cholesky<'a>,
+    factor: &'a dyn Solve,
+    /// Grows with the basis inside memory reserved for `capacity` columns: what is not reached is never touched.
     v: Mat<f64>,
+    capacity: usize,
     m: usize,
     t: Mat<f64>,
     /// Columns of the newest block, not yet multiplied by the operator.
@@ -35,11 +37,15 @@ struct Block {
 
 impl<'a> Krylov<'a> {
     /// An empty basis for at most `capacity` vectors.
-    pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a Cholesky<'a>, capacity: usize) -> Self {
+    pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a dyn Solve, capacity: usize) -> Self {
+        let n = problem.pencil.n();
+        let mut v = Mat::with_capacity(n, capacity);
+        v.resize_with(n, 0, |_, _| 0.0);
         Self {
             problem,
             factor,
-            v: Mat::zeros(problem.pencil.n(), capacity),
+            v,
+            capacity,
             m: 0,
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
@@ -61,7 +67,7 @@ impl<'a> Krylov<'a> {
 
     /// Room left for new vectors.
     pub(super) fn room(&self) -> usize {
-        self.v.ncols() - self.m
+        self.capacity - self.m
     }
 
     /// Whether the newest block is empty: the basis spans an invariant subspace.
@@ -80,6 +86,18 @@ impl<'a> Krylov<'a> {
         let tail = s.subrows(self.projected() - last, last);
         let r = combine(self.coupling.as_ref(), tail);
         (0..s.ncols()).map(|j| r.col(j).norm_l2()).collect()
+    }
+
+    /// OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected x k) with
+    /// values theta: one inverse iteration on them that needs no solve, because OP V = V T + V_fresh B E' holds already.
+    /// It damps what is left of higher modes, and removes what a singular M does not see of the basis.
+    pub(super) fn inverse_iterated(&self, s: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
+        let (size, last) = (self.projected(), self.coupling.ncols());
+        let residual = combine(self.coupling.as_ref(), s.subrows(size - last, last));
+        let coefficients = Mat::from_fn(size + residual.nrows(), s.ncols(), |i, j| {
+            if i < size { s[(i, j)] } else { residual[(i - size, j)] / theta[j] }
+        });
+        combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref())
     }
 
     /// V S for S (projected x k).
@@ -148,6 +166,8 @@ impl<'a> Krylov<'a> {
 
     fn push(&mut self, block: Block) {
         let width = block.w.ncols();
+        let columns = self.v.ncols().max(self.m + width);
+        self.v.resize_with(self.problem.pencil.n(), columns, |_, _| 0.0);
         self.v.as_mut().subcols_mut(self.m, width).copy_from(&block.w);
         self.m += width;
         self.fresh = width;

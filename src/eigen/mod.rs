@@ -1,6 +1,7 @@
 //! Free modes of K psi = lambda M psi: shift-invert block Lanczos or a dense solve, both followed by the same
 //! refinement, canonical form and completeness count. Sees operators, never nodes or files.
 
+mod bounds;
 mod canonical;
 mod completeness;
 mod dense;
@@ -15,6 +16,7 @@ pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
 pub use noise::{energy_noise, rounding_residual};
 pub use problem::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Wanted,
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
+    Wanted,
 };
 pub use solve::solve;

@@ -33,7 +33,8 @@ pub enum Accuracy {
     Fast,
     /// K-residual 1e-9 or the rounding floor of the matrices; completeness proved.
     Standard,
-    /// K-residual at the rounding floor; completeness proved.
+    /// K-residual 1e-12 or the rounding floor; completeness proved from both sides; guaranteed bounds of every eigenvalue
+    /// and, in a conversion, of the invariants.
     Certified,
 }
 
@@ -103,6 +104,21 @@ pub struct Counters {
     pub factor_len: u64,
 }
 
+/// Guaranteed bounds of the eigenvalues of K and M as they are stored, at [`Accuracy::Certified`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct EigenvalueBounds {
+    /// lower\[j\] <= lambda_j, ascending.
+    pub lower: Vec<f64>,
+    /// lambda_j <= upper\[j\], ascending.
+    pub upper: Vec<f64>,
+    /// Upper bound of the distance of each mode to the exact eigenspace of its cluster, in the norm of M.
+    pub shape_error: Vec<f64>,
+    /// Shift between the rigid modes and the first flexible one.
+    pub shift_below: f64,
+    /// Negative pivots of K - shift_below M: the number of rigid modes.
+    pub pivots_below: usize,
+}
+
 /// Flexible modes, ascending.
 #[derive(Debug, Clone)]
 pub struct EigenSolution {
@@ -116,6 +132,8 @@ pub struct EigenSolution {
     pub rounding_floors: Vec<f64>,
     /// What is known about missed modes.
     pub completeness: Completeness,
+    /// Bounds of the eigenvalues, at [`Accuracy::Certified`].
+    pub bounds: Option<EigenvalueBounds>,
     /// Eigenvalues that were computed beyond the last mode given, at least loosely (for cluster and gap decisions).
     pub next_eigenvalue: Option<f64>,
     /// Number of flexible modes with a finite eigenvalue, where it is known (dense path).
@@ -172,6 +190,11 @@ pub enum EigenFailure {
     Inaccurate {
         /// Probe residual.
         residual: f64,
+    },
+    /// The modes are sound, but no bounds of the eigenvalues can be guaranteed.
+    NotCertified {
+        /// The reason.
+        why: &'static str,
     },
     /// The pencil is too large for the memory of the machine.
     Memory {

@@ -51,12 +51,10 @@ fn rayleigh_ritz(
 ) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
     let pencil = &problem.pencil;
     let k = x.ncols() as u64;
-    for _ in 0..2 {
-        counters.mass_columns += k;
-        let mx = pencil.apply_mass(x.as_ref());
-        let along = gram(problem.rigid, mx.as_ref());
-        subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
-    }
+    counters.mass_columns += k;
+    let mx = pencil.apply_mass(x.as_ref());
+    let along = gram(problem.rigid, mx.as_ref());
+    subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
     // Unit M-norms first: inverse iteration scales the columns by theta.
     counters.mass_columns += k;
     counters.stiffness_columns += k;
@@ -114,31 +112,59 @@ pub(super) fn residuals(
     (residuals, floors)
 }
 
-/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor; at most three times.
+impl Refined {
+    /// Rayleigh-Ritz on the span of `x`, and the true K-residuals of the outcome.
+    pub(super) fn new(
+        problem: &EigenProblem<'_>,
+        x: Mat<f64>,
+        counters: &mut Counters,
+    ) -> Result<Self, EigenFailure> {
+        let (eigenvalues, vectors) = rayleigh_ritz(problem, x, counters)?;
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        Ok(Self { eigenvalues, vectors, residuals, floors })
+    }
+
+    /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is higher.
+    fn excess_of(&self, i: usize, tolerance: f64) -> f64 {
+        self.residuals[i] / tolerance.max(self.floors[i])
+    }
+
+    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors.
+    pub(super) fn excess(&self, tolerance: f64) -> f64 {
+        (0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)).fold(0.0, f64::max)
+    }
+}
+
+/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor, by at most three
+/// inverse iterations of those that do not.
 pub(super) fn refine(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
-    mut x: Mat<f64>,
+    mut best: Refined,
     tolerance: f64,
     counters: &mut Counters,
 ) -> Result<Refined, EigenFailure> {
-    let mut best: Option<Refined> = None;
-    let mut least = f64::INFINITY;
     for round in 0..3 {
-        let y = inverse_iteration(problem, factor, x.as_ref(), round > 0, counters);
-        let (eigenvalues, vectors) = rayleigh_ritz(problem, y, counters)?;
-        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
-        // What is left above the tolerance or the floor of each mode: residuals at their floor hide none of the others.
-        let excess = residuals.iter().zip(&floors).fold(0.0f64, |m, (r, f)| m.max(r / tolerance.max(*f)));
-        let stalled = excess > 0.5 * least;
-        if excess < least || best.is_none() {
-            best = Some(Refined { eigenvalues, vectors: vectors.clone(), residuals, floors });
-            least = excess;
-        }
-        if excess <= 1.0 || stalled {
+        let least = best.excess(tolerance);
+        if least <= 1.0 {
             break;
         }
-        x = vectors;
+        let poor: Vec<usize> =
+            (0..best.residuals.len()).filter(|&i| best.excess_of(i, tolerance) > 1.0).collect();
+        let mut x = best.vectors.clone();
+        let chosen = Mat::from_fn(x.nrows(), poor.len(), |i, j| x[(i, poor[j])]);
+        let improved = inverse_iteration(problem, factor, chosen.as_ref(), round > 0, counters);
+        for (from, &to) in poor.iter().enumerate() {
+            x.as_mut().col_mut(to).copy_from(improved.col(from));
+        }
+        let refined = Refined::new(problem, x, counters)?;
+        let excess = refined.excess(tolerance);
+        if excess < least {
+            best = refined;
+        }
+        if excess > 0.5 * least {
+            break;
+        }
     }
-    best.ok_or(EigenFailure::NotConverged { converged: 0, wanted: 0 })
+    Ok(best)
 }

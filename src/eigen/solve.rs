@@ -1,12 +1,14 @@
 //! The one entry: chooses the method, refines, counts, puts into canonical form.
 
+use super::bounds::enclose;
 use super::canonical::{canonical_basis, clusters};
 use super::completeness::{Completeness, Proof, count_below};
 use super::dense;
 use super::lanczos::{self, Goal, NOISE_FACTOR};
 use super::noise::energy_noise;
 use super::problem::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Wanted,
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
+    Wanted,
 };
 use super::refine::{Refined, refine, residuals as residuals_of};
 use crate::linalg::{Analysis, Solve, is_positive_semidefinite};
@@ -76,7 +78,15 @@ pub fn solve(
     if found != counted {
         return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
     }
-    finish(problem, search, completeness, (wanted, tolerance), finite_modes, counters)
+    let bounds = if settings.accuracy == Accuracy::Certified && found > 0 {
+        watch(Event::Phase("bounds"));
+        let (modes, values) = (&search.refined.vectors, &search.refined.eigenvalues[..found]);
+        let modes = modes.as_ref().subcols(0, found);
+        Some(enclose(problem, &analysis, modes, values, completeness.shift, CLUSTER_GAP, &mut counters)?)
+    } else {
+        None
+    };
+    finish(problem, search, (completeness, bounds), (wanted, tolerance), finite_modes, counters)
 }
 
 /// Modes as a method found them.
@@ -109,7 +119,8 @@ fn search_densely(
     {
         last += 1;
     }
-    let refined = refine(problem, &spectrum.factor, spectrum.vectors(last), tolerance, counters)?;
+    let found = Refined::new(problem, spectrum.vectors(last), counters)?;
+    let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
     let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
     Ok((Search { refined, next, tau }, flexible))
@@ -126,18 +137,18 @@ fn search_iteratively(
 ) -> Result<Search, EigenFailure> {
     let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, attempt };
     let mut tau = 0.3 * problem.first_estimate;
-    let (factor, pairs) = loop {
+    let (factor, found, next) = loop {
         watch(Event::Phase("factorisation"));
         let factor = lanczos::factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
         match lanczos::lowest_modes(problem, &factor, &goal, watch, counters)? {
-            lanczos::Search::Found(pairs) => break (factor, pairs),
+            lanczos::Search::Found { modes, next } => break (factor, modes, next),
             lanczos::Search::ShiftTooLarge(shift) => tau = shift,
         }
     };
-    let refined = refine(problem, &factor, pairs.vectors, tolerance, counters)?;
+    let refined = refine(problem, &factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
-    Ok(Search { refined, next: pairs.next, tau: factor.shift() })
+    Ok(Search { refined, next, tau: factor.shift() })
 }
 
 /// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
@@ -204,15 +215,21 @@ fn prove(
 fn finish(
     problem: &EigenProblem<'_>,
     search: Search,
-    completeness: Completeness,
+    (completeness, mut bounds): (Completeness, Option<EigenvalueBounds>),
     (wanted, tolerance): (usize, f64),
     finite_modes: Option<usize>,
     mut counters: Counters,
 ) -> Result<EigenSolution, EigenFailure> {
-    let Refined { eigenvalues, mut vectors, mut residuals, mut floors } = search.refined;
+    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = search.refined;
     let groups = clusters(&eigenvalues, CLUSTER_GAP);
     canonical_basis(vectors.as_mut(), &groups);
-    if groups.iter().any(|g| g.len() > 1) {
+    if let Some(bounds) = &bounds {
+        // The bounds know more digits than the projection in f64.
+        for ((lambda, lower), upper) in eigenvalues.iter_mut().zip(&bounds.lower).zip(&bounds.upper) {
+            *lambda = lambda.clamp(*lower, *upper);
+        }
+    }
+    if bounds.is_some() || groups.iter().any(|g| g.len() > 1) {
         (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
     }
     // The promise: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
@@ -226,7 +243,13 @@ fn finish(
     if given < eigenvalues.len() {
         vectors = vectors.as_ref().subcols(0, given).to_owned();
     }
+    if let Some(bounds) = &mut bounds {
+        for column in [&mut bounds.lower, &mut bounds.upper, &mut bounds.shape_error] {
+            column.truncate(given);
+        }
+    }
     Ok(EigenSolution {
+        bounds,
         eigenvalues: eigenvalues[..given].to_vec(),
         vectors,
         residuals: residuals[..given].to_vec(),

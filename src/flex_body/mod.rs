@@ -6,4 +6,4 @@ mod validate;
 
 pub use crate::invariants::Frame;
 pub use body::FlexBody;
-pub use parts::{Certificate, Interface, LumpedBody, MassStructure, Modes, Parts, Source};
+pub use parts::{Certificate, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source};

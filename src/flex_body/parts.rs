@@ -1,6 +1,6 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use crate::invariants::{Frame, Invariants};
+use crate::invariants::{DIGITS, Frame, Invariants};
 use crate::model::Nodes;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
@@ -62,6 +62,25 @@ pub struct Certificate {
     pub rigid_noise: f64,
     /// max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix.
     pub rigid_residual: f64,
+    /// What accuracy `certified` adds.
+    pub guarantee: Option<Guarantee>,
+}
+
+/// Guaranteed bounds, about K, M, nodes and modes as they are stored (theory section 8, "Certified").
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guarantee {
+    /// Shift between the rigid modes and the first flexible one. Unit: 1/time^2.
+    pub shift_below: f64,
+    /// Negative pivots of K - shift_below M: the number of rigid modes.
+    pub pivots_below: usize,
+    /// Lower bounds of the eigenvalues. Unit: 1/time^2.
+    pub eigenvalue_lower: Vec<f64>,
+    /// Upper bounds of the eigenvalues. Unit: 1/time^2.
+    pub eigenvalue_upper: Vec<f64>,
+    /// Upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the norm of M.
+    pub shape_error: Vec<f64>,
+    /// Guaranteed digits of each invariant of [`DIGITS`], of its worst entry relative to its Cauchy-Schwarz bound.
+    pub digits: [f64; DIGITS.len()],
 }
 
 /// Invariants that lumped masses would have given, with the same modes.

@@ -2,7 +2,7 @@
 
 use super::Parts;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::invariants::Invariants;
+use crate::invariants::{DIGITS, Invariants};
 use faer::{Mat, MatRef};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
@@ -37,6 +37,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.lumped(parts, nf);
     let c = &parts.certificate;
     check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
+    check.guarantee(parts, nf);
     check.interfaces(parts, n);
     check.text("source.name", &parts.source.name);
     check.text("certificate.remark", &c.remark);
@@ -184,6 +185,47 @@ impl Check {
             for (norm, value) in &body.comparison {
                 self.text(&format!("{name} error norm"), norm);
                 self.finite(&format!("{name} {norm}"), [*value]);
+            }
+        }
+    }
+
+    fn guarantee(&mut self, parts: &Parts, nf: usize) {
+        let Some(g) = &parts.certificate.guarantee else { return };
+        let rigid = parts.certificate.rigid_modes;
+        if g.pivots_below != rigid {
+            self.add(format!(
+                "`certificate.guarantee` counts {} eigenvalues below the modes, expected the {rigid} rigid modes",
+                g.pivots_below
+            ));
+        }
+        self.finite("guarantee.shift_below", [g.shift_below]);
+        for (name, column) in [
+            ("guarantee.eigenvalue_lower", &g.eigenvalue_lower),
+            ("guarantee.eigenvalue_upper", &g.eigenvalue_upper),
+            ("guarantee.shape_error", &g.shape_error),
+        ] {
+            self.length(name, column.len(), nf, "mode");
+            self.finite(name, column.iter().copied());
+        }
+        let bounds = g.eigenvalue_lower.iter().zip(&g.eigenvalue_upper);
+        for (j, (value, (lower, upper))) in parts.modes.eigenvalue.iter().zip(bounds).enumerate() {
+            if !(g.shift_below <= *lower && lower <= value && value <= upper) {
+                self.add(format!(
+                    "eigenvalue {value:e} of mode {j} has the bounds {lower:e} and {upper:e} above the shift {:e}, \
+                     expected ascending numbers",
+                    g.shift_below
+                ));
+            }
+        }
+        if let Some(j) = g.shape_error.iter().position(|e| !(0.0..=1.0).contains(e)) {
+            self.add(format!(
+                "`guarantee.shape_error` is {:e} at mode {j}, expected 0 to 1",
+                g.shape_error[j]
+            ));
+        }
+        for (name, digits) in DIGITS.iter().zip(g.digits) {
+            if !(0.0..=16.0).contains(&digits) {
+                self.add(format!("guaranteed digits of `{name}` are {digits:e}, expected 0 to 16"));
             }
         }
     }

@@ -1,10 +1,12 @@
-//! From entries in file order to compressed columns, by counting: the same bits at any number of threads.
+//! From entries in file order to compressed columns, by counting: each task owns some columns and takes the entries that
+//! belong there in file order, so that the bits are the same for any number of tasks.
 
 use super::digits::significant_digits;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::CscMatrix;
+use crate::linalg::{ColumnBlock, CscMatrix, split_columns};
 use crate::model::RawMatrix;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::path::Path;
 
 /// One stored entry, indices from 0.
@@ -75,7 +77,25 @@ pub(super) fn assemble(
     path: &Path,
 ) -> Result<RawMatrix, Diagnostic> {
     let digits = digits_of(&pieces, written);
-    let matrix = compress(n, pieces, storage).map_err(|(row, col)| {
+    finish(n, compress(n, pieces, storage), digits, path)
+}
+
+/// [`assemble`] for columns that are complete: they become the matrix where they lie.
+///
+/// # Errors
+/// As [`assemble`].
+pub(super) fn assemble_columns(columns: Columns, path: &Path) -> Result<RawMatrix, Diagnostic> {
+    let digits = significant_digits(columns.values.len(), 17, |k| columns.values[k]);
+    finish(columns.counts.len() - 1, columns.compress(), digits, path)
+}
+
+fn finish(
+    n: usize,
+    matrix: Result<CscMatrix, (u32, u32)>,
+    digits: u8,
+    path: &Path,
+) -> Result<RawMatrix, Diagnostic> {
+    let matrix = matrix.map_err(|(row, col)| {
         let message =
             format!("duplicates of entry ({}, {}) add up to a value that is not finite", row + 1, col + 1);
         Diagnostic::new(Code::MatrixNotFinite, message).in_file(path)
@@ -102,78 +122,181 @@ fn digits_of(pieces: &[Vec<Entry>], written: u8) -> u8 {
 
 /// `Err` holds the entry whose sum is not finite.
 fn compress(n: usize, pieces: Vec<Vec<Entry>>, storage: Storage) -> Result<CscMatrix, (u32, u32)> {
-    let mirrored = |e: &Entry| storage == Storage::Triangle && e.row != e.col;
+    let list = List::new(pieces, storage);
     let mut col_ptr = vec![0usize; n + 1];
-    for e in pieces.iter().flatten().filter(|e| e.value != 0.0) {
-        col_ptr[e.col as usize + 1] += 1;
-        if mirrored(e) {
-            col_ptr[e.row as usize + 1] += 1;
-        }
-    }
-    for j in 0..n {
-        col_ptr[j + 1] += col_ptr[j];
-    }
-    let mut row_idx = vec![0u32; col_ptr[n]];
-    let mut values = vec![0.0f64; col_ptr[n]];
-    let mut next = col_ptr[..n].to_vec();
-    let mut put = |row: u32, col: u32, value: f64| {
-        let at = &mut next[col as usize];
-        row_idx[*at] = row;
-        values[*at] = value;
-        *at += 1;
+    let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
+    col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
+        let first = task * width;
+        list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
+    });
+    add_up(&mut col_ptr);
+    let entries = col_ptr[n];
+    let (mut row_idx, mut values) = (vec![0u32; entries], vec![0.0f64; entries]);
+    let fill = |block: ColumnBlock<'_>| {
+        let (first, end) = (block.columns.start, block.columns.end);
+        let start = col_ptr[first];
+        let mut next = col_ptr[first..end].to_vec();
+        list.visit(first..end, |row, col, value| {
+            let at = &mut next[col - first];
+            block.rows[*at - start] = row;
+            block.values[*at - start] = value;
+            *at += 1;
+        });
+        sort_columns(&col_ptr[first..=end], block.rows, block.values)
     };
-    for piece in pieces {
-        // Each piece is freed as soon as it is spread out.
-        for e in piece.iter().filter(|e| e.value != 0.0) {
-            put(e.row, e.col, e.value);
-            if mirrored(e) {
-                put(e.col, e.row, e.value);
-            }
-        }
-    }
-    if sort_columns(&col_ptr, &mut row_idx, &mut values) {
+    let blocks = split_columns(&col_ptr, &equal_shares(&col_ptr), &mut row_idx, &mut values);
+    let duplicates = blocks.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
+    drop(list);
+    if duplicates {
         merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
     }
     Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
 }
 
-/// Sorts every column by row, duplicates staying in file order; says whether there are any.
-fn sort_columns(col_ptr: &[usize], row_idx: &mut [u32], values: &mut [f64]) -> bool {
-    // Blocks of whole columns, each with its share of the entries.
-    const BLOCK: usize = 4096;
-    let n = col_ptr.len() - 1;
-    let mut blocks = Vec::with_capacity(n / BLOCK + 1);
-    let (mut rows_left, mut values_left) = (row_idx, values);
-    for first in (0..n).step_by(BLOCK) {
-        let pointers = &col_ptr[first..=(first + BLOCK).min(n)];
-        let share = pointers[pointers.len() - 1] - pointers[0];
-        let (rows, rest) = rows_left.split_at_mut(share);
-        rows_left = rest;
-        let (vals, rest) = values_left.split_at_mut(share);
-        values_left = rest;
-        blocks.push((pointers, rows, vals));
+/// Adds an entry to the last piece, or begins a new one: pieces that cover few columns are left out by most tasks.
+pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
+    const PIECE: usize = 1 << 15;
+    match pieces.last_mut() {
+        Some(piece) if piece.len() < PIECE => piece.push(entry),
+        _ => {
+            let mut piece = Vec::with_capacity(PIECE);
+            piece.push(entry);
+            pieces.push(piece);
+        }
     }
-    let sort_block = |(pointers, rows, vals): (&[usize], &mut [u32], &mut [f64])| {
-        let mut duplicates = false;
-        let mut scratch: Vec<(u32, f64)> = Vec::new();
-        for column in pointers.windows(2) {
-            let range = column[0] - pointers[0]..column[1] - pointers[0];
-            let (rows, vals) = (&mut rows[range.clone()], &mut vals[range]);
-            if rows.is_sorted_by(|a, b| a < b) {
+}
+
+/// Entries that come column by column, in any order within a column, without zeros.
+pub(super) struct Columns {
+    /// At j + 1: the number of entries of column j.
+    counts: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Columns {
+    /// None yet, of `n` columns; about `entries` will come.
+    pub(super) fn with_room(n: usize, entries: usize) -> Self {
+        let (mut row_idx, mut values) = (Vec::new(), Vec::new());
+        // A number that a file states: where there is no such room the lists grow as far as they have to.
+        if row_idx.try_reserve_exact(entries).is_ok() {
+            let _ = values.try_reserve_exact(entries);
+        }
+        Self { counts: vec![0; n + 1], row_idx, values }
+    }
+
+    /// Adds an entry to its column; columns come in ascending order.
+    pub(super) fn push(&mut self, entry: Entry) {
+        self.counts[entry.col as usize + 1] += 1;
+        self.row_idx.push(entry.row);
+        self.values.push(entry.value);
+    }
+
+    /// The entries one by one.
+    pub(super) fn into_entries(self) -> Vec<Vec<Entry>> {
+        let mut entries = Vec::new();
+        let mut at = 0;
+        for (col, &count) in self.counts[1..].iter().enumerate() {
+            for k in at..at + count {
+                let entry = Entry { row: self.row_idx[k], col: col as u32, value: self.values[k] };
+                push(&mut entries, entry);
+            }
+            at += count;
+        }
+        entries
+    }
+
+    fn compress(self) -> Result<CscMatrix, (u32, u32)> {
+        let Self { counts: mut col_ptr, mut row_idx, mut values } = self;
+        add_up(&mut col_ptr);
+        let n = col_ptr.len() - 1;
+        let cuts = equal_shares(&col_ptr);
+        let blocks = split_columns(&col_ptr, &cuts, &mut row_idx, &mut values);
+        let sort =
+            |b: ColumnBlock<'_>| sort_columns(&col_ptr[b.columns.start..=b.columns.end], b.rows, b.values);
+        if blocks.into_par_iter().map(sort).reduce(|| false, |a, b| a | b) {
+            merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
+        }
+        Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+    }
+}
+
+/// From the number of entries of column j at j + 1 to column pointers.
+fn add_up(counts: &mut [usize]) {
+    for j in 1..counts.len() {
+        counts[j] += counts[j - 1];
+    }
+}
+
+/// Cuts the columns into several times as many parts as there are threads, with about equal numbers of entries.
+fn equal_shares(col_ptr: &[usize]) -> Vec<usize> {
+    let (n, parts) = (col_ptr.len() - 1, 4 * rayon::current_num_threads());
+    let cut = |part: usize| col_ptr.partition_point(|&p| p < col_ptr[n] / parts * part).min(n);
+    (0..parts).map(cut).chain([n]).collect()
+}
+
+/// All entries of a file.
+struct List {
+    pieces: Vec<Vec<Entry>>,
+    /// First and last column that each piece has entries for.
+    extents: Vec<(u32, u32)>,
+    mirror: bool,
+}
+
+impl List {
+    fn new(pieces: Vec<Vec<Entry>>, storage: Storage) -> Self {
+        let mirror = storage == Storage::Triangle;
+        let extent = |piece: &Vec<Entry>| {
+            piece.iter().fold((u32::MAX, 0), |(low, high): (u32, u32), e| {
+                let other = if mirror { e.row } else { e.col };
+                (low.min(e.col).min(other), high.max(e.col).max(other))
+            })
+        };
+        let extents = pieces.par_iter().map(extent).collect();
+        Self { pieces, extents, mirror }
+    }
+
+    /// Calls `take` with row, column and value of every nonzero entry of some columns, in file order.
+    fn visit(&self, columns: Range<usize>, mut take: impl FnMut(u32, usize, f64)) {
+        let (start, len) = (columns.start as u32, columns.len() as u32);
+        let here = |column: u32| column.wrapping_sub(start) < len;
+        for (piece, &(low, high)) in self.pieces.iter().zip(&self.extents) {
+            if high < start || low as usize >= columns.end {
                 continue;
             }
-            scratch.clear();
-            scratch.extend(rows.iter().copied().zip(vals.iter().copied()));
-            scratch.sort_by_key(|entry| entry.0); // stable
-            for (k, &(row, value)) in scratch.iter().enumerate() {
-                rows[k] = row;
-                vals[k] = value;
+            for e in piece.iter().filter(|e| e.value != 0.0) {
+                if here(e.col) {
+                    take(e.row, e.col as usize, e.value);
+                }
+                if self.mirror && e.row != e.col && here(e.row) {
+                    take(e.col, e.row as usize, e.value);
+                }
             }
-            duplicates |= rows.windows(2).any(|w| w[0] == w[1]);
         }
-        duplicates
-    };
-    blocks.into_par_iter().map(sort_block).reduce(|| false, |a, b| a | b)
+    }
+}
+
+/// Sorts every column by row, duplicates staying in file order; says whether there are any. `pointers` are those of the
+/// columns whose entries `rows` and `values` are.
+fn sort_columns(pointers: &[usize], rows: &mut [u32], values: &mut [f64]) -> bool {
+    let mut duplicates = false;
+    let mut scratch: Vec<(u32, f64)> = Vec::new();
+    for column in pointers.windows(2) {
+        let range = column[0] - pointers[0]..column[1] - pointers[0];
+        let (rows, values) = (&mut rows[range.clone()], &mut values[range]);
+        if rows.is_sorted_by(|a, b| a < b) {
+            continue;
+        }
+        scratch.clear();
+        scratch.extend(rows.iter().copied().zip(values.iter().copied()));
+        scratch.sort_by_key(|entry| entry.0); // stable
+        for (k, &(row, value)) in scratch.iter().enumerate() {
+            rows[k] = row;
+            values[k] = value;
+        }
+        duplicates |= rows.windows(2).any(|w| w[0] == w[1]);
+    }
+    duplicates
 }
 
 /// Sums runs of equal rows and drops sums that are zero, in place.
@@ -227,6 +350,53 @@ mod tests {
         let raw = assemble(3, pieces, Storage::Triangle, 17, Path::new("K.mtx")).unwrap();
         let expected = CscMatrix::from_triplets(3, 3, &[(0, 0, 3.0), (2, 1, 3.0), (1, 2, 3.0)]);
         assert_eq!(raw.matrix, expected);
+    }
+
+    /// Entries of a lower triangle in no order, with zeros and duplicates whose sums depend on their order.
+    fn disordered(n: u32, count: u32) -> Vec<Entry> {
+        let at = |k: u32| k.wrapping_mul(2_654_435_761) >> 7;
+        let place = |k: u32| (at(k) % n, at(k + count) % n);
+        let value = |k: u32| if k.is_multiple_of(11) { 0.0 } else { (f64::from(k) * 1e3).sin() };
+        (0..count)
+            .map(|k| {
+                let (a, b) = place(if k % 3 == 2 { k - 1 } else { k }); // every third is a duplicate
+                Entry { row: a.max(b), col: a.min(b), value: value(k) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn entries_in_any_order_are_put_where_they_belong_and_summed_in_file_order() {
+        const N: u32 = 3000;
+        let list = disordered(N, 40_000);
+        let mut both = Vec::new();
+        for e in &list {
+            both.push((e.row, e.col, e.value));
+            if e.row != e.col {
+                both.push((e.col, e.row, e.value));
+            }
+        }
+        let n = N as usize;
+        let expected = CscMatrix::from_triplets(n, n, &both);
+        let pieces: Vec<Vec<Entry>> = list.chunks(777).map(<[Entry]>::to_vec).collect();
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let raw = pool.install(|| assemble(n, pieces.clone(), Storage::Triangle, 17, Path::new("K.mtx")));
+            assert_eq!(raw.unwrap().matrix, expected, "{threads} threads");
+        }
+        // The same column by column, as binary files have them.
+        let mut ordered: Vec<Entry> = list.into_iter().filter(|e| e.value != 0.0).collect();
+        ordered.sort_by_key(|e| e.col);
+        let columns = || {
+            let mut columns = Columns::with_room(n, ordered.len());
+            ordered.iter().for_each(|&e| columns.push(e));
+            columns
+        };
+        let lower: Vec<_> = ordered.iter().map(|e| (e.row, e.col, e.value)).collect();
+        let full = assemble_columns(columns(), Path::new("K.h5")).unwrap();
+        assert_eq!(full.matrix, CscMatrix::from_triplets(n, n, &lower));
+        let mirrored = assemble(n, columns().into_entries(), Storage::Triangle, 17, Path::new("K.h5"));
+        assert_eq!(mirrored.unwrap().matrix, expected);
     }
 
     #[test]

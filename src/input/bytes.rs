@@ -5,10 +5,11 @@
 #![allow(unsafe_code)]
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::provenance::sha256_hex;
+use crate::provenance::Fingerprint;
 use memmap2::Mmap;
 use std::fs::File;
 use std::io::ErrorKind;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// An opened input file. Its bytes are those on disk (compressed files: as stored).
@@ -55,7 +56,27 @@ impl InputFile {
 
     /// SHA-256 of its bytes, lowercase hex.
     pub fn sha256(&self) -> String {
-        sha256_hex(self.bytes())
+        const BLOCK: usize = 8 << 20;
+        let mut fingerprint = Fingerprint::default();
+        for start in (0..self.map.len()).step_by(BLOCK) {
+            let range = start..self.map.len().min(start + BLOCK);
+            fingerprint.update(&self.map[range.clone()]);
+            self.release(range);
+        }
+        fingerprint.hex()
+    }
+
+    /// Says that `range` of the bytes has been used: it need not stay in memory. It can still be read.
+    pub(super) fn release(&self, range: Range<usize>) {
+        // SAFETY: pages of a file mapped for reading hold nothing but the file; dropped ones are read again when touched.
+        #[cfg(unix)]
+        unsafe {
+            // A hint: where it is refused the bytes stay.
+            let _ =
+                self.map.unchecked_advise_range(memmap2::UncheckedAdvice::DontNeed, range.start, range.len());
+        }
+        #[cfg(not(unix))]
+        let _ = range;
     }
 }
 

@@ -28,7 +28,7 @@ impl Compression {
     }
 
     /// A stream of the unpacked bytes.
-    pub(super) fn stream<'a>(self, bytes: &'a [u8]) -> std::io::Result<Box<dyn Read + 'a>> {
+    pub(super) fn stream<'a>(self, bytes: &'a [u8]) -> std::io::Result<Box<dyn Read + Send + 'a>> {
         Ok(match self {
             Self::None => Box::new(bytes),
             Self::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(bytes)),

@@ -55,24 +55,26 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
     let path = source.file.path();
     let mut blocks =
         Blocks::new(source.compression, source.file.bytes()).map_err(|e| vec![broken(path, &e)])?;
-    let mut body = Body::default();
-    let mut header: Option<Header> = None;
-    while let Some(block) = blocks.next().map_err(|e| vec![broken(path, &e)])? {
-        let mut rest = block;
-        let known = match header {
-            Some(known) => known,
-            None => {
-                let (new, length, lines) = header::parse(block)?;
-                check_size(new.rows, new.cols, new.entries).map_err(|d| vec![d.at_line(lines)])?;
-                rest = &block[length..];
-                body.lines = lines;
-                *header.insert(new)
-            }
-        };
-        body.parse(rest, &known);
+    let mut next = || blocks.next().map_err(|e| vec![broken(path, &e)]);
+    let Some(first) = next()? else {
+        return Err(vec![Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes")]);
+    };
+    let (header, length, lines) = header::parse(&first)?;
+    check_size(header.rows, header.cols, header.entries).map_err(|d| vec![d.at_line(lines)])?;
+    let mut body = Body { lines, ..Body::default() };
+    let (mut block, mut skip, mut given) = (first, length, 0);
+    loop {
+        // The next block is unpacked while this one is parsed.
+        let (following, ()) = rayon::join(&mut next, || body.parse(&block[skip..], &header));
+        if source.compression == Compression::None {
+            source.file.release(given..given + block.len());
+            given += block.len();
+        }
+        match following? {
+            Some(following) => (block, skip) = (following, 0),
+            None => break,
+        }
     }
-    let header =
-        header.ok_or_else(|| vec![Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes")])?;
     body.finish(&header, blocks.ends_with_newline()).and_then(|(pieces, written)| {
         let storage = match header.symmetry {
             Symmetry::Symmetric => Storage::Triangle,

@@ -1,40 +1,46 @@
 //! The exact condensation: one pass over the mass matrix turns nodes and shapes into the primary data.
 //!
 //! All of theory section 2 is one weighted Gram matrix X' Ms X of the columns X = [1, x, y, z, psi_1x, psi_1y,
-//! psi_1z, psi_2x, ...]. Columns are taken in blocks of a fixed width, rows in chunks of a fixed length; chunks
-//! belong to groups that depend on the number of nodes only, and groups are summed in order. The result is
-//! therefore the same to the last bit at any number of threads, and no sum is longer than a chunk, the chunks
-//! of a group or the groups: rounding does not grow with the model.
+//! psi_1z, psi_2x, ...]. Columns are taken in panels of a fixed width (20 modes: one panel, so that the mass matrix is read
+//! once), rows in chunks of a fixed length; chunks belong to groups that depend on the number of nodes only, and groups are
+//! summed in order. The result is therefore the same to the last bit at any number of threads, and no sum is longer than a
+//! chunk, the chunks of a group or the groups: rounding does not grow with the model.
 
 use super::Invariants;
 use crate::linalg::SymmetricMatrix;
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{Matrix3, Vector3};
+use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows per dense product: the longest plain sum. Shorter chunks cost time, longer ones digits.
-const CHUNK: usize = 128;
+pub(super) const CHUNK: usize = 128;
 /// Upper bound of the number of partial sums kept until they are added in order.
-const MAX_GROUPS: usize = 64;
-/// Columns per pass over the mass matrix: one gathered row is four cache lines.
-const WIDTH: usize = 32;
+pub(super) const MAX_GROUPS: usize = 64;
+/// Columns per pass over the mass matrix.
+const PANEL: usize = 64;
+/// Columns of a panel that are summed at a time, in registers.
+const LANE: usize = 16;
+
+/// A part of a row of a panel.
+type Lane = [f64; LANE];
 
 /// A symmetric mass on the nodes, the same for every direction.
 pub(super) trait NodalMass: Sync {
-    /// Row `i` of Ms X for the node-wise block `x` (n rows of W columns).
-    fn row_times<const W: usize>(&self, i: usize, x: &[[f64; W]]) -> [f64; W];
+    /// Lane `lane` of row `i` of Ms X, for `x` with `lanes` lanes per node.
+    fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane;
 }
 
 /// The consistent mass Ms.
 impl NodalMass for SymmetricMatrix {
-    #[inline]
-    fn row_times<const W: usize>(&self, i: usize, x: &[[f64; W]]) -> [f64; W] {
-        let mut sum = [0.0; W];
+    #[inline(always)] // compiled once per instruction set
+    fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
+        let mut sum = [0.0; LANE];
         let (columns, values) = self.row(i);
         for (&j, &value) in columns.iter().zip(values) {
-            for (s, x) in sum.iter_mut().zip(&x[j as usize]) {
+            for (s, x) in sum.iter_mut().zip(&x[j as usize * lanes + lane]) {
                 *s += value * x;
             }
         }
@@ -44,9 +50,9 @@ impl NodalMass for SymmetricMatrix {
 
 /// A diagonal (lumped) mass: one number per node.
 impl NodalMass for [f64] {
-    #[inline]
-    fn row_times<const W: usize>(&self, i: usize, x: &[[f64; W]]) -> [f64; W] {
-        x[i].map(|x| self[i] * x)
+    #[inline(always)] // compiled once per instruction set
+    fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
+        x[i * lanes + lane].map(|x| self[i] * x)
     }
 }
 
@@ -104,9 +110,15 @@ pub(super) fn condense_with<M: NodalMass + ?Sized>(
         (nf, nf),
         "modal stiffness: one row per mode"
     );
-    let gram = weighted_gram::<WIDTH, M>(mass, Columns { positions, shapes });
+    let gram = weighted_gram(mass, Columns { positions, shapes });
+    from_gram(gram.as_ref(), modal_stiffness)
+}
+
+/// The primary data from the Gram matrix of [`Columns`].
+pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Invariants {
+    let nf = modal_stiffness.ncols();
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
-    let (mass, first_moment, second_moment) = rigid_part(gram.as_ref());
+    let (mass, first_moment, second_moment) = rigid_part(gram);
     Invariants {
         mass,
         first_moment,
@@ -124,7 +136,7 @@ pub(super) fn condense_rigid<M: NodalMass + ?Sized>(
     positions: &[[f64; 3]],
 ) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let no_modes = Mat::<f64>::zeros(3 * positions.len(), 0);
-    rigid_part(weighted_gram::<4, M>(mass, Columns { positions, shapes: no_modes.as_ref() }).as_ref())
+    rigid_part(weighted_gram(mass, Columns { positions, shapes: no_modes.as_ref() }).as_ref())
 }
 
 fn rigid_part(gram: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
@@ -139,18 +151,18 @@ fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
 
 /// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...].
 #[derive(Clone, Copy)]
-struct Columns<'a> {
-    positions: &'a [[f64; 3]],
-    shapes: MatRef<'a, f64>,
+pub(super) struct Columns<'a> {
+    pub positions: &'a [[f64; 3]],
+    pub shapes: MatRef<'a, f64>,
 }
 
 impl Columns<'_> {
-    fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         4 + 3 * self.shapes.ncols()
     }
 
     #[inline]
-    fn get(&self, i: usize, column: usize) -> f64 {
+    pub fn get(&self, i: usize, column: usize) -> f64 {
         match column {
             0 => 1.0,
             1..4 => self.positions[i][column - 1],
@@ -158,40 +170,52 @@ impl Columns<'_> {
         }
     }
 
-    /// Node-wise copy of a block of at most W columns, padded with zeros.
-    fn by_node<const W: usize>(&self, block: Range<usize>) -> Vec<[f64; W]> {
-        let mut rows = vec![[0.0; W]; self.positions.len()];
-        rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
-            for (slot, column) in block.clone().enumerate() {
-                for (i, row) in rows.iter_mut().enumerate() {
-                    row[slot] = self.get(CHUNK * chunk + i, column);
-                }
-            }
-        });
-        rows
-    }
-
-    /// Column-wise copy of the rows `nodes` into the columns of `target`.
-    fn by_column(&self, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
-        for column in 0..target.ncols() {
-            for (row, i) in nodes.clone().enumerate() {
-                target[(row, column)] = self.get(i, column);
+    /// Copies some columns of the nodes `first`, `first + 1`, ... into rows of `width` values, as many as there is room for.
+    fn by_node(&self, first: usize, columns: Range<usize>, width: usize, rows: &mut [f64]) {
+        for (slot, column) in columns.enumerate() {
+            for (k, row) in rows.chunks_exact_mut(width).enumerate() {
+                row[slot] = self.get(first + k, column);
             }
         }
     }
 }
 
+/// Zeros that begin at a cache line: the dense kernels meet the same alignment in every run.
+struct Aligned {
+    values: Vec<f64>,
+    start: usize,
+}
+
+impl Aligned {
+    const LINE: usize = 8;
+
+    fn zeros(len: usize) -> Self {
+        let values = vec![0.0; len + Self::LINE];
+        let start = values.as_ptr().align_offset(64).min(Self::LINE);
+        Self { values, start }
+    }
+
+    fn get(&self) -> &[f64] {
+        &self.values[self.start..self.values.len() + self.start - Self::LINE]
+    }
+
+    fn get_mut(&mut self) -> &mut [f64] {
+        let end = self.values.len() + self.start - Self::LINE;
+        &mut self.values[self.start..end]
+    }
+}
+
 /// X' Ms X, exactly symmetric.
-fn weighted_gram<const W: usize, M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>) -> Mat<f64> {
+fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>) -> Mat<f64> {
     let n_columns = columns.count();
     let mut gram = Mat::<f64>::zeros(n_columns, n_columns);
-    for start in (0..n_columns).step_by(W) {
-        // Rows of X' beyond the block are the transpose of a later block.
-        let end = (start + W).min(n_columns);
-        let block = gram_block::<W, M>(mass, columns, start..end);
+    for start in (0..n_columns).step_by(PANEL) {
+        // Rows of X' beyond the panel are the transpose of a later panel.
+        let end = (start + PANEL).min(n_columns);
+        let panel = gram_panel(mass, columns, start..end);
         for column in start..end {
             for row in 0..=column {
-                gram[(row, column)] = block[(row, column - start)];
+                gram[(row, column)] = panel[(row, column - start)];
                 gram[(column, row)] = gram[(row, column)];
             }
         }
@@ -199,43 +223,59 @@ fn weighted_gram<const W: usize, M: NodalMass + ?Sized>(mass: &M, columns: Colum
     gram
 }
 
-/// Columns 0..block.end of X against Ms X[block]: a matrix of block.end rows and W columns.
-fn gram_block<const W: usize, M: NodalMass + ?Sized>(
-    mass: &M,
-    columns: Columns<'_>,
-    block: Range<usize>,
-) -> Mat<f64> {
+/// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the panel.
+fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Range<usize>) -> Mat<f64> {
     let n = columns.positions.len();
-    let n_left = block.end;
-    let x = columns.by_node::<W>(block);
+    let lanes = panel.len().div_ceil(LANE);
+    let (before, width) = (panel.start, lanes * LANE);
+    let mut x = Aligned::zeros(n * width);
+    x.get_mut().par_chunks_mut(CHUNK * width).enumerate().for_each(|(chunk, rows)| {
+        columns.by_node(chunk * CHUNK, panel.clone(), width, rows);
+    });
+    let x = x.get();
+    let x_lanes = x.as_chunks::<LANE>().0;
+    let arch = Arch::new();
     let group = CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1);
     let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
         .into_par_iter()
         .map(|g| {
-            // faer aligns what it allocates: the dense kernels meet the same alignment in every run.
-            let mut left = Mat::<f64>::zeros(CHUNK, n_left);
-            let mut product = Mat::<f64>::zeros(W, CHUNK);
-            let mut sum = Mat::<f64>::zeros(n_left, W);
+            let mut product = Aligned::zeros(CHUNK * width);
+            let mut earlier = Aligned::zeros(CHUNK * before);
+            let mut sum = Mat::<f64>::zeros(before + width, width);
             let nodes = g * group..((g + 1) * group).min(n);
             for first in nodes.clone().step_by(CHUNK) {
-                let chunk = first..(first + CHUNK).min(nodes.end);
-                let rows = chunk.len();
-                columns.by_column(chunk.clone(), left.subrows_mut(0, rows));
-                for (slot, i) in chunk.enumerate() {
-                    let row = mass.row_times(i, &x);
-                    for (w, value) in row.into_iter().enumerate() {
-                        product[(w, slot)] = value;
-                    }
+                let rows = CHUNK.min(nodes.end - first);
+                let product = &mut product.get_mut()[..rows * width];
+                let targets = product.as_chunks_mut::<LANE>().0;
+                arch.dispatch(|| mass_times(mass, first, x_lanes, lanes, targets));
+                // Rows of nodes are columns of the transpose.
+                let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
+                let product = transposed(product, width).transpose();
+                let (top, bottom) = sum.as_mut().split_at_row_mut(before);
+                if before > 0 {
+                    let earlier = &mut earlier.get_mut()[..rows * before];
+                    columns.by_node(first, 0..before, before, earlier);
+                    matmul(top, Accum::Add, transposed(earlier, before), product, 1.0, Par::Seq);
                 }
-                let (left, product) = (left.subrows(0, rows), product.subcols(0, rows));
-                matmul(&mut sum, Accum::Add, left.transpose(), product.transpose(), 1.0, Par::Seq);
+                let own = transposed(&x[first * width..][..rows * width], width);
+                matmul(bottom, Accum::Add, own, product, 1.0, Par::Seq);
             }
             sum
         })
         .collect();
-    let mut total = Mat::<f64>::zeros(n_left, W);
+    let mut total = Mat::<f64>::zeros(before + width, width);
     for part in &partial {
         total += part;
     }
     total
+}
+
+/// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for.
+#[inline(always)] // compiled once per instruction set
+fn mass_times<M: NodalMass + ?Sized>(mass: &M, first: usize, x: &[Lane], lanes: usize, targets: &mut [Lane]) {
+    for (k, row) in targets.chunks_exact_mut(lanes).enumerate() {
+        for (lane, target) in row.iter_mut().enumerate() {
+            *target = mass.row_times(first + k, x, lanes, lane);
+        }
+    }
 }

@@ -3,6 +3,7 @@
 
 mod alignment;
 mod cauchy_schwarz;
+mod certified;
 mod comparison;
 mod condense;
 mod dense;
@@ -17,6 +18,7 @@ mod transform;
 
 pub use alignment::{Alignment, align, compare_invariants};
 pub use cauchy_schwarz::{CauchySchwarz, primary_differences};
+pub use certified::{CertifiedInvariants, DIGITS, condense_certified};
 pub use comparison::{ERROR_NORMS, error_norms};
 pub use condense::condense;
 pub use derived::Derived;

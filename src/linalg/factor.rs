@@ -25,7 +25,7 @@ pub struct Analysis {
 impl Analysis {
     /// Orders and analyses the pencil; `None` when memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        let mut graph = node_graph(pencil);
+        let mut graph = node_graph(pencil)?;
         let order = nested_dissection(&mut graph)?;
         Some(Self::with_tree(AssemblyTree::new(&graph, &order, pencil.block()), pencil.block()))
     }
@@ -263,6 +263,8 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
     let raised = mass.with_raised_diagonal(1.0 + 1e-9);
     let pencil = Pencil::new(&raised, &raised, 1);
-    let tree = AssemblyTree::new(&node_graph(&pencil), analysis.tree.order(), 1);
-    Cholesky::<f64>::new(&Analysis::with_tree(tree, 1), &pencil, 0.0).is_some()
+    node_graph(&pencil).is_some_and(|graph| {
+        let tree = AssemblyTree::new(&graph, analysis.tree.order(), 1);
+        Cholesky::<f64>::new(&Analysis::with_tree(tree, 1), &pencil, 0.0).is_some()
+    })
 }

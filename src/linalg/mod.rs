@@ -2,6 +2,9 @@
 //! The only room that names the linear-algebra crates' sparse solvers.
 
 mod assembly_tree;
+mod compensated;
+mod compensated_pencil;
+mod compensated_product;
 mod dense;
 mod factor;
 mod front;
@@ -14,11 +17,15 @@ mod substitution;
 mod tall;
 mod tree_walk;
 
+pub use compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
+pub use compensated_pencil::small_pencil_eigenvalues;
+pub use compensated_product::{CompensatedBlock, LANES, gram_compensated, multiply_compensated, sum_length};
 pub use dense::{SymmetricEigen, dense_cholesky, symmetric_eigen};
 pub use factor::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 pub use inertia::Inertia;
 pub use ordering::connected_components;
 pub use pencil::Pencil;
 pub use product::multiply;
+pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{combine, gram, subtract_combination};

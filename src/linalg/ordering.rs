@@ -5,35 +5,75 @@
 
 use super::assembly_tree::Graph;
 use super::{Pencil, SymmetricMatrix};
+use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// METIS seeds and uses one random state per process: one call at a time keeps the ordering reproducible.
 static METIS: Mutex<()> = Mutex::new(());
 
-/// Graph of the nodes of a pencil: two are neighbours where K or M couples them.
-pub(super) fn node_graph(pencil: &Pencil<'_>) -> Graph {
-    let (stiffness, mass, block) = (pencil.stiffness(), pencil.mass(), pencil.block());
-    let vertices = mass.n();
-    let mut pointers = Vec::with_capacity(vertices + 1);
-    let mut neighbours: Vec<i32> = Vec::with_capacity(stiffness.as_csc().nnz() / (block * block));
-    let mut seen = vec![u32::MAX; vertices];
-    pointers.push(0);
-    for vertex in 0..vertices {
-        let start = neighbours.len();
-        seen[vertex] = vertex as u32;
-        let mut add = |other: u32| {
-            if std::mem::replace(&mut seen[other as usize], vertex as u32) != vertex as u32 {
-                neighbours.push(other as i32);
+/// Calls `take` with every neighbour of a node, ascending: those that K or M couples it to.
+fn neighbours(pencil: &Pencil<'_>, vertex: u32, mut take: impl FnMut(u32)) {
+    let block = pencil.block() as u32;
+    let row = |b: u32| pencil.stiffness().row((vertex * block + b) as usize).0;
+    // Blocks of up to three rows are merged without a list of what has been met.
+    let mut stiffness: [&[u32]; 3] =
+        std::array::from_fn(|b| if (b as u32) < block { row(b as u32) } else { &[] });
+    let mut mass = pencil.mass().row(vertex as usize).0;
+    loop {
+        let coupled = stiffness.iter().filter_map(|row| row.first()).min().map(|&column| column / block);
+        let Some(next) = coupled.into_iter().chain(mass.first().copied()).min() else { return };
+        for row in &mut stiffness {
+            // At most `block` columns belong to one neighbour.
+            while let Some((&column, after)) = row.split_first()
+                && column < (next + 1) * block
+            {
+                *row = after;
             }
-        };
-        for b in 0..block {
-            stiffness.row(vertex * block + b).0.iter().for_each(|&column| add(column / block as u32));
         }
-        mass.row(vertex).0.iter().for_each(|&other| add(other));
-        neighbours[start..].sort_unstable();
-        pointers.push(neighbours.len() as i32);
+        if mass.first() == Some(&next) {
+            mass = &mass[1..];
+        }
+        if next != vertex {
+            take(next);
+        }
     }
-    Graph { pointers, neighbours }
+}
+
+/// Graph of the nodes of a pencil: two are neighbours where K or M couples them. `None` when it is too large for the
+/// 32-bit numbers of the ordering library.
+///
+/// # Panics
+/// When a node has not one, two or three rows.
+pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
+    /// Vertices per parallel task.
+    const VERTICES: usize = 1024;
+    assert!((1..=3).contains(&pencil.block()), "nodes of 1, 2 or 3 rows, not {}", pencil.block());
+    let vertices = pencil.mass().n();
+    let mut pointers = vec![0i32; vertices + 1];
+    pointers[1..].par_iter_mut().with_min_len(VERTICES).enumerate().for_each(|(vertex, count)| {
+        neighbours(pencil, vertex as u32, |_| *count += 1);
+    });
+    for vertex in 0..vertices {
+        pointers[vertex + 1] = pointers[vertex].checked_add(pointers[vertex + 1])?;
+    }
+    let mut lists = vec![0i32; pointers[vertices] as usize];
+    let mut shares = Vec::with_capacity(vertices / VERTICES + 1);
+    let mut rest = lists.as_mut_slice();
+    for first in (0..vertices).step_by(VERTICES) {
+        let end = (first + VERTICES).min(vertices);
+        let (share, after) = rest.split_at_mut((pointers[end] - pointers[first]) as usize);
+        shares.push((first as u32..end as u32, share));
+        rest = after;
+    }
+    shares.into_par_iter().for_each(|(range, share)| {
+        let mut places = share.iter_mut();
+        for vertex in range {
+            neighbours(pencil, vertex, |other| {
+                *places.next().expect("as many neighbours as were counted") = other as i32;
+            });
+        }
+    });
+    Some(Graph { pointers, neighbours: lists })
 }
 
 /// Elimination order of the vertices of a graph: entry i is eliminated as the i-th. `None` when the ordering library
@@ -83,9 +123,15 @@ pub fn connected_components(a: &SymmetricMatrix, block: usize) -> Vec<usize> {
         component[first] = count;
         stack.push(first);
         while let Some(vertex) = stack.pop() {
-            for b in 0..block {
-                for &column in a.row(vertex * block + b).0 {
+            for row in vertex * block..(vertex + 1) * block {
+                // Entries of one block stand side by side: it is looked up once.
+                let mut known = vertex * block..(vertex + 1) * block;
+                for &column in a.row(row).0 {
+                    if known.contains(&(column as usize)) {
+                        continue;
+                    }
                     let other = column as usize / block;
+                    known = other * block..(other + 1) * block;
                     if component[other] == usize::MAX {
                         component[other] = count;
                         stack.push(other);
@@ -96,4 +142,60 @@ pub fn connected_components(a: &SymmetricMatrix, block: usize) -> Vec<usize> {
         count += 1;
     }
     component
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::CscMatrix;
+    use std::collections::BTreeSet;
+
+    /// Blocks of three rows, coupled through any one of their nine entries; the last two blocks stand alone.
+    fn scattered(vertices: u32) -> (SymmetricMatrix, Vec<BTreeSet<i32>>) {
+        let mut entries = Vec::new();
+        let mut adjacent = vec![BTreeSet::new(); vertices as usize];
+        for i in 0..3 * vertices {
+            entries.push((i, i, 4.0));
+        }
+        for v in 0..vertices - 2 {
+            for step in [1, 7, 300] {
+                let w = v + step;
+                if w < vertices - 2 {
+                    let (r, c) = (3 * v + (v + step) % 3, 3 * w + v % 3);
+                    entries.extend([(r, c, 1.0), (c, r, 1.0)]);
+                    adjacent[v as usize].insert(w as i32);
+                    adjacent[w as usize].insert(v as i32);
+                }
+            }
+        }
+        let n = 3 * vertices as usize;
+        let matrix = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric");
+        (matrix, adjacent)
+    }
+
+    #[test]
+    fn the_graph_has_one_vertex_per_block_and_every_neighbour_once() {
+        let (matrix, mut adjacent) = scattered(2500);
+        // A mass that couples vertices 0 and 9, which K does not, and 0 and 1, which it does.
+        let mut entries: Vec<(u32, u32, f64)> = (0..2500).map(|i| (i, i, 1.0)).collect();
+        entries.extend([(0, 9, 0.1), (9, 0, 0.1), (0, 1, 0.1), (1, 0, 0.1)]);
+        let mass = SymmetricMatrix::new(CscMatrix::from_triplets(2500, 2500, &entries)).expect("symmetric");
+        adjacent[0].insert(9);
+        adjacent[9].insert(0);
+        let mut graph = node_graph(&Pencil::new(&matrix, &mass, 3)).expect("small");
+        for (v, expected) in adjacent.iter().enumerate() {
+            let list = &graph.neighbours[graph.pointers[v] as usize..graph.pointers[v + 1] as usize];
+            assert!(list.iter().eq(expected), "vertex {v}");
+        }
+        let order = nested_dissection(&mut graph).expect("small");
+        assert_eq!(order.iter().collect::<BTreeSet<_>>().len(), 2500);
+    }
+
+    #[test]
+    fn components_are_numbered_in_the_order_of_their_first_block() {
+        let (matrix, _) = scattered(500);
+        let component = connected_components(&matrix, 3);
+        assert!(component[..498].iter().all(|&c| c == 0));
+        assert_eq!(component[498..], [1, 2]);
+    }
 }

@@ -7,10 +7,13 @@
 use super::SymmetricMatrix;
 use faer::prelude::ReborrowMut;
 use faer::{ColRef, MatMut, MatRef};
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// Rows per parallel task.
 const ROWS: usize = 1024;
+/// Rows of a task that are written at a time.
+const TILE: usize = 32;
 
 /// y = (A kron I_block) x for x, y of `block * A.n()` rows and any number of columns.
 ///
@@ -19,6 +22,7 @@ const ROWS: usize = 1024;
 pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, mut y: MatMut<'_, f64>) {
     let n = a.n() * block;
     assert!(x.nrows() == n && y.nrows() == n && x.ncols() == y.ncols(), "shapes of a block product");
+    let mut scratch = vec![0.0; n * x.ncols().min(8)];
     let mut start = 0;
     while start < x.ncols() {
         let rest = x.ncols() - start;
@@ -31,62 +35,89 @@ pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, mut y: Ma
         };
         let xs = x.subcols(start, width);
         let ys = y.rb_mut().subcols_mut(start, width);
+        let packed = &mut scratch[..n * width];
         match (block, width) {
-            (3, 8) => packed::<3, 8>(a, xs, ys),
-            (3, 4) => packed::<3, 4>(a, xs, ys),
-            (3, 2) => packed::<3, 2>(a, xs, ys),
-            (3, _) => packed::<3, 1>(a, xs, ys),
-            (2, 8) => packed::<2, 8>(a, xs, ys),
-            (2, 4) => packed::<2, 4>(a, xs, ys),
-            (2, 2) => packed::<2, 2>(a, xs, ys),
-            (2, _) => packed::<2, 1>(a, xs, ys),
-            (1, 8) => packed::<1, 8>(a, xs, ys),
-            (1, 4) => packed::<1, 4>(a, xs, ys),
-            (1, 2) => packed::<1, 2>(a, xs, ys),
-            (1, _) => packed::<1, 1>(a, xs, ys),
+            (3, 8) => pass::<3, 8>(a, xs, ys, packed),
+            (3, 4) => pass::<3, 4>(a, xs, ys, packed),
+            (3, 2) => pass::<3, 2>(a, xs, ys, packed),
+            (3, _) => pass::<3, 1>(a, xs, ys, packed),
+            (2, 8) => pass::<2, 8>(a, xs, ys, packed),
+            (2, 4) => pass::<2, 4>(a, xs, ys, packed),
+            (2, 2) => pass::<2, 2>(a, xs, ys, packed),
+            (2, _) => pass::<2, 1>(a, xs, ys, packed),
+            (1, 8) => pass::<1, 8>(a, xs, ys, packed),
+            (1, 4) => pass::<1, 4>(a, xs, ys, packed),
+            (1, 2) => pass::<1, 2>(a, xs, ys, packed),
+            (1, _) => pass::<1, 1>(a, xs, ys, packed),
             _ => panic!("blocks of 1, 2 or 3 components, not {block}"),
         }
         start += width;
     }
 }
 
-/// One packed pass: `B` components per matrix row, `W` columns.
-fn packed<const B: usize, const W: usize>(a: &SymmetricMatrix, x: MatRef<'_, f64>, mut y: MatMut<'_, f64>) {
-    let n = a.n();
-    let columns: Vec<&[f64]> = (0..W).map(|c| contiguous(x.col(c))).collect();
-    let mut xp = vec![[[0.0f64; W]; B]; n];
-    xp.par_chunks_mut(ROWS).enumerate().for_each(|(chunk, rows)| {
-        for c in 0..W {
-            let column = &columns[c][chunk * ROWS * B..];
-            for (row, source) in rows.iter_mut().zip(column.chunks_exact(B)) {
-                for (entry, &value) in row.iter_mut().zip(source) {
-                    entry[c] = value;
-                }
-            }
+/// One pass over the matrix: `B` components per matrix row, `W` columns; `packed` has room for all of x.
+fn pass<const B: usize, const W: usize>(
+    a: &SymmetricMatrix,
+    x: MatRef<'_, f64>,
+    y: MatMut<'_, f64>,
+    packed: &mut [f64],
+) {
+    let arch = Arch::new();
+    let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
+    let packed = packed.as_chunks_mut::<W>().0;
+    packed.par_chunks_mut(ROWS * B).enumerate().for_each(|(chunk, rows)| {
+        let part = columns.map(|column| &column[chunk * ROWS * B..][..rows.len()]);
+        for (k, row) in rows.iter_mut().enumerate() {
+            *row = part.map(|column| column[k]);
         }
     });
-    let mut yp = vec![[[0.0f64; W]; B]; n];
-    yp.par_chunks_mut(ROWS).enumerate().for_each(|(chunk, rows)| {
-        for (r, row) in rows.iter_mut().enumerate() {
-            let (columns, values) = a.row(chunk * ROWS + r);
+    let (packed, rest) = packed.as_chunks::<B>();
+    debug_assert!(rest.is_empty(), "n rows of B components");
+    let mut targets: Vec<_> = y
+        .col_iter_mut()
+        .map(|column| {
+            let column = column.try_as_col_major_mut().expect("blocks are column-major");
+            column.as_slice_mut().chunks_mut(ROWS * B)
+        })
+        .collect();
+    let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS))
+        .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
+        .collect();
+    shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
+        arch.dispatch(|| rows_times::<B, W>(a, chunk * ROWS, packed, share));
+    });
+}
+
+/// Rows `first`, `first + 1`, ... of the product, as many as `y` has room for.
+#[inline(always)] // compiled once per instruction set
+fn rows_times<const B: usize, const W: usize>(
+    a: &SymmetricMatrix,
+    first: usize,
+    x: &[[[f64; W]; B]],
+    mut y: [&mut [f64]; W],
+) {
+    // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the inner loop.
+    let mut tile = [[[0.0f64; W]; B]; TILE];
+    let rows = y[0].len() / B;
+    for start in (0..rows).step_by(TILE) {
+        let tile = &mut tile[..TILE.min(rows - start)];
+        for (r, target) in tile.iter_mut().enumerate() {
+            let (columns, values) = a.row(first + start + r);
             let mut sum = [[0.0f64; W]; B];
             for (&j, &v) in columns.iter().zip(values) {
-                let xj = &xp[j as usize];
+                let xj = &x[j as usize];
                 for b in 0..B {
                     for c in 0..W {
                         sum[b][c] += v * xj[b][c];
                     }
                 }
             }
-            *row = sum;
+            *target = sum;
         }
-    });
-    for c in 0..W {
-        let column = y.rb_mut().col_mut(c);
-        let column = column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut();
-        for (row, target) in yp.iter().zip(column.chunks_exact_mut(B)) {
-            for (value, entry) in target.iter_mut().zip(row) {
-                *value = entry[c];
+        let tile = tile.as_flattened();
+        for (c, column) in y.iter_mut().enumerate() {
+            for (entry, row) in column[start * B..].iter_mut().zip(tile) {
+                *entry = row[c];
             }
         }
     }
@@ -95,4 +126,35 @@ fn packed<const B: usize, const W: usize>(a: &SymmetricMatrix, x: MatRef<'_, f64
 /// A column as a slice: every block in this crate is column-major.
 fn contiguous<'a>(column: ColRef<'a, f64>) -> &'a [f64] {
     column.try_as_col_major().expect("blocks are column-major").as_slice()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::CscMatrix;
+    use faer::Mat;
+
+    #[test]
+    fn every_block_and_width_is_the_sum_in_storage_order() {
+        let n = ROWS + 77; // two tasks
+        let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|i| (i, i, f64::from(i) + 0.1)).collect();
+        for i in 0..n as u32 - 40 {
+            let v = f64::from(i).sin();
+            entries.extend([(i, i + 40, v), (i + 40, i, v)]);
+        }
+        let a = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric");
+        for block in 1..=3 {
+            for columns in 0..=19 {
+                let x = Mat::from_fn(block * n, columns, |i, j| ((i * 31 + j * 7) as f64).cos());
+                let mut y = Mat::from_fn(block * n, columns, |_, _| f64::NAN);
+                multiply(&a, block, x.as_ref(), y.as_mut());
+                let expected = Mat::from_fn(block * n, columns, |i, c| {
+                    let (columns, values) = a.row(i / block);
+                    let terms = columns.iter().zip(values);
+                    terms.fold(0.0, |sum, (&j, v)| sum + v * x[(j as usize * block + i % block, c)])
+                });
+                assert_eq!(y, expected, "{block} components, {columns} columns");
+            }
+        }
+    }
 }

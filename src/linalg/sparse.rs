@@ -1,7 +1,13 @@
 //! Compressed sparse matrices: a general one as readers deliver it, and the symmetric one that all work uses.
 
-/// Sparse matrix in compressed column form, rows ascending within each column, no duplicates, no zeros
-/// unless [`CscMatrix::from_parts`] brought them.
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Columns per parallel task.
+const COLUMNS: usize = 4096;
+
+/// Sparse matrix in compressed column form, rows ascending within each column, no duplicates, no zeros unless
+/// [`CscMatrix::from_parts`] brought them. The default has no rows and no columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CscMatrix {
     n_rows: usize,
@@ -9,6 +15,12 @@ pub struct CscMatrix {
     col_ptr: Vec<usize>,
     row_idx: Vec<u32>,
     values: Vec<f64>,
+}
+
+impl Default for CscMatrix {
+    fn default() -> Self {
+        Self { n_rows: 0, n_cols: 0, col_ptr: vec![0], row_idx: Vec::new(), values: Vec::new() }
+    }
 }
 
 impl CscMatrix {
@@ -28,11 +40,11 @@ impl CscMatrix {
         assert_eq!(col_ptr[0], 0, "first column pointer");
         assert_eq!(*col_ptr.last().expect("n_cols + 1 >= 1"), row_idx.len(), "entries");
         assert_eq!(row_idx.len(), values.len(), "values");
-        for j in 0..n_cols {
+        (0..n_cols).into_par_iter().with_min_len(COLUMNS).for_each(|j| {
             let rows = &row_idx[col_ptr[j]..col_ptr[j + 1]];
-            assert!(rows.windows(2).all(|w| w[0] < w[1]), "rows of column {j} not ascending");
+            assert!(rows.is_sorted_by(|a, b| a < b), "rows of column {j} not ascending");
             assert!(rows.last().is_none_or(|&r| (r as usize) < n_rows), "row out of range");
-        }
+        });
         Self { n_rows, n_cols, col_ptr, row_idx, values }
     }
 
@@ -140,20 +152,65 @@ impl CscMatrix {
         for (old, &new) in to.iter().enumerate() {
             from[new as usize] = old as u32;
         }
-        let mut col_ptr = Vec::with_capacity(n + 1);
-        let mut entries: Vec<(u32, f64)> = Vec::new();
-        let (mut row_idx, mut values) = (Vec::with_capacity(self.nnz()), Vec::with_capacity(self.nnz()));
-        col_ptr.push(0);
-        for &old in &from {
-            let (rows, vals) = self.column(old as usize);
-            entries.clear();
-            entries.extend(rows.iter().zip(vals).map(|(&r, &v)| (to[r as usize], v)));
-            entries.sort_unstable_by_key(|e| e.0);
-            row_idx.extend(entries.iter().map(|e| e.0));
-            values.extend(entries.iter().map(|e| e.1));
-            col_ptr.push(row_idx.len());
+        let mut col_ptr = vec![0usize; n + 1];
+        for (new, &old) in from.iter().enumerate() {
+            col_ptr[new + 1] = col_ptr[new] + self.column(old as usize).0.len();
         }
+        let (mut row_idx, mut values) = (vec![0u32; self.nnz()], vec![0.0; self.nnz()]);
+        let cuts: Vec<usize> = (0..n).step_by(COLUMNS).chain([n]).collect();
+        split_columns(&col_ptr, &cuts, &mut row_idx, &mut values).into_par_iter().for_each(|block| {
+            let mut entries: Vec<(u32, f64)> = Vec::new();
+            let mut at = 0;
+            for &old in &from[block.columns] {
+                let (rows, vals) = self.column(old as usize);
+                entries.clear();
+                entries.extend(rows.iter().zip(vals).map(|(&r, &v)| (to[r as usize], v)));
+                entries.sort_unstable_by_key(|e| e.0);
+                for &(row, value) in &entries {
+                    block.rows[at] = row;
+                    block.values[at] = value;
+                    at += 1;
+                }
+            }
+        });
         Self { n_rows: n, n_cols: n, col_ptr, row_idx, values }
+    }
+
+    /// Whether pattern and values are exactly symmetric.
+    pub fn is_symmetric(&self) -> bool {
+        let n = self.n_cols;
+        // Every task has a cursor per column: a few long ranges.
+        let length = n.div_ceil(16).max(COLUMNS);
+        let surplus = |first: usize| self.lower_surplus(first..(first + length).min(n));
+        self.n_rows == n
+            && (0..n).into_par_iter().step_by(length).map(surplus).try_reduce(|| 0, |a, b| Some(a + b))
+                == Some(0)
+    }
+
+    /// Number of entries below the diagonal less that above it in some columns; `None` when an entry below has no equal
+    /// one at the mirrored place.
+    fn lower_surplus(&self, columns: Range<usize>) -> Option<i64> {
+        let mut surplus = 0;
+        // Ascending columns j meet the mirrored entries (j, i) of column i in ascending order.
+        let mut cursor = vec![0u32; self.n_cols];
+        for j in columns.clone() {
+            let (rows, values) = self.column(j);
+            let below = rows.partition_point(|&r| r as usize <= j);
+            surplus -= rows[..below].iter().filter(|&&r| r as usize != j).count() as i64;
+            surplus += (rows.len() - below) as i64;
+            for (&i, &value) in rows[below..].iter().zip(&values[below..]) {
+                let (mirrored, mirrored_values) = self.column(i as usize);
+                let at = &mut cursor[i as usize];
+                if *at == 0 {
+                    *at = mirrored.partition_point(|&r| (r as usize) < columns.start) as u32;
+                }
+                if mirrored.get(*at as usize) != Some(&(j as u32)) || mirrored_values[*at as usize] != value {
+                    return None;
+                }
+                *at += 1;
+            }
+        }
+        Some(surplus)
     }
 
     /// The transpose; for a symmetric matrix, an equal one.
@@ -189,7 +246,7 @@ pub struct SymmetricMatrix(CscMatrix);
 impl SymmetricMatrix {
     /// Takes a matrix whose pattern and values are exactly symmetric; `None` when they are not.
     pub fn new(matrix: CscMatrix) -> Option<Self> {
-        (matrix.n_rows == matrix.n_cols && matrix == matrix.transpose()).then_some(Self(matrix))
+        Self::try_from(matrix).ok()
     }
 
     /// Takes the mean of a nearly symmetric matrix and its transpose.
@@ -248,7 +305,17 @@ impl SymmetricMatrix {
 
     /// The diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
-        (0..self.n()).map(|i| self.0.get(i, i)).collect()
+        (0..self.n()).into_par_iter().with_min_len(COLUMNS).map(|i| self.0.get(i, i)).collect()
+    }
+
+    /// The matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` when one is not stored.
+    pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
+        let mut matrix = self.clone();
+        for i in 0..self.n() {
+            let at = self.0.col_ptr[i] + self.row(i).0.binary_search(&(i as u32)).ok()?;
+            matrix.0.values[at] = f(i, self.0.values[at]);
+        }
+        Some(matrix)
     }
 
     /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every other.
@@ -266,6 +333,44 @@ impl SymmetricMatrix {
     }
 }
 
+impl TryFrom<CscMatrix> for SymmetricMatrix {
+    /// The matrix itself, unchanged.
+    type Error = CscMatrix;
+
+    /// Takes a matrix whose pattern and values are exactly symmetric, and gives any other back.
+    fn try_from(matrix: CscMatrix) -> Result<Self, CscMatrix> {
+        if matrix.is_symmetric() { Ok(Self(matrix)) } else { Err(matrix) }
+    }
+}
+
+/// Some columns of a matrix that is being made.
+pub(crate) struct ColumnBlock<'a> {
+    /// Which columns.
+    pub columns: Range<usize>,
+    /// Their share of the rows.
+    pub rows: &'a mut [u32],
+    /// Their share of the values.
+    pub values: &'a mut [f64],
+}
+
+/// Cuts the entries of a matrix into those of the columns between successive `cuts`.
+pub(crate) fn split_columns<'a>(
+    col_ptr: &[usize],
+    cuts: &[usize],
+    mut row_idx: &'a mut [u32],
+    mut values: &'a mut [f64],
+) -> Vec<ColumnBlock<'a>> {
+    let mut blocks = Vec::with_capacity(cuts.len());
+    for cut in cuts.windows(2) {
+        let share = col_ptr[cut[1]] - col_ptr[cut[0]];
+        let (rows, rows_left) = row_idx.split_at_mut(share);
+        let (vals, values_left) = values.split_at_mut(share);
+        (row_idx, values) = (rows_left, values_left);
+        blocks.push(ColumnBlock { columns: cut[0]..cut[1], rows, values: vals });
+    }
+    blocks
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -277,5 +382,54 @@ mod tests {
         assert_eq!((matrix.nnz(), matrix.get(0, 0), matrix.get(0, 1)), (2, 2.0, 0.5));
         let skew = CscMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (0, 1, 3.0), (1, 0, -3.0)]);
         assert_eq!(SymmetricMatrix::symmetrised(&skew).as_csc().nnz(), 1);
+    }
+
+    /// A banded symmetric matrix of several tasks.
+    fn banded(n: usize) -> Vec<(u32, u32, f64)> {
+        let value = |i: usize, j: usize| ((i.min(j) * 7 + i.max(j)) as f64).sin() + 2.0;
+        (0..n)
+            .flat_map(|j| [j, j + 1, j + 5, j + 3000].map(|i| (i, j)))
+            .filter(|&(i, _)| i < n)
+            .flat_map(|(i, j)| [(i as u32, j as u32, value(i, j)), (j as u32, i as u32, value(i, j))])
+            .collect()
+    }
+
+    #[test]
+    fn symmetry_is_found_and_every_single_flaw_is_too() {
+        const N: usize = 3 * COLUMNS + 17;
+        let entries = banded(N);
+        let matrix = CscMatrix::from_triplets(N, N, &entries);
+        assert!(matrix.is_symmetric());
+        assert_eq!(matrix, matrix.transpose());
+        for at in [(1, 0), (N - 1, N - 2), (3000 + 4095, 4095), (4096, 4096 + 5), (COLUMNS, COLUMNS - 1)] {
+            let at = (at.0 as u32, at.1 as u32);
+            let missing: Vec<_> = entries.iter().filter(|e| (e.0, e.1) != at).copied().collect();
+            assert!(!CscMatrix::from_triplets(N, N, &missing).is_symmetric(), "{at:?} missing");
+            let changed = entries.iter().map(|&(r, c, v)| (r, c, if (r, c) == at { v + 1e-15 } else { v }));
+            assert!(
+                !CscMatrix::from_triplets(N, N, &changed.collect::<Vec<_>>()).is_symmetric(),
+                "{at:?} changed"
+            );
+        }
+        let wide = CscMatrix::from_triplets(2, 3, &[(0, 0, 1.0)]);
+        assert!(!wide.is_symmetric());
+        let given_back = SymmetricMatrix::try_from(wide.clone()).unwrap_err();
+        assert_eq!(given_back, wide);
+    }
+
+    #[test]
+    fn a_permuted_matrix_has_its_entries_where_they_belong() {
+        const N: usize = COLUMNS + 100;
+        let matrix = CscMatrix::from_triplets(N, N, &banded(N));
+        let to: Vec<u32> = (0..N).map(|i| (i * 3001 % N) as u32).collect(); // 3001 is prime to N
+        let permuted = matrix.permuted(&to);
+        assert!(permuted.is_symmetric());
+        for j in (0..N).step_by(13) {
+            let (rows, values) = matrix.column(j);
+            assert_eq!(permuted.column(to[j] as usize).0.len(), rows.len());
+            for (&i, &v) in rows.iter().zip(values) {
+                assert_eq!(permuted.get(to[i as usize] as usize, to[j] as usize), v);
+            }
+        }
     }
 }

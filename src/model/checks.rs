@@ -7,6 +7,7 @@ use super::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{SymmetricMatrix, connected_components};
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// A model that passed, with the warnings and notes on the way.
@@ -69,8 +70,8 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     stop_on_error(&mut found)?;
 
     let label = |row: usize| DofLabel { node: nodes.ids[row / 3], direction: (row % 3) as u8 + 1 };
-    let stiffness = symmetric(&raw.stiffness, &layout, "stiffness", label, &mut found);
-    let mass = symmetric(&raw.mass, &layout, "mass", label, &mut found);
+    let stiffness = symmetric(&mut raw.stiffness, &layout, "stiffness", label, &mut found);
+    let mass = symmetric(&mut raw.mass, &layout, "mass", label, &mut found);
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -147,7 +148,9 @@ fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
         let message = format!("{name} matrix has no nonzero entries");
         found.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
     }
-    if let Some(at) = matrix.values().iter().position(|v| !v.is_finite()) {
+    let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+    if !matrix.values().par_chunks(1 << 16).all(finite) {
+        let at = matrix.values().iter().position(|v| !v.is_finite()).expect("just found");
         let column = matrix.col_ptr().partition_point(|&p| p <= at);
         let message = format!(
             "{name} matrix has {} in row {}, column {column}",
@@ -158,20 +161,21 @@ fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// The matrix in internal order, symmetric; `None` with a diagnostic when it is not symmetric to rounding.
+/// The matrix in internal order, symmetric, taken out of `raw`; `None` with a diagnostic when it is not symmetric to
+/// rounding.
 fn symmetric(
-    raw: &RawMatrix,
+    raw: &mut RawMatrix,
     layout: &Layout,
     name: &str,
     label: impl Fn(usize) -> DofLabel,
     found: &mut Vec<Diagnostic>,
 ) -> Option<SymmetricMatrix> {
-    let ordered =
-        if layout.is_identity() { raw.matrix.clone() } else { raw.matrix.permuted(&layout.row_to_internal) };
-    let transpose = ordered.transpose();
-    if ordered == transpose {
-        return SymmetricMatrix::new(ordered);
-    }
+    let matrix = std::mem::take(&mut raw.matrix);
+    let ordered = if layout.is_identity() { matrix } else { matrix.permuted(&layout.row_to_internal) };
+    let ordered = match SymmetricMatrix::try_from(ordered) {
+        Ok(symmetric) => return Some(symmetric),
+        Err(ordered) => ordered,
+    };
     let n = ordered.n_cols();
     let size: Vec<f64> = (0..n).map(|i| ordered.get(i, i).abs().sqrt()).collect();
     let (mut worst, mut at) = (0.0f64, (0, 0));
@@ -180,7 +184,7 @@ fn symmetric(
         let (rows, values) = ordered.column(j);
         for (&i, &v) in rows.iter().zip(values) {
             let i = i as usize;
-            let other = transpose.get(i, j);
+            let other = ordered.get(j, i);
             one_sided += usize::from(other == 0.0);
             let scale =
                 (size[i] * size[j]).max(if size[i] * size[j] > 0.0 { 0.0 } else { v.abs().max(other.abs()) });

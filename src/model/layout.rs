@@ -2,6 +2,7 @@
 
 use super::{DofLabel, RawModel};
 use crate::diagnostic::{Code, Diagnostic};
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Where each matrix row goes.
@@ -82,7 +83,14 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
         let message = format!("{} rotational degrees of freedom: {}", rotations.len(), name_some(&rotations));
         found.push(Diagnostic::new(Code::RotationsUnsupported, message).in_file(&raw.dofs_path));
     }
-    let mut missing: Vec<i64> = labels.iter().map(|l| l.node).filter(|id| !index.contains_key(id)).collect();
+    // Looked up once: the labels are three times as many as the nodes.
+    let places: Vec<Option<usize>> = labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
+    let mut missing: Vec<i64> = labels
+        .iter()
+        .zip(&places)
+        .filter(|(_, place)| place.is_none())
+        .map(|(label, _)| label.node)
+        .collect();
     missing.sort_unstable();
     missing.dedup();
     if !missing.is_empty() {
@@ -94,8 +102,8 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     }
     let mut row_of = vec![[u32::MAX; 3]; raw.nodes.len()];
     let mut twice = Vec::new();
-    for (row, label) in labels.iter().enumerate() {
-        let slot = &mut row_of[index[&label.node]][usize::from(label.direction) - 1];
+    for (row, (label, place)) in labels.iter().zip(places.into_iter().flatten()).enumerate() {
+        let slot = &mut row_of[place][usize::from(label.direction) - 1];
         if *slot == u32::MAX {
             *slot = row as u32;
         } else {

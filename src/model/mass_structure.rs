@@ -3,6 +3,11 @@
 use super::DofLabel;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::linalg::{CscMatrix, SymmetricMatrix};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Nodes per parallel task: sums have fixed partitions.
+const NODES: usize = 2048;
 
 /// What the mass matrix turned out to be.
 pub(super) struct ScalarMass {
@@ -20,16 +25,15 @@ pub(super) fn scalar_mass(
     label: impl Fn(usize) -> DofLabel,
 ) -> Result<ScalarMass, Diagnostic> {
     let n = m.n() / 3;
-    let mut totals = [0.0f64; 3];
-    let mut magnitude = 0.0f64;
-    for i in 0..m.n() {
-        let (columns, values) = m.row(i);
-        for (&j, &v) in columns.iter().zip(values) {
-            if j as usize % 3 == i % 3 {
-                totals[i % 3] += v;
-                magnitude += v.abs() / 3.0;
-            }
+    let chunks: Vec<Range<usize>> = (0..n).step_by(NODES).map(|i| i..(i + NODES).min(n)).collect();
+    let parts: Vec<([f64; 3], f64)> =
+        chunks.par_iter().map(|nodes| directional_mass(m, nodes.clone())).collect();
+    let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
+    for (part, part_magnitude) in parts {
+        for (total, part) in totals.iter_mut().zip(part) {
+            *total += part;
         }
+        magnitude += part_magnitude;
     }
     let mean = totals.iter().sum::<f64>() / 3.0;
     if mean.is_nan() || mean <= tolerance * magnitude {
@@ -43,53 +47,25 @@ pub(super) fn scalar_mass(
         return Err(Diagnostic::new(Code::MassDirectional, message));
     }
     let diagonal = m.diagonal();
-    let size = |i: usize| (0..3).fold(0.0f64, |s, k| s.max(diagonal[3 * i + k].abs())).sqrt();
-    let sizes: Vec<f64> = (0..n).map(size).collect();
+    let size = |d: &[f64]| d.iter().fold(0.0f64, |s, d| s.max(d.abs())).sqrt();
+    let sizes: Vec<f64> = diagonal.chunks_exact(3).map(size).collect();
+    // Massless nodes have no scale of their own: compare with the mean nodal mass.
+    let smallest = f64::EPSILON * mean / n as f64;
+    let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
+    let parts: Vec<Part> = chunks.into_par_iter().map(|nodes| reduce(m, nodes, scale)).collect();
+    let entries = parts.iter().map(|part| part.row_idx.len()).sum();
     let (mut worst, mut worst_at) = (0.0f64, (0, 0));
-    let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
-    let mut block: Vec<[f64; 3]> = vec![[0.0; 3]; n];
-    let mut touched: Vec<u32> = Vec::new();
-    let mut is_touched = vec![false; n];
-    for node in 0..n {
-        for k in 0..3 {
-            let (columns, entries) = m.row(3 * node + k);
-            for (&j, &v) in columns.iter().zip(entries) {
-                let (other, l) = (j as usize / 3, j as usize % 3);
-                if !is_touched[other] {
-                    is_touched[other] = true;
-                    touched.push(other as u32);
-                }
-                if k == l {
-                    block[other][l] = v;
-                } else {
-                    // Massless nodes have no scale of their own: compare with the mean nodal mass.
-                    let deviation =
-                        v.abs() / (sizes[node] * sizes[other]).max(f64::EPSILON * mean / n as f64);
-                    if deviation > worst {
-                        (worst, worst_at) = (deviation, (3 * node + k, j as usize));
-                    }
-                }
-            }
+    let mut col_ptr = Vec::with_capacity(n + 1);
+    let (mut row_idx, mut values) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
+    col_ptr.push(0);
+    for part in parts {
+        let before = row_idx.len();
+        col_ptr.extend(part.ends.iter().map(|end| before + end));
+        row_idx.extend(part.row_idx);
+        values.extend(part.values);
+        if part.worst > worst {
+            (worst, worst_at) = (part.worst, part.worst_at);
         }
-        touched.sort_unstable();
-        for &other in &touched {
-            let diagonal = std::mem::take(&mut block[other as usize]);
-            is_touched[other as usize] = false;
-            let alpha = (diagonal[0] + diagonal[1] + diagonal[2]) / 3.0;
-            let scale = (sizes[node] * sizes[other as usize]).max(f64::EPSILON * mean / n as f64);
-            for (k, &v) in diagonal.iter().enumerate() {
-                let deviation = (v - alpha).abs() / scale;
-                if deviation > worst {
-                    (worst, worst_at) = (deviation, (3 * node + k, 3 * other as usize + k));
-                }
-            }
-            if alpha != 0.0 {
-                row_idx.push(other);
-                values.push(alpha);
-            }
-        }
-        touched.clear();
-        col_ptr.push(row_idx.len());
     }
     if worst > tolerance {
         let (a, b) = worst_at;
@@ -100,7 +76,79 @@ pub(super) fn scalar_mass(
         );
         return Err(Diagnostic::new(Code::MassBlockStructure, message));
     }
-    // The mean of three entries is symmetric because each of them is.
     let csc = CscMatrix::from_parts(n, n, col_ptr, row_idx, values);
-    Ok(ScalarMass { matrix: SymmetricMatrix::symmetrised(&csc), deviation: worst })
+    let matrix = SymmetricMatrix::new(csc)
+        .expect("the mean of three entries is symmetric because each of them is, to the bit");
+    Ok(ScalarMass { matrix, deviation: worst })
+}
+
+/// Sum of M along each direction over the rows of some nodes, and a third of the sum of the absolute values.
+fn directional_mass(m: &SymmetricMatrix, nodes: Range<usize>) -> ([f64; 3], f64) {
+    let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
+    for node in nodes {
+        for (k, total) in totals.iter_mut().enumerate() {
+            let (columns, values) = m.row(3 * node + k);
+            for (&j, &v) in columns.iter().zip(values) {
+                if j % 3 == k as u32 {
+                    *total += v;
+                    magnitude += v.abs() / 3.0;
+                }
+            }
+        }
+    }
+    (totals, magnitude)
+}
+
+/// Some columns of Ms, and the largest deviation of their blocks with its place in M.
+#[derive(Default)]
+struct Part {
+    ends: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+    worst: f64,
+    worst_at: (usize, usize),
+}
+
+/// Reduces the rows of some nodes; deviations are relative to `scale` of the two nodes.
+fn reduce(m: &SymmetricMatrix, nodes: Range<usize>, scale: impl Fn(usize, usize) -> f64) -> Part {
+    let mut part = Part::default();
+    for node in nodes {
+        let rows = [0, 1, 2].map(|k| m.row(3 * node + k));
+        let mut at = [0usize; 3];
+        // The three rows are merged: blocks come in the order of the other node.
+        while let Some(other) = (0..3).filter_map(|k| rows[k].0.get(at[k])).min().map(|j| j / 3) {
+            let scale = scale(node, other as usize);
+            let mut diagonal = [0.0; 3];
+            for k in 0..3 {
+                let (columns, values) = rows[k];
+                while let Some(&j) = columns.get(at[k]).filter(|&&j| j / 3 == other) {
+                    let v = values[at[k]];
+                    at[k] += 1;
+                    if j as usize % 3 == k {
+                        diagonal[k] = v;
+                    } else {
+                        part.deviates(v.abs() / scale, 3 * node + k, j as usize);
+                    }
+                }
+            }
+            let alpha = (diagonal[0] + diagonal[1] + diagonal[2]) / 3.0;
+            for (k, &v) in diagonal.iter().enumerate() {
+                part.deviates((v - alpha).abs() / scale, 3 * node + k, 3 * other as usize + k);
+            }
+            if alpha != 0.0 {
+                part.row_idx.push(other);
+                part.values.push(alpha);
+            }
+        }
+        part.ends.push(part.row_idx.len());
+    }
+    part
+}
+
+impl Part {
+    fn deviates(&mut self, by: f64, row: usize, column: usize) {
+        if by > self.worst {
+            (self.worst, self.worst_at) = (by, (row, column));
+        }
+    }
 }

@@ -43,17 +43,24 @@ pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
 
 /// For each row i: max over the six fields of |(K R)_i| / sum_j |K_ij|, zero for empty rows. The fields have
 /// components of at most one, so that values near one mean a support and values near roundoff a free body.
-pub fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>) -> Vec<f64> {
+pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>) -> Vec<f64> {
+    // Row by row: what a matrix entry needs lies in one or two cache lines.
+    let rows: Vec<[f64; 6]> = (0..k.n())
+        .into_par_iter()
+        .with_min_len(1024)
+        .map(|i| std::array::from_fn(|c| fields[(i, c)]))
+        .collect();
     (0..k.n())
         .into_par_iter()
+        .with_min_len(1024)
         .map(|i| {
             let (columns, values) = k.row(i);
             let mut sums = [0.0; 6];
             let mut scale = 0.0;
             for (&j, &v) in columns.iter().zip(values) {
                 scale += v.abs();
-                for (c, sum) in sums.iter_mut().enumerate() {
-                    *sum += v * fields[(j as usize, c)];
+                for (sum, field) in sums.iter_mut().zip(&rows[j as usize]) {
+                    *sum += v * field;
                 }
             }
             let worst = sums.iter().fold(0.0f64, |m, s| m.max(s.abs()));

@@ -1,6 +1,7 @@
 //! The facts of a body and of the run that made it, computed once; every format renders these.
 
 use super::completeness::Completeness;
+use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
 use super::run_data::{Phase, RunData};
@@ -11,7 +12,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 0;
+const MINOR: u32 = 1;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -27,6 +28,8 @@ pub struct Facts {
     pub(super) body: MassProperties,
     pub(super) modes: ModeFacts,
     pub(super) completeness: Completeness,
+    /// At accuracy `certified`.
+    pub(super) guarantee: Option<GuaranteeFacts>,
     pub(super) lumped: Vec<LumpedFacts>,
     pub(super) lumped_modes: Vec<LumpedModesFacts>,
     /// `None` for a body read from a file.
@@ -118,6 +121,7 @@ impl Facts {
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
             completeness: Completeness::of(body),
+            guarantee: GuaranteeFacts::of(body),
             lumped: body.lumped().iter().map(LumpedFacts::of).collect(),
             lumped_modes,
             run: (known != RunData::default()).then(|| RunFacts::of(&known)),

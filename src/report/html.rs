@@ -2,6 +2,7 @@
 
 use super::Facts;
 use super::bar_chart::bar_chart;
+use super::guarantee::cut;
 use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
@@ -171,6 +172,10 @@ fn modes(html: &mut String, facts: &Facts) {
     if !c.remark.is_empty() {
         items.push(("Remark", escape(&c.remark)));
     }
+    if let Some(guarantee) = &facts.guarantee {
+        items.push(("Eigenvalues", escape(&sentence(&guarantee.eigenvalues()))));
+        items.push(("Invariants", escape(&sentence(&guarantee.invariants()))));
+    }
     terms(html, items);
     section(html, "Frequencies");
     // Without damping a column of zeros would say nothing.
@@ -178,6 +183,10 @@ fn modes(html: &mut String, facts: &Facts) {
     let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(&facts.model.units.time));
     let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue, "Residual"]);
     head.extend(damped.then(|| "Damping ratio".to_owned()));
+    let guarantee = facts.guarantee.as_ref();
+    head.extend(
+        guarantee.iter().flat_map(|_| texts(["Lower bound", "Upper bound", "Digits", "Shape error"])),
+    );
     let row = |j: usize| {
         let mut cells = vec![
             (j + 1).to_string(),
@@ -186,10 +195,24 @@ fn modes(html: &mut String, facts: &Facts) {
             significant(modes.residual[j], 2),
         ];
         cells.extend(damped.then(|| significant(modes.damping_ratio[j], 4)));
+        cells.extend(guarantee.iter().flat_map(|g| {
+            [
+                significant(g.eigenvalue_lower[j], 17),
+                significant(g.eigenvalue_upper[j], 17),
+                cut(g.eigenvalue_digits[j]),
+                significant(g.shape_error[j], 2),
+            ]
+        }));
         cells
     };
     let rows: Vec<_> = (0..modes.count).map(row).collect();
     table(html, "Flexible modes, ascending", &head, &[], &rows);
+    if let Some(guarantee) = guarantee {
+        let row = |(name, digits): &(&str, f64)| vec![escape(name), cut(*digits)];
+        let rows: Vec<_> = guarantee.invariant_digits.iter().map(row).collect();
+        let caption = "Guaranteed digits of the invariants, worst entry relative to its Cauchy-Schwarz bound";
+        table(html, caption, &texts(["Invariant", "Digits"]), &[0], &rows);
+    }
 }
 
 fn lumped(html: &mut String, facts: &Facts) {

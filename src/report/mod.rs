@@ -5,6 +5,7 @@ mod clusters;
 mod comparison;
 mod completeness;
 mod facts;
+mod guarantee;
 mod html;
 mod identities;
 mod lumped;

@@ -135,6 +135,10 @@ fn modes(page: &mut Page, facts: &Facts) {
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {
         page.entry("", &plain(&completeness.remark));
     }
+    if let Some(guarantee) = &facts.guarantee {
+        page.entry("guaranteed", &guarantee.eigenvalues());
+        page.entry("", &guarantee.invariants());
+    }
     let noise = significant(completeness.rigid_noise, 2);
     let residual = significant(completeness.rigid_residual, 2);
     page.entry("noise", &format!("rigid modes at {noise} of the first eigenvalue; K R {residual}"));

@@ -3,8 +3,8 @@
 use super::scan::Scan;
 use super::schema::MASS_STRUCTURES;
 use super::value::Value;
-use crate::flex_body::{Certificate, Frame, Interface, LumpedBody, Modes, Parts, Source};
-use crate::invariants::Invariants;
+use crate::flex_body::{Certificate, Frame, Guarantee, Interface, LumpedBody, Modes, Parts, Source};
+use crate::invariants::{DIGITS, Invariants};
 use crate::model::Nodes;
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -164,7 +164,34 @@ impl Take<'_> {
             remark: self.text("/certificate@remark"),
             rigid_noise: self.float("/certificate@rigid_noise"),
             rigid_residual: self.float("/certificate@rigid_residual"),
+            guarantee: self.guarantee(),
         }
+    }
+
+    /// All of what accuracy `certified` adds, or nothing of it.
+    fn guarantee(&mut self) -> Option<Guarantee> {
+        let digits = DIGITS.map(|name| format!("/certificate@digits_{name}"));
+        let columns = ["eigenvalue_lower", "eigenvalue_upper", "shape_error"].map(|n| format!("/modes/{n}"));
+        let counts = ["shift_below", "negative_pivots_below"].map(|n| format!("/certificate@{n}"));
+        let names = || digits.iter().chain(&columns).chain(&counts);
+        let missing: Vec<&String> = names().filter(|name| !self.scan.values.contains_key(*name)).collect();
+        if let Some(first) = missing.first() {
+            if missing.len() < names().count() {
+                self.scan.add(format!(
+                    "{first}: expected with the other entries of accuracy `certified`, found nothing"
+                ));
+            }
+            return None;
+        }
+        let [eigenvalue_lower, eigenvalue_upper, shape_error] = columns.map(|name| self.floats(&name));
+        Some(Guarantee {
+            shift_below: self.float(&counts[0]),
+            pivots_below: self.count(&counts[1]),
+            eigenvalue_lower,
+            eigenvalue_upper,
+            shape_error,
+            digits: digits.map(|name| self.float(&name)),
+        })
     }
 
     fn interfaces(&mut self, body: &Nodes) -> Vec<Interface> {

@@ -1,13 +1,13 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
 
 use super::value::{Units, Value, View, count, matrix, rows, small, text};
-use crate::flex_body::{Interface, LumpedBody, MassStructure, Parts};
+use crate::flex_body::{Guarantee, Interface, LumpedBody, MassStructure, Parts};
 use crate::provenance;
 
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// See [`MAJOR`].
-pub(super) const MINOR: i64 = 0;
+pub(super) const MINOR: i64 = 1;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
@@ -144,6 +144,12 @@ impl Item {
     const fn optional(mut self) -> Self {
         self.required = false;
         self
+    }
+
+    /// Optional, and an addition of a minor version.
+    const fn added(mut self, minor: i64) -> Self {
+        self.since = minor;
+        self.optional()
     }
 
     /// The entry's value for a body.
@@ -336,6 +342,33 @@ const MODES: &[Item] = &[
         |v| Some(Value::Floats(v.body.modes.damping_ratio.clone())),
     ),
     dataset(
+        "eigenvalue_lower",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda-",
+        "guaranteed lower bounds of the eigenvalues of K and M as stored; accuracy `certified` only",
+        |v| Some(Value::Floats(guarantee(v)?.eigenvalue_lower.clone())),
+    )
+    .added(1),
+    dataset(
+        "eigenvalue_upper",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda+",
+        "guaranteed upper bounds of the eigenvalues of K and M as stored; accuracy `certified` only",
+        |v| Some(Value::Floats(guarantee(v)?.eigenvalue_upper.clone())),
+    )
+    .added(1),
+    dataset(
+        "shape_error",
+        Floats(&[Modes]),
+        ONE,
+        "e",
+        "guaranteed upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the norm of M; accuracy `certified` only",
+        |v| Some(Value::Floats(guarantee(v)?.shape_error.clone())),
+    )
+    .added(1),
+    dataset(
         "shape",
         Floats(&[Modes, Nodes, Fixed(3)]),
         PER_ROOT_MASS,
@@ -448,6 +481,59 @@ const CERTIFICATE: &[Item] = &[
         "max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix",
         |v| Some(Value::Float(v.body.certificate.rigid_residual)),
     ),
+    attribute(
+        "shift_below",
+        Float,
+        PER_TIME2,
+        "shift sigma of a second count, between the rigid modes and the first flexible one; accuracy `certified` only",
+        |v| Some(Value::Float(guarantee(v)?.shift_below)),
+    )
+    .added(1),
+    attribute(
+        "negative_pivots_below",
+        Int,
+        ONE,
+        "negative pivots of K - shift_below M: the number of rigid modes; accuracy `certified` only",
+        |v| count(guarantee(v)?.pivots_below),
+    )
+    .added(1),
+];
+
+fn guarantee<'a>(view: &View<'a>) -> Option<&'a Guarantee> {
+    view.body.certificate.guarantee.as_ref()
+}
+
+/// One attribute per invariant, in the order of [`crate::invariants::DIGITS`].
+macro_rules! digits {
+    ($($index:literal $name:literal,)*) => {
+        &[$(attribute(
+            concat!("digits_", $name),
+            Float,
+            ONE,
+            concat!(
+                "guaranteed digits of `/invariants/", $name,
+                "`: -log10 of the rounding of its worst entry, relative to the Cauchy-Schwarz bound; accuracy `certified` only"
+            ),
+            |v| Some(Value::Float(guarantee(v)?.digits[$index])),
+        )
+        .added(1),)*]
+    };
+}
+
+const INVARIANT_DIGITS: &[Item] = digits![
+    0 "mass",
+    1 "first_moment",
+    2 "second_moment",
+    3 "C1",
+    4 "Ibar",
+    5 "S",
+    6 "modal_stiffness",
+    7 "I0",
+    8 "W1",
+    9 "W2",
+    10 "W3",
+    11 "C2",
+    12 "modal_mass",
 ];
 
 const TERMS: &[Item] = &[
@@ -517,7 +603,7 @@ pub(super) const TABLE: &[Group] = &[
         path: "/certificate",
         per: Per::Body,
         description: "What was proved about the modes, and the digits of the input.",
-        items: &[CERTIFICATE],
+        items: &[CERTIFICATE, INVARIANT_DIGITS],
     },
     Group {
         path: "/terms",
@@ -542,4 +628,17 @@ pub(super) const MASS_STRUCTURES: [(&str, MassStructure); 3] = [
 
 fn mass_structure_name(structure: MassStructure) -> &'static str {
     MASS_STRUCTURES.iter().find(|(_, s)| *s == structure).map_or("general", |(name, _)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::invariants::DIGITS;
+
+    #[test]
+    fn digits_are_named_as_their_invariants() {
+        let names: Vec<_> = INVARIANT_DIGITS.iter().map(|i| i.name.trim_start_matches("digits_")).collect();
+        assert_eq!(names, DIGITS);
+        assert!(DIGITS.iter().all(|name| INVARIANTS.iter().any(|item| item.name == *name)));
+    }
 }

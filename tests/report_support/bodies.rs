@@ -103,6 +103,7 @@ pub fn engine_mount() -> FlexBody {
             remark: String::new(),
             rigid_noise: 3.2e-9,
             rigid_residual: 1.1e-15,
+            guarantee: None,
         },
         interfaces: vec![Interface { name: "base".to_owned(), nodes: vec![0, 1, 2, 3] }],
     })
@@ -232,6 +233,7 @@ pub fn condensed(
             remark: String::new(),
             rigid_noise: 0.0,
             rigid_residual: 0.0,
+            guarantee: None,
         },
         interfaces: vec![],
     })

@@ -3,9 +3,9 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FlexBody, Frame, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+    Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
 };
-use flexbody::invariants::Invariants;
+use flexbody::invariants::{DIGITS, Invariants};
 use flexbody::model::Nodes;
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
@@ -80,7 +80,18 @@ impl Random {
     }
 }
 
-/// A valid body with `n` nodes, `nf` modes, `schemes` lumping schemes and `interfaces` interfaces.
+fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
+    Guarantee {
+        shift_below: 0.25 * eigenvalue[0],
+        pivots_below: 6,
+        eigenvalue_lower: eigenvalue.iter().map(|l| 0.5 * l).collect(),
+        eigenvalue_upper: eigenvalue.to_vec(),
+        shape_error: eigenvalue.iter().map(|_| r.positive().min(1.0)).collect(),
+        digits: DIGITS.map(|_| r.positive().min(16.0)),
+    }
+}
+
+/// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
     eigenvalue.sort_by(f64::total_cmp);
@@ -100,6 +111,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             comparison: (0..r.below(5)).map(|k| (format!("{}{k}", r.name()), r.value())).collect(),
         })
         .collect();
+    let bounded = eigenvalue.clone();
     Parts {
         source: Source {
             name: r.name(),
@@ -138,6 +150,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             remark: if r.below(2) == 0 { String::new() } else { r.name() },
             rigid_noise: r.value(),
             rigid_residual: r.value(),
+            guarantee: (n * nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
         },
         interfaces: (0..interfaces)
             .map(|i| Interface {
@@ -185,6 +198,11 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     bits.extend(p.nodes.positions.iter().flatten().map(|v| v.to_bits()));
     bits.extend(p.frame.origin.iter().chain(p.frame.axes.iter()).map(|v| v.to_bits()));
     bits.extend([c.shift, c.rigid_noise, c.rigid_residual].map(f64::to_bits));
+    if let Some(g) = &c.guarantee {
+        let columns = [&g.eigenvalue_lower, &g.eigenvalue_upper, &g.shape_error];
+        bits.extend(columns.into_iter().flatten().chain(&g.digits).map(|v| v.to_bits()));
+        bits.extend([g.shift_below.to_bits(), g.pivots_below as u64]);
+    }
     bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
     let texts = format!(
         "{:?} {:?} {:?} {:?} {:?} {:?}",

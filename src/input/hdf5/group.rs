@@ -1,7 +1,9 @@
 //! One sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy,
 //! anndata, MATLAB and PETSc (`docs/input.md`).
 
-use super::super::assemble::{Entry, Sides, Storage, assemble, check_size, undeclared_triangle};
+use super::super::assemble::{
+    Columns, Entry, Sides, Storage, assemble, assemble_columns, check_size, push, undeclared_triangle,
+};
 use super::members::{Members, POINTERS};
 use super::values::{Found, Vector, integers_of, text_of, truth_of};
 use crate::diagnostic::{Code, Diagnostic};
@@ -43,7 +45,14 @@ pub(super) fn read(group: &Group, name: &str, file: &InputFile) -> Found<RawMatr
         }
         _ => Storage::Full,
     };
-    let mut raw = assemble(parsed.n, parsed.pieces, storage, 17, file.path()).map_err(|d| vec![d])?;
+    let assembled = match (parsed.entries, storage) {
+        (Entries::Columns(columns), Storage::Full) => assemble_columns(columns, file.path()),
+        (Entries::Columns(columns), Storage::Triangle) => {
+            assemble(parsed.n, columns.into_entries(), storage, 17, file.path())
+        }
+        (Entries::Listed(pieces), _) => assemble(parsed.n, pieces, storage, 17, file.path()),
+    };
+    let mut raw = assembled.map_err(|d| vec![d])?;
     if parsed.single_precision {
         raw.digits = raw.digits.min(7);
     }
@@ -64,9 +73,15 @@ enum Declared {
 /// A parsed group.
 struct Parsed {
     n: usize,
-    pieces: Vec<Vec<Entry>>,
+    entries: Entries,
     sides: Sides,
     single_precision: bool,
+}
+
+/// What a group stores.
+enum Entries {
+    Columns(Columns),
+    Listed(Vec<Vec<Entry>>),
 }
 
 struct GroupReader<'a> {
@@ -110,13 +125,17 @@ impl GroupReader<'_> {
             ]);
         }
         // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to say.
+        let mut columns = Columns::with_room(n, entries);
         let mut major = 0usize;
-        self.entries(&values, &[&indices], n, |k, index| {
+        let place = |k: usize, [index]: [i64; 1]| {
             while pointer_values[major + 1] <= k as i64 {
                 major += 1;
             }
-            (index[0], major as i64)
-        })
+            (index, major as i64)
+        };
+        let sides = self.visit(&values, &[&indices], n, place, |entry| columns.push(entry))?;
+        let single_precision = values.is_single_precision();
+        Ok(Parsed { n, entries: Entries::Columns(columns), sides, single_precision })
     }
 
     fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {
@@ -129,21 +148,27 @@ impl GroupReader<'_> {
         let entries = self.same_length(&values, &row_indices)?;
         self.same_length(&values, &column_indices)?;
         let n = check_size(rows, cols, entries as u64).map_err(|d| vec![d])?;
-        self.entries(&values, &[&row_indices, &column_indices], n, |_, index| (index[0], index[1]))
+        let mut pieces = Vec::new();
+        let both = [&row_indices, &column_indices];
+        let sides =
+            self.visit(&values, &both, n, |_, [row, col]| (row, col), |entry| push(&mut pieces, entry))?;
+        let single_precision = values.is_single_precision();
+        Ok(Parsed { n, entries: Entries::Listed(pieces), sides, single_precision })
     }
 
-    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices.
-    fn entries<const N: usize>(
+    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices, `keep` takes the
+    /// entries that are not zero.
+    fn visit<const N: usize>(
         &self,
         values: &Vector,
         indices: &[&Vector; N],
         n: usize,
         mut place: impl FnMut(usize, [i64; N]) -> (i64, i64),
-    ) -> Found<Parsed> {
+        mut keep: impl FnMut(Entry),
+    ) -> Found<Sides> {
         // Whole chunks, so that none is unpacked twice.
         let step = indices.iter().map(|v| v.chunk).fold(PIECE.max(values.chunk), usize::max);
-        let single_precision = values.is_single_precision();
-        let mut parsed = Parsed { n, pieces: Vec::new(), sides: Sides::default(), single_precision };
+        let mut sides = Sides::default();
         let mut bad = Bad { n, shown: Vec::new(), count: 0 };
         for start in (0..values.len).step_by(step) {
             let range = start..values.len.min(start.saturating_add(step));
@@ -152,20 +177,18 @@ impl GroupReader<'_> {
             for (list, vector) in lists.iter_mut().zip(indices) {
                 *list = vector.integers(range.clone())?;
             }
-            let mut piece = Vec::with_capacity(numbers.len());
             for (offset, &value) in numbers.iter().enumerate() {
                 let (row, col) = place(start + offset, std::array::from_fn(|which| lists[which][offset]));
                 if let Some(entry) = bad.check(row, col, value, start + offset) {
-                    parsed.sides.lower |= entry.row > entry.col;
-                    parsed.sides.upper |= entry.row < entry.col;
-                    piece.push(entry);
+                    sides.lower |= entry.row > entry.col;
+                    sides.upper |= entry.row < entry.col;
+                    if bad.count == 0 {
+                        keep(entry);
+                    }
                 }
             }
-            if bad.count == 0 {
-                parsed.pieces.push(piece);
-            }
         }
-        if bad.count == 0 { Ok(parsed) } else { Err(bad.finish(self.name)) }
+        if bad.count == 0 { Ok(sides) } else { Err(bad.finish(self.name)) }
     }
 
     fn same_length(&self, values: &Vector, indices: &Vector) -> Found<usize> {

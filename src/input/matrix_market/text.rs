@@ -1,63 +1,69 @@
-//! Text in blocks that end at line ends: the whole map at once, or as much as is unpacked at a time.
+//! Text in blocks that end at line ends, so that no more of a file than two blocks need be in memory.
 
 use super::{Compression, Read};
+use std::borrow::Cow;
 
-/// Unpacked bytes per block of a compressed file.
-const BLOCK: usize = 32 << 20;
+/// Bytes per block. Unpacked blocks are allocated over and over: larger ones would be fresh pages each time.
+const BLOCK: usize = 8 << 20;
 
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
 /// Gives a file block by block.
 pub(super) enum Blocks<'a> {
-    /// The file as it lies on disk.
-    Plain { bytes: &'a [u8], given: bool },
-    /// A compressed file; `buffer[used..]` is the begin of the next line.
-    Packed { stream: Box<dyn Read + 'a>, buffer: Vec<u8>, used: usize, newline: bool },
+    /// The rest of a file as it lies on disk.
+    Plain { rest: &'a [u8], newline: bool },
+    /// A compressed file; `carry` is the begin of the next line.
+    Packed { stream: Box<dyn Read + Send + 'a>, carry: Vec<u8>, newline: bool },
 }
 
 impl<'a> Blocks<'a> {
     pub(super) fn new(compression: Compression, bytes: &'a [u8]) -> std::io::Result<Self> {
         Ok(match compression {
-            Compression::None => Self::Plain { bytes, given: false },
-            _ => Self::Packed {
-                stream: compression.stream(bytes)?,
-                buffer: Vec::new(),
-                used: 0,
-                newline: true,
-            },
+            Compression::None => Self::Plain { rest: bytes, newline: true },
+            _ => Self::Packed { stream: compression.stream(bytes)?, carry: Vec::new(), newline: true },
         })
     }
 
     /// The next block: it ends at a line end, or at the end of the file, or (a line longer than a block)
     /// anywhere.
-    pub(super) fn next(&mut self) -> std::io::Result<Option<&[u8]>> {
-        match self {
-            Self::Plain { bytes, given } => Ok((!std::mem::replace(given, true)).then_some(bytes)),
-            Self::Packed { stream, buffer, used, newline } => {
-                buffer.drain(..*used);
-                let missing = BLOCK.saturating_sub(buffer.len()) as u64;
-                stream.by_ref().take(missing).read_to_end(buffer)?;
-                let end_of_file = buffer.len() < BLOCK;
-                let last_line_end = buffer.iter().rposition(|&b| b == b'\n').map(|at| at + 1);
-                *used = match last_line_end {
-                    Some(at) if !end_of_file => at,
-                    _ => buffer.len(),
-                };
-                if let Some(&last) = buffer[..*used].last() {
-                    *newline = last == b'\n';
-                }
-                Ok((*used > 0).then_some(&buffer[..*used]))
+    pub(super) fn next(&mut self) -> std::io::Result<Option<Cow<'a, [u8]>>> {
+        let (block, newline) = match self {
+            Self::Plain { rest, newline } => {
+                let end = whole_lines(&rest[..BLOCK.min(rest.len())], rest.len() <= BLOCK);
+                let (block, after) = rest.split_at(end);
+                *rest = after;
+                (Cow::Borrowed(block), newline)
             }
-        }
+            Self::Packed { stream, carry, newline } => {
+                let mut block = Vec::with_capacity(BLOCK);
+                block.append(carry);
+                let missing = BLOCK.saturating_sub(block.len()) as u64;
+                stream.by_ref().take(missing).read_to_end(&mut block)?;
+                let end = whole_lines(&block, block.len() < BLOCK);
+                carry.extend_from_slice(&block[end..]);
+                block.truncate(end);
+                (Cow::Owned(block), newline)
+            }
+        };
+        let Some(&last) = block.last() else { return Ok(None) };
+        *newline = last == b'\n';
+        Ok(Some(block))
     }
 
     /// Whether what was given so far ends with a line end.
     pub(super) fn ends_with_newline(&self) -> bool {
         match self {
-            Self::Plain { bytes, .. } => bytes.last() == Some(&b'\n'),
-            Self::Packed { newline, .. } => *newline,
+            Self::Plain { newline, .. } | Self::Packed { newline, .. } => *newline,
         }
+    }
+}
+
+/// Length of the whole lines of a block; all of it when it ends the file or has no line end.
+fn whole_lines(block: &[u8], ends_file: bool) -> usize {
+    match block.iter().rposition(|&b| b == b'\n') {
+        Some(at) if !ends_file => at + 1,
+        _ => block.len(),
     }
 }
 
@@ -93,7 +99,7 @@ mod tests {
             let mut blocks = Blocks::new(compression, bytes).unwrap();
             let mut at = 0;
             while let Some(block) = blocks.next().unwrap() {
-                for piece in line_aligned(block) {
+                for piece in line_aligned(&block) {
                     assert!(text.as_bytes()[at..].starts_with(piece));
                     at += piece.len();
                     assert!(piece.ends_with(b"\n") || at == text.len());

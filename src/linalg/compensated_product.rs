@@ -1,0 +1,114 @@
+//! Block products in double-double arithmetic: A X and X'Y of exact entries, with fixed partitions.
+
+use super::SymmetricMatrix;
+use super::compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
+use faer::MatRef;
+use rayon::prelude::*;
+
+/// Columns of a block.
+pub const LANES: usize = 8;
+
+/// Rows per parallel task and per partial sum.
+const ROWS: usize = 1024;
+
+/// n rows and up to [`LANES`] columns of double-double numbers; further columns are zero.
+#[derive(Debug, Clone)]
+pub struct CompensatedBlock {
+    hi: Vec<[f64; LANES]>,
+    lo: Vec<[f64; LANES]>,
+}
+
+impl CompensatedBlock {
+    /// The entry in `row` and `column`.
+    pub fn get(&self, row: usize, column: usize) -> DoubleDouble {
+        DoubleDouble { hi: self.hi[row][column], lo: self.lo[row][column] }
+    }
+
+    /// Adds another block of the same size.
+    pub fn add(&mut self, other: &Self) {
+        for row in 0..self.hi.len() {
+            for c in 0..LANES {
+                let sum = self.get(row, c) + other.get(row, c);
+                (self.hi[row][c], self.lo[row][c]) = (sum.hi, sum.lo);
+            }
+        }
+    }
+}
+
+/// (A kron I_block) X for X of `block * A.n()` rows and at most [`LANES`] columns.
+///
+/// With r entries in the row, the error of an entry is at most 4 u^2 (r + 1) (|A| |X|), u = 2^-53.
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>) -> CompensatedBlock {
+    let n = a.n() * block;
+    assert!(x.nrows() == n && x.ncols() <= LANES, "shapes of a compensated product");
+    let mut packed = vec![[0.0; LANES]; n];
+    for c in 0..x.ncols() {
+        for (row, value) in packed.iter_mut().zip(x.col(c).iter()) {
+            row[c] = *value;
+        }
+    }
+    let (mut hi, mut lo) = (vec![[0.0; LANES]; n], vec![[0.0; LANES]; n]);
+    hi.par_chunks_mut(ROWS).zip(lo.par_chunks_mut(ROWS)).enumerate().for_each(|(chunk, (hi, lo))| {
+        with_fma(
+            #[inline(always)]
+            || {
+                for (r, (hi, lo)) in hi.iter_mut().zip(lo).enumerate() {
+                    let (node, component) = ((chunk * ROWS + r) / block, (chunk * ROWS + r) % block);
+                    let (columns, values) = a.row(node);
+                    for (&j, &value) in columns.iter().zip(values) {
+                        accumulate(hi, lo, value, &packed[j as usize * block + component]);
+                    }
+                }
+            },
+        );
+    });
+    CompensatedBlock { hi, lo }
+}
+
+/// A'Y for A (n x m): m rows of [`LANES`] numbers.
+///
+/// The error of an entry is at most 4 u^2 [`sum_length`] |A|'|Y|.
+///
+/// # Panics
+/// When the numbers of rows differ.
+pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[DoubleDouble; LANES]> {
+    let n = a.nrows();
+    assert_eq!(n, y.hi.len(), "rows of a compensated Gram product");
+    let partial: Vec<Vec<[DoubleDouble; LANES]>> = (0..n.div_ceil(ROWS))
+        .into_par_iter()
+        .map(|chunk| {
+            let rows = chunk * ROWS..((chunk + 1) * ROWS).min(n);
+            let column = |c: usize| {
+                let (mut hi, mut lo) = ([0.0; LANES], [0.0; LANES]);
+                let factors = a.col(c).try_as_col_major().expect("blocks are column-major").as_slice();
+                with_fma(
+                    #[inline(always)]
+                    || {
+                        for r in rows.clone() {
+                            accumulate_pair(&mut hi, &mut lo, factors[r], (&y.hi[r], &y.lo[r]));
+                        }
+                    },
+                );
+                std::array::from_fn(|w| DoubleDouble { hi: hi[w], lo: lo[w] })
+            };
+            (0..a.ncols()).map(column).collect()
+        })
+        .collect();
+    let mut total = vec![[DoubleDouble::default(); LANES]; a.ncols()];
+    for part in &partial {
+        for (sum, part) in total.iter_mut().zip(part) {
+            for (sum, part) in sum.iter_mut().zip(part) {
+                *sum = *sum + *part;
+            }
+        }
+    }
+    total
+}
+
+/// Additions that a term of a sum over `n` rows takes part in at most, with room for those around it.
+pub fn sum_length(n: usize) -> f64 {
+    (ROWS.min(n) + n.div_ceil(ROWS) + 16) as f64
+}

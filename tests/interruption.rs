@@ -1,0 +1,83 @@
+//! An interrupted program ends at once, says so, and leaves nothing but what was there before.
+#![cfg(unix)]
+
+#[path = "support/elements.rs"]
+#[allow(dead_code)] // shared with other tests, as the next ones
+mod elements;
+#[path = "support/files.rs"]
+#[allow(dead_code)]
+mod files;
+#[path = "support/mesh.rs"]
+#[allow(dead_code)]
+mod mesh;
+#[path = "support/random.rs"]
+#[allow(dead_code)]
+mod random;
+
+use elements::{Kind, MassRule, Material};
+use files::{Triangle, write_model};
+use flexbody::error::ExitCode;
+use mesh::Mesh;
+use std::io::Read;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+fn members(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("test folder");
+    let mut names: Vec<String> =
+        entries.map(|e| e.expect("test folder").file_name().into_string().expect("our own names")).collect();
+    names.sort();
+    names
+}
+
+/// Waits until both outputs have been reserved: the handler stands since before that.
+fn wait_for_temporary_files(folder: &Path, child: &mut Child) {
+    let began = Instant::now();
+    while members(folder).iter().filter(|name| name.starts_with(".flexbody-")).count() < 2 {
+        assert!(child.try_wait().expect("a child").is_none(), "the program ended before it was interrupted");
+        assert!(began.elapsed() < Duration::from_secs(60), "no temporary file appeared");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn a_signal_during_convert_leaves_the_folder_as_it_was() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (model, out) = (folder.path().join("model"), folder.path().join("out"));
+    std::fs::create_dir(&model).expect("a folder");
+    std::fs::create_dir(&out).expect("a folder");
+    let raw = Mesh::block(Kind::Hex8, [18; 3], [1.0; 3])
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
+    let manifest = write_model(&model, &raw, Triangle::Lower);
+    let body = out.join("body.flex.h5");
+    std::fs::write(&body, "what was there before").expect("a file");
+    for signal in ["INT", "TERM"] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_flexbody"))
+            .arg("convert")
+            .arg(&manifest)
+            .arg("--output")
+            .arg(&body)
+            .arg("--report")
+            .arg(out.join("report.html"))
+            .args(["--modes", "100"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        wait_for_temporary_files(&out, &mut child);
+        let sent = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).status();
+        assert!(sent.expect("kill").success());
+        let status = child.wait().expect("a child");
+        let mut said = String::new();
+        child.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
+        assert_eq!(status.code(), Some(ExitCode::Interrupted as i32), "SIG{signal}: {said}");
+        assert_eq!(said, "interrupted: no unfinished file is left\n");
+        let mut printed = String::new();
+        child.stdout.take().expect("piped").read_to_string(&mut printed).expect("text");
+        assert_eq!(printed, "");
+        assert_eq!(members(&out), ["body.flex.h5"]);
+        assert_eq!(std::fs::read_to_string(&body).expect("text"), "what was there before");
+    }
+}
