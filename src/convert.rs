@@ -2,7 +2,7 @@
 
 use crate::basis::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, Counters, Proof, Wanted, canonical_basis};
+use crate::eigen::{Accuracy, Counters, Plan, Proof, Wanted, canonical_basis};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
@@ -79,6 +79,8 @@ pub struct Conversion {
     pub lumped_modes: Vec<LumpedPipeline>,
     /// Work of the eigen-solver.
     pub counters: Counters,
+    /// Memory and precision as decided before the work; none on the dense path.
+    pub plan: Option<Plan>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -169,6 +171,7 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) ->
         mass_properties,
         lumped_modes,
         counters: solution.counters,
+        plan: solution.plan,
         diagnostics: found.diagnostics,
     })
 }

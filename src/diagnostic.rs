@@ -132,6 +132,7 @@ codes! {
     NoiseFloor = "FB510", Warning, Done, "digits of the input limit the accuracy of the lowest modes", "write the matrices with 17 significant digits";
     MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common for reduced integration";
     NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
+    FactorPrecision = "FB513", Note, Done, "precision of the factor", "nothing to do: --factor f64 or f32 decides otherwise";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -5,6 +5,8 @@
 pub enum Event<'a> {
     /// A phase begins.
     Phase(&'a str),
+    /// What is going to be done and what it needs, known before the work.
+    Plan(&'a str),
     /// Part of the current phase that is done, 0 to 1.
     Fraction(f64),
 }

@@ -22,7 +22,12 @@ fn model(name: &str) -> FeModel {
 }
 
 fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> FreeSurfaceModes {
-    let settings = ModeSettings { wanted: Wanted::Lowest(count), accuracy, method: Method::Lanczos };
+    let settings = ModeSettings {
+        wanted: Wanted::Lowest(count),
+        accuracy,
+        method: Method::Lanczos,
+        ..ModeSettings::default()
+    };
     free_surface(model, &settings, SILENT).expect("modes")
 }
 

@@ -2,8 +2,7 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
-    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Method, Proof, Wanted, energy_noise,
-    solve,
+    EigenFailure, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Wanted, energy_noise, solve,
 };
 use crate::error::{Error, Result};
 use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
@@ -12,23 +11,7 @@ use crate::progress::Watch;
 use faer::{Mat, MatRef};
 
 /// What is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModeSettings {
-    /// The lowest so many modes, or all below lambda (1/time^2).
-    pub wanted: Wanted,
-    /// Promise about residuals and completeness.
-    pub accuracy: Accuracy,
-    /// Dense, Lanczos or whichever suits.
-    pub method: Method,
-}
-
-impl Default for ModeSettings {
-    /// 20 modes at `standard` accuracy.
-    fn default() -> Self {
-        let EigenSettings { wanted, accuracy, method } = EigenSettings::default();
-        Self { wanted, accuracy, method }
-    }
-}
+pub use crate::eigen::EigenSettings as ModeSettings;
 
 /// Free-surface modes of a model, in model axes.
 #[derive(Debug, Clone)]
@@ -74,9 +57,7 @@ pub fn free_surface_of(
     let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
     let first_estimate = quadratic_estimate(&pencil, positions, rigid.as_ref());
     let problem = EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error };
-    let eigen =
-        EigenSettings { wanted: settings.wanted, accuracy: settings.accuracy, method: settings.method };
-    let solution = solve(&problem, &eigen, watch).map_err(|failure| explain(model, failure))?;
+    let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
     if solution.eigenvalues.is_empty() {
         let message = match (settings.wanted, solution.next_eigenvalue) {
             (Wanted::Below(_), Some(next)) => {
@@ -114,7 +95,21 @@ pub fn free_surface_of(
         diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
     }
     describe(&solution, settings, scalar_mass, &mut diagnostics);
+    diagnostics.extend(single_precision_note(&solution, settings));
     Ok(FreeSurfaceModes { solution, rigid_noise, input_noise, diagnostics })
+}
+
+/// What the user should know about the precision of the factor.
+fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
+    let plan = solution.plan.filter(|_| settings.factor == FactorChoice::Auto)?;
+    let message = match plan.precision {
+        Precision::Single => "the factor is in single precision; the modes are corrected in double precision",
+        Precision::Double if plan.single_failed => {
+            "a single-precision factor is too poor for the conditioning of this model: factored in double precision"
+        }
+        Precision::Double => return None,
+    };
+    Some(Diagnostic::new(Code::FactorPrecision, message))
 }
 
 /// Notes about how many modes there are and how they end.
@@ -303,9 +298,17 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             format!("eigenvalue bounds cannot be guaranteed: {why}"),
         )
         .with_help("use --accuracy standard"),
-        EigenFailure::Memory { bytes } => Diagnostic::new(
+        EigenFailure::Memory { bytes, available } => Diagnostic::new(
             Code::MemoryShort,
-            bytes.map_or_else(|| "memory ran out".to_owned(), |b| format!("{b} bytes are needed")),
+            format!(
+                "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are left",
+                bytes as f64 * 1e-9,
+                available as f64 * 1e-9
+            ),
+        ),
+        EigenFailure::TooLarge => Diagnostic::new(
+            Code::MemoryShort,
+            "the node graph has more than 2^31 entries, too many for the ordering",
         ),
     };
     diagnostic.into()

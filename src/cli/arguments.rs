@@ -66,6 +66,12 @@ pub struct ConvertArguments {
     /// Promise about the modes
     #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
     pub accuracy: AccuracyName,
+    /// Precision of the factor: auto takes f32 where f64 does not fit the memory or is slower
+    #[arg(long, value_enum, default_value_t = FactorName::Auto)]
+    pub factor: FactorName,
+    /// Memory that the program may use: a number with K, M, G or T [default: what the machine and its control groups leave]
+    #[arg(long, value_name = "SIZE", value_parser = memory_size)]
+    pub memory_limit: Option<u64>,
     /// Frame of the body
     #[arg(long, value_enum, default_value_t = FrameName::Principal)]
     pub frame: FrameName,
@@ -163,6 +169,31 @@ pub enum AccuracyName {
     Standard,
     /// Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every eigenvalue and digits of every invariant
     Certified,
+}
+
+/// Names of the precisions of the factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FactorName {
+    /// Whichever fits and is faster
+    Auto,
+    /// Double precision
+    F64,
+    /// Single precision, corrected in double
+    F32,
+}
+
+/// A number of bytes: `20G`, `512M`, `1.5GB`; powers of 1000.
+fn memory_size(text: &str) -> Result<u64, String> {
+    let text = text.trim_end_matches(['b', 'B']);
+    let (number, factor) = match text.char_indices().last() {
+        Some((at, unit)) if unit.is_ascii_alphabetic() => {
+            let power = "kmgt".find(unit.to_ascii_lowercase()).ok_or("the unit is K, M, G or T")?;
+            (&text[..at], 1000f64.powi(power as i32 + 1))
+        }
+        _ => (text, 1.0),
+    };
+    let bytes = number.trim().parse::<f64>().map_err(|e| e.to_string())? * factor;
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("not a size of memory".to_owned()) }
 }
 
 /// Names of the frames.

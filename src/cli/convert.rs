@@ -1,13 +1,13 @@
 //! `flexbody convert`.
 
-use super::arguments::{AccuracyName, ConvertArguments, FrameName};
+use super::arguments::{AccuracyName, ConvertArguments, FactorName, FrameName};
 use super::output::{Outcome, tell};
-use super::resources::peak_memory_bytes;
+use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
 use crate::basis::ModeSettings;
 use crate::convert::{Conversion, ConvertSettings, Lumping, convert};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, Method, Wanted};
+use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use crate::error::Result;
 use crate::input::{InterfaceNodes, ModelFiles, read_manifest, read_model, read_nodal_masses};
 use crate::invariants::BodyFrame;
@@ -43,6 +43,12 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
                 AccuracyName::Certified => Accuracy::Certified,
             },
             method: Method::Auto,
+            factor: match arguments.factor {
+                FactorName::Auto => FactorChoice::Auto,
+                FactorName::F64 => FactorChoice::Always(Precision::Double),
+                FactorName::F32 => FactorChoice::Always(Precision::Single),
+            },
+            memory: memory_left(arguments.memory_limit),
         },
         frame: match arguments.frame {
             FrameName::Principal => BodyFrame::Principal,
@@ -52,6 +58,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         lumped,
         lumped_modes: arguments.lumped_modes,
     };
+    let resident = resident_bytes();
     let conversion = convert(&model, &settings, &|event| watcher.hear(event)).inspect_err(|_| {
         watcher.clear();
         tell(arguments.printing, &checked.diagnostics);
@@ -62,7 +69,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let mut diagnostics = checked.diagnostics;
     diagnostics.extend(conversion.diagnostics.iter().cloned());
     tell(arguments.printing, &diagnostics);
-    let run = run_data(arguments, &conversion, diagnostics, phases, threads);
+    let mut run = run_data(arguments, &conversion, diagnostics, phases, threads);
+    run.memory_estimate_bytes = conversion.plan.map(|plan| resident + plan.bytes);
     let facts = Facts::new(&conversion.body, &run);
     for (slot, format) in report_slots.into_iter().zip(&formats) {
         slot.write(render(&facts, *format).as_bytes())?;
@@ -191,6 +199,8 @@ fn run_data(
         ("mass_columns", work.mass_columns),
         ("restarts", work.restarts),
         ("factor_len", work.factor_len),
+        ("factor_flops", work.factor_flops),
+        ("factor_bytes", work.factor_bytes),
     ];
     let lumped_modes = conversion
         .lumped_modes
@@ -211,6 +221,7 @@ fn run_data(
     RunData {
         phases,
         peak_memory_bytes: peak_memory_bytes(),
+        memory_estimate_bytes: None,
         threads,
         diagnostics,
         counters: counters.iter().map(|&(name, count)| (name.to_owned(), count)).collect(),

@@ -18,6 +18,57 @@ pub(super) fn cpu_seconds() -> f64 {
 /// Largest resident memory of this process so far, in bytes.
 pub(super) fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    kibibytes(&status, "VmHWM:")
+}
+
+/// Memory in use by this process, in bytes; zero where the system does not tell.
+pub(super) fn resident_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    kibibytes(&status, "VmRSS:").unwrap_or(0)
+}
+
+/// Bytes that may still be allocated: up to `limit` where the user gives one, otherwise what the machine has left, or what
+/// the control groups of this process leave of that. `None` where the system does not tell.
+pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
+    if let Some(limit) = limit {
+        return Some(limit.saturating_sub(resident_bytes()));
+    }
+    let machine = kibibytes(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
+    machine.into_iter().chain(control_groups()).min()
+}
+
+/// What each memory control group of this process leaves (versions 1 and 2); files that are mapped count as free.
+fn control_groups() -> Vec<u64> {
+    let groups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let mut left = Vec::new();
+    for line in groups.lines() {
+        let mut fields = line.splitn(3, ':').skip(1);
+        let (Some(controllers), Some(path)) = (fields.next(), fields.next()) else { continue };
+        let (root, limit, used) = match controllers {
+            "" => ("/sys/fs/cgroup", "memory.max", "memory.current"),
+            _ if controllers.split(',').any(|c| c == "memory") => {
+                ("/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes")
+            }
+            _ => continue,
+        };
+        // A group is limited by those above it as well. Inside a container the own group is the root.
+        let own = std::path::Path::new(root).join(path.trim_start_matches('/'));
+        for folder in own.ancestors().take_while(|folder| folder.starts_with(root)) {
+            let number =
+                |name: &str| std::fs::read_to_string(folder.join(name)).ok()?.trim().parse::<u64>().ok();
+            let Some(limit) = number(limit) else { continue };
+            let statistics = std::fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
+            let pages =
+                statistics.lines().find_map(|line| line.strip_prefix("inactive_file ")?.parse::<u64>().ok());
+            let used = number(used).unwrap_or(0).saturating_sub(pages.unwrap_or(0));
+            left.push(limit.saturating_sub(used));
+        }
+    }
+    left
+}
+
+/// A line of a table of /proc in bytes.
+fn kibibytes(table: &str, key: &str) -> Option<u64> {
+    let line = table.lines().find(|line| line.starts_with(key))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
 }

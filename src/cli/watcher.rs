@@ -50,6 +50,7 @@ impl Watcher {
                 self.bar.set_message(name.to_owned());
                 self.bar.reset();
             }
+            Event::Plan(text) => self.bar.println(text),
             Event::Fraction(part) => self.bar.set_position((1000.0 * part) as u64),
         }
     }

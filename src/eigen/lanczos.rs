@@ -8,7 +8,7 @@ use super::krylov::Krylov;
 use super::noise::energy_noise;
 use super::problem::{Counters, EigenFailure, EigenProblem};
 use super::refine::Refined;
-use crate::linalg::{Analysis, Cholesky, Solve, SymmetricEigen, symmetric_eigen};
+use crate::linalg::{Analysis, Cholesky, Real, Solve, SymmetricEigen, symmetric_eigen};
 use crate::progress::{Event, Watch};
 use faer::Mat;
 
@@ -42,17 +42,24 @@ pub(super) enum Search {
         /// Further Ritz values, loosely converged.
         next: Vec<f64>,
     },
+    /// With rough modes, asked for as such, and some more: the span of these vectors.
+    Rough {
+        /// Not orthonormal.
+        vectors: Mat<f64>,
+        /// How many of the lowest are wanted.
+        wanted: usize,
+    },
     /// Early: with this shift it would be shorter and more accurate.
     ShiftTooLarge(f64),
 }
 
 /// Cholesky factor with a probe of its accuracy.
-pub(super) fn factorise<'a>(
+pub(super) fn factorise<'a, T: Real>(
     problem: &EigenProblem<'_>,
     analysis: &'a Analysis,
     tau: f64,
     counters: &mut Counters,
-) -> Result<Cholesky<'a>, EigenFailure> {
+) -> Result<Cholesky<'a, T>, EigenFailure> {
     counters.factorizations += 1;
     let pencil = &problem.pencil;
     let factor =
@@ -65,8 +72,8 @@ pub(super) fn factorise<'a>(
     let row_sum = |i: usize| pencil.stiffness().row(i).1.iter().map(|v| v.abs()).sum::<f64>();
     let scale = b.norm_max() + (0..pencil.n()).map(row_sum).fold(0.0, f64::max) * x.norm_max();
     let relative = residual.norm_max() / scale;
-    // Backward stable factors leave 1e-15 or so here; a wrong one leaves O(1).
-    if relative.is_nan() || relative > 1e-8 {
+    // Backward stable factors leave about the unit roundoff here; a wrong one leaves O(1).
+    if relative.is_nan() || relative > T::ROUNDOFF.sqrt() {
         return Err(EigenFailure::Inaccurate { residual: relative });
     }
     Ok(factor)
@@ -80,7 +87,7 @@ const STEPS_TO_JUDGE: usize = 6;
 fn better_shift(
     problem: &EigenProblem<'_>,
     krylov: &Krylov<'_>,
-    factor: &Cholesky<'_>,
+    factor: &dyn Solve,
     wanted: usize,
     counters: &mut Counters,
 ) -> Result<Option<f64>, EigenFailure> {
@@ -118,7 +125,7 @@ const ZERO_ENERGY_BASIS: usize = 96;
 /// Counts and resolves the modes without strain energy.
 fn zero_energy(
     problem: &EigenProblem<'_>,
-    factor: &Cholesky<'_>,
+    factor: &dyn Solve,
     tau: f64,
     counters: &mut Counters,
 ) -> Result<EigenFailure, EigenFailure> {
@@ -147,6 +154,8 @@ pub(super) struct Goal {
     pub tolerance: f64,
     /// Eigenvalues closer than this (relative) are one cluster.
     pub cluster_gap: f64,
+    /// Whether the solves are rough: the modes are then handed out as a span to be corrected.
+    pub rough: bool,
     /// Chooses the random start: a search repeated after a count that found more modes starts elsewhere.
     pub attempt: u64,
 }
@@ -154,12 +163,12 @@ pub(super) struct Goal {
 /// The lowest flexible modes.
 pub(super) fn lowest_modes(
     problem: &EigenProblem<'_>,
-    factor: &Cholesky<'_>,
+    factor: &dyn Solve,
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Search, EigenFailure> {
-    let Goal { wanted, tolerance, cluster_gap, attempt } = *goal;
+    let Goal { wanted, tolerance, cluster_gap, attempt, rough } = *goal;
     let tau = factor.shift();
     let free = problem.pencil.n() - problem.rigid.ncols();
     let capacity = (2 * wanted + SPARE).min(free + BLOCK);
@@ -217,6 +226,12 @@ pub(super) fn lowest_modes(
                 good(last, 1e-3) && norms[last] <= 0.1 * gap
             });
         watch(Event::Fraction(converged as f64 / wanted.max(1) as f64));
+        if converged == last && beyond && rough && !complete {
+            // Half as many again: what the corrections would have to find of the next modes is then there.
+            let count = (last + last / 2 + 2 * BLOCK).min(size);
+            let vectors = krylov.inverse_iterated(s.as_ref().subcols(0, count), &theta[..count]);
+            return Ok(Search::Rough { vectors, wanted: last });
+        }
         if converged == last && beyond {
             let x = krylov.inverse_iterated(s.as_ref().subcols(0, last), &theta[..last]);
             let modes = Refined::new(problem, x, counters)?;

@@ -8,13 +8,16 @@ mod dense;
 mod krylov;
 mod lanczos;
 mod noise;
+mod plan;
 mod problem;
 mod refine;
+mod single;
 mod solve;
 
 pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
 pub use noise::{energy_noise, rounding_residual};
+pub use plan::{FactorChoice, Plan, Precision};
 pub use problem::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
     Wanted,

@@ -1,6 +1,7 @@
 //! What is asked of the eigen-solver and what it answers.
 
 use super::Completeness;
+use super::plan::{FactorChoice, Plan};
 use crate::linalg::Pencil;
 use faer::{Mat, MatRef};
 
@@ -78,12 +79,22 @@ pub struct EigenSettings {
     pub accuracy: Accuracy,
     /// How.
     pub method: Method,
+    /// Precision of the factor.
+    pub factor: FactorChoice,
+    /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
+    pub memory: Option<u64>,
 }
 
 impl Default for EigenSettings {
     /// 20 modes (the usual size of a modal basis), proved, by the method that suits the size.
     fn default() -> Self {
-        Self { wanted: Wanted::Lowest(20), accuracy: Accuracy::Standard, method: Method::Auto }
+        Self {
+            wanted: Wanted::Lowest(20),
+            accuracy: Accuracy::Standard,
+            method: Method::Auto,
+            factor: FactorChoice::Auto,
+            memory: None,
+        }
     }
 }
 
@@ -100,8 +111,12 @@ pub struct Counters {
     pub mass_columns: u64,
     /// Thick restarts.
     pub restarts: u64,
-    /// Numbers in one factor (0 for the dense path).
+    /// Numbers in one factor.
     pub factor_len: u64,
+    /// Multiplications and additions of one factorisation.
+    pub factor_flops: u64,
+    /// Bytes of the factor that the modes were found with (0 for the dense path).
+    pub factor_bytes: u64,
 }
 
 /// Guaranteed bounds of the eigenvalues of K and M as they are stored, at [`Accuracy::Certified`].
@@ -132,6 +147,8 @@ pub struct EigenSolution {
     pub rounding_floors: Vec<f64>,
     /// What is known about missed modes.
     pub completeness: Completeness,
+    /// Memory and precision as decided (not on the dense path); the precision is the one used in the end.
+    pub plan: Option<Plan>,
     /// Bounds of the eigenvalues, at [`Accuracy::Certified`].
     pub bounds: Option<EigenvalueBounds>,
     /// Eigenvalues that were computed beyond the last mode given, at least loosely (for cluster and gap decisions).
@@ -196,9 +213,13 @@ pub enum EigenFailure {
         /// The reason.
         why: &'static str,
     },
-    /// The pencil is too large for the memory of the machine.
+    /// What is asked for needs more memory than there is.
     Memory {
-        /// Bytes needed, where known.
-        bytes: Option<u64>,
+        /// Bytes needed.
+        bytes: u64,
+        /// Bytes there are.
+        available: u64,
     },
+    /// The pencil is too large for the ordering's 32-bit numbers.
+    TooLarge,
 }

@@ -42,9 +42,12 @@ fn inverse_iteration(
     y
 }
 
+/// Squared M-norm, relative to that of the columns, below which a direction of their span is only rounding.
+const DEPENDENT: f64 = 1e-8;
+
 /// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz vectors
-/// in ascending order of lambda.
-fn rayleigh_ritz(
+/// in ascending order of lambda. Directions in which X is dependent are left out.
+pub(super) fn rayleigh_ritz(
     problem: &EigenProblem<'_>,
     mut x: Mat<f64>,
     counters: &mut Counters,
@@ -62,7 +65,9 @@ fn rayleigh_ritz(
     let kx = pencil.apply_stiffness(x.as_ref());
     let gm = gram(x.as_ref(), mx.as_ref());
     let gk = gram(x.as_ref(), kx.as_ref());
-    let scale: Vec<f64> = (0..x.ncols()).map(|j| gm[(j, j)].sqrt().recip()).collect();
+    // A column that nothing is left of spans nothing.
+    let scale: Vec<f64> =
+        (0..x.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
     if scale.iter().any(|s| !s.is_finite()) {
         return Err(EigenFailure::MassIndefinite);
     }
@@ -70,13 +75,11 @@ fn rayleigh_ritz(
         Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
     };
     let (gm, gk) = (scaled(&gm), scaled(&gk));
-    // G_M is the identity up to a small defect: its inverse square root is stable.
     let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
-    if eigen.values.first().is_some_and(|&v| v < 1e-8) {
-        return Err(EigenFailure::Inaccurate { residual: eigen.values[0] });
-    }
-    let root = Mat::from_fn(gm.nrows(), gm.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
-    let to_orthonormal = combine(root.as_ref(), eigen.vectors.transpose());
+    let first = eigen.values.partition_point(|&v| v < DEPENDENT);
+    let to_orthonormal = Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
+        eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
+    });
     let projected = gram(to_orthonormal.as_ref(), combine(gk.as_ref(), to_orthonormal.as_ref()).as_ref());
     let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
     let coefficients = combine(to_orthonormal.as_ref(), ritz.vectors.as_ref());
@@ -119,7 +122,11 @@ impl Refined {
         x: Mat<f64>,
         counters: &mut Counters,
     ) -> Result<Self, EigenFailure> {
+        let given = x.ncols();
         let (eigenvalues, vectors) = rayleigh_ritz(problem, x, counters)?;
+        if vectors.ncols() < given {
+            return Err(EigenFailure::Inaccurate { residual: DEPENDENT });
+        }
         let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
         Ok(Self { eigenvalues, vectors, residuals, floors })
     }

@@ -6,12 +6,14 @@ use super::completeness::{Completeness, Proof, count_below};
 use super::dense;
 use super::lanczos::{self, Goal, NOISE_FACTOR};
 use super::noise::energy_noise;
+use super::plan::{FactorChoice, Plan, Precision, gigabytes};
 use super::problem::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
     Wanted,
 };
 use super::refine::{Refined, refine, residuals as residuals_of};
-use crate::linalg::{Analysis, Solve, is_positive_semidefinite};
+use super::single;
+use crate::linalg::{Analysis, Cholesky, is_positive_semidefinite};
 use crate::progress::{Event, Watch};
 
 /// Models up to this size are solved densely: all modes take less than a second.
@@ -38,8 +40,9 @@ pub fn solve(
     let mut counters = Counters::default();
     let pencil = &problem.pencil;
     watch(Event::Phase("ordering"));
-    let analysis = Analysis::new(pencil).ok_or(EigenFailure::Memory { bytes: None })?;
+    let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
     counters.factor_len = analysis.factor_len() as u64;
+    counters.factor_flops = analysis.flops() as u64;
     if !is_positive_semidefinite(pencil.mass(), &analysis) {
         return Err(EigenFailure::MassIndefinite);
     }
@@ -52,6 +55,7 @@ pub fn solve(
             count_below(problem, &analysis, lambda, &mut counters)?.saturating_sub(rigid)
         }
     };
+    let plan = Plan::new(problem, settings, &analysis, wanted)?;
     let dense = match settings.method {
         Method::Dense => true,
         Method::Lanczos => false,
@@ -61,18 +65,20 @@ pub fn solve(
         }
     };
     let tolerance = settings.accuracy.residual();
+    let mut sparse = Sparse { problem, settings, analysis: &analysis, plan };
     let (mut search, finite_modes) = if dense {
         let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
         (search, Some(finite))
     } else {
-        (search_iteratively(problem, &analysis, wanted, tolerance, 0, watch, &mut counters)?, None)
+        watch(Event::Plan(&sparse.plan.to_string()));
+        (sparse.search(wanted, 0, watch, &mut counters)?, None)
     };
-    let mut completeness = prove(problem, settings, &analysis, &search, watch, &mut counters)?;
+    let mut completeness = prove(&sparse, &search, watch, &mut counters)?;
     let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
     if missed > 0 {
         // Once more, from other directions and for as many modes as there are.
-        search = search_iteratively(problem, &analysis, wanted + missed, tolerance, 1, watch, &mut counters)?;
-        completeness = prove(problem, settings, &analysis, &search, watch, &mut counters)?;
+        search = sparse.search(wanted + missed, 1, watch, &mut counters)?;
+        completeness = prove(&sparse, &search, watch, &mut counters)?;
     }
     let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
     if found != counted {
@@ -86,7 +92,10 @@ pub fn solve(
     } else {
         None
     };
-    finish(problem, search, (completeness, bounds), (wanted, tolerance), finite_modes, counters)
+    let plan = (!dense).then_some(sparse.plan);
+    let solution =
+        finish(problem, search, (completeness, bounds), (wanted, tolerance), finite_modes, counters)?;
+    Ok(EigenSolution { plan, ..solution })
 }
 
 /// Modes as a method found them.
@@ -126,29 +135,68 @@ fn search_densely(
     Ok((Search { refined, next, tau }, flexible))
 }
 
-fn search_iteratively(
+/// The iterative search and what it goes by.
+struct Sparse<'a> {
+    problem: &'a EigenProblem<'a>,
+    settings: &'a EigenSettings,
+    analysis: &'a Analysis,
+    plan: Plan,
+}
+
+impl Sparse<'_> {
+    /// Searches with the factor of the plan; from single precision back to double where it fails, if that fits.
+    fn search(
+        &mut self,
+        wanted: usize,
+        attempt: u64,
+        watch: Watch<'_>,
+        counters: &mut Counters,
+    ) -> Result<Search, EigenFailure> {
+        let Self { problem, analysis, .. } = *self;
+        let tolerance = self.settings.accuracy.residual();
+        let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, rough: false, attempt };
+        let found = if self.plan.precision == Precision::Single {
+            match single::search(problem, analysis, &goal, watch, counters) {
+                Err(failure) if self.settings.factor == FactorChoice::Auto => {
+                    let double = Plan::in_double(problem, self.settings, analysis, wanted);
+                    self.plan = Plan { single_failed: true, ..double.map_err(|_| failure)? };
+                    None
+                }
+                found => Some(found?),
+            }
+        } else {
+            None
+        };
+        let (refined, next, tau) = match found {
+            Some(found) => found,
+            None => search_in_double(problem, analysis, &goal, watch, counters)?,
+        };
+        counters.factor_bytes = self.plan.factor_bytes;
+        check_zero_energy(problem, &refined)?;
+        Ok(Search { refined, next, tau })
+    }
+}
+
+fn search_in_double(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
-    wanted: usize,
-    tolerance: f64,
-    attempt: u64,
+    goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<Search, EigenFailure> {
-    let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, attempt };
+) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
     let mut tau = 0.3 * problem.first_estimate;
-    let (factor, found, next) = loop {
+    loop {
         watch(Event::Phase("factorisation"));
-        let factor = lanczos::factorise(problem, analysis, tau, counters)?;
+        let factor: Cholesky<'_, f64> = lanczos::factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
-        match lanczos::lowest_modes(problem, &factor, &goal, watch, counters)? {
-            lanczos::Search::Found { modes, next } => break (factor, modes, next),
+        match lanczos::lowest_modes(problem, &factor, goal, watch, counters)? {
+            lanczos::Search::Found { modes, next } => {
+                return Ok((refine(problem, &factor, modes, goal.tolerance, counters)?, next, tau));
+            }
             lanczos::Search::ShiftTooLarge(shift) => tau = shift,
+            lanczos::Search::Rough { .. } => unreachable!("not asked for"),
         }
-    };
-    let refined = refine(problem, &factor, found, tolerance, counters)?;
-    check_zero_energy(problem, &refined)?;
-    Ok(Search { refined, next, tau: factor.shift() })
+    }
 }
 
 /// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
@@ -174,13 +222,12 @@ fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<()
 
 /// The inertia count in the gap above the last mode.
 fn prove(
-    problem: &EigenProblem<'_>,
-    settings: &EigenSettings,
-    analysis: &Analysis,
+    sparse: &Sparse<'_>,
     search: &Search,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Completeness, EigenFailure> {
+    let Sparse { problem, settings, analysis, plan } = sparse;
     let found = search.refined.eigenvalues.len();
     let last = search.refined.eigenvalues.last().copied().unwrap_or(0.0);
     let shift = match (settings.wanted, search.next.first()) {
@@ -190,14 +237,18 @@ fn prove(
         // Nothing above: every finite mode was computed.
         (_, None) => 1.1 * last,
     };
-    if settings.accuracy == Accuracy::Fast {
-        return Ok(Completeness {
-            proof: Proof::NotProved,
-            shift,
-            negative_pivots: None,
-            modes_below: found,
-            remark: "accuracy `fast` leaves the count out".to_owned(),
-        });
+    let remark = match plan.proof_too_large {
+        _ if settings.accuracy == Accuracy::Fast => Some("accuracy `fast` leaves the count out".to_owned()),
+        Some((needed, available)) => Some(format!(
+            "the count needs {} of memory, {} are available",
+            gigabytes(needed),
+            gigabytes(available)
+        )),
+        None => None,
+    };
+    if let Some(remark) = remark {
+        let proof = Proof::NotProved;
+        return Ok(Completeness { proof, shift, negative_pivots: None, modes_below: found, remark });
     }
     watch(Event::Phase("completeness"));
     let below = search.refined.eigenvalues.iter().filter(|&&l| l < shift).count();
@@ -249,6 +300,7 @@ fn finish(
         }
     }
     Ok(EigenSolution {
+        plan: None,
         bounds,
         eigenvalues: eigenvalues[..given].to_vec(),
         vectors,

@@ -5,7 +5,7 @@ use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
 use super::ordering::{nested_dissection, node_graph};
 use super::substitution;
-use super::tree_walk::Walk;
+use super::tree_walk::{Needs, Walk};
 use super::{Pencil, SymmetricMatrix};
 use faer::MatMut;
 use faer::prelude::ReborrowMut;
@@ -48,6 +48,26 @@ impl Analysis {
         self.flops
     }
 
+    /// Most numbers held at a time, with `threads` subtrees in work at the same time.
+    pub fn peaks(&self, threads: usize) -> Peaks {
+        let shape = |s: usize| {
+            let width = self.tree.columns(s).len() * self.block;
+            (width, self.tree.rows(s).len() * self.block)
+        };
+        let pivots = |s: usize| {
+            let (width, rest) = shape(s);
+            Trapezoid::<f64>::stored(width + rest, width)
+        };
+        let rest = |s: usize| Trapezoid::<f64>::stored(shape(s).1, shape(s).1);
+        let numbers = |needs: &dyn Fn(usize) -> Needs| self.walk.peak(&self.tree, threads, needs) as u64;
+        Peaks {
+            factor: self.len as u64,
+            cholesky: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: 0 }),
+            // L and L B.
+            inertia: numbers(&|s| Needs { kept: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
+        }
+    }
+
     /// Zeros for the columns of a front, and for its Schur complement.
     pub(super) fn new_front<T: Real>(&self, s: usize) -> (Trapezoid<T>, Trapezoid<T>) {
         let width = self.tree.columns(s).len() * self.block;
@@ -70,6 +90,17 @@ impl Analysis {
         });
         Scaled { analysis: self, pencil, sigma, scale: scale.collect() }
     }
+}
+
+/// Most numbers held at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Peaks {
+    /// By a Cholesky factor when it is done.
+    pub factor: u64,
+    /// During a Cholesky factorisation.
+    pub cholesky: u64,
+    /// During an inertia count, in double precision.
+    pub inertia: u64,
 }
 
 /// Multiplications and additions that eliminate `width` columns with `rest` rows below them.

@@ -34,6 +34,8 @@ pub trait Real:
     + Mul<Output = Self>
     + Neg<Output = Self>
 {
+    /// Unit roundoff.
+    const ROUNDOFF: f64;
     /// Rounded from double precision.
     fn of(x: f64) -> Self;
     /// In double precision.
@@ -43,6 +45,7 @@ pub trait Real:
 }
 
 impl Real for f64 {
+    const ROUNDOFF: f64 = f64::EPSILON / 2.0;
     fn of(x: f64) -> Self {
         x
     }
@@ -56,6 +59,7 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
+    const ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
     fn of(x: f64) -> Self {
         x as f32
     }

@@ -21,7 +21,7 @@ pub use compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
 pub use compensated_pencil::small_pencil_eigenvalues;
 pub use compensated_product::{CompensatedBlock, LANES, gram_compensated, multiply_compensated, sum_length};
 pub use dense::{SymmetricEigen, dense_cholesky, symmetric_eigen};
-pub use factor::{Analysis, Cholesky, Solve, is_positive_semidefinite};
+pub use factor::{Analysis, Cholesky, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
 pub use inertia::Inertia;
 pub use ordering::connected_components;

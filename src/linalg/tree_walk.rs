@@ -19,6 +19,17 @@ struct Segment {
     branches: Vec<Segment>,
 }
 
+/// Memory of the work at one supernode.
+#[derive(Debug, Clone, Copy)]
+pub struct Needs {
+    /// Held until the end of the walk.
+    pub kept: usize,
+    /// Held until the parent has been visited.
+    pub handed_on: usize,
+    /// Held during the visit only.
+    pub in_work: usize,
+}
+
 /// How walks cut the tree.
 #[derive(Debug)]
 pub struct Walk {
@@ -59,6 +70,12 @@ impl Walk {
         }
         let top = gather(roots, &mut branches);
         Self { trees: Segment { supernodes: 0..tree.len(), branches: top } }
+    }
+
+    /// Most memory that an upward walk holds at a time, in the units of `needs`, with so many branches in work at the same
+    /// time: those that need most beyond what they leave.
+    pub fn peak(&self, tree: &AssemblyTree, threads: usize, needs: &dyn Fn(usize) -> Needs) -> usize {
+        peak(tree, &self.trees, threads.max(1), needs).0
     }
 
     /// Calls `visit(supernode, slot, results of its children)` for every supernode, children first. Results of roots
@@ -107,6 +124,28 @@ fn own(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
     let begins: Vec<usize> = std::iter::once(segment.supernodes.start).chain(ends).collect();
     let gaps: Vec<Range<usize>> = begins.into_iter().zip(starts).map(|(a, b)| a..b).collect();
     gaps.into_iter().flatten()
+}
+
+/// The most that a segment holds at a time, and what is left at its end.
+fn peak(
+    tree: &AssemblyTree,
+    segment: &Segment,
+    threads: usize,
+    needs: &dyn Fn(usize) -> Needs,
+) -> (usize, usize) {
+    let branches: Vec<(usize, usize)> =
+        segment.branches.iter().map(|branch| peak(tree, branch, threads, needs)).collect();
+    let mut held: usize = branches.iter().map(|b| b.1).sum();
+    let mut beyond: Vec<usize> = branches.iter().map(|b| b.0 - b.1).collect();
+    beyond.sort_unstable();
+    let mut most = held + beyond.iter().rev().take(threads).sum::<usize>();
+    for s in own(segment) {
+        let Needs { kept, handed_on, in_work } = needs(s);
+        held += kept + handed_on;
+        most = most.max(held + in_work);
+        held -= tree.children(s).iter().map(|&c| needs(c as usize).handed_on).sum::<usize>();
+    }
+    (most, held)
 }
 
 /// The results of the supernodes of a segment that have no parent inside it.

@@ -83,6 +83,7 @@ pub(super) struct RunFacts {
     pub cpu_seconds: f64,
     pub phases: Vec<Phase>,
     pub peak_memory_bytes: Option<u64>,
+    pub memory_estimate_bytes: Option<u64>,
     #[serde(serialize_with = "as_map")]
     pub counters: Vec<(String, u64)>,
     pub output: Option<OutputFacts>,
@@ -204,6 +205,7 @@ impl RunFacts {
             cpu_seconds: run.phases.iter().map(|p| p.cpu_seconds).sum(),
             phases: run.phases.clone(),
             peak_memory_bytes: run.peak_memory_bytes,
+            memory_estimate_bytes: run.memory_estimate_bytes,
             counters: run.counters.clone(),
             output: run
                 .output

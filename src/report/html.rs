@@ -348,6 +348,7 @@ fn run(html: &mut String, facts: &Facts) {
         ("Time", format!("{} wall, {} CPU", duration(run.wall_seconds), duration(run.cpu_seconds))),
         ("Threads", run.threads.to_string()),
         ("Peak memory", run.peak_memory_bytes.map_or_else(|| "not known".to_owned(), bytes)),
+        ("Memory expected", run.memory_estimate_bytes.map_or_else(|| "not known".to_owned(), bytes)),
         ("Accuracy", escape(&run.accuracy)),
     ];
     if let Some(output) = &run.output {

@@ -35,6 +35,8 @@ pub struct RunData {
     pub phases: Vec<Phase>,
     /// Largest resident memory of the process, where the system tells it.
     pub peak_memory_bytes: Option<u64>,
+    /// What was expected of it before the work, where it was.
+    pub memory_estimate_bytes: Option<u64>,
     /// Number of threads.
     pub threads: usize,
     /// Everything that was found, in order.

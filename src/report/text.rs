@@ -190,7 +190,10 @@ fn timing(page: &mut Page, run: &RunFacts) {
         let phases: Vec<String> = run.phases.iter().map(phase).collect();
         page.entry("phases", &format!("{} s (wall/CPU)", phases.join(", ")));
     }
-    let memory = run.peak_memory_bytes.map_or(String::new(), |m| format!(", peak memory {}", bytes(m)));
+    let mut memory = run.peak_memory_bytes.map_or(String::new(), |m| format!(", peak memory {}", bytes(m)));
+    if let Some(estimate) = run.memory_estimate_bytes {
+        memory.push_str(&format!(" ({} expected)", bytes(estimate)));
+    }
     let (wall, cpu) = (duration(run.wall_seconds), duration(run.cpu_seconds));
     let threads = counted(run.threads, "thread");
     page.entry("total", &format!("{wall} wall, {cpu} CPU, {threads}{memory}"));

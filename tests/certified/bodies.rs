@@ -14,7 +14,12 @@ use flexbody::store;
 use flexbody::verification::verify;
 
 fn settings(accuracy: Accuracy, count: usize, frame: BodyFrame) -> ConvertSettings {
-    let modes = ModeSettings { wanted: Wanted::Lowest(count), accuracy, method: Method::Auto };
+    let modes = ModeSettings {
+        wanted: Wanted::Lowest(count),
+        accuracy,
+        method: Method::Auto,
+        ..ModeSettings::default()
+    };
     ConvertSettings { modes, frame, ..ConvertSettings::default() }
 }
 

@@ -68,7 +68,7 @@ impl Body {
             first_estimate: form(&self.k, &ramp, &ramp) / form(&self.m, &ramp, &ramp),
             input_error: 0.0,
         };
-        solve(&problem, &EigenSettings { wanted, accuracy, method }, SILENT)
+        solve(&problem, &EigenSettings { wanted, accuracy, method, ..EigenSettings::default() }, SILENT)
     }
 
     /// Every bound is right by exact counts; the largest relative width.

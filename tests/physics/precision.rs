@@ -24,7 +24,8 @@ const WAYS: [(Method, Accuracy); 4] = [
 fn in_every_way(what: &str, body: &Assembly, count: usize, check: impl Fn(&str, &Body)) {
     for (method, accuracy) in WAYS {
         let what = format!("{what}, {count} modes, {method:?}, {accuracy:?}");
-        let settings = ModeSettings { wanted: Wanted::Lowest(count), accuracy, method };
+        let settings =
+            ModeSettings { wanted: Wanted::Lowest(count), accuracy, method, ..ModeSettings::default() };
         let found = solve(body.raw_model(), &settings).unwrap_or_else(|error| panic!("{what}: {error}"));
         assert_eq!(found.eigenvalues().len(), count, "{what}");
         assert_eq!(found.modes.solution.completeness.proof, Proof::InertiaCount, "{what}");
@@ -91,7 +92,12 @@ fn thin_plates_tell_their_noise() {
             let mut first: Option<Vec<f64>> = None;
             for (method, accuracy) in WAYS {
                 let what = format!("{kind:?}, {count} modes, {method:?}, {accuracy:?}");
-                let settings = ModeSettings { wanted: Wanted::Lowest(count), accuracy, method };
+                let settings = ModeSettings {
+                    wanted: Wanted::Lowest(count),
+                    accuracy,
+                    method,
+                    ..ModeSettings::default()
+                };
                 let found =
                     solve(body.raw_model(), &settings).unwrap_or_else(|error| panic!("{what}: {error}"));
                 assert!(found.modes.diagnostics.iter().any(|d| d.code() == Code::NoiseFloor), "{what}");

@@ -125,8 +125,12 @@ fn agrees_with_its_reference(case: &Case) {
         );
     }
     if let Some((shift, below)) = case.count {
-        let settings =
-            ModeSettings { wanted: Wanted::Below(shift), accuracy: Accuracy::Standard, method: Method::Auto };
+        let settings = ModeSettings {
+            wanted: Wanted::Below(shift),
+            accuracy: Accuracy::Standard,
+            method: Method::Auto,
+            ..ModeSettings::default()
+        };
         let found = free_surface(&body.model, &settings, SILENT).expect("a sound body").solution;
         assert_eq!(found.eigenvalues.len() + 6, below, "{name}");
         assert_eq!(found.completeness.negative_pivots, Some(below), "{name}");

@@ -117,7 +117,12 @@ fn nodes_without_mass_are_counted_on_every_path() {
     body.scalar_mass = CscMatrix::from_triplets(n, n, &kept);
     let at_most = body.n_dofs() - 6 - 3 * massless.len();
     for method in METHODS {
-        let settings = ModeSettings { wanted: Wanted::Lowest(10), accuracy: Accuracy::Standard, method };
+        let settings = ModeSettings {
+            wanted: Wanted::Lowest(10),
+            accuracy: Accuracy::Standard,
+            method,
+            ..ModeSettings::default()
+        };
         let found = solve(body.raw_model(), &settings).expect("a sound body");
         let note = found.modes.diagnostics.iter().find(|d| d.code() == Code::MassMatrixSingular);
         let message = note.map(|d| d.message()).unwrap_or_default();
@@ -139,7 +144,8 @@ fn every_mode_below_a_frequency_is_found() {
         }
         for method in METHODS {
             let wanted = Wanted::Below(0.5 * (below + above));
-            let settings = ModeSettings { wanted, accuracy: Accuracy::Standard, method };
+            let settings =
+                ModeSettings { wanted, accuracy: Accuracy::Standard, method, ..ModeSettings::default() };
             let found = free_surface(&model, &settings, SILENT).expect("a sound body");
             assert_eq!(found.solution.eigenvalues.len(), count, "{method:?}");
             assert_eq!(found.solution.completeness.proof, Proof::InertiaCount);

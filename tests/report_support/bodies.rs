@@ -125,6 +125,7 @@ pub fn run_data() -> RunData {
             phase("invariants", 0.125, 0.24),
         ],
         peak_memory_bytes: Some(512_345_678),
+        memory_estimate_bytes: Some(498_000_000),
         threads: 2,
         diagnostics: vec![
             Diagnostic::new(Code::NoiseFloor, "rigid modes reach 3.2e-9 of the first eigenvalue")

@@ -64,7 +64,15 @@ pub fn solve(raw: RawModel, settings: &ModeSettings) -> Result<Body> {
 
 /// The lowest `count` flexible modes at certified accuracy by `method`.
 pub fn try_modes(raw: RawModel, count: usize, method: Method) -> Result<Body> {
-    solve(raw, &ModeSettings { wanted: Wanted::Lowest(count), accuracy: Accuracy::Certified, method })
+    solve(
+        raw,
+        &ModeSettings {
+            wanted: Wanted::Lowest(count),
+            accuracy: Accuracy::Certified,
+            method,
+            ..ModeSettings::default()
+        },
+    )
 }
 
 /// The lowest `count` flexible modes of a sound body, with their completeness proved: the inertia count says that
