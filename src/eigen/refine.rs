@@ -65,9 +65,16 @@ pub(super) fn rayleigh_ritz(
     let kx = pencil.apply_stiffness(x.as_ref());
     let gm = gram(x.as_ref(), mx.as_ref());
     let gk = gram(x.as_ref(), kx.as_ref());
+    let (values, coefficients) = small_ritz(gm, gk)?;
+    Ok((values, combine(x.as_ref(), coefficients.as_ref())))
+}
+
+/// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram matrices
+/// with M and with K. Directions in which the basis is dependent are left out.
+pub(super) fn small_ritz(gm: Mat<f64>, gk: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
     // A column that nothing is left of spans nothing.
     let scale: Vec<f64> =
-        (0..x.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
+        (0..gm.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
     if scale.iter().any(|s| !s.is_finite()) {
         return Err(EigenFailure::MassIndefinite);
     }
@@ -85,7 +92,7 @@ pub(super) fn rayleigh_ritz(
     let coefficients = combine(to_orthonormal.as_ref(), ritz.vectors.as_ref());
     let coefficients =
         Mat::from_fn(coefficients.nrows(), coefficients.ncols(), |i, j| scale[i] * coefficients[(i, j)]);
-    Ok((ritz.values, combine(x.as_ref(), coefficients.as_ref())))
+    Ok((ritz.values, coefficients))
 }
 
 /// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be helped:

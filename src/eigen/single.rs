@@ -8,8 +8,8 @@
 
 use super::lanczos::{self, Goal, Search, factorise};
 use super::problem::{Counters, EigenFailure, EigenProblem};
-use super::refine::{Refined, rayleigh_ritz, residuals};
-use crate::linalg::{Analysis, Cholesky, Solve, combine, gram, subtract_combination};
+use super::refine::{Refined, rayleigh_ritz, residuals, small_ritz};
+use crate::linalg::{Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 
@@ -50,6 +50,33 @@ pub(super) fn search(
     }
 }
 
+/// Vectors with their products.
+struct Span {
+    x: Mat<f64>,
+    kx: Mat<f64>,
+    mx: Mat<f64>,
+}
+
+impl Span {
+    fn new(problem: &EigenProblem<'_>, x: Mat<f64>, counters: &mut Counters) -> Self {
+        counters.stiffness_columns += x.ncols() as u64;
+        counters.mass_columns += x.ncols() as u64;
+        let (kx, mx) = (problem.pencil.apply_stiffness(x.as_ref()), problem.pencil.apply_mass(x.as_ref()));
+        Self { x, kx, mx }
+    }
+
+    /// Replaces the vectors by combinations of them and of others, `coefficients` first of its own, then of the others.
+    fn combine_with(&mut self, other: &Self, coefficients: MatRef<'_, f64>) {
+        let (own, others) = coefficients.split_at_row(self.x.ncols());
+        for (mine, theirs) in [(&mut self.x, &other.x), (&mut self.kx, &other.kx), (&mut self.mx, &other.mx)]
+        {
+            let mut new = combine(mine.as_ref(), own);
+            add_combination(new.as_mut(), theirs.as_ref(), others);
+            *mine = new;
+        }
+    }
+}
+
 /// Corrects the span of `x` until its lowest `wanted` Ritz pairs keep the tolerance, and the end of their cluster is seen.
 fn correct(
     problem: &EigenProblem<'_>,
@@ -60,9 +87,11 @@ fn correct(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>), EigenFailure> {
-    let kept = x.ncols() + wanted;
-    let (mut lambda, mut x) = rayleigh_ritz(problem, x, counters)?;
+    let (mut lambda, x) = rayleigh_ritz(problem, x, counters)?;
+    let mut span = Span::new(problem, x, counters);
+    let m_rigid = problem.pencil.apply_mass(problem.rigid);
     let (mut least, mut since) = (f64::INFINITY, 0);
+    let mut floors = Vec::new();
     for _ in 0..MAX_ROUNDS {
         while wanted < lambda.len()
             && lambda[wanted] - lambda[wanted - 1] <= goal.cluster_gap * lambda[wanted - 1].abs()
@@ -70,22 +99,28 @@ fn correct(
             wanted += 1;
         }
         let looked = (wanted + 1).min(lambda.len());
-        let (found, floors) = residuals(problem, &lambda[..looked], x.as_ref().subcols(0, looked), counters);
-        let excess =
-            |i: usize| if i < wanted { found[i] / goal.tolerance.max(floors[i]) } else { found[i] / BEYOND };
-        let poor: Vec<usize> = (0..looked).filter(|&i| excess(i) > 1.0).collect();
+        if floors.len() < looked {
+            let lowest = span.x.as_ref().subcols(0, looked);
+            floors = residuals(problem, &lambda[..looked], lowest, counters).1;
+        }
+        let residual = |j: usize| {
+            let r = span.kx.col(j) - span.mx.col(j) * faer::Scale(lambda[j]);
+            let size = span.kx.col(j).norm_l2() + lambda[j].abs() * span.mx.col(j).norm_l2();
+            r.norm_l2() / size.max(f64::MIN_POSITIVE)
+        };
+        let excess: Vec<f64> = (0..looked)
+            .map(|j| residual(j) / if j < wanted { goal.tolerance.max(floors[j]) } else { BEYOND })
+            .collect();
+        let poor: Vec<usize> = (0..looked).filter(|&i| excess[i] > 1.0).collect();
         watch(Event::Fraction(1.0 - poor.len() as f64 / looked as f64));
         if poor.is_empty() {
             let next = lambda[wanted..looked].to_vec();
-            let modes = Refined {
-                eigenvalues: lambda[..wanted].to_vec(),
-                vectors: x.as_ref().subcols(0, wanted).to_owned(),
-                residuals: found[..wanted].to_vec(),
-                floors: floors[..wanted].to_vec(),
-            };
-            return Ok((modes, next));
+            return Ok((
+                Refined::new(problem, span.x.as_ref().subcols(0, wanted).to_owned(), counters)?,
+                next,
+            ));
         }
-        let worst = poor.iter().map(|&i| excess(i)).fold(0.0, f64::max);
+        let worst = excess.iter().fold(0.0f64, |m, e| if e.is_nan() { f64::NAN } else { m.max(*e) });
         if worst < 0.5 * least {
             (least, since) = (worst, 0);
         } else {
@@ -94,53 +129,53 @@ fn correct(
         if since > PATIENCE || worst.is_nan() {
             break;
         }
-        let chosen = Mat::from_fn(x.nrows(), poor.len(), |i, j| x[(i, poor[j])]);
-        let values: Vec<f64> = poor.iter().map(|&i| lambda[i]).collect();
-        let new = corrections(problem, factor, chosen.as_ref(), &values, x.as_ref(), counters);
-        let mut all = Mat::zeros(x.nrows(), x.ncols() + new.ncols());
-        all.as_mut().subcols_mut(0, x.ncols()).copy_from(&x);
-        all.as_mut().subcols_mut(x.ncols(), new.ncols()).copy_from(&new);
-        (lambda, x) = rayleigh_ritz(problem, all, counters)?;
-        let kept = kept.min(x.ncols());
-        lambda.truncate(kept);
-        x = x.as_ref().subcols(0, kept).to_owned();
+        let new = corrections(problem, factor, &span, &poor, &lambda, m_rigid.as_ref(), counters);
+        let gram_of = |x: &Mat<f64>, y: &Mat<f64>| gram(x.as_ref(), y.as_ref());
+        let gm = bordered(&gram_of(&span.x, &span.mx), &gram_of(&span.x, &new.mx), &gram_of(&new.x, &new.mx));
+        let gk = bordered(&gram_of(&span.x, &span.kx), &gram_of(&span.x, &new.kx), &gram_of(&new.x, &new.kx));
+        let (values, coefficients) = small_ritz(gm, gk)?;
+        let kept = span.x.ncols().min(values.len());
+        span.combine_with(&new, coefficients.as_ref().subcols(0, kept));
+        lambda = values[..kept].to_vec();
     }
     Err(EigenFailure::NotConverged { converged: 0, wanted })
 }
 
-/// T (K x - lambda M x) for some Ritz pairs, M-orthogonal to the basis and of unit M-norm.
+/// [A, B; B', C].
+fn bordered(a: &Mat<f64>, b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
+    let m = a.ncols();
+    Mat::from_fn(m + c.ncols(), m + c.ncols(), |i, j| match (i < m, j < m) {
+        (true, true) => a[(i, j)],
+        (true, false) => b[(i, j - m)],
+        (false, true) => b[(j, i - m)],
+        (false, false) => c[(i - m, j - m)],
+    })
+}
+
+/// T (K x - lambda M x) for some Ritz pairs, M-orthogonal to the span and to the rigid modes.
 fn corrections(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
-    x: MatRef<'_, f64>,
+    span: &Span,
+    chosen: &[usize],
     lambda: &[f64],
-    basis: MatRef<'_, f64>,
+    m_rigid: MatRef<'_, f64>,
     counters: &mut Counters,
-) -> Mat<f64> {
-    let pencil = &problem.pencil;
-    let k = x.ncols() as u64;
-    counters.stiffness_columns += k;
-    counters.mass_columns += 4 * k;
-    counters.solved_columns += k;
-    let mx = pencil.apply_mass(x);
-    let mut r = pencil.apply_stiffness(x);
-    for (j, &lambda) in lambda.iter().enumerate() {
-        let column = r.col(j) - mx.col(j) * faer::Scale(lambda);
+) -> Span {
+    counters.solved_columns += chosen.len() as u64;
+    let mut d = Mat::zeros(span.x.nrows(), chosen.len());
+    for (mut d, &j) in d.col_iter_mut().zip(chosen) {
+        let r = span.kx.col(j) - span.mx.col(j) * faer::Scale(lambda[j]);
         // Unit size: residuals near rounding would leave the range of single precision.
-        let size = column.norm_max();
-        let scale = if size > 0.0 { size.recip() } else { 0.0 };
-        r.as_mut().col_mut(j).copy_from(column * faer::Scale(scale));
+        let size = r.norm_max();
+        d.copy_from(r * faer::Scale(if size > 0.0 { size.recip() } else { 0.0 }));
     }
-    factor.solve_in_place(r.as_mut());
+    factor.solve_in_place(d.as_mut());
     for _ in 0..2 {
-        let mr = pencil.apply_mass(r.as_ref());
-        let along = gram(basis, mr.as_ref());
-        subtract_combination(r.as_mut(), basis, along.as_ref());
+        for (basis, m_basis) in [(problem.rigid, m_rigid), (span.x.as_ref(), span.mx.as_ref())] {
+            let along = gram(m_basis, d.as_ref());
+            subtract_combination(d.as_mut(), basis, along.as_ref());
+        }
     }
-    let mr = pencil.apply_mass(r.as_ref());
-    let squares = gram(r.as_ref(), mr.as_ref());
-    let scale = Mat::from_fn(r.ncols(), r.ncols(), |i, j| {
-        if i == j && squares[(i, i)] > 0.0 { squares[(i, i)].sqrt().recip() } else { 0.0 }
-    });
-    combine(r.as_ref(), scale.as_ref())
+    Span::new(problem, d, counters)
 }

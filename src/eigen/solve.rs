@@ -28,6 +28,10 @@ const DENSE_PART: f64 = 0.2;
 /// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
 const CLUSTER_GAP: f64 = 1e-9;
 
+/// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
+/// residuals, up to the root of m times the largest.
+const SEARCHED: f64 = 0.4;
+
 /// Computes the wanted flexible modes.
 ///
 /// # Errors
@@ -64,7 +68,7 @@ pub fn solve(
                 || (pencil.n() <= DENSE_AT_MOST && wanted as f64 > DENSE_PART * available as f64)
         }
     };
-    let tolerance = settings.accuracy.residual();
+    let tolerance = SEARCHED * settings.accuracy.residual();
     let mut sparse = Sparse { problem, settings, analysis: &analysis, plan };
     let (mut search, finite_modes) = if dense {
         let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
@@ -93,8 +97,14 @@ pub fn solve(
         None
     };
     let plan = (!dense).then_some(sparse.plan);
-    let solution =
-        finish(problem, search, (completeness, bounds), (wanted, tolerance), finite_modes, counters)?;
+    let solution = finish(
+        problem,
+        search,
+        (completeness, bounds),
+        (wanted, settings.accuracy.residual()),
+        finite_modes,
+        counters,
+    )?;
     Ok(EigenSolution { plan, ..solution })
 }
 
@@ -153,7 +163,7 @@ impl Sparse<'_> {
         counters: &mut Counters,
     ) -> Result<Search, EigenFailure> {
         let Self { problem, analysis, .. } = *self;
-        let tolerance = self.settings.accuracy.residual();
+        let tolerance = SEARCHED * self.settings.accuracy.residual();
         let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, rough: false, attempt };
         let found = if self.plan.precision == Precision::Single {
             match single::search(problem, analysis, &goal, watch, counters) {

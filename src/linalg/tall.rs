@@ -56,6 +56,14 @@ pub fn subtract_combination(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_
     add_product(w, Accum::Add, v, h, -1.0);
 }
 
+/// W += V H for tall V (n x m), W (n x k) and small H (m x k).
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn add_combination(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) {
+    add_product(w, Accum::Add, v, h, 1.0);
+}
+
 /// V H (n x k) for tall V (n x m) and small H (m x k).
 ///
 /// # Panics
