@@ -11,6 +11,7 @@ mod noise;
 mod problem;
 mod refine;
 mod solve;
+mod start;
 
 pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
@@ -20,3 +21,4 @@ pub use problem::{
     Wanted,
 };
 pub use solve::solve;
+pub use start::{Resume, Save, Snapshot};

@@ -11,8 +11,10 @@ use super::problem::{
     Wanted,
 };
 use super::refine::{Refined, refine, residuals as residuals_of};
+use super::start::{Snapshot, fitting_start};
 use crate::linalg::{Analysis, Solve, is_positive_semidefinite};
 use crate::progress::{Event, Watch};
+use faer::Mat;
 
 /// Models up to this size are solved densely: all modes take less than a second.
 const DENSE_ALWAYS: usize = 600;
@@ -25,6 +27,9 @@ const DENSE_PART: f64 = 0.2;
 
 /// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
 const CLUSTER_GAP: f64 = 1e-9;
+
+/// First shift of an iterative search, in units of the upper bound of the first eigenvalue.
+const FIRST_SHIFT: f64 = 0.3;
 
 /// Computes the wanted flexible modes.
 ///
@@ -122,6 +127,14 @@ fn search_densely(
     let found = Refined::new(problem, spectrum.vectors(last), counters)?;
     let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
+    problem.resume.save(|| Snapshot {
+        // That of an iterative search: it may go on from here when other modes are wanted.
+        shift: FIRST_SHIFT * problem.first_estimate,
+        eigenvalues: refined.eigenvalues.clone(),
+        basis: refined.vectors.clone(),
+        coupling: Mat::zeros(0, last),
+        converged: last,
+    });
     let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
     Ok((Search { refined, next, tau }, flexible))
 }
@@ -136,14 +149,16 @@ fn search_iteratively(
     counters: &mut Counters,
 ) -> Result<Search, EigenFailure> {
     let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, attempt };
-    let mut tau = 0.3 * problem.first_estimate;
+    // A repeated search must not start from the directions that led to a wrong count.
+    let mut start = fitting_start(problem).filter(|_| attempt == 0);
+    let mut tau = start.map_or(FIRST_SHIFT * problem.first_estimate, |start| start.shift);
     let (factor, found, next) = loop {
         watch(Event::Phase("factorisation"));
         let factor = lanczos::factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
-        match lanczos::lowest_modes(problem, &factor, &goal, watch, counters)? {
+        match lanczos::lowest_modes(problem, &factor, &goal, start, watch, counters)? {
             lanczos::Search::Found { modes, next } => break (factor, modes, next),
-            lanczos::Search::ShiftTooLarge(shift) => tau = shift,
+            lanczos::Search::ShiftTooLarge(shift) => (tau, start) = (shift, None),
         }
     };
     let refined = refine(problem, &factor, found, tolerance, counters)?;
