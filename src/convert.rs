@@ -1,8 +1,8 @@
 //! The main job: from a checked model to a flexible body, with what lumped masses would have given.
 
-use crate::basis::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of};
+use crate::basis::{FreeSurfaceModes, ModeSettings, free_surface_of, free_surface_resumed};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, Counters, Plan, Proof, Wanted, canonical_basis};
+use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, canonical_basis};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
@@ -88,12 +88,25 @@ pub struct Conversion {
 /// Converts a checked model.
 ///
 /// # Errors
-/// Those of [`free_surface`] and [`choose_frame`]; [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not
+/// Those of [`free_surface`](crate::basis::free_surface) and [`choose_frame`]; [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not
 /// fit the nodes (found before any work).
 pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
+    convert_resumed(model, settings, Resume::default(), watch)
+}
+
+/// The same with a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+///
+/// # Errors
+/// As [`convert`].
+pub fn convert_resumed(
+    model: &FeModel,
+    settings: &ConvertSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<Conversion> {
     let schemes =
         settings.lumped.iter().map(|lumping| lumped_masses(model, lumping)).collect::<Result<Vec<_>>>()?;
-    let found = free_surface(model, &settings.modes, watch)?;
+    let found = free_surface_resumed(model, &settings.modes, resume, watch)?;
     watch(Event::Phase("invariants"));
     let positions = &model.nodes().positions;
     let (frame, mass_properties) = choose_frame(model.scalar_mass(), positions, settings.frame)?;

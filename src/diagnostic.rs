@@ -30,7 +30,7 @@ impl Severity {
 macro_rules! codes {
     ($($variant:ident = $id:literal, $severity:ident, $exit:ident, $title:literal, $help:literal;)*) => {
         /// A diagnostic's identity. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model,
-        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files, FB8xx usage.
+        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files and checkpoints, FB8xx usage.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Code {
             $(#[doc = $title] $variant,)*
@@ -136,7 +136,8 @@ codes! {
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
-    // FB7xx: flex-body files
+    CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
+    // FB7xx: flex-body files and checkpoints
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
     BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
@@ -144,6 +145,10 @@ codes! {
     BodiesDiffer = "FB705", Error, CheckFailed, "flexible bodies differ", "see the table of quantities and tolerances";
     BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
     BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
+    CheckpointUnreadable = "FB708", Error, BadInput, "not a checkpoint, or a damaged one", "remove the file or name another one: the run then starts anew";
+    CheckpointVersion = "FB709", Error, BadInput, "checkpoint of another format version", "read it with the flexbody version named in the file, or name another file";
+    CheckpointForeign = "FB710", Error, BadInput, "checkpoint of another model", "name another file for this model";
+    CheckpointTakenUp = "FB711", Note, Done, "search for modes goes on from a checkpoint", "nothing to do";
     // FB8xx: usage
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";

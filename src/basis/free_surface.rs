@@ -2,7 +2,8 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
-    EigenFailure, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Wanted, energy_noise, solve,
+    EigenFailure, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, energy_noise,
+    solve,
 };
 use crate::error::{Error, Result};
 use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
@@ -38,7 +39,20 @@ const NOISE_TOLD: f64 = 1e-6;
 /// # Errors
 /// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
 pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<FreeSurfaceModes> {
-    free_surface_of(model, model.scalar_mass(), settings, watch)
+    free_surface_resumed(model, settings, Resume::default(), watch)
+}
+
+/// The same with a search that starts where an earlier one stood, or that is kept.
+///
+/// # Errors
+/// As [`free_surface`].
+pub fn free_surface_resumed(
+    model: &FeModel,
+    settings: &ModeSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<FreeSurfaceModes> {
+    compute(model, model.scalar_mass(), settings, resume, watch)
 }
 
 /// The same with another mass matrix Ms (a lumped one) in place of the model's.
@@ -51,12 +65,22 @@ pub fn free_surface_of(
     settings: &ModeSettings,
     watch: Watch<'_>,
 ) -> Result<FreeSurfaceModes> {
+    compute(model, scalar_mass, settings, Resume::default(), watch)
+}
+
+fn compute(
+    model: &FeModel,
+    scalar_mass: &SymmetricMatrix,
+    settings: &ModeSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<FreeSurfaceModes> {
     let pencil = Pencil::new(model.stiffness(), scalar_mass, 3);
     let positions = &model.nodes().positions;
     let rigid = rigid_modes(&pencil, positions)?;
     let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
     let first_estimate = quadratic_estimate(&pencil, positions, rigid.as_ref());
-    let problem = EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error };
+    let problem = EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error, resume };
     let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
     if solution.eigenvalues.is_empty() {
         let message = match (settings.wanted, solution.next_eigenvalue) {

@@ -2,4 +2,4 @@
 
 mod free_surface;
 
-pub use free_surface::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of};
+pub use free_surface::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of, free_surface_resumed};

@@ -1,13 +1,14 @@
 //! `flexbody convert`.
 
 use super::arguments::{AccuracyName, ConvertArguments, FactorName, FrameName};
+use super::checkpoint::{CheckpointFile, resume};
 use super::output::{Outcome, tell};
 use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
 use crate::basis::ModeSettings;
-use crate::convert::{Conversion, ConvertSettings, Lumping, convert};
+use crate::convert::{Conversion, ConvertSettings, Lumping, convert_resumed};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
+use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::error::Result;
 use crate::input::{InterfaceNodes, ModelFiles, read_manifest, read_model, read_nodal_masses};
 use crate::invariants::BodyFrame;
@@ -26,6 +27,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     refuse_overwriting(arguments, &files, &schemes)?;
     let slot = store::prepare_output(&arguments.output)?;
     let report_slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let checkpoint = arguments.checkpoint.as_deref().map(CheckpointFile::open).transpose()?;
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
@@ -34,6 +36,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     watcher.hear(Event::Phase("checks"));
     let checked = FeModel::from_raw(raw)?;
     let model = checked.model;
+    let checkpoint = checkpoint.map(|file| file.for_model(&files, &model)).transpose()?;
     let settings = ConvertSettings {
         modes: ModeSettings {
             wanted: wanted(arguments, model.units()),
@@ -59,15 +62,20 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         lumped_modes: arguments.lumped_modes,
     };
     let resident = resident_bytes();
-    let conversion = convert(&model, &settings, &|event| watcher.hear(event)).inspect_err(|_| {
-        watcher.clear();
-        tell(arguments.printing, &checked.diagnostics);
-    })?;
+    let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
+    let resume = resume(checkpoint.as_ref(), &save);
+    let conversion =
+        convert_resumed(&model, &settings, resume, &|event| watcher.hear(event)).inspect_err(|_| {
+            watcher.clear();
+            tell(arguments.printing, &checked.diagnostics);
+        })?;
     watcher.hear(Event::Phase("writing"));
     store::write_to(&conversion.body, slot)?;
     let phases = watcher.finish();
     let mut diagnostics = checked.diagnostics;
     diagnostics.extend(conversion.diagnostics.iter().cloned());
+    let taken_up = conversion.counters.taken_up;
+    diagnostics.extend(checkpoint.into_iter().flat_map(|file| file.diagnostics(taken_up)));
     tell(arguments.printing, &diagnostics);
     let mut run = run_data(arguments, &conversion, diagnostics, phases, threads);
     run.memory_estimate_bytes = conversion.plan.map(|plan| resident + plan.bytes);
@@ -157,7 +165,7 @@ fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles, schemes:
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
     };
     let mut taken: Vec<_> = inputs.flatten().map(|path| place(path)).collect();
-    for output in std::iter::once(&arguments.output).chain(&arguments.report) {
+    for output in std::iter::once(&arguments.output).chain(&arguments.report).chain(&arguments.checkpoint) {
         let path = place(output);
         if taken.contains(&path) {
             let message = format!("output {} is an input or another output of this run", output.display());

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod check;
+mod checkpoint;
 mod compare;
 mod convert;
 mod inspect;

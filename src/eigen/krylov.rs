@@ -1,6 +1,7 @@
 //! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
 
 use super::problem::{Counters, EigenProblem};
+use super::start::Snapshot;
 use crate::linalg::{Solve, combine, gram, subtract_combination};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
@@ -162,6 +163,35 @@ impl<'a> Krylov<'a> {
             self.t[(i, i)] = value;
         }
         self.m = k + self.fresh;
+    }
+
+    /// Ritz vectors V S (S: projected x k) with the newest block F behind them, and C of OP V S = V S Theta + F C.
+    pub(super) fn state(&self, s: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
+        let (size, k, last) = (self.projected(), s.ncols(), self.coupling.ncols());
+        let coefficients = Mat::from_fn(self.m, k + self.fresh, |i, j| match (i < size, j < k) {
+            (true, true) => s[(i, j)],
+            (false, false) => f64::from(i - size == j - k),
+            _ => 0.0,
+        });
+        let basis = combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref());
+        (basis, combine(self.coupling.as_ref(), s.subrows(size - last, last)))
+    }
+
+    /// Fills the empty basis with the first `k` Ritz vectors of a snapshot and its newest block.
+    pub(super) fn take_up(&mut self, start: &Snapshot, shift: f64, k: usize, counters: &mut Counters) {
+        let (given, width) = (start.eigenvalues.len(), start.coupling.nrows());
+        self.v.resize_with(self.problem.pencil.n(), k + width, |_, _| 0.0);
+        self.v.as_mut().subcols_mut(0, k).copy_from(start.basis.as_ref().subcols(0, k));
+        let newest = start.basis.as_ref().subcols(given, width);
+        self.v.as_mut().subcols_mut(k, width).copy_from(newest);
+        for (i, lambda) in start.eigenvalues[..k].iter().enumerate() {
+            self.t[(i, i)] = (lambda + shift).recip();
+        }
+        self.coupling = start.coupling.as_ref().subcols(0, if width > 0 { k } else { 0 }).to_owned();
+        self.m = k + width;
+        self.fresh = width;
+        counters.mass_columns += width as u64;
+        self.m_fresh = self.problem.pencil.apply_mass(newest);
     }
 
     fn push(&mut self, block: Block) {

@@ -13,6 +13,7 @@ mod problem;
 mod refine;
 mod single;
 mod solve;
+mod start;
 
 pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
@@ -23,3 +24,4 @@ pub use problem::{
     Wanted,
 };
 pub use solve::solve;
+pub use start::{Resume, Save, Snapshot};

@@ -87,8 +87,8 @@ impl Plan {
         if with_slack(needed) > available {
             return Err(EigenFailure::Memory { bytes: with_slack(needed), available });
         }
-        let proof_too_large =
-            (settings.accuracy != Accuracy::Fast && with_slack(count) > available).then_some((count, available));
+        let proof_too_large = (settings.accuracy != Accuracy::Fast && with_slack(count) > available)
+            .then_some((count, available));
         let counted = settings.accuracy != Accuracy::Fast && proof_too_large.is_none();
         let size = if precision == Precision::Double { 8 } else { 4 };
         Ok(Self {

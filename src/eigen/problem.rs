@@ -1,7 +1,7 @@
 //! What is asked of the eigen-solver and what it answers.
 
-use super::Completeness;
 use super::plan::{FactorChoice, Plan};
+use super::{Completeness, Resume};
 use crate::linalg::Pencil;
 use faer::{Mat, MatRef};
 
@@ -16,6 +16,8 @@ pub struct EigenProblem<'a> {
     pub first_estimate: f64,
     /// Relative error of the entries of K: half a unit of the last digit that the input carries.
     pub input_error: f64,
+    /// Where an iterative search starts, and who keeps how far it came.
+    pub resume: Resume<'a>,
 }
 
 /// Which modes are wanted.
@@ -111,6 +113,8 @@ pub struct Counters {
     pub mass_columns: u64,
     /// Thick restarts.
     pub restarts: u64,
+    /// Ritz vectors taken from an earlier search.
+    pub taken_up: u64,
     /// Numbers in one factor.
     pub factor_len: u64,
     /// Multiplications and additions of one factorisation.

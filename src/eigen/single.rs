@@ -9,6 +9,8 @@
 use super::lanczos::{self, Goal, Search, factorise};
 use super::problem::{Counters, EigenFailure, EigenProblem};
 use super::refine::{Refined, rayleigh_ritz, residuals, small_ritz};
+use super::solve::FIRST_SHIFT;
+use super::start::{Snapshot, fitting_start};
 use crate::linalg::{Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
@@ -34,12 +36,20 @@ pub(super) fn search(
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
     let rough = Goal { tolerance: HANDED_OVER, rough: true, ..*goal };
-    let mut tau = 0.3 * problem.first_estimate;
+    // A repeated search must not start from the directions that led to a wrong count.
+    let start = fitting_start(problem).filter(|start| goal.attempt == 0 && start.converged >= goal.wanted);
+    let mut tau = start.map_or(FIRST_SHIFT * problem.first_estimate, |start| start.shift);
     loop {
         watch(Event::Phase("factorisation"));
         let factor: Cholesky<'_, f32> = factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
-        match lanczos::lowest_modes(problem, &factor, &rough, watch, counters)? {
+        if let Some(start) = start {
+            counters.taken_up = start.eigenvalues.len() as u64;
+            let vectors = start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned();
+            let (modes, next) = correct(problem, &factor, vectors, goal.wanted, goal, watch, counters)?;
+            return Ok((modes, next, tau));
+        }
+        match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
             Search::ShiftTooLarge(shift) => tau = shift,
             Search::Found { modes, next } => return Ok((modes, next, tau)),
             Search::Rough { vectors, wanted } => {
@@ -115,6 +125,13 @@ fn correct(
         watch(Event::Fraction(1.0 - poor.len() as f64 / looked as f64));
         if poor.is_empty() {
             let next = lambda[wanted..looked].to_vec();
+            problem.resume.save(|| Snapshot {
+                shift: factor.shift(),
+                eigenvalues: lambda.clone(),
+                basis: span.x.clone(),
+                coupling: Mat::zeros(0, lambda.len()),
+                converged: wanted,
+            });
             return Ok((
                 Refined::new(problem, span.x.as_ref().subcols(0, wanted).to_owned(), counters)?,
                 next,

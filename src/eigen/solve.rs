@@ -13,8 +13,10 @@ use super::problem::{
 };
 use super::refine::{Refined, refine, residuals as residuals_of};
 use super::single;
+use super::start::{Snapshot, fitting_start};
 use crate::linalg::{Analysis, Cholesky, is_positive_semidefinite};
 use crate::progress::{Event, Watch};
+use faer::Mat;
 
 /// Models up to this size are solved densely: all modes take less than a second.
 const DENSE_ALWAYS: usize = 600;
@@ -31,6 +33,9 @@ const CLUSTER_GAP: f64 = 1e-9;
 /// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
 /// residuals, up to the root of m times the largest.
 const SEARCHED: f64 = 0.4;
+
+/// First shift of an iterative search, in units of the upper bound of the first eigenvalue.
+pub(super) const FIRST_SHIFT: f64 = 0.3;
 
 /// Computes the wanted flexible modes.
 ///
@@ -141,6 +146,14 @@ fn search_densely(
     let found = Refined::new(problem, spectrum.vectors(last), counters)?;
     let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
+    problem.resume.save(|| Snapshot {
+        // That of an iterative search: it may go on from here when other modes are wanted.
+        shift: FIRST_SHIFT * problem.first_estimate,
+        eigenvalues: refined.eigenvalues.clone(),
+        basis: refined.vectors.clone(),
+        coupling: Mat::zeros(0, last),
+        converged: last,
+    });
     let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
     Ok((Search { refined, next, tau }, flexible))
 }
@@ -194,16 +207,18 @@ fn search_in_double(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    let mut tau = 0.3 * problem.first_estimate;
+    // A repeated search must not start from the directions that led to a wrong count.
+    let mut start = fitting_start(problem).filter(|_| goal.attempt == 0);
+    let mut tau = start.map_or(FIRST_SHIFT * problem.first_estimate, |start| start.shift);
     loop {
         watch(Event::Phase("factorisation"));
         let factor: Cholesky<'_, f64> = lanczos::factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
-        match lanczos::lowest_modes(problem, &factor, goal, watch, counters)? {
+        match lanczos::lowest_modes(problem, &factor, goal, start, watch, counters)? {
             lanczos::Search::Found { modes, next } => {
                 return Ok((refine(problem, &factor, modes, goal.tolerance, counters)?, next, tau));
             }
-            lanczos::Search::ShiftTooLarge(shift) => tau = shift,
+            lanczos::Search::ShiftTooLarge(shift) => (tau, start) = (shift, None),
             lanczos::Search::Rough { .. } => unreachable!("not asked for"),
         }
     }

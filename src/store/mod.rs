@@ -1,7 +1,8 @@
-//! The flex-body file: HDF5, one table for writer, reader, validator and documentation. The only room that names
-//! HDF5 for output.
+//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; and the checkpoint of a search.
+//! The only room that names HDF5 for output.
 
 mod assemble;
+mod checkpoint;
 mod derived;
 mod document;
 mod hdf5_value;
@@ -15,6 +16,7 @@ mod value;
 mod write;
 
 pub use crate::output::OutputSlot;
+pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
 pub use document::{format_markdown, format_schema};
 pub use read::{read, validate};
 pub use structure::structure;

@@ -49,8 +49,15 @@ fn examine(path: &Path) -> Result<(Option<FlexBody>, Vec<Diagnostic>)> {
 
 /// Opens a file of this program and of a format that this version knows; also gives its size in bytes.
 pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
+    let (file, bytes) = open_sound(path, "flexible body", Code::BodyUnreadable)?;
+    check_format(&file, path)?;
+    Ok((file, bytes))
+}
+
+/// Opens an HDF5 file whose texts can be read without harm; `what` it should be, and the code when it is not HDF5.
+pub(super) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
-        Error::from(Diagnostic::new(code, format!("cannot read the flexible body: {why}")).in_file(path))
+        Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
     };
     let meta = std::fs::metadata(path).map_err(|e| unreadable(Code::FileUnreadable, e.to_string()))?;
     if !meta.is_file() {
@@ -59,16 +66,15 @@ pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
     let broken_heap = std::fs::File::open(path).and_then(|mut file| heap::first_broken(&mut file));
     if let Some(position) = broken_heap.map_err(|e| unreadable(Code::FileUnreadable, e.to_string()))? {
         let why = format!("the text heap at byte {position} is damaged");
-        return Err(unreadable(Code::BodyUnreadable, why));
+        return Err(unreadable(foreign, why));
     }
-    let file = hdf5::File::open(path).map_err(|e| unreadable(Code::BodyUnreadable, e.to_string()))?;
+    let file = hdf5::File::open(path).map_err(|e| unreadable(foreign, e.to_string()))?;
     // The check of the heaps knows 8-byte sizes only; nothing else is in use.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
     if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
         let why = "its addresses or sizes do not have 8 bytes".to_owned();
-        return Err(unreadable(Code::BodyUnreadable, why));
+        return Err(unreadable(foreign, why));
     }
-    check_format(&file, path)?;
     Ok((file, meta.len()))
 }
 

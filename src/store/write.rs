@@ -48,7 +48,7 @@ pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
 }
 
 /// HDF5 tells the system's error number in its text only.
-fn system_error(text: &str) -> std::io::Error {
+pub(super) fn system_error(text: &str) -> std::io::Error {
     let number = text.split_once("errno = ").and_then(|(_, rest)| {
         let digits = rest.find(|c: char| !c.is_ascii_digit()).map_or(rest, |end| &rest[..end]);
         digits.parse().ok()
@@ -126,7 +126,7 @@ fn describe(dataset: &hdf5::Dataset, item: &Item, view: &View<'_>) -> hdf5::Resu
     put_text(dataset, "description", item.description)
 }
 
-fn put_text(place: &hdf5::Location, name: &str, text: &str) -> hdf5::Result<()> {
+pub(super) fn put_text(place: &hdf5::Location, name: &str, text: &str) -> hdf5::Result<()> {
     let text: VarLenUnicode = text.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
     place.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&text)
 }

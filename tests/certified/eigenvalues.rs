@@ -4,8 +4,8 @@
 use crate::exact::count_below;
 use faer::Mat;
 use flexbody::eigen::{
-    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Wanted,
-    solve,
+    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Resume,
+    Wanted, solve,
 };
 use flexbody::linalg::{CscMatrix, Pencil, SymmetricMatrix};
 use flexbody::progress::SILENT;
@@ -67,6 +67,7 @@ impl Body {
             rigid: rigid.as_ref(),
             first_estimate: form(&self.k, &ramp, &ramp) / form(&self.m, &ramp, &ramp),
             input_error: 0.0,
+            resume: Resume::default(),
         };
         solve(&problem, &EigenSettings { wanted, accuracy, method, ..EigenSettings::default() }, SILENT)
     }

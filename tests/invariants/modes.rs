@@ -3,7 +3,7 @@
 use crate::bodies::orthonormalised;
 use crate::models::{self, Model};
 use faer::Mat;
-use flexbody::eigen::{EigenProblem, EigenSettings, Wanted, solve};
+use flexbody::eigen::{EigenProblem, EigenSettings, Resume, Wanted, solve};
 use flexbody::invariants::{
     BodyFrame, Expected, Invariants, LumpedMasses, choose_frame, condense, condense_lumped, identities,
 };
@@ -25,7 +25,13 @@ fn modes(model: &Model, positions: &[[f64; 3]], count: usize) -> Modes {
     let rigid = orthonormalised(&model.scalar_mass, positions, &rigid, false);
     // CalculiX writes 14 digits.
     let first_estimate = 2.0 * model.reference["flexible_eigenvalues"][0].as_f64().expect("number");
-    let problem = EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error: 0.5e-13 };
+    let problem = EigenProblem {
+        pencil,
+        rigid: rigid.as_ref(),
+        first_estimate,
+        input_error: 0.5e-13,
+        resume: Resume::default(),
+    };
     let settings = EigenSettings { wanted: Wanted::Lowest(count), ..EigenSettings::default() };
     let solution = solve(&problem, &settings, SILENT).expect("modes");
     let product = pencil.apply_stiffness(solution.vectors.as_ref());
