@@ -247,7 +247,8 @@ impl<T: Real> Solve for Cholesky<'_, T> {
         while start < x.ncols() {
             let width = COLUMNS.min(x.ncols() - start);
             let columns = x.rb_mut().subcols_mut(start, width);
-            if width > COLUMNS / 2 {
+            // In single precision eight columns are one vector: four would not be faster.
+            if width > COLUMNS / 2 || size_of::<T>() < size_of::<f64>() {
                 self.solve_block::<COLUMNS>(columns);
             } else {
                 self.solve_block::<{ COLUMNS / 2 }>(columns);

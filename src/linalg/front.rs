@@ -22,7 +22,7 @@ const WORTH_A_TASK: usize = 4_000_000;
 /// The numbers of a factor.
 pub trait Real:
     faer::traits::RealField
-    + Copy
+    + pulp::bytemuck::Pod
     + Default
     + Send
     + Sync
@@ -38,8 +38,6 @@ pub trait Real:
     fn of(x: f64) -> Self;
     /// In double precision.
     fn wide(self) -> f64;
-    /// self a + b, rounded once.
-    fn times_plus(self, a: Self, b: Self) -> Self;
 }
 
 impl Real for f64 {
@@ -49,10 +47,6 @@ impl Real for f64 {
     fn wide(self) -> f64 {
         self
     }
-    #[inline(always)]
-    fn times_plus(self, a: Self, b: Self) -> Self {
-        self.mul_add(a, b)
-    }
 }
 
 impl Real for f32 {
@@ -61,10 +55,6 @@ impl Real for f32 {
     }
     fn wide(self) -> f64 {
         f64::from(self)
-    }
-    #[inline(always)]
-    fn times_plus(self, a: Self, b: Self) -> Self {
-        self.mul_add(a, b)
     }
 }
 

@@ -3,7 +3,10 @@
 //! from end to end. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL, Real, Trapezoid};
-use pulp::{Arch, NullaryFnOnce};
+use faer::traits::ComplexField;
+use faer::traits::math_utils::recip;
+use pulp::bytemuck::{cast_slice, cast_slice_mut};
+use pulp::{Arch, Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows of a piece of parallel work.
@@ -20,13 +23,13 @@ pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T
         let width = l.panel_width(p);
         let (x, below) = front[p * PANEL..].split_at_mut(width);
         let (square, rest) = panel.split_at(width * width);
-        arch.dispatch(SolveLower(square, x));
+        arch.dispatch(Step::SolveLower(square, x));
         let x = &*x;
         if rest.len() < WORTH_TASKS {
-            arch.dispatch(SubtractProduct(rest, x, below));
+            arch.dispatch(Step::SubtractProduct(rest, x, below));
         } else {
             let pieces = rest.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
-            pieces.for_each(|(l, y)| arch.dispatch(SubtractProduct(l, x, y)));
+            pieces.for_each(|(l, y)| arch.dispatch(Step::SubtractProduct(l, x, y)));
         }
     }
 }
@@ -39,13 +42,13 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
         let (x, below) = front[p * PANEL..].split_at_mut(width);
         let (square, rest) = panel.split_at(width * width);
         if rest.len() < WORTH_TASKS {
-            arch.dispatch(SubtractTransposed(rest, below, x));
+            arch.dispatch(Step::SubtractTransposed(rest, below, x));
         } else {
             let pieces = rest.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
             let sums: Vec<Vec<[T; K]>> = pieces
                 .map(|(l, y)| {
                     let mut sum = vec![[T::default(); K]; width];
-                    arch.dispatch(SubtractTransposed(l, y, &mut sum));
+                    arch.dispatch(Step::SubtractTransposed(l, y, &mut sum));
                     sum
                 })
                 .collect();
@@ -55,170 +58,290 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
                 }
             }
         }
-        arch.dispatch(SolveTransposed(square, x));
+        arch.dispatch(Step::SolveTransposed(square, x));
     }
 }
 
-// The kernels below are compiled once per instruction set: named types, because closures are not always inlined there.
+/// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its columns to the
+/// other (x).
+enum Step<'a, T, const K: usize> {
+    /// x <- L^-1 x for the leading square of a panel.
+    SolveLower(&'a [T], &'a mut [[T; K]]),
+    /// y -= L x.
+    SubtractProduct(&'a [T], &'a [[T; K]], &'a mut [[T; K]]),
+    /// x -= L' y.
+    SubtractTransposed(&'a [T], &'a [[T; K]], &'a mut [[T; K]]),
+    /// x <- L^-T x for the leading square of a panel.
+    SolveTransposed(&'a [T], &'a mut [[T; K]]),
+}
 
-/// y -= L x: the rows of L belong to those of y, its columns to those of x.
-struct SubtractProduct<'a, T, const K: usize>(&'a [T], &'a [[T; K]], &'a mut [[T; K]]);
+// Everything below is inlined into one function per instruction set. A row of right-hand sides is a few vectors that
+// stay in registers, and every number of L is spread over a vector of its own: left to itself, the compiler runs
+// its vectors along the rows of L and pays for it in shuffles.
 
-impl<T: Real, const K: usize> NullaryFnOnce for SubtractProduct<'_, T, K> {
+impl<T: Real, const K: usize> WithSimd for Step<'_, T, K> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        let Self(l, x, y) = self;
+    fn with_simd<S: Simd>(self, simd: S) {
+        // Rows of L taken together: enough sums to hide the latency of a multiplication, few enough for the registers.
+        match size_of::<[T; K]>() / size_of::<T::SimdVec<S>>() {
+            1 => Kernels::<T, S, 1>(T::simd_ctx(simd)).run::<8, K>(self),
+            2 => Kernels::<T, S, 2>(T::simd_ctx(simd)).run::<4, K>(self),
+            4 => Kernels::<T, S, 4>(T::simd_ctx(simd)).run::<2, K>(self),
+            // Rows shorter than a vector, machines without vectors.
+            _ => Kernels::<T, Scalar, K>(T::simd_ctx(Scalar)).run::<1, K>(self),
+        }
+    }
+}
+
+/// Columns of L between two calls of [`fetch`].
+const STEP: usize = 8;
+
+/// Brings the `R` [`STEP`] numbers of L from `from` on into the cache, a line at a time. Several rows read side by side
+/// are no stream that the hardware foresees; these reads, one row group ahead and in the order of memory, are.
+#[inline(always)]
+fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
+    for at in (from..from + R * STEP).step_by(64 / size_of::<T>()) {
+        std::hint::black_box(l.get(at).copied().unwrap_or_default());
+    }
+}
+
+/// The right-hand sides of a row.
+type Row<T, S, const N: usize> = [<T as ComplexField>::SimdVec<S>; N];
+
+/// The kernels for rows of `N` vectors of the instruction set `S`.
+struct Kernels<T: Real, S: Simd, const N: usize>(T::SimdCtx<S>);
+
+impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
+    /// Takes `R` rows of L together.
+    #[inline(always)]
+    fn run<const R: usize, const K: usize>(&self, step: Step<'_, T, K>) {
+        match step {
+            Step::SolveLower(l, x) => {
+                let x = Self::rows_mut(x);
+                // The odd rows come first, where there is next to nothing to subtract.
+                let odd = x.len() % R;
+                (0..odd).for_each(|base| self.solve_lower::<1>(l, x, base));
+                (odd..x.len()).step_by(R).for_each(|base| self.solve_lower::<R>(l, x, base));
+            }
+            Step::SubtractProduct(l, x, y) => {
+                let (x, (y, odd)) = (Self::rows(x), Self::rows_mut(y).as_chunks_mut());
+                let (l, odd_l) = l.split_at(y.len() * R * x.len());
+                self.subtract_product::<R>(l, x, y);
+                self.subtract_product::<1>(odd_l, x, odd.as_chunks_mut().0);
+            }
+            Step::SubtractTransposed(l, y, x) => {
+                let (x, (y, odd)) = (Self::rows_mut(x), Self::rows(y).as_chunks());
+                let (l, odd_l) = l.split_at(y.len() * R * x.len());
+                self.subtract_transposed::<R>(l, y, x);
+                self.subtract_transposed::<1>(odd_l, odd.as_chunks().0, x);
+            }
+            Step::SolveTransposed(l, x) => {
+                let x = Self::rows_mut(x);
+                let odd = x.len() % R;
+                (odd..x.len()).step_by(R).rev().for_each(|base| self.solve_transposed::<R>(l, x, base));
+                (0..odd).rev().for_each(|base| self.solve_transposed::<1>(l, x, base));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn rows<const K: usize>(x: &[[T; K]]) -> &[Row<T, S, N>] {
+        cast_slice::<T, T::SimdVec<S>>(x.as_flattened()).as_chunks().0
+    }
+
+    #[inline(always)]
+    fn rows_mut<const K: usize>(x: &mut [[T; K]]) -> &mut [Row<T, S, N>] {
+        cast_slice_mut::<T, T::SimdVec<S>>(x.as_flattened_mut()).as_chunks_mut().0
+    }
+
+    #[inline(always)]
+    fn solve_lower<const R: usize>(&self, l: &[T], x: &mut [Row<T, S, N>], base: usize) {
         let width = x.len();
-        let mut quads = l.chunks_exact(4 * width);
-        let mut targets = y.chunks_exact_mut(4);
-        for (l, y) in (&mut quads).zip(&mut targets) {
-            let sums = four_products(l, width, x);
+        let l = &l[base * width..];
+        let (solved, open) = x.split_at_mut(base);
+        let sums = self.products::<R>(l, width, solved);
+        for i in 0..R {
+            let mut row = open[i];
+            self.subtract(&mut row, &sums[i]);
+            for j in 0..i {
+                self.add_multiple(&mut row, -l[i * width + base + j], &open[j]);
+            }
+            self.divide(&mut row, l[i * width + base + i]);
+            open[i] = row;
+        }
+    }
+
+    #[inline(always)]
+    fn solve_transposed<const R: usize>(&self, l: &[T], x: &mut [Row<T, S, N>], base: usize) {
+        let width = x.len();
+        let l = &l[base * width..];
+        let (open, rest) = x.split_at_mut(base);
+        let Some(own) = rest.first_chunk_mut::<R>() else { return };
+        for i in (0..R).rev() {
+            self.divide(&mut own[i], l[i * width + base + i]);
+            let solved = own[i];
+            for j in 0..i {
+                self.add_multiple(&mut own[j], -l[i * width + base + j], &solved);
+            }
+        }
+        self.subtract_rows(l, width, own, open);
+    }
+
+    #[inline(always)]
+    fn subtract_product<const R: usize>(&self, l: &[T], x: &[Row<T, S, N>], y: &mut [[Row<T, S, N>; R]]) {
+        for (i, y) in y.iter_mut().enumerate() {
+            let sums = self.products::<R>(&l[i * R * x.len()..], x.len(), x);
             for (y, sum) in y.iter_mut().zip(&sums) {
-                subtract(y, sum);
-            }
-        }
-        for (l, y) in quads.remainder().chunks_exact(width).zip(targets.into_remainder()) {
-            for (&l, x) in l.iter().zip(x) {
-                subtract_multiple(y, l, x);
+                self.subtract(y, sum);
             }
         }
     }
-}
-
-/// Products of four consecutive rows of L, `stride` numbers apart, with x.
-#[inline(always)]
-fn four_products<T: Real, const K: usize>(l: &[T], stride: usize, x: &[[T; K]]) -> [[T; K]; 4] {
-    let [a, b, c, d]: [&[T]; 4] = std::array::from_fn(|q| &l[q * stride..][..x.len()]);
-    let mut sums = [[T::default(); K]; 4];
-    for ((((x, a), b), c), d) in x.iter().zip(a).zip(b).zip(c).zip(d) {
-        for k in 0..K {
-            sums[0][k] = a.times_plus(x[k], sums[0][k]);
-            sums[1][k] = b.times_plus(x[k], sums[1][k]);
-            sums[2][k] = c.times_plus(x[k], sums[2][k]);
-            sums[3][k] = d.times_plus(x[k], sums[3][k]);
-        }
-    }
-    sums
-}
-
-/// x -= L' y.
-struct SubtractTransposed<'a, T, const K: usize>(&'a [T], &'a [[T; K]], &'a mut [[T; K]]);
-
-impl<T: Real, const K: usize> NullaryFnOnce for SubtractTransposed<'_, T, K> {
-    type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        let Self(l, y, x) = self;
-        let width = x.len();
-        let mut quads = l.chunks_exact(4 * width);
-        let mut sources = y.chunks_exact(4);
-        for (l, y) in (&mut quads).zip(&mut sources) {
-            subtract_four(l, width, [y[0], y[1], y[2], y[3]], x);
+    fn subtract_transposed<const R: usize>(&self, l: &[T], y: &[[Row<T, S, N>; R]], x: &mut [Row<T, S, N>]) {
+        for (i, y) in y.iter().enumerate() {
+            self.subtract_rows(&l[i * R * x.len()..], x.len(), y, x);
         }
-        for (l, y) in quads.remainder().chunks_exact(width).zip(sources.remainder()) {
-            for (&l, x) in l.iter().zip(&mut *x) {
-                subtract_multiple(x, l, y);
+    }
+
+    /// Products of the first `R` rows of L, `stride` numbers apart, with x.
+    #[inline(always)]
+    fn products<const R: usize>(&self, l: &[T], stride: usize, x: &[Row<T, S, N>]) -> [Row<T, S, N>; R] {
+        let rows: [&[T]; R] = std::array::from_fn(|q| &l[q * stride..][..x.len()]);
+        let mut sums = [[T::simd_splat(&self.0, &T::default()); N]; R];
+        for (i, part) in x.chunks(STEP).enumerate() {
+            fetch::<T, R>(l, R * stride + i * STEP * R);
+            for (j, x) in (i * STEP..x.len()).zip(part) {
+                for q in 0..R {
+                    self.add_multiple(&mut sums[q], rows[q][j], x);
+                }
+            }
+        }
+        sums
+    }
+
+    /// x -= the transpose of the first `R` rows of L, `stride` numbers apart, times y.
+    #[inline(always)]
+    fn subtract_rows<const R: usize>(
+        &self,
+        l: &[T],
+        stride: usize,
+        y: &[Row<T, S, N>; R],
+        x: &mut [Row<T, S, N>],
+    ) {
+        let width = x.len();
+        let rows: [&[T]; R] = std::array::from_fn(|q| &l[q * stride..][..width]);
+        let mut minus = *y;
+        for y in minus.as_flattened_mut() {
+            *y = T::simd_neg(&self.0, *y);
+        }
+        for (i, part) in x.chunks_mut(STEP).enumerate() {
+            fetch::<T, R>(l, R * stride + i * STEP * R);
+            for (j, x) in (i * STEP..width).zip(part) {
+                for q in 0..R {
+                    self.add_multiple(x, rows[q][j], &minus[q]);
+                }
             }
         }
     }
-}
 
-/// x -= the transpose of four consecutive rows of L, `stride` numbers apart, times y.
-#[inline(always)]
-fn subtract_four<T: Real, const K: usize>(l: &[T], stride: usize, y: [[T; K]; 4], x: &mut [[T; K]]) {
-    let y = y.map(|row| row.map(|v| -v));
-    let [a, b, c, d]: [&[T]; 4] = std::array::from_fn(|q| &l[q * stride..][..x.len()]);
-    for ((((x, a), b), c), d) in x.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        for k in 0..K {
-            let first = b.times_plus(y[1][k], a.times_plus(y[0][k], x[k]));
-            x[k] = d.times_plus(y[3][k], c.times_plus(y[2][k], first));
+    /// sum += l x.
+    #[inline(always)]
+    fn add_multiple(&self, sum: &mut Row<T, S, N>, l: T, x: &Row<T, S, N>) {
+        let l = T::simd_splat(&self.0, &l);
+        for (sum, &x) in sum.iter_mut().zip(x) {
+            *sum = T::simd_mul_add(&self.0, l, x, *sum);
         }
     }
-}
-
-/// x <- L^-1 x for the leading square of a panel.
-struct SolveLower<'a, T, const K: usize>(&'a [T], &'a mut [[T; K]]);
-
-impl<T: Real, const K: usize> NullaryFnOnce for SolveLower<'_, T, K> {
-    type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        let Self(l, x) = self;
-        let width = x.len();
-        let mut base = 0;
-        while base < width {
-            let count = 4.min(width - base);
-            let (solved, rest) = x.split_at_mut(base);
-            if count == 4 {
-                let sums = four_products(&l[base * width..], width, solved);
-                for (x, sum) in rest.iter_mut().zip(&sums) {
-                    subtract(x, sum);
-                }
-            } else {
-                for (i, x) in rest.iter_mut().enumerate() {
-                    for (&l, y) in l[(base + i) * width..].iter().zip(&*solved) {
-                        subtract_multiple(x, l, y);
-                    }
-                }
-            }
-            for i in base..base + count {
-                for j in base..i {
-                    let y = x[j];
-                    subtract_multiple(&mut x[i], l[i * width + j], &y);
-                }
-                divide(&mut x[i], l[i * width + i]);
-            }
-            base += count;
+    fn subtract(&self, x: &mut Row<T, S, N>, y: &Row<T, S, N>) {
+        for (x, &y) in x.iter_mut().zip(y) {
+            *x = T::simd_sub(&self.0, *x, y);
         }
     }
-}
-
-/// x <- L^-T x for the leading square of a panel.
-struct SolveTransposed<'a, T, const K: usize>(&'a [T], &'a mut [[T; K]]);
-
-impl<T: Real, const K: usize> NullaryFnOnce for SolveTransposed<'_, T, K> {
-    type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        let Self(l, x) = self;
-        let width = x.len();
-        let mut end = width;
-        while end > 0 {
-            // The odd rows come first in elimination order, so last here.
-            let count = if end >= 4 { 4 } else { end };
-            let base = end - count;
-            for i in (base..end).rev() {
-                divide(&mut x[i], l[i * width + i]);
-                let y = x[i];
-                for j in base..i {
-                    subtract_multiple(&mut x[j], l[i * width + j], &y);
-                }
-            }
-            if count == 4 {
-                let (open, solved) = x.split_at_mut(base);
-                subtract_four(&l[base * width..], width, [solved[0], solved[1], solved[2], solved[3]], open);
-            }
-            end = base;
+    fn divide(&self, x: &mut Row<T, S, N>, l: T) {
+        let inverse = T::simd_splat(&self.0, &recip(&l));
+        for x in x {
+            *x = T::simd_mul(&self.0, *x, inverse);
         }
     }
 }
 
-#[inline(always)]
-fn subtract<T: Real, const K: usize>(x: &mut [T; K], y: &[T; K]) {
-    x.iter_mut().zip(y).for_each(|(x, y)| *x -= *y);
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-#[inline(always)]
-fn subtract_multiple<T: Real, const K: usize>(x: &mut [T; K], l: T, y: &[T; K]) {
-    x.iter_mut().zip(y).for_each(|(x, y)| *x -= l * *y);
-}
+    /// Entry of a well-conditioned factor.
+    fn entry(i: usize, j: usize) -> f64 {
+        let noise = ((i * 37 + j * 101) % 211) as f64 / 211.0 - 0.5;
+        if i == j { 2.0 + noise } else { 0.05 * noise }
+    }
 
-#[inline(always)]
-fn divide<T: Real, const K: usize>(x: &mut [T; K], l: T) {
-    x.iter_mut().for_each(|x| *x /= l);
+    /// Forward and back substitution against the definition, row by row in double precision.
+    fn check<T: Real, const K: usize>(width: usize, rows: usize, tolerance: f64) {
+        let height = width + rows;
+        let mut l = Trapezoid::<T>::zeros(height, width);
+        for j in 0..width {
+            (j..height).for_each(|i| l.add(i, j, T::of(entry(i, j))));
+        }
+        let l_at = |i, j| T::of(entry(i, j)).wide();
+        let start = |i: usize, k: usize| T::of(((i * 13 + k * 7) % 29) as f64 / 29.0 - 0.4);
+        let front: Vec<[T; K]> = (0..height).map(|i| std::array::from_fn(|k| start(i, k))).collect();
+        let exact: Vec<[f64; K]> = front.iter().map(|row| row.map(Real::wide)).collect();
+        let close = |found: &[[T; K]], expected: &[[f64; K]], what: &str| {
+            for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+                for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+                    let error = (found.wide() - expected).abs();
+                    assert!(
+                        error <= tolerance,
+                        "{what}, {width} + {rows} rows: row {i}, column {k}: {error:e}"
+                    );
+                }
+            }
+        };
+
+        let mut expected = exact.clone();
+        for i in 0..height {
+            let (done, rest) = expected.split_at_mut(i);
+            for (j, x) in done[..i.min(width)].iter().enumerate() {
+                (0..K).for_each(|k| rest[0][k] -= l_at(i, j) * x[k]);
+            }
+            if i < width {
+                (0..K).for_each(|k| rest[0][k] /= l_at(i, i));
+            }
+        }
+        let mut found = front.clone();
+        forward(&l, &mut found);
+        close(&found, &expected, "forward");
+
+        let mut expected = exact;
+        for j in (0..width).rev() {
+            let (open, done) = expected.split_at_mut(j + 1);
+            for (i, y) in (j + 1..height).zip(done) {
+                (0..K).for_each(|k| open[j][k] -= l_at(i, j) * y[k]);
+            }
+            (0..K).for_each(|k| open[j][k] /= l_at(j, j));
+        }
+        let mut found = front;
+        backward(&l, &mut found);
+        close(&found, &expected, "backward");
+    }
+
+    #[test]
+    fn both_substitutions_match_their_definition() {
+        for width in [1, 3, 5, 127, 128, 131, 300] {
+            // The tallest panels are cut into pieces.
+            for rows in [0, 1, 7, 600, 2500] {
+                check::<f64, 4>(width, rows, 1e-13);
+                check::<f64, 8>(width, rows, 1e-13);
+                check::<f32, 4>(width, rows, 3e-5);
+                check::<f32, 8>(width, rows, 3e-5);
+            }
+        }
+    }
 }
