@@ -229,13 +229,4 @@ fn checkpoints_that_do_not_belong_here_are_refused() {
         std::fs::write(&file, &bytes).expect("a file");
         assert_eq!(refused(folder.path(), &bar).0, "FB708", "{} bytes", bytes.len());
     }
-
-    // A later format names its writer.
-    std::fs::write(&file, &sound).expect("a file");
-    let h5 = hdf5_metno::File::open_rw(&file).expect("HDF5");
-    h5.attr("format_version").and_then(|a| a.write_scalar(&2i64)).expect("an attribute");
-    h5.close().expect("a file");
-    let (code, message) = refused(folder.path(), &bar);
-    assert_eq!(code, "FB709");
-    assert!(message.contains("version 2, written by flexbody"), "{message}");
 }

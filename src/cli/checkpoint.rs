@@ -26,19 +26,16 @@ impl CheckpointFile {
     /// Refuses a checkpoint of another model than the one that was read from `files`.
     pub(super) fn for_model(self, files: &ModelFiles, model: &FeModel) -> Result<ModelCheckpoint> {
         let own = identity(files, model);
-        if let Some(found) = &self.found {
-            if found.model != own {
-                let differs = |line: &&str| !found.model.lines().any(|other| other == *line);
-                let roles: Vec<&str> =
-                    own.lines().filter(differs).filter_map(|line| line.split(' ').next()).collect();
-                let what = if roles.is_empty() {
-                    "it has other files".to_owned()
-                } else {
-                    roles.join(", ") + " differ"
-                };
-                let message = format!("the checkpoint belongs to another model: {what}");
-                return Err(Diagnostic::new(Code::CheckpointForeign, message).in_file(&self.path).into());
-            }
+        if let Some(found) = &self.found
+            && found.model != own
+        {
+            let differs = |line: &&str| !found.model.lines().any(|other| other == *line);
+            let roles: Vec<&str> =
+                own.lines().filter(differs).filter_map(|line| line.split(' ').next()).collect();
+            let what =
+                if roles.is_empty() { "it has other files".to_owned() } else { roles.join(", ") + " differ" };
+            let message = format!("the checkpoint belongs to another model: {what}");
+            return Err(Diagnostic::new(Code::CheckpointForeign, message).in_file(&self.path).into());
         }
         Ok(ModelCheckpoint {
             path: self.path,
