@@ -21,7 +21,12 @@ fn model(name: &str) -> FeModel {
 }
 
 fn settings(count: usize, method: Method) -> ModeSettings {
-    ModeSettings { wanted: Wanted::Lowest(count), accuracy: Accuracy::Standard, method, ..ModeSettings::default() }
+    ModeSettings {
+        wanted: Wanted::Lowest(count),
+        accuracy: Accuracy::Standard,
+        method,
+        ..ModeSettings::default()
+    }
 }
 
 /// Modes, and every snapshot that was taken on the way.

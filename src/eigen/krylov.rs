@@ -6,6 +6,10 @@ use crate::linalg::{Solve, combine, gram, subtract_combination};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
+/// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not see: the rest is
+/// rounding of the product.
+const UNSEEN: f64 = 1e-13;
+
 /// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is rounding.
 const VANISHED: f64 = 1e-13;
 
@@ -25,6 +29,7 @@ pub(super) struct Krylov<'a> {
     /// Coupling B (fresh x previous block): OP V = V T + V_fresh B E'.
     coupling: Mat<f64>,
     random: u64,
+    mass_diagonal: Vec<f64>,
 }
 
 /// An M-orthonormalised block W and M W.
@@ -53,6 +58,7 @@ impl<'a> Krylov<'a> {
             m_fresh: Mat::zeros(0, 0),
             coupling: Mat::zeros(0, 0),
             random: 0,
+            mass_diagonal: problem.pencil.mass_diagonal().collect(),
         }
     }
 
@@ -224,7 +230,11 @@ impl<'a> Krylov<'a> {
             subtract_combination(w.as_mut(), basis, part.as_ref());
             h += combine(part.as_ref(), b.as_ref());
             mw = pencil.apply_mass(w.as_ref());
-            b = combine(gram_schmidt(&mut w, &mut mw, &norms).as_ref(), b.as_ref());
+            let unseen = |w: faer::ColRef<'_, f64>| {
+                let rows = w.iter().zip(&self.mass_diagonal);
+                UNSEEN * rows.map(|(w, m)| w * w * m).sum::<f64>()
+            };
+            b = combine(gram_schmidt(&mut w, &mut mw, &norms, &unseen).as_ref(), b.as_ref());
         }
         let room = self.room();
         if w.ncols() > room {
@@ -242,8 +252,13 @@ fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
 }
 
 /// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`] of
-/// their norm before are dropped. Returns T (new x old) with W_old = W_new T.
-fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> {
+/// their norm before are dropped, and those whose square does not exceed `unseen`. Returns T (new x old) with W_old = W_new T.
+fn gram_schmidt(
+    w: &mut Mat<f64>,
+    mw: &mut Mat<f64>,
+    norms: &[f64],
+    unseen: &dyn Fn(faer::ColRef<'_, f64>) -> f64,
+) -> Mat<f64> {
     let width = w.ncols();
     let mut t = Mat::zeros(width, width);
     let mut kept = 0;
@@ -257,8 +272,9 @@ fn gram_schmidt(w: &mut Mat<f64>, mw: &mut Mat<f64>, norms: &[f64]) -> Mat<f64> 
                 subtract_column(mw, j, i, along);
             }
         }
-        let norm = dot(w, mw, j, j).max(0.0).sqrt();
-        if norm <= VANISHED * norms[j] {
+        let square = dot(w, mw, j, j);
+        let norm = square.max(0.0).sqrt();
+        if norm <= VANISHED * norms[j] || square <= unseen(w.col(j)) {
             continue;
         }
         t[(kept, j)] = norm;

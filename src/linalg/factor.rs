@@ -85,7 +85,7 @@ impl Analysis {
     /// in any units.
     pub(super) fn scaled<'a>(&'a self, pencil: &'a Pencil<'a>, sigma: f64) -> Scaled<'a> {
         let scale = (0..pencil.n()).map(|i| {
-            let diagonal = pencil.stiffness_diagonal(i).abs() + (sigma * pencil.mass_diagonal(i)).abs();
+            let diagonal = pencil.stiffness_diagonal(i).abs() + (sigma * pencil.mass_entry(i)).abs();
             if diagonal > 0.0 && diagonal.is_finite() { (-0.5 * diagonal.log2()).round().exp2() } else { 1.0 }
         });
         Scaled { analysis: self, pencil, sigma, scale: scale.collect() }

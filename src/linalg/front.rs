@@ -264,7 +264,7 @@ pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<
         )
         .ok()?;
         // A failed pivot may also show as something that is not a number.
-        if (0..width).any(|j| !(diagonal[(j, j)] > T::default())) {
+        if (0..width).any(|j| diagonal[(j, j)].wide().is_nan() || diagonal[(j, j)] <= T::default()) {
             return None;
         }
         MatMut::from_row_major_slice_mut(square, width, width).copy_from_triangular_lower(&diagonal);

@@ -106,7 +106,7 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
             column.iter_mut().for_each(|v| *v *= 1.0 + 1e-8);
         }
     });
-    assert_eq!(moved, ["bounds_recomputed"]);
+    assert_eq!(moved, ["residual_recomputed", "bounds_recomputed"]);
 }
 
 #[test]
