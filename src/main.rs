@@ -12,6 +12,7 @@ use std::io::{IsTerminal, Write};
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> std::process::ExitCode {
+    keep_freed_memory();
     let arguments = Arguments::parse();
     // Where no handler can be set the work is done all the same: an interruption then leaves a temporary file.
     let _ = ctrlc::set_handler(interrupted);
@@ -21,6 +22,21 @@ fn main() -> std::process::ExitCode {
         ExitCode::Bug
     });
     std::process::ExitCode::from(code as u8)
+}
+
+/// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by page, cleared
+/// (measured: 50 000 page faults and 1 of 15 CPU seconds on a model of 100 000 degrees of freedom).
+#[allow(unsafe_code)]
+fn keep_freed_memory() {
+    /// `mi_option_purge_delay` of mimalloc 3, which the bindings do not name, and its default in milliseconds.
+    const PURGE_DELAY: (i32, i64) = (15, 1000);
+    // SAFETY: reads and sets a number inside the allocator, before any thread is started. Where the number is not the default,
+    // the user has set it, or it is another option in that version of the allocator.
+    unsafe {
+        if libmimalloc_sys::mi_option_get(PURGE_DELAY.0) == PURGE_DELAY.1 {
+            libmimalloc_sys::mi_option_set(PURGE_DELAY.0, -1);
+        }
+    }
 }
 
 /// Ctrl-C, or SIGTERM: ends the process at once, whatever it is doing.
