@@ -25,6 +25,17 @@ pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
     ranges
 }
 
+/// Number of eigenvalues up to the end of the cluster that the last of the first `wanted` belongs to, clusters as [`clusters`]
+/// forms them of the `count` eigenvalues lambda(0), lambda(1), ...
+pub(super) fn cluster_end(wanted: usize, count: usize, gap: f64, lambda: impl Fn(usize) -> f64) -> usize {
+    let near = |i: usize| {
+        let (below, above) = (lambda(i - 1), lambda(i));
+        above - below <= gap * above.abs().max(below.abs())
+    };
+    let wanted = wanted.min(count);
+    if wanted == 0 { 0 } else { (wanted..count).find(|&i| !near(i)).unwrap_or(count) }
+}
+
 /// Rotates the columns of each cluster into echelon form and fixes all signs.
 ///
 /// Within a cluster, the row with the largest norm is found and the columns are rotated so that only the first has

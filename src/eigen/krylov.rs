@@ -28,6 +28,8 @@ pub(super) struct Krylov<'a> {
     m_fresh: Mat<f64>,
     /// Coupling B (fresh x previous block): OP V = V T + V_fresh B E'.
     coupling: Mat<f64>,
+    /// First column of the basis that the operator couples to the newest block.
+    reach: usize,
     random: u64,
     mass_diagonal: Vec<f64>,
 }
@@ -57,6 +59,7 @@ impl<'a> Krylov<'a> {
             fresh: 0,
             m_fresh: Mat::zeros(0, 0),
             coupling: Mat::zeros(0, 0),
+            reach: 0,
             random: 0,
             mass_diagonal: problem.pencil.mass_diagonal().collect(),
         }
@@ -114,7 +117,8 @@ impl<'a> Krylov<'a> {
 
     /// Appends `x` (any block), orthonormalised; columns dependent on the basis are dropped.
     pub(super) fn append(&mut self, x: Mat<f64>, counters: &mut Counters) {
-        let block = self.orthonormalise(x, counters);
+        let block = self.orthonormalise(x, 0, counters);
+        self.reach = 0;
         self.coupling = Mat::zeros(block.w.ncols(), 0);
         self.push(block);
     }
@@ -140,7 +144,8 @@ impl<'a> Krylov<'a> {
         let mut w = std::mem::replace(&mut self.m_fresh, Mat::zeros(0, 0));
         counters.solved_columns += old as u64;
         self.factor.solve_in_place(w.as_mut());
-        let block = self.orthonormalise(w, counters);
+        let block = self.orthonormalise(w, self.reach, counters);
+        self.reach = at;
         for j in 0..old {
             for i in 0..self.m {
                 // The diagonal block of h is symmetric up to rounding; the mean keeps T exactly symmetric.
@@ -169,6 +174,7 @@ impl<'a> Krylov<'a> {
             self.t[(i, i)] = value;
         }
         self.m = k + self.fresh;
+        self.reach = 0;
     }
 
     /// Ritz vectors V S (S: projected x k) with the newest block F behind them, and C of OP V S = V S Theta + F C.
@@ -211,16 +217,17 @@ impl<'a> Krylov<'a> {
     }
 
     /// Two passes of: block Gram-Schmidt against the rigid modes and the basis, then column by column inside the block.
-    /// The second pass works on unit vectors, so that even a direction that lost ten digits in the first ends
+    /// The first leaves out the columns before `reach`, where the operator leaves nothing but rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the first ends
     /// orthogonal to rounding; only what is rounding altogether is dropped.
-    fn orthonormalise(&self, mut w: Mat<f64>, counters: &mut Counters) -> Block {
+    fn orthonormalise(&self, mut w: Mat<f64>, reach: usize, counters: &mut Counters) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
         let basis = self.v.as_ref().subcols(0, self.m);
         let mut h = Mat::zeros(self.m, width);
         let mut b = Mat::<f64>::identity(width, width);
         let mut mw = Mat::zeros(0, 0);
-        for _ in 0..2 {
+        for from in [reach, 0] {
+            let basis = basis.subcols(from, self.m - from);
             counters.mass_columns += 2 * w.ncols() as u64;
             mw = pencil.apply_mass(w.as_ref());
             let norms: Vec<f64> = (0..w.ncols()).map(|j| dot(&w, &mw, j, j).max(0.0).sqrt()).collect();
@@ -228,6 +235,7 @@ impl<'a> Krylov<'a> {
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
             subtract_combination(w.as_mut(), basis, part.as_ref());
+            let mut h = h.as_mut().subrows_mut(from, self.m - from);
             h += combine(part.as_ref(), b.as_ref());
             mw = pencil.apply_mass(w.as_ref());
             let unseen = |w: faer::ColRef<'_, f64>| {

@@ -4,6 +4,7 @@
 //! product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) keeps repeated
 //! eigenvalues complete up to what the later inertia count proves.
 
+use super::canonical::cluster_end;
 use super::krylov::Krylov;
 use super::noise::energy_noise;
 use super::problem::{Counters, EigenFailure, EigenProblem};
@@ -16,7 +17,7 @@ use faer::Mat;
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
 /// 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8. 4 is also one more than
 /// the copies of an eigenvalue that an isotropic cube has.
-const BLOCK: usize = 4;
+pub(super) const BLOCK: usize = 4;
 
 /// Restarts without which every model met so far converged, times ten.
 const MAX_RESTARTS: u64 = 100;
@@ -158,6 +159,8 @@ pub(super) struct Goal {
     pub tolerance: f64,
     /// Eigenvalues closer than this (relative) are one cluster.
     pub cluster_gap: f64,
+    /// Columns per step.
+    pub block: usize,
     /// Whether the solves are rough: the modes are then handed out as a span to be corrected.
     pub rough: bool,
     /// Chooses the random start: a search repeated after a count that found more modes starts elsewhere.
@@ -173,21 +176,21 @@ pub(super) fn lowest_modes(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Search, EigenFailure> {
-    let Goal { wanted, tolerance, cluster_gap, attempt, rough } = *goal;
+    let Goal { wanted, tolerance, cluster_gap, block, rough, attempt } = *goal;
     let tau = factor.shift();
     let free = problem.pencil.n() - problem.rigid.ncols();
-    let capacity = (2 * wanted + SPARE).min(free + BLOCK);
+    let capacity = (2 * wanted + SPARE).min(free + block);
     let mut krylov = Krylov::new(problem, factor, capacity);
     krylov.choose_random(1000 * attempt);
     match start {
         // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for any part of them.
         Some(start) => {
-            let room = capacity.saturating_sub(start.coupling.nrows() + BLOCK);
+            let room = capacity.saturating_sub(start.coupling.nrows() + block);
             let taken = start.eigenvalues.len().min(room);
             counters.taken_up = taken as u64;
             krylov.take_up(start, tau, taken, counters);
         }
-        None => krylov.append_random(BLOCK.min(free), counters),
+        None => krylov.append_random(block.min(free), counters),
     }
     // A start is looked at before the first step: it may hold all that is wanted.
     let mut taken_up = krylov.projected() > 0 && !krylov.exhausted();
@@ -196,7 +199,7 @@ pub(super) fn lowest_modes(
     loop {
         if krylov.exhausted() {
             // An invariant subspace: go on with new directions, or everything is found.
-            krylov.append_random(BLOCK.min(krylov.room()), counters);
+            krylov.append_random(block.min(krylov.room()), counters);
         }
         let complete = krylov.exhausted();
         let at_start = std::mem::take(&mut taken_up);
@@ -210,7 +213,7 @@ pub(super) fn lowest_modes(
             return Ok(Search::ShiftTooLarge(shift));
         }
         let size = krylov.projected();
-        let full = krylov.room() < BLOCK;
+        let full = krylov.room() < block;
         // The projected eigenproblem costs size^3: beyond 100 vectors or so not after every step.
         if !(complete || full) && (size < wanted + 1 || size < checked + checked / 25) {
             continue;
@@ -225,13 +228,7 @@ pub(super) fn lowest_modes(
         let s = Mat::from_fn(size, size, |i, j| ritz.vectors[(i, size - 1 - j)]);
         let norms = krylov.residual_norms(s.as_ref());
         let good = |i: usize, tol: f64| norms[i] <= tol * theta[i];
-        let mut last = wanted.min(size);
-        while last < size
-            && last > 0
-            && lambda(last) - lambda(last - 1) <= cluster_gap * lambda(last - 1).abs()
-        {
-            last += 1;
-        }
+        let last = cluster_end(wanted, size, cluster_gap, lambda);
         // K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with M-norms
         // for the Euclidean ones.
         let estimate = |i: usize| 0.5 * norms[i] / (theta[i] * (1.0 - tau * theta[i]).max(SMALLEST_PART));
@@ -255,7 +252,7 @@ pub(super) fn lowest_modes(
         }
         if converged == last && beyond && rough && !complete {
             // Half as many again: what the corrections would have to find of the next modes is then there.
-            let count = (last + last / 2 + 2 * BLOCK).min(size);
+            let count = (last + last / 2 + 2 * block).min(size);
             let vectors = krylov.inverse_iterated(s.as_ref().subcols(0, count), &theta[..count]);
             return Ok(Search::Rough { vectors, wanted: last });
         }
@@ -279,7 +276,7 @@ pub(super) fn lowest_modes(
                 return Ok(Search::ShiftTooLarge(shift));
             }
             counters.restarts += 1;
-            let keep = (last + (capacity - last) / 3).min(size.saturating_sub(BLOCK));
+            let keep = (last + (capacity - last) / 3).min(size.saturating_sub(block));
             krylov.restart(s.as_ref().subcols(0, keep), &theta[..keep]);
             checked = 0;
         }

@@ -3,7 +3,7 @@
 use super::noise::rounding_residual;
 use super::problem::{Counters, EigenFailure, EigenProblem};
 use crate::linalg::{Solve, combine, gram, subtract_combination, symmetric_eigen};
-use faer::{Mat, MatRef};
+use faer::{ColRef, Mat, MatRef};
 
 /// Refined modes with their products.
 pub(super) struct Refined {
@@ -114,12 +114,22 @@ pub(super) fn residuals(
     let mut residuals = Vec::with_capacity(x.ncols());
     let mut floors = Vec::with_capacity(x.ncols());
     for (j, &lambda) in eigenvalues.iter().enumerate() {
-        let r = kx.col(j) - mx.col(j) * faer::Scale(lambda);
-        let scale = kx.col(j).norm_l2() + lambda.abs() * mx.col(j).norm_l2();
-        residuals.push(if scale > 0.0 { r.norm_l2() / scale } else { 0.0 });
+        let scale = residual_scale(kx.col(j), mx.col(j), lambda);
+        residuals.push(relative_residual(kx.col(j), mx.col(j), lambda));
         floors.push(if scale > 0.0 { (rounding[j] + rigid.col(j).norm_l2()) / scale } else { 0.0 });
     }
     (residuals, floors)
+}
+
+/// |K psi| + |lambda| |M psi|.
+fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+    k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
+}
+
+/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros.
+pub(super) fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+    let scale = residual_scale(k_psi, m_psi, lambda);
+    if scale > 0.0 { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale } else { 0.0 }
 }
 
 impl Refined {

@@ -6,17 +6,20 @@
 //! 1e-4. A correction T r of the residual r = K x - lambda M x, with Rayleigh-Ritz on all that is there, gains as many
 //! digits again for one solved column, where refining every solve of Lanczos would cost several.
 
+use super::canonical::cluster_end;
 use super::lanczos::{self, Goal, Search, factorise};
 use super::problem::{Counters, EigenFailure, EigenProblem};
-use super::refine::{Refined, rayleigh_ritz, residuals, small_ritz};
-use super::solve::FIRST_SHIFT;
-use super::start::{Snapshot, fitting_start};
+use super::refine::{Refined, relative_residual, residuals, small_ritz};
+use super::start::{Snapshot, first_shift, fitting_start};
 use crate::linalg::{Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 
-/// Ritz residual at which Lanczos hands over: below the error of the factor more steps gain nothing.
-const HANDED_OVER: f64 = 1e-3;
+/// Columns per step of Lanczos: as many as the solves take together, since with single precision four cost the same.
+const BLOCK: usize = 8;
+
+/// Ritz residual at which Lanczos hands over: more steps find no modes that the factor's error does not hide.
+const HANDED_OVER: f64 = 1e-4;
 
 /// Residual of the first mode beyond the wanted ones: its eigenvalue, good to the square, bounds the gap of the count.
 const BEYOND: f64 = 1e-3;
@@ -27,7 +30,7 @@ const MAX_ROUNDS: usize = 30;
 /// Rounds in a row that gain less than a factor of two before it is given up.
 const PATIENCE: usize = 6;
 
-/// The lowest modes, or the reason why single precision does not find them.
+/// The lowest modes, eigenvalues beyond them, and the shift; or the reason why single precision does not find them.
 pub(super) fn search(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
@@ -35,28 +38,28 @@ pub(super) fn search(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    let rough = Goal { tolerance: HANDED_OVER, rough: true, ..*goal };
-    // A repeated search must not start from the directions that led to a wrong count.
-    let start = fitting_start(problem).filter(|start| goal.attempt == 0 && start.converged >= goal.wanted);
-    let mut tau = start.map_or(FIRST_SHIFT * problem.first_estimate, |start| start.shift);
+    let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, ..*goal };
+    let start = fitting_start(problem, goal.attempt).filter(|start| start.converged >= goal.wanted);
+    let mut tau = first_shift(problem, start);
     loop {
         watch(Event::Phase("factorisation"));
         let factor: Cholesky<'_, f32> = factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
-        if let Some(start) = start {
+        let (vectors, wanted) = if let Some(start) = start {
             counters.taken_up = start.eigenvalues.len() as u64;
-            let vectors = start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned();
-            let (modes, next) = correct(problem, &factor, vectors, goal.wanted, goal, watch, counters)?;
-            return Ok((modes, next, tau));
-        }
-        match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
-            Search::ShiftTooLarge(shift) => tau = shift,
-            Search::Found { modes, next } => return Ok((modes, next, tau)),
-            Search::Rough { vectors, wanted } => {
-                let (modes, next) = correct(problem, &factor, vectors, wanted, goal, watch, counters)?;
-                return Ok((modes, next, tau));
+            (start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned(), goal.wanted)
+        } else {
+            match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
+                Search::ShiftTooLarge(shift) => {
+                    tau = shift;
+                    continue;
+                }
+                Search::Found { modes, next } => return Ok((modes, next, tau)),
+                Search::Rough { vectors, wanted } => (vectors, wanted),
             }
-        }
+        };
+        let (modes, next) = correct(problem, &factor, vectors, wanted, goal, watch, counters)?;
+        return Ok((modes, next, tau));
     }
 }
 
@@ -75,6 +78,13 @@ impl Span {
         Self { x, kx, mx }
     }
 
+    /// Replaces the vectors by combinations of them.
+    fn combine(&mut self, coefficients: MatRef<'_, f64>) {
+        for mine in [&mut self.x, &mut self.kx, &mut self.mx] {
+            *mine = combine(mine.as_ref(), coefficients);
+        }
+    }
+
     /// Replaces the vectors by combinations of them and of others, `coefficients` first of its own, then of the others.
     fn combine_with(&mut self, other: &Self, coefficients: MatRef<'_, f64>) {
         let (own, others) = coefficients.split_at_row(self.x.ncols());
@@ -91,36 +101,37 @@ impl Span {
 fn correct(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
-    x: Mat<f64>,
+    mut x: Mat<f64>,
     mut wanted: usize,
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>), EigenFailure> {
-    let (mut lambda, x) = rayleigh_ritz(problem, x, counters)?;
-    let mut span = Span::new(problem, x, counters);
     let m_rigid = problem.pencil.apply_mass(problem.rigid);
-    let (mut least, mut since) = (f64::INFINITY, 0);
+    let along = gram(m_rigid.as_ref(), x.as_ref());
+    subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
+    let mut span = Span::new(problem, x, counters);
+    let gram_of = |x: &Mat<f64>, y: &Mat<f64>| gram(x.as_ref(), y.as_ref());
+    let (mut lambda, coefficients) = small_ritz(gram_of(&span.x, &span.mx), gram_of(&span.x, &span.kx))?;
+    span.combine(coefficients.as_ref());
+    // The span keeps earlier corrections until it has twice this size: with them the last modes take half the columns.
+    let base = lambda.len();
+    let (mut least, mut since, mut converged) = (f64::INFINITY, 0, 0);
     let mut floors = Vec::new();
     for _ in 0..MAX_ROUNDS {
-        while wanted < lambda.len()
-            && lambda[wanted] - lambda[wanted - 1] <= goal.cluster_gap * lambda[wanted - 1].abs()
-        {
-            wanted += 1;
-        }
+        wanted = cluster_end(wanted, lambda.len(), goal.cluster_gap, |i| lambda[i]);
         let looked = (wanted + 1).min(lambda.len());
         if floors.len() < looked {
             let lowest = span.x.as_ref().subcols(0, looked);
             floors = residuals(problem, &lambda[..looked], lowest, counters).1;
         }
-        let residual = |j: usize| {
-            let r = span.kx.col(j) - span.mx.col(j) * faer::Scale(lambda[j]);
-            let size = span.kx.col(j).norm_l2() + lambda[j].abs() * span.mx.col(j).norm_l2();
-            r.norm_l2() / size.max(f64::MIN_POSITIVE)
-        };
         let excess: Vec<f64> = (0..looked)
-            .map(|j| residual(j) / if j < wanted { goal.tolerance.max(floors[j]) } else { BEYOND })
+            .map(|j| {
+                let allowed = if j < wanted { goal.tolerance.max(floors[j]) } else { BEYOND };
+                relative_residual(span.kx.col(j), span.mx.col(j), lambda[j]) / allowed
+            })
             .collect();
+        converged = excess[..wanted].iter().filter(|e| **e <= 1.0).count();
         let poor: Vec<usize> = (0..looked).filter(|&i| excess[i] > 1.0).collect();
         watch(Event::Fraction(1.0 - poor.len() as f64 / looked as f64));
         if poor.is_empty() {
@@ -147,22 +158,24 @@ fn correct(
             break;
         }
         let new = corrections(problem, factor, &span, &poor, &lambda, m_rigid.as_ref(), counters);
-        let gram_of = |x: &Mat<f64>, y: &Mat<f64>| gram(x.as_ref(), y.as_ref());
-        let gm = bordered(&gram_of(&span.x, &span.mx), &gram_of(&span.x, &new.mx), &gram_of(&new.x, &new.mx));
-        let gk = bordered(&gram_of(&span.x, &span.kx), &gram_of(&span.x, &new.kx), &gram_of(&new.x, &new.kx));
+        // X' M X = I and X' K X = Lambda hold already.
+        let ones = vec![1.0; lambda.len()];
+        let gm = bordered(&ones, &gram_of(&span.x, &new.mx), &gram_of(&new.x, &new.mx));
+        let gk = bordered(&lambda, &gram_of(&span.x, &new.kx), &gram_of(&new.x, &new.kx));
         let (values, coefficients) = small_ritz(gm, gk)?;
-        let kept = span.x.ncols().min(values.len());
+        let kept = if values.len() <= 2 * base { values.len() } else { base };
         span.combine_with(&new, coefficients.as_ref().subcols(0, kept));
         lambda = values[..kept].to_vec();
     }
-    Err(EigenFailure::NotConverged { converged: 0, wanted })
+    Err(EigenFailure::NotConverged { converged, wanted })
 }
 
-/// [A, B; B', C].
-fn bordered(a: &Mat<f64>, b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
-    let m = a.ncols();
+/// [diag(a), B; B', C].
+fn bordered(a: &[f64], b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
+    let m = a.len();
     Mat::from_fn(m + c.ncols(), m + c.ncols(), |i, j| match (i < m, j < m) {
-        (true, true) => a[(i, j)],
+        (true, true) if i == j => a[i],
+        (true, true) => 0.0,
         (true, false) => b[(i, j - m)],
         (false, true) => b[(j, i - m)],
         (false, false) => c[(i - m, j - m)],

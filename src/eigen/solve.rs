@@ -1,10 +1,10 @@
 //! The one entry: chooses the method, refines, counts, puts into canonical form.
 
 use super::bounds::enclose;
-use super::canonical::{canonical_basis, clusters};
+use super::canonical::{canonical_basis, cluster_end, clusters};
 use super::completeness::{Completeness, Proof, count_below};
 use super::dense;
-use super::lanczos::{self, Goal, NOISE_FACTOR};
+use super::lanczos::{self, BLOCK, Goal, NOISE_FACTOR};
 use super::noise::energy_noise;
 use super::plan::{FactorChoice, Plan, Precision, gigabytes};
 use super::problem::{
@@ -13,7 +13,7 @@ use super::problem::{
 };
 use super::refine::{Refined, refine, residuals as residuals_of};
 use super::single;
-use super::start::{Snapshot, fitting_start};
+use super::start::{Snapshot, first_shift, fitting_start};
 use crate::linalg::{Analysis, Cholesky, is_positive_semidefinite};
 use crate::progress::{Event, Watch};
 use faer::Mat;
@@ -33,9 +33,6 @@ const CLUSTER_GAP: f64 = 1e-9;
 /// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
 /// residuals, up to the root of m times the largest.
 const SEARCHED: f64 = 0.4;
-
-/// First shift of an iterative search, in units of the upper bound of the first eigenvalue.
-pub(super) const FIRST_SHIFT: f64 = 0.3;
 
 /// Computes the wanted flexible modes.
 ///
@@ -102,15 +99,14 @@ pub fn solve(
         None
     };
     let plan = (!dense).then_some(sparse.plan);
-    let solution = finish(
+    finish(
         problem,
         search,
         (completeness, bounds),
         (wanted, settings.accuracy.residual()),
-        finite_modes,
+        (plan, finite_modes),
         counters,
-    )?;
-    Ok(EigenSolution { plan, ..solution })
+    )
 }
 
 /// Modes as a method found them.
@@ -135,20 +131,13 @@ fn search_densely(
     // refinement separates them.
     let tau = dense::shift(problem.first_estimate, dense::highest_estimate(pencil));
     let spectrum = dense::Spectrum::new(problem, tau)?;
-    let mut last = wanted.min(flexible);
-    while last > 0
-        && last < flexible
-        && spectrum.eigenvalue(last) - spectrum.eigenvalue(last - 1)
-            <= CLUSTER_GAP * spectrum.eigenvalue(last).abs()
-    {
-        last += 1;
-    }
+    let last = cluster_end(wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
     let found = Refined::new(problem, spectrum.vectors(last), counters)?;
     let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;
     problem.resume.save(|| Snapshot {
         // That of an iterative search: it may go on from here when other modes are wanted.
-        shift: FIRST_SHIFT * problem.first_estimate,
+        shift: first_shift(problem, None),
         eigenvalues: refined.eigenvalues.clone(),
         basis: refined.vectors.clone(),
         coupling: Mat::zeros(0, last),
@@ -177,7 +166,7 @@ impl Sparse<'_> {
     ) -> Result<Search, EigenFailure> {
         let Self { problem, analysis, .. } = *self;
         let tolerance = SEARCHED * self.settings.accuracy.residual();
-        let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, rough: false, attempt };
+        let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, block: BLOCK, rough: false, attempt };
         let found = if self.plan.precision == Precision::Single {
             match single::search(problem, analysis, &goal, watch, counters) {
                 Err(failure) if self.settings.factor == FactorChoice::Auto => {
@@ -207,9 +196,8 @@ fn search_in_double(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    // A repeated search must not start from the directions that led to a wrong count.
-    let mut start = fitting_start(problem).filter(|_| goal.attempt == 0);
-    let mut tau = start.map_or(FIRST_SHIFT * problem.first_estimate, |start| start.shift);
+    let mut start = fitting_start(problem, goal.attempt);
+    let mut tau = first_shift(problem, start);
     loop {
         watch(Event::Phase("factorisation"));
         let factor: Cholesky<'_, f64> = lanczos::factorise(problem, analysis, tau, counters)?;
@@ -293,7 +281,7 @@ fn finish(
     search: Search,
     (completeness, mut bounds): (Completeness, Option<EigenvalueBounds>),
     (wanted, tolerance): (usize, f64),
-    finite_modes: Option<usize>,
+    (plan, finite_modes): (Option<Plan>, Option<usize>),
     mut counters: Counters,
 ) -> Result<EigenSolution, EigenFailure> {
     let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = search.refined;
@@ -325,7 +313,7 @@ fn finish(
         }
     }
     Ok(EigenSolution {
-        plan: None,
+        plan,
         bounds,
         eigenvalues: eigenvalues[..given].to_vec(),
         vectors,

@@ -26,7 +26,7 @@ pub use front::Real;
 pub use inertia::Inertia;
 pub use ordering::connected_components;
 pub use pencil::Pencil;
-pub use product::multiply;
+pub use product::{multiply, sum_terms};
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{add_combination, combine, gram, subtract_combination};

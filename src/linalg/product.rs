@@ -19,7 +19,21 @@ const TILE: usize = 32;
 ///
 /// # Panics
 /// When the shapes disagree.
-pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, mut y: MatMut<'_, f64>) {
+pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
+    sum_terms(a, block, x, y, |term| term);
+}
+
+/// y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] for other sums of the same terms.
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn sum_terms(
+    a: &SymmetricMatrix,
+    block: usize,
+    x: MatRef<'_, f64>,
+    mut y: MatMut<'_, f64>,
+    f: impl Fn(f64) -> f64 + Copy + Sync,
+) {
     let n = a.n() * block;
     assert!(x.nrows() == n && y.nrows() == n && x.ncols() == y.ncols(), "shapes of a block product");
     let mut scratch = vec![0.0; n * x.ncols().min(8)];
@@ -37,18 +51,18 @@ pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, mut y: Ma
         let ys = y.rb_mut().subcols_mut(start, width);
         let packed = &mut scratch[..n * width];
         match (block, width) {
-            (3, 8) => pass::<3, 8>(a, xs, ys, packed),
-            (3, 4) => pass::<3, 4>(a, xs, ys, packed),
-            (3, 2) => pass::<3, 2>(a, xs, ys, packed),
-            (3, _) => pass::<3, 1>(a, xs, ys, packed),
-            (2, 8) => pass::<2, 8>(a, xs, ys, packed),
-            (2, 4) => pass::<2, 4>(a, xs, ys, packed),
-            (2, 2) => pass::<2, 2>(a, xs, ys, packed),
-            (2, _) => pass::<2, 1>(a, xs, ys, packed),
-            (1, 8) => pass::<1, 8>(a, xs, ys, packed),
-            (1, 4) => pass::<1, 4>(a, xs, ys, packed),
-            (1, 2) => pass::<1, 2>(a, xs, ys, packed),
-            (1, _) => pass::<1, 1>(a, xs, ys, packed),
+            (3, 8) => pass::<3, 8>(a, xs, ys, packed, f),
+            (3, 4) => pass::<3, 4>(a, xs, ys, packed, f),
+            (3, 2) => pass::<3, 2>(a, xs, ys, packed, f),
+            (3, _) => pass::<3, 1>(a, xs, ys, packed, f),
+            (2, 8) => pass::<2, 8>(a, xs, ys, packed, f),
+            (2, 4) => pass::<2, 4>(a, xs, ys, packed, f),
+            (2, 2) => pass::<2, 2>(a, xs, ys, packed, f),
+            (2, _) => pass::<2, 1>(a, xs, ys, packed, f),
+            (1, 8) => pass::<1, 8>(a, xs, ys, packed, f),
+            (1, 4) => pass::<1, 4>(a, xs, ys, packed, f),
+            (1, 2) => pass::<1, 2>(a, xs, ys, packed, f),
+            (1, _) => pass::<1, 1>(a, xs, ys, packed, f),
             _ => panic!("blocks of 1, 2 or 3 components, not {block}"),
         }
         start += width;
@@ -61,6 +75,7 @@ fn pass<const B: usize, const W: usize>(
     x: MatRef<'_, f64>,
     y: MatMut<'_, f64>,
     packed: &mut [f64],
+    f: impl Fn(f64) -> f64 + Copy + Sync,
 ) {
     let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
@@ -84,7 +99,7 @@ fn pass<const B: usize, const W: usize>(
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
     shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
-        arch.dispatch(|| rows_times::<B, W>(a, chunk * ROWS, packed, share));
+        arch.dispatch(|| rows_times::<B, W>(a, chunk * ROWS, packed, share, f));
     });
 }
 
@@ -95,6 +110,7 @@ fn rows_times<const B: usize, const W: usize>(
     first: usize,
     x: &[[[f64; W]; B]],
     mut y: [&mut [f64]; W],
+    f: impl Fn(f64) -> f64,
 ) {
     // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the inner loop.
     let mut tile = [[[0.0f64; W]; B]; TILE];
@@ -108,7 +124,7 @@ fn rows_times<const B: usize, const W: usize>(
                 let xj = &x[j as usize];
                 for b in 0..B {
                     for c in 0..W {
-                        sum[b][c] += v * xj[b][c];
+                        sum[b][c] += f(v * xj[b][c]);
                     }
                 }
             }
