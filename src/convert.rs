@@ -1,6 +1,6 @@
 //! The main job: from a checked model to a flexible body, with what lumped masses would have given.
 
-use crate::basis::{FreeSurfaceModes, ModeSettings, free_surface_of, free_surface_resumed};
+use crate::basis::{BasisChoice, ModalBasis, ModeSettings, Task, free_surface_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, canonical_basis};
 use crate::error::Result;
@@ -33,6 +33,8 @@ pub enum Lumping {
 pub struct ConvertSettings {
     /// Which modes and how good.
     pub modes: ModeSettings,
+    /// Which basis.
+    pub basis: BasisChoice,
     /// Body frame.
     pub frame: BodyFrame,
     /// Comparators.
@@ -46,6 +48,7 @@ impl Default for ConvertSettings {
     fn default() -> Self {
         Self {
             modes: ModeSettings::default(),
+            basis: BasisChoice::default(),
             frame: BodyFrame::default(),
             lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
             lumped_modes: false,
@@ -106,7 +109,8 @@ pub fn convert_resumed(
 ) -> Result<Conversion> {
     let schemes =
         settings.lumped.iter().map(|lumping| lumped_masses(model, lumping)).collect::<Result<Vec<_>>>()?;
-    let found = free_surface_resumed(model, &settings.modes, resume, watch)?;
+    let task = Task { model, settings: &settings.modes, resume, watch };
+    let found = settings.basis.basis().modes(&task)?;
     watch(Event::Phase("invariants"));
     let positions = &model.nodes().positions;
     let (frame, mass_properties) = choose_frame(model.scalar_mass(), positions, settings.frame)?;
@@ -156,7 +160,7 @@ pub fn convert_resumed(
     let body = FlexBody::new(Parts {
         source: Source {
             name: model.name().to_owned(),
-            files: model.sources().to_vec(),
+            files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
             n_dofs: model.stiffness().n(),
             mass_structure: if model.has_diagonal_mass() {
                 MassStructure::Diagonal
@@ -173,6 +177,7 @@ pub fn convert_resumed(
             damping_ratio: vec![0.0; solution.eigenvalues.len()],
             eigenvalue: solution.eigenvalues,
             residual: solution.residuals,
+            provenance: found.provenance,
             shape: shapes,
         },
         invariants,
@@ -297,7 +302,7 @@ fn lumped_pipeline(
     })
 }
 
-fn certificate(model: &FeModel, found: &FreeSurfaceModes, guarantee: Option<Guarantee>) -> Certificate {
+fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>) -> Certificate {
     let completeness = &found.solution.completeness;
     let proved = completeness.proof == Proof::InertiaCount;
     Certificate {
@@ -327,7 +332,7 @@ fn interfaces(model: &FeModel) -> Vec<Interface> {
 /// The settings that can change the result, for the file.
 fn describe(settings: &ConvertSettings) -> serde_json::Value {
     let (modes, below) = match settings.modes.wanted {
-        Wanted::Lowest(count) => (Some(count), None),
+        Wanted::Lowest(count) => ((count < usize::MAX).then_some(count), None),
         Wanted::Below(lambda) => (None, Some(lambda)),
     };
     let schemes: Vec<&str> = settings
@@ -341,7 +346,7 @@ fn describe(settings: &ConvertSettings) -> serde_json::Value {
         .collect();
     serde_json::json!({
         "accuracy": settings.modes.accuracy.name(),
-        "basis": "free",
+        "basis": settings.basis.basis().name(),
         "frame": settings.frame.name(),
         "lumped": schemes,
         "max_eigenvalue": below,

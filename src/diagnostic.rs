@@ -100,6 +100,8 @@ codes! {
     MatrixDigits = "FB311", Warning, Done, "matrix values carry few digits", "write 15 to 17 significant digits: thin bodies lose them all";
     MatrixEmpty = "FB312", Error, BadInput, "matrix has no nonzero entries", "write the matrix again";
     MatrixTooLarge = "FB313", Error, BadInput, "matrix is larger than 4294967295 rows", "split the model";
+    ShapesSize = "FB320", Error, BadInput, "array of shapes does not fit the matrices", "one row (or one column) for every matrix row, in the order of the matrices";
+    ShapesZero = "FB321", Error, BadInput, "shape is zero everywhere", "remove the column";
     // FB4xx: model
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom belong to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "one row of dofs.csv per matrix row; without dofs.csv three per node";
@@ -133,6 +135,10 @@ codes! {
     MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common for reduced integration";
     NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
     FactorPrecision = "FB513", Note, Done, "precision of the factor", "nothing to do: --factor f64 or f32 decides otherwise";
+    ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
+    ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
+    ShapesRigid = "FB522", Note, Done, "rigid motions among the shapes are removed", "nothing to do: rigid motion is the body frame's";
+    ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

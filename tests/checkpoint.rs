@@ -1,7 +1,7 @@
 //! A search for modes that goes on from a checkpoint gives what a fresh one gives, with less work; a file that is no
 //! checkpoint of the model is refused.
 
-use flexbody::basis::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_resumed};
+use flexbody::basis::{ModalBasis, ModeSettings, free_surface, free_surface_resumed};
 use flexbody::eigen::{Accuracy, Method, Proof, Resume, Snapshot, Wanted};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::linalg::{Pencil, gram};
@@ -34,7 +34,7 @@ fn modes(
     model: &FeModel,
     settings: &ModeSettings,
     start: Option<&Snapshot>,
-) -> (FreeSurfaceModes, Vec<Snapshot>) {
+) -> (ModalBasis, Vec<Snapshot>) {
     let taken = Mutex::new(Vec::new());
     let save = |snapshot: &Snapshot| taken.lock().expect("one thread").push(snapshot.clone());
     let resume = Resume { start, save: Some(&save) };
@@ -43,7 +43,7 @@ fn modes(
 }
 
 /// Same eigenvalues, same shapes, and every promise of the level kept.
-fn assert_same(model: &FeModel, a: &FreeSurfaceModes, b: &FreeSurfaceModes) {
+fn assert_same(model: &FeModel, a: &ModalBasis, b: &ModalBasis) {
     let (a, b) = (&a.solution, &b.solution);
     assert_eq!(a.eigenvalues.len(), b.eigenvalues.len());
     for (x, y) in a.eigenvalues.iter().zip(&b.eigenvalues) {

@@ -1,7 +1,7 @@
 //! The work of the eigen-solver on the fixture models, counted: a slower algorithm fails here without any clock.
 //! `FLEXBODY_BLESS=1 cargo test --test work_counters` writes the table after a change that is meant.
 
-use flexbody::basis::{FreeSurfaceModes, ModeSettings, free_surface};
+use flexbody::basis::{ModalBasis, ModeSettings, free_surface};
 use flexbody::eigen::{Accuracy, Method, Wanted};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::FeModel;
@@ -21,7 +21,7 @@ fn model(name: &str) -> FeModel {
     FeModel::from_raw(raw).expect("a sound model").model
 }
 
-fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> FreeSurfaceModes {
+fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> ModalBasis {
     let settings = ModeSettings {
         wanted: Wanted::Lowest(count),
         accuracy,

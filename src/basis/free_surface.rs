@@ -1,44 +1,38 @@
 //! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
 
+use super::failure::explain;
+use super::modal_basis::{Basis, ModalBasis, Task, input_error};
+use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{
-    EigenFailure, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, energy_noise,
-    solve,
-};
-use crate::error::{Error, Result};
+use crate::eigen::{EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve};
+use crate::error::Result;
 use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
-use crate::model::{FeModel, centre_and_length, rigid_fields};
+use crate::model::{FeModel, centre_and_length};
 use crate::progress::Watch;
 use faer::{Mat, MatRef};
 
 /// What is asked for.
 pub use crate::eigen::EigenSettings as ModeSettings;
 
-/// Free-surface modes of a model, in model axes.
-#[derive(Debug, Clone)]
-pub struct FreeSurfaceModes {
-    /// Eigenvalues, shapes (3n x nf, row 3 i + k), residuals, completeness, work.
-    pub solution: EigenSolution,
-    /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what digits and
-    /// node positions leave of rigid motion.
-    pub rigid_noise: f64,
-    /// For each mode, the standard deviation of lambda that the digits of K explain, relative to lambda.
-    pub input_noise: Vec<f64>,
-    /// Warnings and notes.
-    pub diagnostics: Vec<Diagnostic>,
+/// The lowest free-surface modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FreeSurface;
+
+impl Basis for FreeSurface {
+    fn name(&self) -> &'static str {
+        "free"
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        free_surface_resumed(task.model, task.settings, task.resume, task.watch)
+    }
 }
-
-/// Relative energy of rigid motion above which the first mode is not a free mode: the body is tied to ground weakly.
-const RIGID_ENERGY: f64 = 0.05;
-
-/// Noise of lambda above which the user is told.
-const NOISE_TOLD: f64 = 1e-6;
 
 /// Computes the free-surface modes of `model`.
 ///
 /// # Errors
 /// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
-pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<FreeSurfaceModes> {
+pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<ModalBasis> {
     free_surface_resumed(model, settings, Resume::default(), watch)
 }
 
@@ -51,7 +45,7 @@ pub fn free_surface_resumed(
     settings: &ModeSettings,
     resume: Resume<'_>,
     watch: Watch<'_>,
-) -> Result<FreeSurfaceModes> {
+) -> Result<ModalBasis> {
     compute(model, model.scalar_mass(), settings, resume, watch)
 }
 
@@ -64,7 +58,7 @@ pub fn free_surface_of(
     scalar_mass: &SymmetricMatrix,
     settings: &ModeSettings,
     watch: Watch<'_>,
-) -> Result<FreeSurfaceModes> {
+) -> Result<ModalBasis> {
     compute(model, scalar_mass, settings, Resume::default(), watch)
 }
 
@@ -74,53 +68,23 @@ fn compute(
     settings: &ModeSettings,
     resume: Resume<'_>,
     watch: Watch<'_>,
-) -> Result<FreeSurfaceModes> {
+) -> Result<ModalBasis> {
     let pencil = Pencil::new(model.stiffness(), scalar_mass, 3);
     let positions = &model.nodes().positions;
     let rigid = rigid_modes(&pencil, positions)?;
-    let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
     let first_estimate = quadratic_estimate(&pencil, positions, rigid.as_ref());
-    let problem = EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error, resume };
+    let problem = EigenProblem {
+        pencil,
+        rigid: rigid.as_ref(),
+        first_estimate,
+        input_error: input_error(model),
+        resume,
+    };
     let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
-    if solution.eigenvalues.is_empty() {
-        let message = match (settings.wanted, solution.next_eigenvalue) {
-            (Wanted::Below(_), Some(next)) => {
-                let hertz = model.units().frequency_of(next);
-                format!("the first flexible mode has {hertz:.6} Hz, above the limit that was given")
-            }
-            _ => "no flexible mode has a finite frequency".to_owned(),
-        };
-        return Err(Diagnostic::new(Code::NoModes, message).into());
-    }
-    let mut diagnostics = Vec::new();
-    let first = solution.eigenvalues.first().copied().unwrap_or(f64::INFINITY);
-    let energy = gram(rigid.as_ref(), pencil.apply_stiffness(rigid.as_ref()).as_ref());
-    let rigid_noise = energy.norm_l2() / first;
-    if rigid_noise > RIGID_ENERGY {
-        let message = format!(
-            "rigid motion carries {:.1} % of the energy of the first mode: lambda_rigid / lambda_1 = {rigid_noise:.2e}",
-            100.0 * rigid_noise
-        );
-        return Err(Diagnostic::new(Code::RigidMotionStrained, message)
-            .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
-            .into());
-    }
-    let input_noise: Vec<f64> = energy_noise(model.stiffness(), solution.vectors.as_ref(), input_error)
-        .iter()
-        .zip(&solution.eigenvalues)
-        .map(|(noise, lambda)| noise / lambda)
-        .collect();
-    let noise = input_noise.iter().fold(rigid_noise, |m, n| m.max(*n));
-    if noise > NOISE_TOLD {
-        let message = format!(
-            "the {} digits of the stiffness values leave a relative noise of {noise:.0e} in the lowest eigenvalues",
-            model.digits()
-        );
-        diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
-    }
-    describe(&solution, settings, scalar_mass, &mut diagnostics);
-    diagnostics.extend(single_precision_note(&solution, settings));
-    Ok(FreeSurfaceModes { solution, rigid_noise, input_noise, diagnostics })
+    let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
+    describe(&basis.solution, settings, scalar_mass, &mut basis.diagnostics);
+    basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
+    Ok(basis)
 }
 
 /// What the user should know about the precision of the factor.
@@ -187,28 +151,6 @@ fn describe(
     }
 }
 
-/// Six M-orthonormal rigid modes from the node positions.
-fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> {
-    let (centre, length) = centre_and_length(positions);
-    let fields = rigid_fields(positions, centre, length);
-    let orthonormal = |r: &Mat<f64>| {
-        let mass = gram(r.as_ref(), pencil.apply_mass(r.as_ref()).as_ref());
-        let eigen = symmetric_eigen(mass.as_ref())?;
-        let largest = eigen.values.last().copied().unwrap_or(0.0);
-        // A body on one line has a rotation that moves nothing.
-        if eigen.values[0].is_nan() || eigen.values[0] <= 1e-14 * largest {
-            return None;
-        }
-        let root = Mat::from_fn(6, 6, |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
-        Some(combine(r.as_ref(), root.as_ref()))
-    };
-    // Twice: the second pass removes what the condition of the first Gram matrix left.
-    orthonormal(&fields).and_then(|once| orthonormal(&once)).ok_or_else(|| {
-        let message = format!("the {} nodes lie on one line or carry mass on one line only", positions.len());
-        Error::from(Diagnostic::new(Code::BodyDegenerate, message))
-    })
-}
-
 /// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper
 /// bound of the first flexible eigenvalue, within a factor of two for a uniform body.
 fn quadratic_estimate(pencil: &Pencil<'_>, positions: &[[f64; 3]], rigid: MatRef<'_, f64>) -> f64 {
@@ -264,76 +206,4 @@ fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
     let k: f64 = pencil.stiffness().diagonal().iter().sum();
     let m: f64 = pencil.mass().diagonal().iter().sum::<f64>() * pencil.block() as f64;
     k / m
-}
-
-/// Turns a failure of the eigen-solver into a diagnostic that names nodes.
-fn explain(model: &FeModel, failure: EigenFailure) -> Error {
-    let moving = |vectors: &Mat<f64>| {
-        let mut size: Vec<(usize, f64)> = (0..model.nodes().len())
-            .map(|i| {
-                let square = (0..vectors.ncols())
-                    .flat_map(|j| (0..3).map(move |k| (3 * i + k, j)))
-                    .map(|(r, j)| vectors[(r, j)].powi(2))
-                    .sum::<f64>();
-                (i, square)
-            })
-            .collect();
-        size.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let named: Vec<String> =
-            size.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
-        named.join(", ")
-    };
-    let diagnostic = match failure {
-        EigenFailure::NotConverged { converged, wanted } => {
-            Diagnostic::new(Code::NotConverged, format!("{converged} of {wanted} modes converged"))
-        }
-        EigenFailure::NotPositiveDefinite { shift } => Diagnostic::new(
-            Code::StiffnessIndefinite,
-            format!("K + {shift:.3e} M is not positive definite: K or M is indefinite"),
-        ),
-        EigenFailure::NegativeEigenvalue { eigenvalue, vector } => Diagnostic::new(
-            Code::StiffnessIndefinite,
-            format!("eigenvalue {eigenvalue:.6e} is negative; its mode moves nodes {} most", moving(&vector)),
-        ),
-        EigenFailure::MassIndefinite => {
-            Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
-        }
-        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
-            Code::Mechanism,
-            format!(
-                "{} zero-energy modes: six rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
-                count + 6,
-                eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
-                moving(&vectors)
-            ),
-        ),
-        EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
-            Code::CompletenessFailed,
-            format!(
-                "{found} flexible modes were found below lambda = {shift:.6e}, the inertia count says {counted}"
-            ),
-        ),
-        EigenFailure::Inaccurate { residual } => Diagnostic::new(
-            Code::FactorizationFailed,
-            format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
-        ),
-        EigenFailure::NotCertified { why } => Diagnostic::new(
-            Code::FactorizationFailed,
-            format!("eigenvalue bounds cannot be guaranteed: {why}"),
-        )
-        .with_help("use --accuracy standard"),
-        EigenFailure::Memory { bytes, available } => Diagnostic::new(
-            Code::MemoryShort,
-            format!(
-                "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are left",
-                bytes as f64 * 1e-9,
-                available as f64 * 1e-9
-            ),
-        ),
-        EigenFailure::TooLarge => Diagnostic::new(
-            Code::MemoryShort,
-            "the node graph has more than 2^31 entries, too many for the ordering",
-        ),
-    };
-    diagnostic.into()
 }

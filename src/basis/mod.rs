@@ -1,5 +1,15 @@
-//! Modal bases: which shapes span the deformation of a body, each kind in one file.
+//! Modal bases: which shapes span the deformation of a body, each kind in one file behind [`Basis`].
 
+mod choice;
+mod columns;
+mod failure;
 mod free_surface;
+mod imported;
+mod modal_basis;
+mod pseudo_free_surface;
+mod rigid_modes;
 
-pub use free_surface::{FreeSurfaceModes, ModeSettings, free_surface, free_surface_of, free_surface_resumed};
+pub use choice::BasisChoice;
+pub use free_surface::{FreeSurface, ModeSettings, free_surface, free_surface_of, free_surface_resumed};
+pub use imported::ImportedShapes;
+pub use modal_basis::{Basis, ModalBasis, Task};

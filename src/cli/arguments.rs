@@ -57,12 +57,18 @@ pub struct ConvertArguments {
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
-    /// Number of flexible modes, up to all of them
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
-    pub modes: u32,
+    /// Number of flexible modes, up to all of them [default: 20; imported shapes: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
+    pub modes: Option<u32>,
     /// All flexible modes up to this frequency instead
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub max_frequency: Option<f64>,
+    /// What the modes are made of
+    #[arg(long, value_enum, default_value_t = BasisName::Free)]
+    pub basis: BasisName,
+    /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array
+    #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
+    pub shapes: Option<PathBuf>,
     /// Promise about the modes
     #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
     pub accuracy: AccuracyName,
@@ -161,6 +167,15 @@ pub struct Printing {
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// What the modes are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BasisName {
+    /// Free-surface modes, computed here
+    Free,
+    /// Shapes that were computed elsewhere: eigenvectors, static shapes, any mixture of them
+    Imported,
 }
 
 /// Names of the accuracy levels.

@@ -1,16 +1,18 @@
 //! `flexbody convert`.
 
-use super::arguments::{AccuracyName, ConvertArguments, FactorName, FrameName};
+use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName};
 use super::checkpoint::{CheckpointFile, resume};
 use super::output::{Outcome, tell};
 use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
-use crate::basis::ModeSettings;
+use crate::basis::{BasisChoice, ImportedShapes, ModeSettings};
 use crate::convert::{Conversion, ConvertSettings, Lumping, convert_resumed};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::error::Result;
-use crate::input::{InterfaceNodes, ModelFiles, read_manifest, read_model, read_nodal_masses};
+use crate::input::{
+    InterfaceNodes, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
+};
 use crate::invariants::BodyFrame;
 use crate::model::FeModel;
 use crate::output::OutputSlot;
@@ -23,6 +25,7 @@ use std::path::Path;
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
+    refuse_contradictions(arguments)?;
     let files = model_files(arguments)?;
     refuse_overwriting(arguments, &files, &schemes)?;
     let slot = store::prepare_output(&arguments.output)?;
@@ -37,6 +40,10 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let checked = FeModel::from_raw(raw)?;
     let model = checked.model;
     let checkpoint = checkpoint.map(|file| file.for_model(&files, &model)).transpose()?;
+    let basis = basis(arguments, &model).inspect_err(|_| {
+        watcher.clear();
+        tell(arguments.printing, &checked.diagnostics);
+    })?;
     let settings = ConvertSettings {
         modes: ModeSettings {
             wanted: wanted(arguments, model.units()),
@@ -53,6 +60,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
             },
             memory: memory_left(arguments.memory_limit),
         },
+        basis,
         frame: match arguments.frame {
             FrameName::Principal => BodyFrame::Principal,
             FrameName::Com => BodyFrame::Com,
@@ -84,6 +92,33 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         slot.write(render(&facts, *format).as_bytes())?;
     }
     Ok(Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true })
+}
+
+/// Options that say nothing together.
+fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
+    let free = arguments.basis == BasisName::Free;
+    let message = match arguments {
+        ConvertArguments { shapes: Some(_), .. } if free => "--shapes needs --basis imported",
+        ConvertArguments { checkpoint: Some(_), .. } if !free => {
+            "--checkpoint keeps a search for modes, imported shapes need none"
+        }
+        ConvertArguments { lumped_modes: true, .. } if !free => {
+            "--lumped-modes compares free-surface modes, not imported shapes"
+        }
+        _ => return Ok(()),
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
+}
+
+/// The basis, with the shapes read that it needs.
+fn basis(arguments: &ConvertArguments, model: &FeModel) -> Result<BasisChoice> {
+    match (arguments.basis, &arguments.shapes) {
+        (BasisName::Imported, Some(shapes)) => {
+            let raw = read_shapes(&MatrixLocation::parse(shapes), model.stiffness().n(), "shapes")?;
+            ImportedShapes::new(model, raw).map(BasisChoice::Imported)
+        }
+        _ => Ok(BasisChoice::Free),
+    }
 }
 
 /// A lumping scheme as named on the command line.
@@ -159,7 +194,9 @@ fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles, schemes:
         InterfaceNodes::File(path) => Some(path),
         InterfaceNodes::Listed(_) => None,
     });
-    let inputs = matrices.into_iter().chain(tables).chain(masses).chain(interfaces);
+    let shapes = arguments.shapes.as_ref().map(|path| MatrixLocation::parse(path).path);
+    let matrices = matrices.into_iter().chain([shapes.as_ref()]);
+    let inputs = matrices.chain(tables).chain(masses).chain(interfaces);
     let place = |path: &Path| {
         std::fs::canonicalize(path)
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
@@ -188,7 +225,11 @@ fn use_threads(asked: Option<u16>) -> usize {
 fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
     match arguments.max_frequency {
         Some(hertz) => Wanted::Below(units.eigenvalue_of(hertz)),
-        None => Wanted::Lowest(arguments.modes as usize),
+        None => Wanted::Lowest(match (arguments.modes, arguments.basis) {
+            (Some(modes), _) => modes as usize,
+            (None, BasisName::Free) => ModeSettings::DEFAULT_COUNT,
+            (None, BasisName::Imported) => usize::MAX,
+        }),
     }
 }
 

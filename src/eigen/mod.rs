@@ -13,6 +13,7 @@ mod problem;
 mod refine;
 mod single;
 mod solve;
+mod span;
 mod start;
 
 pub use canonical::{canonical_basis, clusters};
@@ -24,4 +25,5 @@ pub use problem::{
     Wanted,
 };
 pub use solve::solve;
+pub use span::modes_of_span;
 pub use start::{Resume, Save, Snapshot};

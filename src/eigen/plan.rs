@@ -50,6 +50,11 @@ fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u
     8 * (problem.pencil.n() * basis.max(corrected)) as u64
 }
 
+/// What an inertia count of `inertia` numbers needs, with the modes and their products.
+fn count_bytes(problem: &EigenProblem<'_>, inertia: u64, modes: usize) -> u64 {
+    8 * (inertia + (3 * modes * problem.pencil.n()) as u64)
+}
+
 impl Plan {
     /// Decides for `wanted` modes.
     ///
@@ -68,7 +73,7 @@ impl Plan {
             (size * cholesky).max(size * factor + vectors(problem, wanted, precision))
         };
         // The factor is given back before the count.
-        let count = 8 * (inertia + (3 * wanted * problem.pencil.n()) as u64);
+        let count = count_bytes(problem, inertia, wanted);
         let certified = settings.accuracy == Accuracy::Certified;
         let precision = match settings.factor {
             _ if certified => Precision::Double,
@@ -99,6 +104,11 @@ impl Plan {
             single_failed: false,
             proof_too_large,
         })
+    }
+
+    /// Bytes that an inertia count beside `found` modes needs.
+    pub(super) fn count_bytes(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
+        with_slack(count_bytes(problem, analysis.peaks(rayon::current_num_threads()).inertia, found))
     }
 
     /// The same in double precision, where that fits.

@@ -1,6 +1,7 @@
 //! What is asked of the eigen-solver and what it answers.
 
 use super::plan::{FactorChoice, Plan};
+use super::solve::keeps;
 use super::{Completeness, Resume};
 use crate::linalg::Pencil;
 use faer::{Mat, MatRef};
@@ -87,11 +88,16 @@ pub struct EigenSettings {
     pub memory: Option<u64>,
 }
 
+impl EigenSettings {
+    /// Number of modes when nothing else is said: the usual size of a modal basis.
+    pub const DEFAULT_COUNT: usize = 20;
+}
+
 impl Default for EigenSettings {
-    /// 20 modes (the usual size of a modal basis), proved, by the method that suits the size.
+    /// 20 modes, proved, by the method that suits the size.
     fn default() -> Self {
         Self {
-            wanted: Wanted::Lowest(20),
+            wanted: Wanted::Lowest(Self::DEFAULT_COUNT),
             accuracy: Accuracy::Standard,
             method: Method::Auto,
             factor: FactorChoice::Auto,
@@ -163,6 +169,14 @@ pub struct EigenSolution {
     pub shift: f64,
     /// Work.
     pub counters: Counters,
+}
+
+impl EigenSolution {
+    /// How many of the modes, wherever they come from, are eigenvectors to the K-residual of `accuracy` or to rounding.
+    pub fn eigenvectors(&self, accuracy: Accuracy) -> usize {
+        let pairs = self.residuals.iter().zip(&self.rounding_floors);
+        pairs.filter(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()
+    }
 }
 
 /// Why there is no trustworthy result.

@@ -28,7 +28,7 @@ const DENSE_AT_MOST: usize = 9000;
 const DENSE_PART: f64 = 0.2;
 
 /// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
-const CLUSTER_GAP: f64 = 1e-9;
+pub(super) const CLUSTER_GAP: f64 = 1e-9;
 
 /// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
 /// residuals, up to the root of m times the largest.
@@ -213,7 +213,7 @@ fn search_in_double(
 }
 
 /// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
-fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
+pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
     let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
     let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
     if let Some(&lambda) = refined.eigenvalues.first()
@@ -275,6 +275,11 @@ fn prove(
     })
 }
 
+/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
+pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
+    residual <= tolerance.max(30.0 * floor)
+}
+
 /// Canonical form, the wanted number of modes, residuals of what is handed out.
 fn finish(
     problem: &EigenProblem<'_>,
@@ -296,9 +301,8 @@ fn finish(
     if bounds.is_some() || groups.iter().any(|g| g.len() > 1) {
         (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
     }
-    // The promise: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
-    let kept = |i: usize| residuals[i] <= tolerance.max(30.0 * floors[i]);
-    let converged = (0..eigenvalues.len()).filter(|&i| kept(i)).count();
+    let kept = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
+    let converged = (0..eigenvalues.len()).filter(kept).count();
     if converged < eigenvalues.len() {
         return Err(EigenFailure::NotConverged { converged, wanted });
     }

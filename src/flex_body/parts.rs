@@ -39,6 +39,8 @@ pub struct Modes {
     pub eigenvalue: Vec<f64>,
     /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), 2-norms.
     pub residual: Vec<f64>,
+    /// Where each mode comes from: `free mode`, `imported shape`, ...; empty when it is not known.
+    pub provenance: Vec<String>,
     /// Modal damping ratios, 0 when none was given.
     pub damping_ratio: Vec<f64>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.

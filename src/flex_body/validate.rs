@@ -157,6 +157,9 @@ impl Check {
                 ));
             }
         }
+        if !modes.provenance.is_empty() {
+            self.length("modes.provenance", modes.provenance.len(), nf, "mode");
+        }
         self.matrix("modes.shape", &modes.shape, 3 * n, nf);
     }
 

@@ -7,10 +7,12 @@ use crate::error::{Error, Result};
 use crate::model::RawMatrix;
 use hdf5_metno::{File, Group, LinkType};
 
+mod array;
 mod group;
 mod members;
 mod values;
 
+pub(super) use array::read_array;
 use members::Members;
 use values::Found;
 

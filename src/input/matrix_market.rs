@@ -12,10 +12,12 @@ use crate::model::RawMatrix;
 use rayon::prelude::*;
 use std::io::Read;
 
+mod array;
 mod header;
 mod line;
 mod text;
 
+pub(super) use array::read_array;
 use header::{Header, Symmetry};
 use line::{BadLine, Limits};
 use text::Blocks;

@@ -9,8 +9,10 @@ mod hdf5;
 mod manifest;
 mod matrix_market;
 mod model_files;
+mod npy;
 mod read_model;
 mod reader;
+mod shapes;
 mod table;
 mod tables;
 
@@ -20,3 +22,4 @@ pub use manifest::read_manifest;
 pub use model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles};
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
+pub use shapes::read_shapes;

@@ -36,6 +36,15 @@ pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     sum_pairwise(&partial)
 }
 
+/// a_j' b_j for the columns of equal-shaped blocks A and B (n x m).
+///
+/// # Panics
+/// When the shapes differ.
+pub fn column_products(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Vec<f64> {
+    assert_eq!(a.ncols(), b.ncols(), "columns of a product by columns");
+    (0..a.ncols()).map(|j| gram(a.subcols(j, 1), b.subcols(j, 1))[(0, 0)]).collect()
+}
+
 /// Sum of equal-shaped matrices, pairwise: error grows with the logarithm of their number.
 fn sum_pairwise(parts: &[Mat<f64>]) -> Mat<f64> {
     match parts {

@@ -98,6 +98,7 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     }
     check_plausibility(&scalar_mass, &nodes, &raw, &mut found);
     let model = FeModel::new(raw, nodes, stiffness, scalar_mass, rigid_residual, deviation, diagonal_mass);
+    let model = if layout.is_identity() { model } else { model.reordered(layout.row_to_internal) };
     Ok(CheckedModel { model, diagnostics: found })
 }
 

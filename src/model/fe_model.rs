@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
+use faer::Mat;
 
 /// A checked free body. Internal order of degrees of freedom: node-major x, y, z in the order of `nodes`.
 #[derive(Debug, Clone)]
@@ -20,6 +21,8 @@ pub struct FeModel {
     rigid_residual: f64,
     mass_deviation: f64,
     diagonal_mass: bool,
+    /// Internal row of each matrix row; none when they are the same.
+    row_to_internal: Option<Vec<u32>>,
 }
 
 impl FeModel {
@@ -52,7 +55,14 @@ impl FeModel {
             rigid_residual,
             mass_deviation,
             diagonal_mass,
+            row_to_internal: None,
         }
+    }
+
+    /// The same for matrices whose rows stood in another order: the internal row of each.
+    pub(super) fn reordered(mut self, row_to_internal: Vec<u32>) -> Self {
+        self.row_to_internal = Some(row_to_internal);
+        self
     }
 
     /// Model name.
@@ -108,6 +118,22 @@ impl FeModel {
     /// Whether M is diagonal: lumped by the FE program.
     pub fn has_diagonal_mass(&self) -> bool {
         self.diagonal_mass
+    }
+
+    /// Columns that are given by the rows of the matrices as they were read, in the internal order.
+    ///
+    /// # Panics
+    /// When there are not as many rows.
+    pub fn in_internal_order(&self, columns: Mat<f64>) -> Mat<f64> {
+        assert_eq!(columns.nrows(), self.stiffness.n(), "rows of the matrices");
+        let Some(to) = &self.row_to_internal else { return columns };
+        let mut ordered = Mat::zeros(columns.nrows(), columns.ncols());
+        for j in 0..columns.ncols() {
+            for (row, &internal) in to.iter().enumerate() {
+                ordered[(internal as usize, j)] = columns[(row, j)];
+            }
+        }
+        ordered
     }
 
     /// Label of an internal row.

@@ -11,5 +11,5 @@ mod rigid;
 pub use checks::{CheckedModel, check};
 pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
-pub use raw::{RawMatrix, RawModel};
+pub use raw::{RawMatrix, RawModel, RawShapes};
 pub use rigid::{centre_and_length, rigid_fields};

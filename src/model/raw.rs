@@ -3,7 +3,9 @@
 use super::{DofLabel, NodeSet, Nodes};
 use crate::diagnostic::Diagnostic;
 use crate::linalg::CscMatrix;
+use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
+use faer::Mat;
 use std::path::PathBuf;
 
 /// A matrix with what its file says about it.
@@ -16,6 +18,19 @@ pub struct RawMatrix {
     pub digits: u8,
     /// Where it came from; empty for matrices handed over in memory.
     pub path: PathBuf,
+}
+
+/// Shapes or loads as a reader delivers them: one column each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawShapes {
+    /// N x k, by matrix rows.
+    pub matrix: Mat<f64>,
+    /// Significant decimal digits that the values carry at the most: 7 for single precision.
+    pub digits: u8,
+    /// Where they came from; empty when handed over in memory.
+    pub path: PathBuf,
+    /// The same with its fingerprint; none when handed over in memory.
+    pub source: Option<SourceFile>,
 }
 
 /// Everything that describes one model, before the checks.
@@ -69,5 +84,3 @@ impl RawModel {
         }
     }
 }
-
-pub use crate::provenance::SourceFile;

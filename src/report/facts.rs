@@ -12,7 +12,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 1;
+const MINOR: u32 = 2;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -71,6 +71,8 @@ pub(super) struct ModeFacts {
     /// Unit: 1/time^2.
     pub eigenvalue: Vec<f64>,
     pub residual: Vec<f64>,
+    /// Where each mode comes from; empty when it is not known.
+    pub provenance: Vec<String>,
     pub damping_ratio: Vec<f64>,
     pub worst_residual: f64,
 }
@@ -118,6 +120,7 @@ impl Facts {
                 frequency_hz,
                 eigenvalue: body.modes().eigenvalue.clone(),
                 residual: body.modes().residual.clone(),
+                provenance: body.modes().provenance.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
@@ -167,6 +170,20 @@ impl ModelFacts {
             "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",
             _ => "general mass matrix",
         }
+    }
+}
+
+impl ModeFacts {
+    /// How many modes come from where, in the order of their first ones; empty where all are free modes.
+    pub fn origins(&self) -> Vec<(&str, usize)> {
+        let mut origins: Vec<(&str, usize)> = Vec::new();
+        for origin in &self.provenance {
+            match origins.iter_mut().find(|(known, _)| known == origin) {
+                Some((_, count)) => *count += 1,
+                None => origins.push((origin, 1)),
+            }
+        }
+        if matches!(origins.as_slice(), [("free mode", _)]) { Vec::new() } else { origins }
     }
 }
 

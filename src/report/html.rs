@@ -183,6 +183,8 @@ fn modes(html: &mut String, facts: &Facts) {
     let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(&facts.model.units.time));
     let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue, "Residual"]);
     head.extend(damped.then(|| "Damping ratio".to_owned()));
+    let origins = !modes.origins().is_empty();
+    head.extend(origins.then(|| "Origin".to_owned()));
     let guarantee = facts.guarantee.as_ref();
     head.extend(
         guarantee.iter().flat_map(|_| texts(["Lower bound", "Upper bound", "Digits", "Shape error"])),
@@ -195,6 +197,7 @@ fn modes(html: &mut String, facts: &Facts) {
             significant(modes.residual[j], 2),
         ];
         cells.extend(damped.then(|| significant(modes.damping_ratio[j], 4)));
+        cells.extend(origins.then(|| escape(&modes.provenance[j])));
         cells.extend(guarantee.iter().flat_map(|g| {
             [
                 significant(g.eigenvalue_lower[j], 17),

@@ -130,6 +130,10 @@ fn modes(page: &mut Page, facts: &Facts) {
     let residual = significant(modes.worst_residual, 2);
     page.entry("modes", &format!("{} flexible, worst residual {residual}{accuracy}", modes.count));
     page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
+    let origins = modes.origins();
+    page.list("origin", &origins, |(origin, count)| {
+        format!("{}: {}", counted(*count, "mode"), plain(origin))
+    });
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {

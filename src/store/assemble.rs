@@ -116,8 +116,14 @@ impl Take<'_> {
     fn modes(&mut self, n: usize) -> Modes {
         let eigenvalue = self.floats("/modes/eigenvalue");
         let shape = self.floats("/modes/shape");
+        let provenance = if self.scan.values.contains_key("/modes@provenance") {
+            self.json("/modes@provenance", "a JSON array of texts").unwrap_or_default()
+        } else {
+            Vec::new()
+        };
         Modes {
             residual: self.floats("/modes/residual"),
+            provenance,
             damping_ratio: self.floats("/modes/damping_ratio"),
             shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
             eigenvalue,

@@ -7,7 +7,7 @@ use crate::provenance;
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// See [`MAJOR`].
-pub(super) const MINOR: i64 = 1;
+pub(super) const MINOR: i64 = 2;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
@@ -304,6 +304,18 @@ const NODES: &[Item] = &[
 ];
 
 const MODES: &[Item] = &[
+    attribute(
+        "provenance",
+        Text,
+        ONE,
+        "where each mode comes from, as a JSON array of nf texts; absent: not known",
+        |v| {
+            let provenance = &v.body.modes.provenance;
+            let json = || serde_json::to_string(provenance).expect("strings are valid JSON");
+            (!provenance.is_empty()).then(|| Value::Text(json()))
+        },
+    )
+    .added(2),
     dataset(
         "eigenvalue",
         Floats(&[Modes]),

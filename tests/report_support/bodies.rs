@@ -90,6 +90,7 @@ pub fn engine_mount() -> FlexBody {
         modes: Modes {
             eigenvalue: hz.map(eigenvalue).to_vec(),
             residual: (0..nf).map(|j| (1.0 + j as f64) * 1e-13).collect(),
+            provenance: vec![],
             damping_ratio: vec![0.0; nf],
             shape: Mat::from_fn(24, nf, |i, j| if i == j { 1.0 } else { 0.0 }),
         },
@@ -221,6 +222,7 @@ pub fn condensed(
         modes: Modes {
             eigenvalue: EIGENVALUES.to_vec(),
             residual: vec![1e-14; 6],
+            provenance: vec![],
             damping_ratio: vec![0.0; 6],
             shape,
         },

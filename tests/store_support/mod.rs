@@ -137,6 +137,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         modes: Modes {
             eigenvalue,
             residual: (0..nf).map(|_| r.value().abs()).collect(),
+            provenance: (0..nf).filter(|_| n * nf % 2 == 1).map(|_| r.name()).collect(),
             damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
             shape: r.matrix(3 * n, nf),
         },

@@ -2,7 +2,7 @@
 
 use super::mesh::Assembly;
 use faer::Mat;
-use flexbody::basis::{FreeSurfaceModes, ModeSettings, free_surface};
+use flexbody::basis::{ModalBasis, ModeSettings, free_surface};
 use flexbody::eigen::{Accuracy, Method, Proof, Wanted};
 use flexbody::error::Result;
 use flexbody::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
@@ -12,7 +12,7 @@ use flexbody::progress::SILENT;
 /// A checked model and its lowest flexible modes, in model axes.
 pub struct Body {
     pub model: FeModel,
-    pub modes: FreeSurfaceModes,
+    pub modes: ModalBasis,
 }
 
 /// A body in its own frame.

@@ -28,6 +28,11 @@ impl Members {
         self.0.get(name).copied()
     }
 
+    /// Whether `name` is there and not a link to another file.
+    pub(super) fn is_here(&self, name: &str) -> bool {
+        self.link(name).is_some_and(|link| link != LinkType::External)
+    }
+
     pub(super) fn hard_links(&self) -> impl Iterator<Item = &str> {
         self.0.iter().filter(|(_, link)| **link == LinkType::Hard).map(|(name, _)| name.as_str())
     }

@@ -31,21 +31,16 @@ impl Kind {
     }
 }
 
-/// A list of numbers in the file.
-pub(super) struct Vector {
-    dataset: Dataset,
+/// A dataset of numbers whose values are stored in this file.
+pub(super) struct Numbers {
+    pub dataset: Dataset,
     /// Path within the file, for messages.
     pub name: String,
-    dimensions: usize,
-    axis: usize,
-    pub len: usize,
     kind: Kind,
-    /// Values per chunk, 1 when not chunked.
-    pub chunk: usize,
 }
 
-impl Vector {
-    /// Opens a dataset of numbers with one dimension (or with others of length 1).
+impl Numbers {
+    /// Opens the dataset `name` of a group.
     ///
     /// # Errors
     /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values that are
@@ -63,29 +58,57 @@ impl Vector {
         if dataset.layout() == hdf5_metno::dataset::Layout::Virtual || !properties.external().is_empty() {
             return Err(refuse(Code::Hdf5Layout, "keeps its values in another file".into()));
         }
-        let shape = dataset.shape();
-        let long: Vec<usize> = (0..shape.len()).filter(|&d| shape[d] != 1).collect();
-        let axis = match (shape.len(), long.as_slice()) {
-            (0, _) => return Err(refuse(Code::MatrixKind, "is a single value, expected a list".into())),
-            (_, []) => 0,
-            (_, &[axis]) => axis,
-            _ => {
-                let message = format!("has the shape {shape:?}, expected a list");
-                return Err(refuse(Code::MatrixKind, message));
-            }
-        };
         let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| Kind::of(&t));
         let kind = kind.ok_or_else(|| {
             refuse(Code::MatrixKind, "holds no real numbers (complex, boolean or structured values?)".into())
         })?;
-        let len = shape[axis];
+        let declared =
+            dataset.shape().iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
         let stored = dataset.storage_size();
-        if len as u64 > stored.saturating_mul(RATIO) {
-            let message = format!("declares {len} values, but only {stored} bytes are stored");
+        if declared > stored.saturating_mul(RATIO) {
+            let message = format!("declares {declared} values, but only {stored} bytes are stored");
             return Err(refuse(Code::MatrixCount, message));
         }
+        Ok(Self { dataset, name: at, kind })
+    }
+
+    pub(super) fn is_single_precision(&self) -> bool {
+        self.kind == Kind::Single
+    }
+}
+
+/// A list of numbers in the file.
+pub(super) struct Vector {
+    dataset: Dataset,
+    /// Path within the file, for messages.
+    pub name: String,
+    dimensions: usize,
+    axis: usize,
+    pub len: usize,
+    kind: Kind,
+    /// Values per chunk, 1 when not chunked.
+    pub chunk: usize,
+}
+
+impl Vector {
+    /// Opens a dataset of numbers with one dimension (or with others of length 1).
+    ///
+    /// # Errors
+    /// As [`Numbers::open`]; FB302 for other shapes.
+    pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
+        let Numbers { dataset, name, kind } = Numbers::open(group, members, group_name, name)?;
+        let refuse = |what: String| vec![Diagnostic::new(Code::MatrixKind, format!("dataset {name} {what}"))];
+        let shape = dataset.shape();
+        let long: Vec<usize> = (0..shape.len()).filter(|&d| shape[d] != 1).collect();
+        let axis = match (shape.len(), long.as_slice()) {
+            (0, _) => return Err(refuse("is a single value, expected a list".into())),
+            (_, []) => 0,
+            (_, &[axis]) => axis,
+            _ => return Err(refuse(format!("has the shape {shape:?}, expected a list"))),
+        };
+        let len = shape[axis];
         let chunk = dataset.chunk().and_then(|chunk| chunk.get(axis).copied()).unwrap_or(1).min(len.max(1));
-        Ok(Self { dataset, name: at, dimensions: shape.len(), axis, len, kind, chunk })
+        Ok(Self { dataset, name, dimensions: shape.len(), axis, len, kind, chunk })
     }
 
     pub(super) fn is_single_precision(&self) -> bool {

@@ -57,7 +57,8 @@ pub(super) fn parse(text: &[u8]) -> Result<(Header, usize, usize), Vec<Diagnosti
     Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(count)])
 }
 
-fn size(field: &[u8]) -> Option<u64> {
+/// A whole number.
+pub(super) fn size(field: &[u8]) -> Option<u64> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 

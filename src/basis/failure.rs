@@ -1,0 +1,79 @@
+//! Failures of the eigen-solver as messages that name nodes.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::eigen::EigenFailure;
+use crate::error::Error;
+use crate::model::FeModel;
+use faer::Mat;
+
+/// Turns a failure of the eigen-solver into a diagnostic that names nodes.
+pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
+    let moving = |vectors: &Mat<f64>| {
+        let mut size: Vec<(usize, f64)> = (0..model.nodes().len())
+            .map(|i| {
+                let square = (0..vectors.ncols())
+                    .flat_map(|j| (0..3).map(move |k| (3 * i + k, j)))
+                    .map(|(r, j)| vectors[(r, j)].powi(2))
+                    .sum::<f64>();
+                (i, square)
+            })
+            .collect();
+        size.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let named: Vec<String> =
+            size.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
+        named.join(", ")
+    };
+    let diagnostic = match failure {
+        EigenFailure::NotConverged { converged, wanted } => {
+            Diagnostic::new(Code::NotConverged, format!("{converged} of {wanted} modes converged"))
+        }
+        EigenFailure::NotPositiveDefinite { shift } => Diagnostic::new(
+            Code::StiffnessIndefinite,
+            format!("K + {shift:.3e} M is not positive definite: K or M is indefinite"),
+        ),
+        EigenFailure::NegativeEigenvalue { eigenvalue, vector } => Diagnostic::new(
+            Code::StiffnessIndefinite,
+            format!("eigenvalue {eigenvalue:.6e} is negative; its mode moves nodes {} most", moving(&vector)),
+        ),
+        EigenFailure::MassIndefinite => {
+            Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
+        }
+        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
+            Code::Mechanism,
+            format!(
+                "{} zero-energy modes: six rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
+                count + 6,
+                eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
+                moving(&vectors)
+            ),
+        ),
+        EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
+            Code::CompletenessFailed,
+            format!(
+                "{found} flexible modes were found below lambda = {shift:.6e}, the inertia count says {counted}"
+            ),
+        ),
+        EigenFailure::Inaccurate { residual } => Diagnostic::new(
+            Code::FactorizationFailed,
+            format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
+        ),
+        EigenFailure::NotCertified { why } => Diagnostic::new(
+            Code::FactorizationFailed,
+            format!("eigenvalue bounds cannot be guaranteed: {why}"),
+        )
+        .with_help("use --accuracy standard"),
+        EigenFailure::Memory { bytes, available } => Diagnostic::new(
+            Code::MemoryShort,
+            format!(
+                "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are left",
+                bytes as f64 * 1e-9,
+                available as f64 * 1e-9
+            ),
+        ),
+        EigenFailure::TooLarge => Diagnostic::new(
+            Code::MemoryShort,
+            "the node graph has more than 2^31 entries, too many for the ordering",
+        ),
+    };
+    diagnostic.into()
+}

@@ -1,0 +1,207 @@
+//! NumPy's format of one array, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+
+use super::shapes::Array;
+use crate::diagnostic::{Code, Diagnostic};
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+pub(super) fn recognises(head: &[u8]) -> bool {
+    head.starts_with(MAGIC)
+}
+
+/// An array of real numbers with one or two extents.
+pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
+    let syntax = |what: String| {
+        Diagnostic::new(Code::MatrixSyntax, what).with_help("write the array again by numpy.save")
+    };
+    let number = |range: std::ops::Range<usize>| {
+        let bytes = bytes.get(range)?;
+        Some(bytes.iter().rev().fold(0usize, |number, &byte| number << 8 | usize::from(byte)))
+    };
+    let version = bytes.get(6).copied().unwrap_or(0);
+    let (start, length) = match version {
+        1 => (10, number(8..10)),
+        2 | 3 => (12, number(8..12)),
+        _ => return Err(syntax(format!("NumPy format has version {version}, expected 1 to 3"))),
+    };
+    let header = length.and_then(|length| bytes.get(start..)?.get(..length));
+    let header = header.ok_or_else(|| syntax("file ends inside its header".into()))?;
+    let data = &bytes[start + header.len()..];
+    let text = header.escape_ascii().to_string();
+    let shown = text.get(..100).unwrap_or(&text).trim_end();
+    let Header { descr, fortran, shape } =
+        parse(header).ok_or_else(|| syntax(format!("header is not understood: `{shown}`")))?;
+    let (size, decode): (usize, fn(&[u8]) -> f64) = match descr {
+        "<f8" => (8, |b| f64::from_le_bytes(b.try_into().expect("eight bytes"))),
+        ">f8" => (8, |b| f64::from_be_bytes(b.try_into().expect("eight bytes"))),
+        "<f4" => (4, |b| f64::from(f32::from_le_bytes(b.try_into().expect("four bytes")))),
+        ">f4" => (4, |b| f64::from(f32::from_be_bytes(b.try_into().expect("four bytes")))),
+        other => {
+            let message = format!("array has the type `{}`, expected f8 or f4", other.escape_default());
+            return Err(Diagnostic::new(Code::MatrixKind, message)
+                .with_help("write real numbers: numpy.save(file, array.astype(float))"));
+        }
+    };
+    let (rows, cols) = match *shape.as_slice() {
+        [rows] => (rows, 1),
+        [rows, cols] => (rows, cols),
+        _ => {
+            let message = format!("array has {} extents, expected 2", shape.len());
+            return Err(Diagnostic::new(Code::MatrixKind, message)
+                .with_help("reshape it: one row for every matrix row, one column for every shape"));
+        }
+    };
+    let count = rows.checked_mul(cols).filter(|count| count.checked_mul(size) == Some(data.len()));
+    if count.is_none() {
+        let message =
+            format!("header announces {rows} x {cols} values of {size} bytes, {} bytes follow", data.len());
+        return Err(Diagnostic::new(Code::MatrixCount, message));
+    }
+    let values = data.chunks_exact(size).map(decode).collect();
+    Ok(Array { rows, cols, row_major: !fortran, values, digits: if size == 4 { 7 } else { 17 } })
+}
+
+struct Header<'a> {
+    descr: &'a str,
+    fortran: bool,
+    shape: Vec<usize>,
+}
+
+/// The header: a Python dictionary with exactly the keys descr, fortran_order and shape.
+fn parse(text: &[u8]) -> Option<Header<'_>> {
+    let mut cursor = Cursor(std::str::from_utf8(text).ok()?.trim());
+    let (mut descr, mut fortran, mut shape) = (None, None, None);
+    cursor.take("{")?;
+    while cursor.take("}").is_none() {
+        let key = cursor.quoted()?;
+        cursor.take(":")?;
+        match key {
+            "descr" if descr.is_none() => descr = Some(cursor.quoted()?),
+            "fortran_order" if fortran.is_none() => {
+                fortran = Some(if cursor.take("True").is_some() {
+                    true
+                } else {
+                    cursor.take("False")?;
+                    false
+                });
+            }
+            "shape" if shape.is_none() => shape = Some(cursor.tuple()?),
+            _ => return None,
+        }
+        if cursor.take(",").is_none() {
+            cursor.take("}")?;
+            break;
+        }
+    }
+    let all = cursor.0.is_empty();
+    Some(Header { descr: descr?, fortran: fortran?, shape: shape? }).filter(|_| all)
+}
+
+/// What is left of the text.
+struct Cursor<'a>(&'a str);
+
+impl<'a> Cursor<'a> {
+    /// Takes `token` and the blanks after it.
+    fn take(&mut self, token: &str) -> Option<()> {
+        self.0 = self.0.strip_prefix(token)?.trim_start();
+        Some(())
+    }
+
+    fn quoted(&mut self) -> Option<&'a str> {
+        let quote = self.0.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
+        let (text, rest) = self.0[1..].split_once(quote)?;
+        self.0 = rest.trim_start();
+        Some(text)
+    }
+
+    /// Whole numbers in parentheses.
+    fn tuple(&mut self) -> Option<Vec<usize>> {
+        self.take("(")?;
+        let mut numbers = Vec::new();
+        while self.take(")").is_none() {
+            let end = self.0.find(|c: char| !c.is_ascii_digit())?;
+            numbers.push(self.0[..end].parse().ok()?);
+            self.0 = self.0[end..].trim_start();
+            if self.take(",").is_none() {
+                self.take(")")?;
+                break;
+            }
+        }
+        Some(numbers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(version: u8, header: &str, data: &[u8]) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend([version, 0]);
+        match version {
+            1 => bytes.extend((header.len() as u16).to_le_bytes()),
+            _ => bytes.extend((header.len() as u32).to_le_bytes()),
+        }
+        bytes.extend(header.as_bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    #[test]
+    fn every_version_order_and_byte_order() {
+        let values = [1.5, -2.0, 0.25, 3.0, 4.0, 5.0];
+        for version in [1, 2, 3] {
+            for (descr, digits) in [("<f8", 17), (">f8", 17), ("<f4", 7), (">f4", 7)] {
+                let data: Vec<u8> = values
+                    .iter()
+                    .flat_map(|&v: &f64| match descr {
+                        "<f8" => v.to_le_bytes().to_vec(),
+                        ">f8" => v.to_be_bytes().to_vec(),
+                        "<f4" => (v as f32).to_le_bytes().to_vec(),
+                        _ => (v as f32).to_be_bytes().to_vec(),
+                    })
+                    .collect();
+                for (fortran, row_major) in [("False", true), ("True", false)] {
+                    let header = format!(
+                        "{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': (3, 2), }}     \n"
+                    );
+                    let expected = Array { rows: 3, cols: 2, row_major, values: values.to_vec(), digits };
+                    assert_eq!(read(&file(version, &header, &data)), Ok(expected));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_an_array_of_real_numbers_is_refused() {
+        let header = |descr: &str, shape: &str| {
+            format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}")
+        };
+        let eight = [0u8; 8];
+        for (bytes, code) in [
+            (file(1, &header("'<f8'", "(1, 1)"), &eight[..7]), Code::MatrixCount),
+            (file(1, &header("'<f8'", "(1, 2)"), &eight), Code::MatrixCount),
+            (file(1, &header("'<f8'", "(4294967296, 4294967296)"), &eight), Code::MatrixCount),
+            (file(1, &header("'<f8'", "(99999999999999999999, 1)"), &eight), Code::MatrixSyntax),
+            (file(1, &header("'<f8'", "(1, -1)"), &eight), Code::MatrixSyntax),
+            (file(1, &header("'<f8'", "(1, 1, 1)"), &eight), Code::MatrixKind),
+            (file(1, &header("'<f8'", "()"), &eight), Code::MatrixKind),
+            (file(1, &header("'<c16'", "(1, 1)"), &eight), Code::MatrixKind),
+            (file(1, &header("'|O'", "(1, 1)"), &eight), Code::MatrixKind),
+            (file(1, &header("[('a', '<f8')]", "(1, 1)"), &eight), Code::MatrixSyntax),
+            (file(1, "{'descr': '<f8', 'shape': (1, 1)}", &eight), Code::MatrixSyntax),
+            (
+                file(1, "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 1)} x", &eight),
+                Code::MatrixSyntax,
+            ),
+            (file(1, "{", &eight), Code::MatrixSyntax),
+            (file(4, "", &eight), Code::MatrixSyntax),
+            (MAGIC.to_vec(), Code::MatrixSyntax),
+            ([MAGIC, &[2, 0, 255, 255, 255, 255, b'{']].concat(), Code::MatrixSyntax),
+            ([MAGIC, &[1, 0, 255, 255, 0xff, 0xfe]].concat(), Code::MatrixSyntax),
+        ] {
+            let found = read(&bytes).expect_err("not an array");
+            assert_eq!(found.code(), code, "{found}");
+        }
+    }
+}

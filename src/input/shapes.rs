@@ -1,0 +1,117 @@
+//! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by content.
+
+use super::bytes::InputFile;
+use super::compression::Compression;
+use super::hdf5::Hdf5;
+use super::matrix_market::MatrixMarket;
+use super::model_files::MatrixLocation;
+use super::reader::{HEAD, Reader};
+use super::{hdf5, matrix_market, npy};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::{Error, Result};
+use crate::model::RawShapes;
+use crate::provenance::SourceFile;
+use faer::Mat;
+
+/// A dense array as its file has it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Array {
+    pub rows: usize,
+    pub cols: usize,
+    /// Whether the values of a row, or of a column, follow each other.
+    pub row_major: bool,
+    /// As many as rows x cols.
+    pub values: Vec<f64>,
+    /// Significant decimal digits that they carry at the most.
+    pub digits: u8,
+}
+
+/// Reads shapes or loads for matrices with `n` rows: an array n x k, or k x n where k is not n too. `role` names the file
+/// in the provenance.
+///
+/// # Errors
+/// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.
+pub fn read_shapes(location: &MatrixLocation, n: usize, role: &str) -> Result<RawShapes> {
+    let file = InputFile::open(&location.path)?;
+    let path = file.path();
+    let array = read(&file, location.group.as_deref())
+        .and_then(|array| oriented(array, n).map_err(|diagnostic| vec![diagnostic]));
+    let (matrix, digits) =
+        array.map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))?;
+    let source = Some(SourceFile::new(role, path, file.sha256()));
+    Ok(RawShapes { matrix, digits, path: path.to_path_buf(), source })
+}
+
+fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
+    let compression = Compression::of(file.bytes());
+    let head = compression.head(file.bytes(), HEAD);
+    let packed = compression != Compression::None;
+    if !packed && Hdf5.recognises(&head) {
+        return hdf5::read_array(file, dataset);
+    }
+    if let Some(dataset) = dataset {
+        let message = format!("dataset `{dataset}` is named, but the file is not HDF5");
+        return Err(vec![Diagnostic::new(Code::Hdf5Layout, message).with_help("give the file alone")]);
+    }
+    if MatrixMarket.recognises(&head) {
+        return matrix_market::read_array(file, compression);
+    }
+    if !packed && npy::recognises(&head) {
+        return npy::read(file.bytes()).map_err(|diagnostic| vec![diagnostic]);
+    }
+    let start = &head[..head.len().min(24)];
+    let what = if packed && (npy::recognises(&head) || Hdf5.recognises(&head)) {
+        "file is compressed as a whole".to_owned()
+    } else {
+        format!("file begins with `{}`", start.escape_ascii())
+    };
+    Err(vec![Diagnostic::new(Code::FileFormatUnknown, what).with_help(
+        "give a NumPy array (.npy), an HDF5 file (FILE.h5:/dataset) or a Matrix Market array (.mtx)",
+    )])
+}
+
+/// The array with one shape in each column, and its digits.
+fn oriented(array: Array, n: usize) -> std::result::Result<(Mat<f64>, u8), Diagnostic> {
+    let Array { rows, cols, row_major, values, digits } = array;
+    let upright = match (rows == n, cols == n) {
+        (true, false) => true,
+        (false, true) => false,
+        (true, true) => {
+            let message = format!("array is {rows} x {cols}: its rows and its columns may be the shapes");
+            return Err(Diagnostic::new(Code::ShapesSize, message).with_help("give fewer shapes"));
+        }
+        (false, false) => {
+            let message = format!("array is {rows} x {cols}, the matrices have {n} rows");
+            return Err(Diagnostic::new(Code::ShapesSize, message));
+        }
+    };
+    let k = if upright { cols } else { rows };
+    // Shapes follow each other: row by row in an array of rows, column by column in one of columns.
+    let one_by_one = row_major != upright;
+    let at = |i: usize, j: usize| if one_by_one { j * n + i } else { i * k + j };
+    Ok((Mat::from_fn(n, k, |i, j| values[at(i, j)]), digits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_orientation_and_order_gives_the_same_columns() {
+        let value = |i: usize, j: usize| (10 * i + j) as f64;
+        let expected = Mat::from_fn(7, 2, value);
+        for (rows, cols) in [(7, 2), (2, 7)] {
+            let entry = |r: usize, c: usize| if rows == 7 { value(r, c) } else { value(c, r) };
+            for row_major in [true, false] {
+                let values =
+                    (0..14)
+                        .map(|at| {
+                            if row_major { entry(at / cols, at % cols) } else { entry(at % rows, at / rows) }
+                        })
+                        .collect();
+                let array = Array { rows, cols, row_major, values, digits: 17 };
+                assert_eq!(oriented(array, 7), Ok((expected.clone(), 17)));
+            }
+        }
+    }
+}
