@@ -11,6 +11,8 @@ use crate::input::shapes::Array;
 /// Values whose written digits are counted.
 const COUNTED: usize = 4096;
 
+const HELP: &str = "write the array as Matrix Market array real general: scipy.io.mmwrite of a numpy array";
+
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
 /// Reads an array of real numbers.
@@ -81,12 +83,15 @@ impl Reading {
             };
             self.size = extents.and_then(|(rows, cols)| Some((rows, cols, rows.checked_mul(cols)?)));
             let message = || format!("size line is `{}`, expected rows and columns", excerpt(line));
-            return self.size.map(|_| ()).ok_or_else(|| Diagnostic::new(Code::MatrixSyntax, message()));
+            return self
+                .size
+                .map(|_| ())
+                .ok_or_else(|| Diagnostic::new(Code::MatrixSyntax, message()).with_help(HELP));
         };
         fields.try_for_each(|field| {
             let value = real(field).ok_or_else(|| {
                 let message = format!("value `{}` is not a number", excerpt(field));
-                Diagnostic::new(Code::MatrixSyntax, message)
+                Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
             })?;
             if self.values.len() == count {
                 let message = format!("header announces {count} values, the file has more");
