@@ -1,11 +1,14 @@
 //! The main job: from a checked model to a flexible body, with what lumped masses would have given.
 
-use crate::basis::{BasisChoice, ModalBasis, ModeSettings, Task, free_surface_of};
+use crate::basis::{
+    BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
+};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, canonical_basis};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+    Truncation,
 };
 use crate::invariants::{
     BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame, condense,
@@ -178,6 +181,11 @@ pub fn convert_resumed(
             eigenvalue: solution.eigenvalues,
             residual: solution.residuals,
             provenance: found.provenance,
+            truncation: found
+                .truncation
+                .into_iter()
+                .map(|Lacking { load, before, after }| Truncation { load, before, after })
+                .collect(),
             shape: shapes,
         },
         invariants,
@@ -344,6 +352,10 @@ fn describe(settings: &ConvertSettings) -> serde_json::Value {
             Lumping::User(_) => LumpedScheme::User.name(),
         })
         .collect();
+    let loads: Vec<&str> = match &settings.basis {
+        BasisChoice::Free(free) => free.residual_vectors.iter().map(Loads::name).collect(),
+        BasisChoice::Imported(_) => Vec::new(),
+    };
     serde_json::json!({
         "accuracy": settings.modes.accuracy.name(),
         "basis": settings.basis.basis().name(),
@@ -351,5 +363,6 @@ fn describe(settings: &ConvertSettings) -> serde_json::Value {
         "lumped": schemes,
         "max_eigenvalue": below,
         "modes": modes,
+        "residual_vectors": loads,
     })
 }

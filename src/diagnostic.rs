@@ -100,8 +100,8 @@ codes! {
     MatrixDigits = "FB311", Warning, Done, "matrix values carry few digits", "write 15 to 17 significant digits: thin bodies lose them all";
     MatrixEmpty = "FB312", Error, BadInput, "matrix has no nonzero entries", "write the matrix again";
     MatrixTooLarge = "FB313", Error, BadInput, "matrix is larger than 4294967295 rows", "split the model";
-    ShapesSize = "FB320", Error, BadInput, "array of shapes does not fit the matrices", "one row (or one column) for every matrix row, in the order of the matrices";
-    ShapesZero = "FB321", Error, BadInput, "shape is zero everywhere", "remove the column";
+    ShapesSize = "FB320", Error, BadInput, "array of shapes or loads does not fit the matrices", "one row (or one column) for every matrix row, in the order of the matrices";
+    ShapesZero = "FB321", Error, BadInput, "shape or load is zero everywhere", "remove the column";
     // FB4xx: model
     NodesMissing = "FB401", Error, BadInput, "degrees of freedom belong to nodes without coordinates", "add the nodes to the node table";
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "one row of dofs.csv per matrix row; without dofs.csv three per node";
@@ -139,6 +139,7 @@ codes! {
     ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
     ShapesRigid = "FB522", Note, Done, "rigid motions among the shapes are removed", "nothing to do: rigid motion is the body frame's";
     ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
+    LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -66,7 +66,7 @@ fn modes_of(model: &FeModel, shapes: ImportedShapes, accuracy: Accuracy) -> Resu
 }
 
 fn converted(model: &FeModel, basis: BasisChoice, accuracy: Accuracy) -> Conversion {
-    let count = if basis == BasisChoice::Free { COUNT } else { usize::MAX };
+    let count = if basis == BasisChoice::default() { COUNT } else { usize::MAX };
     let modes = settings(Wanted::Lowest(count), accuracy);
     convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT).expect("a body")
 }
@@ -83,7 +83,7 @@ fn random(rows: usize, cols: usize, random: &mut Random) -> Mat<f64> {
 fn mixed_shapes_with_rigid_motion_in_them_give_the_body_of_the_free_path() {
     let model = bracket();
     let modes = free(&model);
-    let free_body = converted(&model, BasisChoice::Free, Accuracy::Standard).body;
+    let free_body = converted(&model, BasisChoice::default(), Accuracy::Standard).body;
     let rigid = rigid_fields(&model.nodes().positions, [0.3, -1.0, 2.0], 0.1);
     for seed in 0..3 {
         let mut r = Random(seed);
@@ -133,7 +133,7 @@ fn accuracy_fast_factors_nothing() {
 #[test]
 fn single_precision_costs_what_it_must_and_is_said() {
     let model = bracket();
-    let exact = converted(&model, BasisChoice::Free, Accuracy::Standard).body;
+    let exact = converted(&model, BasisChoice::default(), Accuracy::Standard).body;
     let modes = free(&model);
     let rounded = Mat::from_fn(modes.nrows(), COUNT, |i, j| f64::from(modes[(i, j)] as f32));
     let done = converted(&model, BasisChoice::Imported(imported(&model, &rounded, 7)), Accuracy::Standard);
@@ -245,7 +245,7 @@ fn eigenvectors_of_scipy_give_the_same_invariants() {
         read_shapes(&MatrixLocation { path, group: None }, model.stiffness().n(), "shapes").expect("shapes");
     let shapes = ImportedShapes::new(&model, raw).expect("fits");
     let done = converted(&model, BasisChoice::Imported(shapes), Accuracy::Standard);
-    let free_body = converted(&model, BasisChoice::Free, Accuracy::Standard).body;
+    let free_body = converted(&model, BasisChoice::default(), Accuracy::Standard).body;
     let strict = Tolerances { invariants: 1e-9, ..Tolerances::default() };
     let comparison = compare(&free_body, &done.body, &strict).expect("comparable");
     assert!(comparison.passed(), "{comparison:#?}");

@@ -1,7 +1,9 @@
 //! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
 
+use super::Loads;
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, input_error};
+use super::residual_vectors::{NamedLoads, with_residual_vectors};
 use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve};
@@ -15,8 +17,11 @@ use faer::{Mat, MatRef};
 pub use crate::eigen::EigenSettings as ModeSettings;
 
 /// The lowest free-surface modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FreeSurface;
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FreeSurface {
+    /// Loads whose static responses join the modes.
+    pub residual_vectors: Vec<Loads>,
+}
 
 impl Basis for FreeSurface {
     fn name(&self) -> &'static str {
@@ -24,7 +29,22 @@ impl Basis for FreeSurface {
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
-        free_surface_resumed(task.model, task.settings, task.resume, task.watch)
+        let Task { model, settings, resume, watch } = *task;
+        let modes = || free_surface_resumed(model, settings, resume, watch);
+        if self.residual_vectors.is_empty() {
+            return modes();
+        }
+        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+        let rigid = rigid_modes(&pencil, &model.nodes().positions)?;
+        let problem = EigenProblem {
+            pencil,
+            rigid: rigid.as_ref(),
+            first_estimate: f64::INFINITY,
+            input_error: input_error(model),
+            resume,
+        };
+        let loads = NamedLoads::new(&problem, model, &self.residual_vectors, settings)?;
+        with_residual_vectors(model, &problem, modes()?, &loads, settings, watch)
     }
 }
 

@@ -7,9 +7,11 @@ mod free_surface;
 mod imported;
 mod modal_basis;
 mod pseudo_free_surface;
+mod residual_vectors;
 mod rigid_modes;
 
 pub use choice::BasisChoice;
 pub use free_surface::{FreeSurface, ModeSettings, free_surface, free_surface_of, free_surface_resumed};
 pub use imported::ImportedShapes;
-pub use modal_basis::{Basis, ModalBasis, Task};
+pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
+pub use residual_vectors::{Loads, UserLoads};

@@ -34,6 +34,18 @@ pub struct Task<'a> {
     pub watch: Watch<'a>,
 }
 
+/// What a basis lacks of the static response x = K^+ f to a load: |x - x_basis| / |x| in the norm of K, which is
+/// sqrt(1 - sum_p (psi_p'f)^2 / lambda_p / f'K^+ f).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truncation {
+    /// Name of the load.
+    pub load: String,
+    /// With the free modes alone.
+    pub before: f64,
+    /// With the residual vectors.
+    pub after: f64,
+}
+
 /// Modes of a model, in model axes, whatever basis they come from.
 #[derive(Debug, Clone)]
 pub struct ModalBasis {
@@ -47,6 +59,8 @@ pub struct ModalBasis {
     pub input_noise: Vec<f64>,
     /// Where each mode comes from.
     pub provenance: Vec<String>,
+    /// For each load of the residual vectors, what the basis lacks.
+    pub truncation: Vec<Truncation>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -111,6 +125,6 @@ impl ModalBasis {
             diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
         }
         let provenance = vec![provenance.to_owned(); solution.eigenvalues.len()];
-        Ok(Self { solution, rigid_noise, input_noise, provenance, diagnostics })
+        Ok(Self { solution, rigid_noise, input_noise, provenance, truncation: Vec::new(), diagnostics })
     }
 }

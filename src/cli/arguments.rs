@@ -69,6 +69,9 @@ pub struct ConvertArguments {
     /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array
     #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
     pub shapes: Option<PathBuf>,
+    /// Static responses to add to free modes: centrifugal, interfaces, loads=FILE (nodal forces by matrix rows), comma-separated
+    #[arg(long, value_name = "LOADS")]
+    pub residual_vectors: Option<String>,
     /// Promise about the modes
     #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
     pub accuracy: AccuracyName,

@@ -5,7 +5,7 @@ use super::checkpoint::{CheckpointFile, resume};
 use super::output::{Outcome, tell};
 use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
-use crate::basis::{BasisChoice, ImportedShapes, ModeSettings};
+use crate::basis::{BasisChoice, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads};
 use crate::convert::{Conversion, ConvertSettings, Lumping, convert_resumed};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
@@ -26,8 +26,9 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     refuse_contradictions(arguments)?;
+    let loads = load_sets(arguments.residual_vectors.as_deref().unwrap_or(""))?;
     let files = model_files(arguments)?;
-    refuse_overwriting(arguments, &files, &schemes)?;
+    refuse_overwriting(arguments, &files, &schemes, &loads)?;
     let slot = store::prepare_output(&arguments.output)?;
     let report_slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let checkpoint = arguments.checkpoint.as_deref().map(CheckpointFile::open).transpose()?;
@@ -40,7 +41,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let checked = FeModel::from_raw(raw)?;
     let model = checked.model;
     let checkpoint = checkpoint.map(|file| file.for_model(&files, &model)).transpose()?;
-    let basis = basis(arguments, &model).inspect_err(|_| {
+    let basis = basis(arguments, &loads, &model).inspect_err(|_| {
         watcher.clear();
         tell(arguments.printing, &checked.diagnostics);
     })?;
@@ -94,6 +95,37 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     Ok(Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true })
 }
 
+/// Loads of residual vectors as named on the command line.
+enum LoadSet {
+    Centrifugal,
+    Interfaces,
+    File(MatrixLocation),
+}
+
+fn load_sets(text: &str) -> Result<Vec<LoadSet>> {
+    let mut sets = Vec::new();
+    let mut names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+    for name in &names {
+        sets.push(match (*name, name.strip_prefix("loads=")) {
+            ("centrifugal", _) => LoadSet::Centrifugal,
+            ("interfaces", _) => LoadSet::Interfaces,
+            (_, Some(path)) if !path.is_empty() => LoadSet::File(MatrixLocation::parse(path)),
+            _ => {
+                let message = format!("`{name}` is no set of loads for residual vectors");
+                return Err(Diagnostic::new(Code::Usage, message)
+                    .with_help("centrifugal, interfaces, loads=FILE, or several of them with commas")
+                    .into());
+            }
+        });
+    }
+    names.sort_unstable();
+    if names.windows(2).any(|pair| pair[0] == pair[1]) {
+        let message = format!("loads are named twice in `{text}`");
+        return Err(Diagnostic::new(Code::Usage, message).into());
+    }
+    Ok(sets)
+}
+
 /// Options that say nothing together.
 fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
     let free = arguments.basis == BasisName::Free;
@@ -101,6 +133,15 @@ fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
         ConvertArguments { shapes: Some(_), .. } if free => "--shapes needs --basis imported",
         ConvertArguments { checkpoint: Some(_), .. } if !free => {
             "--checkpoint keeps a search for modes, imported shapes need none"
+        }
+        ConvertArguments { residual_vectors: Some(_), .. } if !free => {
+            "--residual-vectors needs --basis free"
+        }
+        ConvertArguments { residual_vectors: Some(_), lumped_modes: true, .. } => {
+            "--lumped-modes compares free-surface modes, not residual vectors"
+        }
+        ConvertArguments { residual_vectors: Some(_), accuracy: AccuracyName::Certified, .. } => {
+            "residual vectors are no eigenvectors and cannot be certified"
         }
         ConvertArguments { lumped_modes: true, .. } if !free => {
             "--lumped-modes compares free-surface modes, not imported shapes"
@@ -111,13 +152,24 @@ fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
 }
 
 /// The basis, with the shapes read that it needs.
-fn basis(arguments: &ConvertArguments, model: &FeModel) -> Result<BasisChoice> {
+fn basis(arguments: &ConvertArguments, loads: &[LoadSet], model: &FeModel) -> Result<BasisChoice> {
     match (arguments.basis, &arguments.shapes) {
         (BasisName::Imported, Some(shapes)) => {
             let raw = read_shapes(&MatrixLocation::parse(shapes), model.stiffness().n(), "shapes")?;
             ImportedShapes::new(model, raw).map(BasisChoice::Imported)
         }
-        _ => Ok(BasisChoice::Free),
+        _ => {
+            let read = |set: &LoadSet| match set {
+                LoadSet::Centrifugal => Ok(Loads::Centrifugal),
+                LoadSet::Interfaces => Ok(Loads::Interfaces),
+                LoadSet::File(location) => {
+                    let raw = read_shapes(location, model.stiffness().n(), "loads")?;
+                    UserLoads::new(model, raw).map(Loads::User)
+                }
+            };
+            let residual_vectors = loads.iter().map(read).collect::<Result<_>>()?;
+            Ok(BasisChoice::Free(FreeSurface { residual_vectors }))
+        }
     }
 }
 
@@ -183,7 +235,12 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
 }
 
 /// No output may replace an input or another output.
-fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles, schemes: &[Scheme]) -> Result<()> {
+fn refuse_overwriting(
+    arguments: &ConvertArguments,
+    files: &ModelFiles,
+    schemes: &[Scheme],
+    loads: &[LoadSet],
+) -> Result<()> {
     let matrices = [Some(&files.stiffness.path), Some(&files.mass.path)];
     let tables = [Some(&files.nodes), files.dofs.as_ref(), files.manifest.as_ref()];
     let masses = schemes.iter().map(|scheme| match scheme {
@@ -196,7 +253,11 @@ fn refuse_overwriting(arguments: &ConvertArguments, files: &ModelFiles, schemes:
     });
     let shapes = arguments.shapes.as_ref().map(|path| MatrixLocation::parse(path).path);
     let matrices = matrices.into_iter().chain([shapes.as_ref()]);
-    let inputs = matrices.chain(tables).chain(masses).chain(interfaces);
+    let loads = loads.iter().map(|set| match set {
+        LoadSet::File(location) => Some(&location.path),
+        _ => None,
+    });
+    let inputs = matrices.chain(loads).chain(tables).chain(masses).chain(interfaces);
     let place = |path: &Path| {
         std::fs::canonicalize(path)
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))

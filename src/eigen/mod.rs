@@ -15,6 +15,7 @@ mod single;
 mod solve;
 mod span;
 mod start;
+mod static_response;
 
 pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
@@ -27,3 +28,4 @@ pub use problem::{
 pub use solve::solve;
 pub use span::modes_of_span;
 pub use start::{Resume, Save, Snapshot};
+pub use static_response::static_responses;

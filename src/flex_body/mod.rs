@@ -6,4 +6,6 @@ mod validate;
 
 pub use crate::invariants::Frame;
 pub use body::FlexBody;
-pub use parts::{Certificate, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source};
+pub use parts::{
+    Certificate, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+};

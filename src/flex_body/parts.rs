@@ -32,6 +32,18 @@ pub enum MassStructure {
     General,
 }
 
+/// What the modes lack of the static response to a load, relative, in the norm of K.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truncation {
+    /// Name of the load.
+    pub load: String,
+    /// With the free modes alone.
+    pub before: f64,
+    /// With the residual vectors.
+    pub after: f64,
+}
+
 /// Mode shapes and what is known of each mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Modes {
@@ -41,6 +53,8 @@ pub struct Modes {
     pub residual: Vec<f64>,
     /// Where each mode comes from: `free mode`, `imported shape`, ...; empty when it is not known.
     pub provenance: Vec<String>,
+    /// For each load that residual vectors were made for, what the modes lack.
+    pub truncation: Vec<Truncation>,
     /// Modal damping ratios, 0 when none was given.
     pub damping_ratio: Vec<f64>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.

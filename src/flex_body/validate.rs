@@ -160,6 +160,7 @@ impl Check {
         if !modes.provenance.is_empty() {
             self.length("modes.provenance", modes.provenance.len(), nf, "mode");
         }
+        self.finite("modes.truncation", modes.truncation.iter().flat_map(|t| [t.before, t.after]));
         self.matrix("modes.shape", &modes.shape, 3 * n, nf);
     }
 

@@ -6,7 +6,7 @@ use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
-use crate::flex_body::{FlexBody, MassStructure};
+use crate::flex_body::{FlexBody, MassStructure, Truncation};
 use crate::provenance::{self, SourceFile};
 use serde::{Serialize, Serializer};
 
@@ -73,6 +73,8 @@ pub(super) struct ModeFacts {
     pub residual: Vec<f64>,
     /// Where each mode comes from; empty when it is not known.
     pub provenance: Vec<String>,
+    /// What the modes lack of static responses, for the loads of residual vectors.
+    pub truncation: Vec<Truncation>,
     pub damping_ratio: Vec<f64>,
     pub worst_residual: f64,
 }
@@ -121,6 +123,7 @@ impl Facts {
                 eigenvalue: body.modes().eigenvalue.clone(),
                 residual: body.modes().residual.clone(),
                 provenance: body.modes().provenance.clone(),
+                truncation: body.modes().truncation.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },

@@ -6,6 +6,7 @@ use super::guarantee::cut;
 use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
+use crate::flex_body::Truncation;
 use crate::invariants::ERROR_NORMS;
 use std::collections::HashMap;
 
@@ -210,6 +211,12 @@ fn modes(html: &mut String, facts: &Facts) {
     };
     let rows: Vec<_> = (0..modes.count).map(row).collect();
     table(html, "Flexible modes, ascending", &head, &[], &rows);
+    if !modes.truncation.is_empty() {
+        let row = |t: &Truncation| vec![escape(&t.load), significant(t.before, 3), significant(t.after, 3)];
+        let rows: Vec<_> = modes.truncation.iter().map(row).collect();
+        let caption = "Static responses: what the modes lack, in the norm of K";
+        table(html, caption, &texts(["Load", "Free modes alone", "With residual vectors"]), &[0], &rows);
+    }
     if let Some(guarantee) = guarantee {
         let row = |(name, digits): &(&str, f64)| vec![escape(name), cut(*digits)];
         let rows: Vec<_> = guarantee.invariant_digits.iter().map(row).collect();

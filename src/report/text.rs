@@ -134,6 +134,10 @@ fn modes(page: &mut Page, facts: &Facts) {
     page.list("origin", &origins, |(origin, count)| {
         format!("{}: {}", counted(*count, "mode"), plain(origin))
     });
+    page.list("static", &modes.truncation, |t| {
+        let (before, after) = (significant(t.before, 2), significant(t.after, 2));
+        format!("{}: error {before} with free modes alone, {after} with residual vectors", plain(&t.load))
+    });
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {

@@ -99,6 +99,12 @@ impl Take<'_> {
         parsed.ok()
     }
 
+    /// An empty list where nothing is stored.
+    fn optional_json<T: serde::de::DeserializeOwned>(&mut self, path: &str, expected: &str) -> Vec<T> {
+        let stored = self.scan.values.contains_key(path);
+        stored.then(|| self.json(path, expected)).flatten().unwrap_or_default()
+    }
+
     fn source(&mut self) -> Option<Source> {
         let name = self.text("/source@model");
         let files = self.json("/source@files", "a JSON array of files");
@@ -116,14 +122,12 @@ impl Take<'_> {
     fn modes(&mut self, n: usize) -> Modes {
         let eigenvalue = self.floats("/modes/eigenvalue");
         let shape = self.floats("/modes/shape");
-        let provenance = if self.scan.values.contains_key("/modes@provenance") {
-            self.json("/modes@provenance", "a JSON array of texts").unwrap_or_default()
-        } else {
-            Vec::new()
-        };
+        let provenance = self.optional_json("/modes@provenance", "a JSON array of texts");
+        let truncation = self.optional_json("/modes@truncation", "a JSON array of loads");
         Modes {
             residual: self.floats("/modes/residual"),
             provenance,
+            truncation,
             damping_ratio: self.floats("/modes/damping_ratio"),
             shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
             eigenvalue,

@@ -305,6 +305,18 @@ const NODES: &[Item] = &[
 
 const MODES: &[Item] = &[
     attribute(
+        "truncation",
+        Text,
+        ONE,
+        "JSON array with the `load` of every residual vector and what the modes lack of the static response to it, in the norm of K, `before` (free modes alone) and `after`; absent: no residual vectors",
+        |v| {
+            let truncation = &v.body.modes.truncation;
+            let json = || serde_json::to_string(truncation).expect("finite numbers and strings are valid JSON");
+            (!truncation.is_empty()).then(|| Value::Text(json()))
+        },
+    )
+    .added(2),
+    attribute(
         "provenance",
         Text,
         ONE,

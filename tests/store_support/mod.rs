@@ -4,6 +4,7 @@
 use faer::Mat;
 use flexbody::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+    Truncation,
 };
 use flexbody::invariants::{DIGITS, Invariants};
 use flexbody::model::Nodes;
@@ -138,6 +139,10 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             eigenvalue,
             residual: (0..nf).map(|_| r.value().abs()).collect(),
             provenance: (0..nf).filter(|_| n * nf % 2 == 1).map(|_| r.name()).collect(),
+            truncation: (0..nf)
+                .filter(|_| n * nf % 2 == 1)
+                .map(|_| Truncation { load: r.name(), before: r.value(), after: r.value() })
+                .collect(),
             damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
             shape: r.matrix(3 * n, nf),
         },
