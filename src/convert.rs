@@ -8,11 +8,11 @@ use crate::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
 };
 use crate::invariants::{
-    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame, condense,
-    condense_certified, condense_lumped, error_norms,
+    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
+    choose_plane_frame, condense, condense_certified, condense_lumped, error_norms,
 };
-use crate::linalg::{Pencil, SymmetricMatrix, gram};
-use crate::model::{FeModel, Nodes};
+use crate::linalg::{Pencil, SymmetricMatrix, gram, multiply};
+use crate::model::{FeModel, Nodes, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
@@ -109,7 +109,10 @@ pub fn convert_resumed(
     let found = free_surface_resumed(model, &settings.modes, resume, watch)?;
     watch(Event::Phase("invariants"));
     let positions = &model.nodes().positions;
-    let (frame, mass_properties) = choose_frame(model.scalar_mass(), positions, settings.frame)?;
+    let (frame, mass_properties) = match model.dimension() {
+        2 => choose_plane_frame(model.scalar_mass(), positions, settings.frame)?,
+        _ => choose_frame(model.scalar_mass(), positions, settings.frame)?,
+    };
     let place = Place { frame, positions: frame.to_body(positions) };
     let (shapes, modal_stiffness) = place.modes(model, &found.solution.vectors);
     let (mass, positions) = (model.scalar_mass(), &place.positions);
@@ -165,6 +168,7 @@ pub fn convert_resumed(
             },
             settings: describe(settings),
         },
+        dimension: model.dimension(),
         units: model.units().clone(),
         frame,
         interfaces: interfaces(model),
@@ -196,14 +200,14 @@ struct Place {
 }
 
 impl Place {
-    /// Modes in body axes with canonical signs there, and Psi' K Psi.
+    /// Modes in body axes (3n x nf) with canonical signs there, and Psi' K Psi.
     fn modes(&self, model: &FeModel, vectors: &Mat<f64>) -> (Mat<f64>, Mat<f64>) {
-        let mut shapes = vectors.clone();
+        let mut shapes = in_space(vectors, model.dimension());
         self.frame.rotate_shapes(&mut shapes);
         let unsigned = shapes.clone();
         canonical_basis(shapes.as_mut(), &[]);
         // K lives in model axes: its reduction is taken there, and the signs are carried over.
-        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
         let k = gram(vectors.as_ref(), pencil.apply_stiffness(vectors.as_ref()).as_ref());
         let flipped: Vec<f64> = (0..shapes.ncols())
             .map(|j| if (0..shapes.nrows()).all(|i| shapes[(i, j)] == unsigned[(i, j)]) { 1.0 } else { -1.0 })
@@ -213,6 +217,17 @@ impl Place {
         });
         (shapes, modal)
     }
+}
+
+/// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
+pub(crate) fn in_space(shapes: &Mat<f64>, dimension: usize) -> Mat<f64> {
+    if dimension == 3 {
+        return shapes.clone();
+    }
+    Mat::from_fn(shapes.nrows() / 2 * 3, shapes.ncols(), |row, j| match row % 3 {
+        2 => 0.0,
+        k => shapes[(row / 3 * 2 + k, j)],
+    })
 }
 
 fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
@@ -284,8 +299,10 @@ fn lumped_pipeline(
         return Ok(none(format!("the lumped mass has {} modes only", found.eigenvalues.len())));
     }
     let (shapes, modal_stiffness) = exact.place.modes(exact.model, &found.vectors);
-    let pencil = Pencil::new(exact.model.stiffness(), exact.model.scalar_mass(), 3);
-    let cross = gram(exact.shapes, pencil.apply_mass(shapes.as_ref()).as_ref());
+    // In the plane as in space: M = Ms kron I3 for shapes with three components.
+    let mut m_shapes = Mat::zeros(shapes.nrows(), nf);
+    multiply(exact.model.scalar_mass(), 3, shapes.as_ref(), m_shapes.as_mut());
+    let cross = gram(exact.shapes, m_shapes.as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..nf)));
     let own = condense_lumped(masses, &exact.place.positions, shapes.as_ref(), modal_stiffness);
     Ok(LumpedPipeline {
@@ -304,7 +321,7 @@ fn certificate(model: &FeModel, found: &FreeSurfaceModes, guarantee: Option<Guar
         proved_modes: proved.then_some(completeness.modes_below),
         shift: completeness.shift,
         negative_pivots: completeness.negative_pivots,
-        rigid_modes: 6,
+        rigid_modes: rigid_count(model.dimension()),
         remark: completeness.remark.clone(),
         rigid_noise: found.rigid_noise,
         rigid_residual: model.rigid_residual(),

@@ -117,11 +117,11 @@ codes! {
     BodiesSeveral = "FB414", Error, Untrustworthy, "model falls into separate bodies", "connect them, or convert each by itself";
     DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
     BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
-    ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more than six degrees of freedom";
-    DimensionUnsupported = "FB419", Error, BadInput, "dimension not supported", "this version handles bodies in three dimensions";
+    ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more degrees of freedom than rigid motions: six in space, three in the plane";
+    DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
-    Mechanism = "FB502", Error, Untrustworthy, "more than six zero-energy modes: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
+    Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
     MassIndefinite = "FB503", Error, Untrustworthy, "mass matrix is indefinite", "negative lumped masses or wrong signs: export the consistent mass";
     StiffnessIndefinite = "FB504", Error, Untrustworthy, "stiffness matrix is indefinite", "check for negative springs, prestress beyond buckling, wrong signs";
     FactorizationFailed = "FB505", Error, Untrustworthy, "factorisation failed or is inaccurate", "the model may be scaled pathologically; check units and stiffness contrasts";

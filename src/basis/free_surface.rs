@@ -7,7 +7,7 @@ use crate::eigen::{
 };
 use crate::error::{Error, Result};
 use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
-use crate::model::{FeModel, centre_and_length, rigid_fields};
+use crate::model::{FeModel, centre_and_length, rigid_count, rigid_fields};
 use crate::progress::Watch;
 use faer::{Mat, MatRef};
 
@@ -17,7 +17,7 @@ pub use crate::eigen::EigenSettings as ModeSettings;
 /// Free-surface modes of a model, in model axes.
 #[derive(Debug, Clone)]
 pub struct FreeSurfaceModes {
-    /// Eigenvalues, shapes (3n x nf, row 3 i + k), residuals, completeness, work.
+    /// Eigenvalues, shapes (d n x nf, row d i + k, d the dimension), residuals, completeness, work.
     pub solution: EigenSolution,
     /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what digits and
     /// node positions leave of rigid motion.
@@ -75,7 +75,7 @@ fn compute(
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<FreeSurfaceModes> {
-    let pencil = Pencil::new(model.stiffness(), scalar_mass, 3);
+    let pencil = Pencil::new(model.stiffness(), scalar_mass, model.dimension());
     let positions = &model.nodes().positions;
     let rigid = rigid_modes(&pencil, positions)?;
     let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
@@ -118,7 +118,7 @@ fn compute(
         );
         diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
     }
-    describe(&solution, settings, scalar_mass, &mut diagnostics);
+    describe(&solution, settings, &pencil, &mut diagnostics);
     diagnostics.extend(single_precision_note(&solution, settings));
     Ok(FreeSurfaceModes { solution, rigid_noise, input_noise, diagnostics })
 }
@@ -140,11 +140,12 @@ fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> O
 fn describe(
     solution: &EigenSolution,
     settings: &ModeSettings,
-    scalar_mass: &SymmetricMatrix,
+    pencil: &Pencil<'_>,
     notes: &mut Vec<Diagnostic>,
 ) {
     let given = solution.eigenvalues.len();
-    let at_most = 3 * scalar_mass.n() - 6;
+    let (scalar_mass, dimension) = (pencil.mass(), pencil.block());
+    let at_most = pencil.n() - rigid_count(dimension);
     // Known from the rank of Ms, or because all there are were found.
     let mut finite = solution.finite_modes;
     if let Wanted::Lowest(wanted) = settings.wanted
@@ -163,7 +164,7 @@ fn describe(
         }
         None if massless > 0 => Some(format!(
             "nodes without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
-            at_most - 3 * massless
+            at_most - dimension * massless
         )),
         _ => None,
     };
@@ -187,10 +188,10 @@ fn describe(
     }
 }
 
-/// Six M-orthonormal rigid modes from the node positions.
+/// The M-orthonormal rigid modes from the node positions: six, in the plane three.
 fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> {
     let (centre, length) = centre_and_length(positions);
-    let fields = rigid_fields(positions, centre, length);
+    let fields = rigid_fields(positions, pencil.block(), centre, length);
     let orthonormal = |r: &Mat<f64>| {
         let mass = gram(r.as_ref(), pencil.apply_mass(r.as_ref()).as_ref());
         let eigen = symmetric_eigen(mass.as_ref())?;
@@ -199,7 +200,7 @@ fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> 
         if eigen.values[0].is_nan() || eigen.values[0] <= 1e-14 * largest {
             return None;
         }
-        let root = Mat::from_fn(6, 6, |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+        let root = Mat::from_fn(r.ncols(), r.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
         Some(combine(r.as_ref(), root.as_ref()))
     };
     // Twice: the second pass removes what the condition of the first Gram matrix left.
@@ -214,13 +215,14 @@ fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> 
 fn quadratic_estimate(pencil: &Pencil<'_>, positions: &[[f64; 3]], rigid: MatRef<'_, f64>) -> f64 {
     let (centre, length) = centre_and_length(positions);
     let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
-    let mut fields = Mat::zeros(pencil.n(), 27);
+    let d = pencil.block();
+    let mut fields = Mat::zeros(pencil.n(), exponents.len() * d);
     for (i, x) in positions.iter().enumerate() {
         let r = [0, 1, 2].map(|k| (x[k] - centre[k]) / length);
         for (e, &(a, b)) in exponents.iter().enumerate() {
             let value = r[a] * r.get(b).copied().unwrap_or(1.0);
-            for k in 0..3 {
-                fields[(3 * i + k, 3 * e + k)] = value;
+            for k in 0..d {
+                fields[(d * i + k, d * e + k)] = value;
             }
         }
     }
@@ -268,11 +270,13 @@ fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
 
 /// Turns a failure of the eigen-solver into a diagnostic that names nodes.
 fn explain(model: &FeModel, failure: EigenFailure) -> Error {
+    let d = model.dimension();
+    let rigid = rigid_count(d);
     let moving = |vectors: &Mat<f64>| {
         let mut size: Vec<(usize, f64)> = (0..model.nodes().len())
             .map(|i| {
                 let square = (0..vectors.ncols())
-                    .flat_map(|j| (0..3).map(move |k| (3 * i + k, j)))
+                    .flat_map(|j| (0..d).map(move |k| (d * i + k, j)))
                     .map(|(r, j)| vectors[(r, j)].powi(2))
                     .sum::<f64>();
                 (i, square)
@@ -301,8 +305,8 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
             Code::Mechanism,
             format!(
-                "{} zero-energy modes: six rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
-                count + 6,
+                "{} zero-energy modes: {rigid} rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
+                count + rigid,
                 eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
                 moving(&vectors)
             ),

@@ -142,7 +142,8 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             nodes,
             arguments.dofs.clone(),
             arguments.units.as_deref(),
-        ),
+        )
+        .map(|files| ModelFiles { dimension: arguments.dimension.unwrap_or(files.dimension), ..files }),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
 }

@@ -112,6 +112,8 @@ pub struct Interface {
 pub struct Parts {
     /// Provenance.
     pub source: Source,
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    pub dimension: usize,
     /// Units of all numbers.
     pub units: UnitSystem,
     /// Body frame.

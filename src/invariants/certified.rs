@@ -55,7 +55,7 @@ pub struct CertifiedInvariants {
 /// [`condense`](super::condense()) and K_ff = Psi' K Psi with compensated products and guaranteed digits.
 ///
 /// * `mass`, `positions`, `shapes`: as for [`condense`](super::condense()); body axes.
-/// * `stiffness`: K (3n x 3n), model axes.
+/// * `stiffness`: K (3n x 3n; of a plane body 2n x 2n), model axes.
 /// * `axes`: columns are the body axes in model axes.
 ///
 /// # Panics
@@ -69,8 +69,9 @@ pub fn condense_certified(
 ) -> CertifiedInvariants {
     assert_eq!(mass.n(), positions.len(), "rows of Ms and positions");
     assert!(
-        shapes.nrows() == 3 * positions.len() && stiffness.n() == shapes.nrows(),
-        "rows of shapes and stiffness: three per position"
+        shapes.nrows() == 3 * positions.len()
+            && (stiffness.n() == shapes.nrows() || stiffness.n() == 2 * positions.len()),
+        "rows of shapes: three per position; of the stiffness three or two"
     );
     let (gram, gram_error) = mass_gram(mass, Columns { positions, shapes });
     let (modal, modal_error) = modal_stiffness(stiffness, axes, shapes);
@@ -196,11 +197,13 @@ fn modal_stiffness(
     axes: &Matrix3<f64>,
     shapes: MatRef<'_, f64>,
 ) -> (Mat<f64>, Mat<f64>) {
-    let (n, nf) = (shapes.nrows(), shapes.ncols());
+    let (n, nf) = (stiffness.n(), shapes.ncols());
+    // Rows of the stiffness per node: a plane body has none along z.
+    let d = n / (shapes.nrows() / 3).max(1);
     // Turned shapes as sums of two blocks of f64.
     let turned = |row: usize, p: usize| {
         (0..3).fold(DoubleDouble::default(), |sum, l| {
-            sum + DoubleDouble::product(axes[(row % 3, l)], shapes[(row - row % 3 + l, p)])
+            sum + DoubleDouble::product(axes[(row % d, l)], shapes[(row / d * 3 + l, p)])
         })
     };
     let (mut hi, mut lo) = (Mat::zeros(n, nf), Mat::zeros(n, nf));
@@ -210,8 +213,7 @@ fn modal_stiffness(
         for row in 0..n {
             let value = turned(row, p);
             (hi[(row, p)], lo[(row, p)]) = (value.hi, value.lo);
-            let terms: f64 =
-                (0..3).map(|l| (axes[(row % 3, l)] * shapes[(row - row % 3 + l, p)]).abs()).sum();
+            let terms: f64 = (0..3).map(|l| (axes[(row % d, l)] * shapes[(row / d * 3 + l, p)]).abs()).sum();
             size[p] += weights[row] * terms * terms;
         }
         size[p] = size[p].sqrt();

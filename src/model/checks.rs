@@ -2,7 +2,7 @@
 
 use super::layout::{Layout, layout, name_some};
 use super::mass_structure::{ScalarMass, scalar_mass};
-use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
+use super::rigid::{centre_and_length, rigid_count, rigid_fields, rigid_residuals};
 use super::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
@@ -32,12 +32,13 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
         let message = format!("stiffness matrix has {nk} rows, mass matrix {nm}");
         found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&raw.mass.path));
     }
-    if raw.dimension != 3 {
-        let message = format!("model has dimension {}", raw.dimension);
-        found.push(Diagnostic::new(Code::DimensionUnsupported, message));
+    if !(2..=3).contains(&raw.dimension) {
+        let message = format!("`dimension` is {}, expected 2 or 3", raw.dimension);
+        found.push(Diagnostic::new(Code::ManifestSyntax, message));
     }
     stop_on_error(&mut found)?;
 
+    let dimension = usize::from(raw.dimension);
     let layout = layout(&raw, &mut found);
     stop_on_error(&mut found)?;
     let layout = layout.expect("a missing layout comes with an error");
@@ -48,6 +49,10 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     if nodes.positions.iter().flatten().any(|x| !x.is_finite()) {
         let message = "a node coordinate is not a finite number";
         found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
+    }
+    if let Some(i) = nodes.positions.iter().position(|x| dimension == 2 && x[2] != 0.0) {
+        let message = format!("node {} of a plane model has z = {}", nodes.ids[i], nodes.positions[i][2]);
+        found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
     }
     check_names(&raw, &mut found);
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
@@ -63,13 +68,14 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
             found.push(Diagnostic::new(Code::InterfaceNode, message));
         }
     }
-    if nk <= 6 {
+    if nk <= rigid_count(dimension) {
         let message = format!("model has {nk} degrees of freedom");
         found.push(Diagnostic::new(Code::ModelTooSmall, message));
     }
     stop_on_error(&mut found)?;
 
-    let label = |row: usize| DofLabel { node: nodes.ids[row / 3], direction: (row % 3) as u8 + 1 };
+    let label =
+        |row: usize| DofLabel { node: nodes.ids[row / dimension], direction: (row % dimension) as u8 + 1 };
     let stiffness = symmetric(&mut raw.stiffness, &layout, "stiffness", label, &mut found);
     let mass = symmetric(&mut raw.mass, &layout, "mass", label, &mut found);
     stop_on_error(&mut found)?;
@@ -79,7 +85,7 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     check_diagonals(&stiffness, &mass, label, &raw, &mut found);
     stop_on_error(&mut found)?;
 
-    let scalar = match scalar_mass(&mass, block_tolerance(raw.mass.digits), label) {
+    let scalar = match scalar_mass(&mass, dimension, block_tolerance(raw.mass.digits), label) {
         Ok(scalar) => Some(scalar),
         Err(diagnostic) => {
             found.push(diagnostic.in_file(&raw.mass.path));
@@ -249,7 +255,7 @@ fn check_connections(
     raw: &RawModel,
     found: &mut Vec<Diagnostic>,
 ) {
-    let component = connected_components(stiffness, 3);
+    let component = connected_components(stiffness, usize::from(raw.dimension));
     let count = component.iter().max().map_or(0, |last| last + 1);
     if count > 1 {
         let mut sizes = vec![0usize; count];
@@ -275,7 +281,7 @@ fn check_rigid_motion(
     found: &mut Vec<Diagnostic>,
 ) -> f64 {
     let (centre, length) = centre_and_length(&nodes.positions);
-    let fields = rigid_fields(&nodes.positions, centre, length);
+    let fields = rigid_fields(&nodes.positions, usize::from(raw.dimension), centre, length);
     let residuals = rigid_residuals(stiffness, &fields);
     let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
     // Node tables written with few digits leave 1e-6 without harm; supports leave 0.01 to 1.

@@ -1,4 +1,4 @@
-//! The checked model: every used node has three displacements, DOF 3 i + k is direction k of node i.
+//! The checked model: every used node has d displacements (d: the dimension), DOF d i + k is direction k of node i.
 
 use super::{CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check};
 use crate::error::Result;
@@ -6,10 +6,11 @@ use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 
-/// A checked free body. Internal order of degrees of freedom: node-major x, y, z in the order of `nodes`.
+/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the order of `nodes`.
 #[derive(Debug, Clone)]
 pub struct FeModel {
     name: String,
+    dimension: usize,
     units: UnitSystem,
     nodes: Nodes,
     stiffness: SymmetricMatrix,
@@ -43,6 +44,7 @@ impl FeModel {
         Self {
             digits: raw.stiffness.digits,
             name: raw.name,
+            dimension: usize::from(raw.dimension),
             units: raw.units,
             nodes,
             stiffness,
@@ -60,6 +62,11 @@ impl FeModel {
         &self.name
     }
 
+    /// 3, or 2 for a body in the plane: displacements per node.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
     /// Units of all numbers.
     pub fn units(&self) -> &UnitSystem {
         &self.units
@@ -70,12 +77,12 @@ impl FeModel {
         &self.nodes
     }
 
-    /// K (3n x 3n), row 3 i + k.
+    /// K (d n x d n), row d i + k.
     pub fn stiffness(&self) -> &SymmetricMatrix {
         &self.stiffness
     }
 
-    /// Ms (n x n): M = Ms kron I3.
+    /// Ms (n x n): M = Ms kron I_d.
     pub fn scalar_mass(&self) -> &SymmetricMatrix {
         &self.scalar_mass
     }
@@ -112,6 +119,6 @@ impl FeModel {
 
     /// Label of an internal row.
     pub fn label(&self, row: usize) -> DofLabel {
-        DofLabel { node: self.nodes.ids[row / 3], direction: (row % 3) as u8 + 1 }
+        DofLabel { node: self.nodes.ids[row / self.dimension], direction: (row % self.dimension) as u8 + 1 }
     }
 }

@@ -12,4 +12,4 @@ pub use checks::{CheckedModel, check};
 pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel};
-pub use rigid::{centre_and_length, rigid_fields};
+pub use rigid::{centre_and_length, rigid_count, rigid_fields};

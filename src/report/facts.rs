@@ -40,7 +40,7 @@ pub struct Facts {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ModelFacts {
     pub name: String,
-    pub dimension: u8,
+    pub dimension: usize,
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
@@ -136,7 +136,7 @@ impl ModelFacts {
         let (source, units) = (body.source(), body.units());
         Self {
             name: source.name.clone(),
-            dimension: 3,
+            dimension: body.dimension(),
             n_nodes: body.n_nodes(),
             n_dofs: source.n_dofs,
             mass_structure: match source.mass_structure {

@@ -16,6 +16,7 @@ use std::collections::HashMap;
 /// `scan` had no problems before, so every required entry is there, of its kind and with its shape.
 pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let mut take = Take { scan };
+    let dimension = take.count("/@dimension");
     let source = take.source();
     let frame = Frame {
         origin: Vector3::from_column_slice(&take.floats("/frame/origin")),
@@ -32,7 +33,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
     let source = source.filter(|_| scan.problems.is_empty())?;
-    Some(Parts { source, units, frame, nodes, modes, invariants, lumped, certificate, interfaces })
+    Some(Parts { source, dimension, units, frame, nodes, modes, invariants, lumped, certificate, interfaces })
 }
 
 /// Moves values out of a scan.

@@ -224,7 +224,13 @@ const ROOT: &[Item] = &[
     attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
         text(provenance::generator())
     }),
-    constant("dimension", Int, ConstantInt(3), "space dimension in this version"),
+    attribute(
+        "dimension",
+        Int,
+        ONE,
+        "3; 2: the body stays in its plane z = 0, all components along z are zero",
+        |v| count(v.body.dimension),
+    ),
     attribute(
         "units_length",
         Text,

@@ -79,6 +79,7 @@ pub fn engine_mount() -> FlexBody {
             mass_structure: MassStructure::RotationInvariant,
             settings: serde_json::json!({ "accuracy": "standard", "frame": "principal", "modes": 8 }),
         },
+        dimension: 3,
         units: UnitSystem::parse("m", "kg", "s").unwrap(),
         frame: Frame { origin: Vector3::new(0.125, 0.0, -0.0625), axes: Matrix3::identity() },
         nodes: Nodes {
@@ -215,6 +216,7 @@ pub fn condensed(
             mass_structure: MassStructure::RotationInvariant,
             settings: serde_json::json!({}),
         },
+        dimension: 3,
         units: UnitSystem::default(),
         frame,
         nodes: Nodes { ids, positions },

@@ -128,6 +128,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
             }),
         },
+        dimension: 3,
         units: units[r.below(3)].clone(),
         frame: Frame { origin: Vector3::from_fn(|_, _| r.value()), axes: *axes.matrix() },
         nodes: Nodes {
