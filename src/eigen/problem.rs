@@ -83,6 +83,8 @@ pub struct EigenSettings {
     pub method: Method,
     /// Precision of the factor.
     pub factor: FactorChoice,
+    /// Multiplications and additions of a factorisation above which [`FactorChoice::Auto`] tries single precision for its speed.
+    pub single_pays: f64,
     /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
     pub memory: Option<u64>,
 }
@@ -95,6 +97,8 @@ impl Default for EigenSettings {
             accuracy: Accuracy::Standard,
             method: Method::Auto,
             factor: FactorChoice::Auto,
+            // Below, the columns that its corrections solve cost what the factorisation saves.
+            single_pays: 4e11,
             memory: None,
         }
     }
