@@ -58,7 +58,7 @@ impl<'a> Krylov<'a> {
             m_fresh: Mat::zeros(0, 0),
             coupling: Mat::zeros(0, 0),
             random: 0,
-            mass_diagonal: problem.pencil.mass_diagonal().collect(),
+            mass_diagonal: problem.pencil.mass_diagonal(),
         }
     }
 
