@@ -30,7 +30,7 @@ fn models() -> Vec<(String, FeModel)> {
         let file = |name: &str| folder.join(name);
         let dofs = Some(file("dofs.csv"));
         let files =
-            ModelFiles::from_arguments(&file("K.mtx.gz"), &file("M.mtx.gz"), &file("nodes.csv"), dofs, None);
+            ModelFiles::from_arguments(file("K.mtx.gz"), file("M.mtx.gz"), file("nodes.csv"), dofs, None);
         let raw = read_model(&files.expect("default units")).expect("readable files");
         (folder.display().to_string(), FeModel::from_raw(raw).expect("a sound model").model)
     };

@@ -282,7 +282,8 @@ fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
     k / m
 }
 
-/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then.
+/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then. Energies are
+/// another matter: they come from K in double precision.
 fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
     let (code, why) = match failure {
         EigenFailure::NotConverged { converged, wanted } => {
@@ -294,10 +295,6 @@ fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
         EigenFailure::Inaccurate { residual } => {
             (Code::FactorizationFailed, format!("a probe has a relative residual of {residual:.1e}"))
         }
-        EigenFailure::NegativeEigenvalue { .. } | EigenFailure::ZeroEnergy { .. } => (
-            Code::FactorizationFailed,
-            "the lowest modes have no strain energy, or a negative one".to_owned(),
-        ),
         _ => return None,
     };
     let message = format!("the modes cannot be found with a single-precision factor: {why}");
@@ -309,7 +306,9 @@ fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
 
 /// Turns a failure of the eigen-solver into a diagnostic that names nodes.
 fn explain(model: &FeModel, settings: &ModeSettings, failure: EigenFailure) -> Error {
+    // `certified` always factors in double precision.
     if settings.factor == FactorChoice::Always(Precision::Single)
+        && settings.accuracy != Accuracy::Certified
         && let Some(found) = too_poor(&failure)
     {
         return found.into();
