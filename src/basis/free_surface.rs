@@ -2,8 +2,8 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
-    EigenFailure, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, energy_noise,
-    solve,
+    Accuracy, EigenFailure, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted,
+    energy_noise, solve,
 };
 use crate::error::{Error, Result};
 use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
@@ -33,6 +33,9 @@ const RIGID_ENERGY: f64 = 0.05;
 
 /// Noise of lambda above which the user is told.
 const NOISE_TOLD: f64 = 1e-6;
+
+/// Decimal digits that tell every double-precision number apart.
+const ALL_DIGITS: u8 = 17;
 
 /// Computes the free-surface modes of `model`.
 ///
@@ -116,7 +119,14 @@ fn compute(
             "the {} digits of the stiffness values leave a relative noise of {noise:.0e} in the lowest eigenvalues",
             model.digits()
         );
-        diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
+        let diagnostic = Diagnostic::new(Code::NoiseFloor, message);
+        diagnostics.push(if model.digits() < ALL_DIGITS {
+            diagnostic
+        } else {
+            diagnostic.with_help(
+                "double precision holds no more digits: expect no better of a body as thin or stiff as this",
+            )
+        });
     }
     describe(&solution, settings, &pencil, &mut diagnostics);
     diagnostics.extend(single_precision_note(&solution, settings));
@@ -184,7 +194,13 @@ fn describe(
     if solution.completeness.proof == Proof::NotProved {
         let message =
             format!("completeness of the {given} modes is not proved: {}", solution.completeness.remark);
-        notes.push(Diagnostic::new(Code::CompletenessUnproved, message));
+        let note = Diagnostic::new(Code::CompletenessUnproved, message);
+        notes.push(match settings.accuracy {
+            Accuracy::Fast => note,
+            _ => note.with_help(
+                "the modes keep their accuracy; a larger --memory-limit or machine allows the proof",
+            ),
+        });
     }
 }
 
@@ -268,6 +284,28 @@ fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
     k / m
 }
 
+/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then. Energies are
+/// another matter: they come from K in double precision.
+fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
+    let (code, why) = match failure {
+        EigenFailure::NotConverged { converged, wanted } => {
+            (Code::NotConverged, format!("{converged} of {wanted} modes converged"))
+        }
+        EigenFailure::NotPositiveDefinite { shift } => {
+            (Code::FactorizationFailed, format!("rounded, K + {shift:.3e} M is not positive definite"))
+        }
+        EigenFailure::Inaccurate { residual } => {
+            (Code::FactorizationFailed, format!("a probe has a relative residual of {residual:.1e}"))
+        }
+        _ => return None,
+    };
+    let message = format!("the modes cannot be found with a single-precision factor: {why}");
+    Some(
+        Diagnostic::new(code, message)
+            .with_help("use --factor auto or f64: the model may be too thin, or unsound"),
+    )
+}
+
 /// Turns a failure of the eigen-solver into a diagnostic that names nodes.
 fn explain(model: &FeModel, failure: EigenFailure) -> Error {
     let d = model.dimension();
@@ -288,6 +326,10 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         named.join(", ")
     };
     let diagnostic = match failure {
+        EigenFailure::SinglePrecision(failure) => match too_poor(&failure) {
+            Some(found) => found,
+            None => return explain(model, *failure),
+        },
         EigenFailure::NotConverged { converged, wanted } => {
             Diagnostic::new(Code::NotConverged, format!("{converged} of {wanted} modes converged"))
         }
@@ -302,12 +344,12 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         EigenFailure::MassIndefinite => {
             Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
         }
-        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
+        // Their eigenvalues are rounding: no two machines would print the same.
+        EigenFailure::ZeroEnergy { count, vectors, .. } => Diagnostic::new(
             Code::Mechanism,
             format!(
-                "{} zero-energy modes: {rigid} rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
+                "{} zero-energy modes: {rigid} rigid ones and {count} more, which move nodes {} most",
                 count + rigid,
-                eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
                 moving(&vectors)
             ),
         ),

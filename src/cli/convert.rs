@@ -52,6 +52,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
                 FactorName::F32 => FactorChoice::Always(Precision::Single),
             },
             memory: memory_left(arguments.memory_limit),
+            ..ModeSettings::default()
         },
         frame: match arguments.frame {
             FrameName::Principal => BodyFrame::Principal,
@@ -61,7 +62,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         lumped,
         lumped_modes: arguments.lumped_modes,
     };
-    let resident = resident_bytes();
+    let (resident, peak) = (resident_bytes(), peak_memory_bytes());
     let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
     let resume = resume(checkpoint.as_ref(), &save);
     let conversion =
@@ -78,7 +79,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     diagnostics.extend(checkpoint.into_iter().flat_map(|file| file.diagnostics(taken_up)));
     tell(arguments.printing, &diagnostics);
     let mut run = run_data(arguments, &conversion, diagnostics, phases, threads);
-    run.memory_estimate_bytes = conversion.plan.map(|plan| resident + plan.bytes);
+    // Reading may have taken more than the work will.
+    run.memory_estimate_bytes = conversion.plan.map(|plan| peak.unwrap_or(0).max(resident + plan.bytes));
     let facts = Facts::new(&conversion.body, &run);
     for (slot, format) in report_slots.into_iter().zip(&formats) {
         slot.write(render(&facts, *format).as_bytes())?;

@@ -11,4 +11,4 @@ mod resources;
 mod watcher;
 
 pub use arguments::Arguments;
-pub use output::run;
+pub use output::{parse, run};

@@ -3,7 +3,7 @@
 //! The guarantee is about the numbers that a flex-body file holds: nodes, modes and axes as stored, M and K as given.
 //! What separates these modes from the exact ones is another matter (`/modes/shape_error`).
 
-use super::condense::{CHUNK, Columns, MAX_GROUPS, from_gram};
+use super::condense::{CHUNK, Columns, MAX_GROUPS, fill_symmetric, from_gram, group_length};
 use super::dense::worst;
 use super::derived::CYCLIC;
 use super::{CauchySchwarz, Invariants};
@@ -89,12 +89,7 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
         // Rows of X' beyond the block are the transpose of a later block.
         let end = (start + WIDTH).min(count);
         let block = gram_block(mass, columns, start..end);
-        for column in start..end {
-            for row in 0..=column {
-                gram[(row, column)] = block[row][column - start].hi;
-                gram[(column, row)] = gram[(row, column)];
-            }
-        }
+        fill_symmetric(&mut gram, start..end, |row, column| block[row][column - start].hi);
     }
     // sum_ij |x_i| |M_ij| |y_j| <= sqrt(sum_i rho_i x_i^2) sqrt(sum_i rho_i y_i^2) with rho_i the row sums of |M|.
     let weights: Vec<f64> = (0..n).map(|i| mass.row(i).1.iter().map(|v| v.abs()).sum()).collect();
@@ -109,20 +104,11 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
     (gram, error)
 }
 
-/// Rows of a group: the partition depends on the number of nodes only.
-fn group_length(n: usize) -> usize {
-    CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
-}
-
 /// Node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
 fn by_node(columns: Columns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
     let mut rows = vec![[0.0; WIDTH]; columns.positions.len()];
     rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
-        for (slot, column) in block.clone().enumerate() {
-            for (i, row) in rows.iter_mut().enumerate() {
-                row[slot] = columns.get(CHUNK * chunk + i, column);
-            }
-        }
+        columns.by_node(CHUNK * chunk, block.clone(), WIDTH, rows.as_flattened_mut());
     });
     rows
 }
@@ -228,12 +214,9 @@ fn modal_stiffness(
         product.add(&multiply_compensated(stiffness, 1, lo.as_ref().subcols(start, width)));
         let (large, small) =
             (gram_compensated(hi.as_ref(), &product), gram_compensated(lo.as_ref(), &product));
-        for c in 0..width {
-            for i in 0..=start + c {
-                value[(i, start + c)] = (large[i][c] + small[i][c]).hi;
-                value[(start + c, i)] = value[(i, start + c)];
-            }
-        }
+        fill_symmetric(&mut value, start..start + width, |row, column| {
+            (large[row][column - start] + small[row][column - start]).hi
+        });
     }
     let error = Mat::from_fn(nf, nf, |i, j| ROOM * (U * value[(i, j)].abs() + terms * size[i] * size[j]));
     (value, error)

@@ -143,7 +143,7 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     if !incomplete.is_empty() {
         let message = format!("{} displacements are missing: {}", incomplete.len(), name_some(&incomplete));
         let mut diagnostic = Diagnostic::new(Code::DofIncomplete, message).in_file(&raw.dofs_path);
-        if incomplete.iter().all(|label| label.direction == 3) {
+        if used.is_empty() && incomplete.iter().all(|label| label.direction == 3) {
             diagnostic = diagnostic.with_help("for a plane model, set `dimension = 2` (--dimension 2)");
         }
         found.push(diagnostic);
