@@ -289,13 +289,18 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 }
 
 /// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has
-/// been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Uses the node
-/// order of `analysis`, whose pencil has `block` rows per node.
+/// been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Most are far from
+/// semidefinite: where it succeeds in single precision with a diagonal that is 1e-3 less, that settles it in half the time.
+/// Uses the node order of `analysis`, whose pencil has `block` rows per node.
 pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
+    let Some(graph) = node_graph(&Pencil::new(mass, mass, 1)) else { return false };
+    let analysis = Analysis::with_tree(AssemblyTree::new(&graph, analysis.tree.order(), 1), 1);
+    drop(graph);
+    let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
+    if Cholesky::<f32>::new(&analysis, &Pencil::new(&lowered, &lowered, 1), 0.0).is_some() {
+        return true;
+    }
+    drop(lowered);
     let raised = mass.with_raised_diagonal(1.0 + 1e-9);
-    let pencil = Pencil::new(&raised, &raised, 1);
-    node_graph(&pencil).is_some_and(|graph| {
-        let tree = AssemblyTree::new(&graph, analysis.tree.order(), 1);
-        Cholesky::<f64>::new(&Analysis::with_tree(tree, 1), &pencil, 0.0).is_some()
-    })
+    Cholesky::<f64>::new(&analysis, &Pencil::new(&raised, &raised, 1), 0.0).is_some()
 }
