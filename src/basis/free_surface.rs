@@ -298,15 +298,22 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         EigenFailure::MassIndefinite => {
             Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
         }
-        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
-            Code::Mechanism,
-            format!(
-                "{} zero-energy modes: six rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
-                count + 6,
-                eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
-                moving(&vectors)
-            ),
-        ),
+        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => {
+            let largest = eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs()));
+            let (all, moved) = (count + 6, moving(&vectors));
+            let message = format!(
+                "{all} zero-energy modes: six rigid ones and {count} more (lambda {largest:.1e}), which move nodes {moved} most"
+            );
+            if all % 6 == 0 {
+                let bodies = all / 6;
+                let message = format!("{message}; {bodies} separate bodies have as many");
+                Diagnostic::new(Code::Mechanism, message).with_help(
+                    "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
+                )
+            } else {
+                Diagnostic::new(Code::Mechanism, message)
+            }
+        }
         EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
             Code::CompletenessFailed,
             format!(

@@ -1,6 +1,6 @@
 //! The checked model: every used node has three displacements, DOF 3 i + k is direction k of node i.
 
-use super::{CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check};
+use super::{BodyNumber, CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
 use crate::error::Result;
 use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
@@ -20,6 +20,7 @@ pub struct FeModel {
     rigid_residual: f64,
     mass_deviation: f64,
     diagonal_mass: bool,
+    number: Option<BodyNumber>,
 }
 
 impl FeModel {
@@ -31,6 +32,15 @@ impl FeModel {
         check(raw)
     }
 
+    /// The same for matrices that hold several bodies: each becomes a model of its own.
+    ///
+    /// # Errors
+    /// See [`check_bodies`].
+    pub fn bodies_from_raw(raw: RawModel) -> Result<Vec<CheckedModel>> {
+        check_bodies(raw)
+    }
+
+    #[allow(clippy::too_many_arguments)] // private, called once
     pub(super) fn new(
         raw: RawModel,
         nodes: Nodes,
@@ -39,6 +49,7 @@ impl FeModel {
         rigid_residual: f64,
         mass_deviation: f64,
         diagonal_mass: bool,
+        number: Option<BodyNumber>,
     ) -> Self {
         Self {
             digits: raw.stiffness.digits,
@@ -52,6 +63,7 @@ impl FeModel {
             rigid_residual,
             mass_deviation,
             diagonal_mass,
+            number,
         }
     }
 
@@ -108,6 +120,11 @@ impl FeModel {
     /// Whether M is diagonal: lumped by the FE program.
     pub fn has_diagonal_mass(&self) -> bool {
         self.diagonal_mass
+    }
+
+    /// Which body of several in the same matrices it is; `None` for a model that was not split.
+    pub fn number(&self) -> Option<BodyNumber> {
+        self.number
     }
 
     /// Label of an internal row.
