@@ -147,8 +147,8 @@ fn mass_coupling_joins_bodies_and_a_part_that_only_mass_holds_is_a_mechanism() {
 }
 
 /// A steel block with an interface at its first nodes.
-fn block(cells: usize) -> RawModel {
-    let mesh = Mesh::block(Kind::Hex8, [cells, 2, 1], [0.1 * cells as f64, 0.15, 0.07]);
+fn block(cells: i32) -> RawModel {
+    let mesh = Mesh::block(Kind::Hex8, [cells, 2, 1], [0.1 * f64::from(cells), 0.15, 0.07]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     raw.name = "pair".to_owned();
     raw.interfaces = vec![NodeSet { name: "root".to_owned(), nodes: raw.nodes.ids[..3].to_vec() }];
