@@ -160,6 +160,7 @@ pub fn convert_resumed(
         source: Source {
             name: model.name().to_owned(),
             files: model.sources().to_vec(),
+            number: model.number(),
             n_dofs: model.stiffness().n(),
             mass_structure: if model.has_diagonal_mass() {
                 MassStructure::Diagonal

@@ -86,6 +86,7 @@ codes! {
     DofDirection = "FB207", Error, BadInput, "direction is not 1 to 6", "1, 2, 3 are displacements along x, y, z; 4, 5, 6 rotations";
     DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... each once", "number the rows from 0 or leave the column out";
     InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
+    InterfaceAcross = "FB210", Error, BadInput, "interface has nodes of several bodies", "give each body an interface of its own";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
@@ -114,7 +115,7 @@ codes! {
     PencilSingular = "FB411", Error, BadInput, "rows empty in both K and M: the eigenproblem is singular", "remove these degrees of freedom from the matrices";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
     InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit the stated units", "check the units of the manifest";
-    BodiesSeveral = "FB414", Error, Untrustworthy, "model falls into separate bodies", "connect them, or convert each by itself";
+    BodiesSeveral = "FB414", Error, Untrustworthy, "matrices hold several bodies", "convert each by itself with --split, or connect them";
     DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
     BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
     ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more degrees of freedom than rigid motions: six in space, three in the plane";
@@ -216,6 +217,12 @@ impl Diagnostic {
     /// Replaces the table's help by a more precise one.
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
+        self
+    }
+
+    /// Puts what it is about in front of the message.
+    pub fn about(mut self, what: impl std::fmt::Display) -> Self {
+        self.message = format!("{what}: {}", self.message);
         self
     }
 

@@ -345,14 +345,20 @@ fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
         }
         // Their eigenvalues are rounding: no two machines would print the same.
-        EigenFailure::ZeroEnergy { count, vectors, .. } => Diagnostic::new(
-            Code::Mechanism,
-            format!(
-                "{} zero-energy modes: {rigid} rigid ones and {count} more, which move nodes {} most",
-                count + rigid,
-                moving(&vectors)
-            ),
-        ),
+        EigenFailure::ZeroEnergy { count, vectors, .. } => {
+            let (all, moved) = (count + rigid, moving(&vectors));
+            let message = format!(
+                "{all} zero-energy modes: {rigid} rigid ones and {count} more, which move nodes {moved} most"
+            );
+            if all % rigid == 0 {
+                let message = format!("{message}; {} separate bodies have as many", all / rigid);
+                Diagnostic::new(Code::Mechanism, message).with_help(
+                    "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
+                )
+            } else {
+                Diagnostic::new(Code::Mechanism, message)
+            }
+        }
         EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
             Code::CompletenessFailed,
             format!(

@@ -90,6 +90,9 @@ pub struct ConvertArguments {
     /// Keep the search for modes in this file; a run that was interrupted or asks for more modes goes on from it
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
+    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports and checkpoint likewise)
+    #[arg(long)]
+    pub split: bool,
     /// Threads; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,

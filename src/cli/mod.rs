@@ -7,6 +7,7 @@ mod compare;
 mod convert;
 mod inspect;
 mod output;
+mod places;
 mod resources;
 mod watcher;
 

@@ -1,7 +1,7 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
 use crate::invariants::{DIGITS, Frame, Invariants};
-use crate::model::Nodes;
+use crate::model::{BodyNumber, Nodes};
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -13,6 +13,8 @@ pub struct Source {
     pub name: String,
     /// Files and fingerprints.
     pub files: Vec<SourceFile>,
+    /// Which body of several in the same matrices it is, where these were split.
+    pub number: Option<BodyNumber>,
     /// Number of matrix rows of the FE model.
     pub n_dofs: usize,
     /// `rotation-invariant`: M = Ms kron I3; `diagonal`: the same and diagonal; `general`: neither.

@@ -41,6 +41,9 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.guarantee(parts, nf);
     check.interfaces(parts, n);
     check.text("source.name", &parts.source.name);
+    if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
+        check.add(format!("`source.number` is {number}"));
+    }
     check.text("certificate.remark", &c.remark);
     check.problems
 }

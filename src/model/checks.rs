@@ -3,7 +3,7 @@
 use super::layout::{Layout, layout, name_some};
 use super::mass_structure::{ScalarMass, scalar_mass};
 use super::rigid::{centre_and_length, rigid_count, rigid_fields, rigid_residuals};
-use super::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
+use super::{BodyNumber, DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{SymmetricMatrix, connected_components};
@@ -23,7 +23,38 @@ pub struct CheckedModel {
 ///
 /// # Errors
 /// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and rigid motion.
-pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
+pub fn check(raw: RawModel) -> Result<CheckedModel> {
+    let (assembled, found) = assemble(raw)?;
+    finish(assembled, None, found)
+}
+
+/// A model in the internal order whose matrices are sound by themselves.
+pub(super) struct Assembled {
+    /// What was read, without matrices, nodes and labels.
+    pub raw: RawModel,
+    /// Nodes with degrees of freedom.
+    pub nodes: Nodes,
+    /// K (d n x d n, d the dimension).
+    pub stiffness: SymmetricMatrix,
+    /// M (d n x d n).
+    pub mass: SymmetricMatrix,
+}
+
+impl Assembled {
+    /// Rows per node.
+    pub fn dimension(&self) -> usize {
+        usize::from(self.raw.dimension)
+    }
+
+    /// Label of an internal row.
+    fn label(&self, row: usize) -> DofLabel {
+        let d = self.dimension();
+        DofLabel { node: self.nodes.ids[row / d], direction: (row % d) as u8 + 1 }
+    }
+}
+
+/// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes so far.
+pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)> {
     let mut found = std::mem::take(&mut raw.diagnostics);
     check_matrix(&raw.stiffness, "stiffness", &mut found);
     check_matrix(&raw.mass, "mass", &mut found);
@@ -84,17 +115,27 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     };
     check_diagonals(&stiffness, &mass, label, &raw, &mut found);
     stop_on_error(&mut found)?;
+    (raw.nodes, raw.dofs) = (Nodes::default(), None);
+    Ok((Assembled { raw, nodes, stiffness, mass }, found))
+}
 
-    let scalar = match scalar_mass(&mass, dimension, block_tolerance(raw.mass.digits), label) {
+/// The checks of a body: its mass, its connections, its rigid motion.
+pub(super) fn finish(
+    body: Assembled,
+    number: Option<BodyNumber>,
+    mut found: Vec<Diagnostic>,
+) -> Result<CheckedModel> {
+    let label = |row: usize| body.label(row);
+    let raw = &body.raw;
+    let scalar = match scalar_mass(&body.mass, body.dimension(), block_tolerance(raw.mass.digits), label) {
         Ok(scalar) => Some(scalar),
         Err(diagnostic) => {
             found.push(diagnostic.in_file(&raw.mass.path));
             None
         }
     };
-    drop(mass);
-    check_connections(&stiffness, &nodes, &raw, &mut found);
-    let rigid_residual = check_rigid_motion(&stiffness, &nodes, &raw, label, &mut found);
+    check_connections(&body, &mut found);
+    let rigid_residual = check_rigid_motion(&body.stiffness, &body.nodes, raw, label, &mut found);
     stop_on_error(&mut found)?;
     let ScalarMass { matrix: scalar_mass, deviation } = scalar.expect("a missing mass comes with an error");
     let diagonal_mass = (0..scalar_mass.n()).all(|i| scalar_mass.row(i).0.iter().all(|&j| j as usize == i));
@@ -102,8 +143,10 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
         let message = "mass matrix is diagonal: it was lumped before it came here";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }
-    check_plausibility(&scalar_mass, &nodes, &raw, &mut found);
-    let model = FeModel::new(raw, nodes, stiffness, scalar_mass, rigid_residual, deviation, diagonal_mass);
+    check_plausibility(&scalar_mass, &body.nodes, raw, &mut found);
+    let Assembled { raw, nodes, stiffness, .. } = body;
+    let model =
+        FeModel::new(raw, nodes, stiffness, scalar_mass, rigid_residual, deviation, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found })
 }
 
@@ -249,27 +292,43 @@ fn check_diagonals(
     }
 }
 
-fn check_connections(
-    stiffness: &SymmetricMatrix,
-    nodes: &Nodes,
-    raw: &RawModel,
-    found: &mut Vec<Diagnostic>,
-) {
-    let component = connected_components(stiffness, usize::from(raw.dimension));
-    let count = component.iter().max().map_or(0, |last| last + 1);
-    if count > 1 {
-        let mut sizes = vec![0usize; count];
-        let mut first = vec![0i64; count];
-        for (i, &c) in component.iter().enumerate().rev() {
-            sizes[c] += 1;
-            first[c] = nodes.ids[i];
-        }
-        let bodies: Vec<String> =
-            sizes.iter().zip(&first).map(|(size, id)| format!("{size} nodes with node {id}")).collect();
-        let message =
-            format!("stiffness connects the nodes to {count} separate bodies: {}", name_some(&bodies));
+/// K and M together make one body, and K alone holds it together.
+fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
+    let Assembled { raw, nodes, stiffness, mass } = body;
+    let bodies = groups(&connected_components(&[stiffness, mass], body.dimension()), nodes);
+    if bodies.len() > 1 {
+        let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
         found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
+        return;
     }
+    // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
+    let parts = groups(&connected_components(&[stiffness], body.dimension()), nodes);
+    if parts.len() > 1 {
+        let message = format!(
+            "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
+            parts.len(),
+            in_words(&parts)
+        );
+        found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
+    }
+}
+
+/// Node numbers of every component, in the order of their first nodes.
+pub(super) fn groups(component: &[usize], nodes: &Nodes) -> Vec<Vec<i64>> {
+    let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
+    for (&c, &id) in component.iter().zip(&nodes.ids) {
+        groups[c].push(id);
+    }
+    groups
+}
+
+/// `8 nodes (1, 2, 3, 4, 5 and 3 more), 1 node (9)`.
+pub(super) fn in_words(groups: &[Vec<i64>]) -> String {
+    let group = |nodes: &Vec<i64>| {
+        let plural = if nodes.len() == 1 { "" } else { "s" };
+        format!("{} node{plural} ({})", nodes.len(), name_some(nodes))
+    };
+    name_some(&groups.iter().map(group).collect::<Vec<_>>())
 }
 
 /// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body.

@@ -1,6 +1,6 @@
 //! The checked model: every used node has d displacements (d: the dimension), DOF d i + k is direction k of node i.
 
-use super::{CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check};
+use super::{BodyNumber, CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
 use crate::error::Result;
 use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
@@ -21,6 +21,7 @@ pub struct FeModel {
     rigid_residual: f64,
     mass_deviation: f64,
     diagonal_mass: bool,
+    number: Option<BodyNumber>,
 }
 
 impl FeModel {
@@ -32,6 +33,15 @@ impl FeModel {
         check(raw)
     }
 
+    /// The same for matrices that hold several bodies: each becomes a model of its own.
+    ///
+    /// # Errors
+    /// See [`check_bodies`].
+    pub fn bodies_from_raw(raw: RawModel) -> Result<Vec<CheckedModel>> {
+        check_bodies(raw)
+    }
+
+    #[allow(clippy::too_many_arguments)] // private, called once
     pub(super) fn new(
         raw: RawModel,
         nodes: Nodes,
@@ -40,6 +50,7 @@ impl FeModel {
         rigid_residual: f64,
         mass_deviation: f64,
         diagonal_mass: bool,
+        number: Option<BodyNumber>,
     ) -> Self {
         Self {
             digits: raw.stiffness.digits,
@@ -54,6 +65,7 @@ impl FeModel {
             rigid_residual,
             mass_deviation,
             diagonal_mass,
+            number,
         }
     }
 
@@ -115,6 +127,11 @@ impl FeModel {
     /// Whether M is diagonal: lumped by the FE program.
     pub fn has_diagonal_mass(&self) -> bool {
         self.diagonal_mass
+    }
+
+    /// Which body of several in the same matrices it is; `None` for a model that was not split.
+    pub fn number(&self) -> Option<BodyNumber> {
+        self.number
     }
 
     /// Label of an internal row.

@@ -7,9 +7,11 @@ mod mass_structure;
 mod nodes;
 mod raw;
 mod rigid;
+mod several;
 
 pub use checks::{CheckedModel, check};
 pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel};
 pub use rigid::{centre_and_length, rigid_count, rigid_fields};
+pub use several::{BodyNumber, check_bodies};

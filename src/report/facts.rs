@@ -12,7 +12,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 1;
+const MINOR: u32 = 2;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -41,6 +41,8 @@ pub struct Facts {
 pub(super) struct ModelFacts {
     pub name: String,
     pub dimension: usize,
+    /// Of several bodies in the same matrices.
+    pub body: Option<BodyFacts>,
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
@@ -48,6 +50,12 @@ pub(super) struct ModelFacts {
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
     pub settings: serde_json::Value,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct BodyFacts {
+    pub number: usize,
+    pub of: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -137,6 +145,7 @@ impl ModelFacts {
         Self {
             name: source.name.clone(),
             dimension: body.dimension(),
+            body: source.number.map(|n| BodyFacts { number: n.number, of: n.of }),
             n_nodes: body.n_nodes(),
             n_dofs: source.n_dofs,
             mass_structure: match source.mass_structure {

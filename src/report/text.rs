@@ -109,6 +109,9 @@ fn heading(page: &mut Page, facts: &Facts) {
         "model",
         &format!("{} nodes, {} degrees of freedom, {}", model.n_nodes, model.n_dofs, model.mass_in_words()),
     );
+    if let Some(body) = &model.body {
+        page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
+    }
     page.entry("mass", &format!("{} {}", significant(body.mass, 6), units.mass()));
     let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
     let centre = coordinates(&body.centre_of_mass, size, &units.length());

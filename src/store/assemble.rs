@@ -5,7 +5,7 @@ use super::schema::MASS_STRUCTURES;
 use super::value::Value;
 use crate::flex_body::{Certificate, Frame, Guarantee, Interface, LumpedBody, Modes, Parts, Source};
 use crate::invariants::{DIGITS, Invariants};
-use crate::model::Nodes;
+use crate::model::{BodyNumber, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -103,6 +103,7 @@ impl Take<'_> {
     fn source(&mut self) -> Option<Source> {
         let name = self.text("/source@model");
         let files = self.json("/source@files", "a JSON array of files");
+        let number = self.number();
         let n_dofs = self.count("/source@n_dofs");
         let structure = self.text("/source@mass_structure");
         let mass_structure = MASS_STRUCTURES.iter().find(|(name, _)| *name == structure).map(|(_, s)| *s);
@@ -111,7 +112,25 @@ impl Take<'_> {
             self.scan.add(format!("/source@mass_structure: expected one of {known}, found {structure:?}"));
         }
         let settings = self.json("/source@settings", "JSON");
-        Some(Source { name, files: files?, n_dofs, mass_structure: mass_structure?, settings: settings? })
+        Some(Source {
+            name,
+            files: files?,
+            number,
+            n_dofs,
+            mass_structure: mass_structure?,
+            settings: settings?,
+        })
+    }
+
+    /// Both counts or none.
+    fn number(&mut self) -> Option<BodyNumber> {
+        let paths = ["/source@body_number", "/source@bodies"];
+        let there = paths.map(|path| self.scan.values.contains_key(path));
+        let [number, of] = paths.map(|path| self.optional_count(path));
+        if there[0] != there[1] {
+            self.scan.add(format!("{} and {}: expected both or none, found one", paths[0], paths[1]));
+        }
+        Some(BodyNumber { number: number?, of: of? })
     }
 
     fn modes(&mut self, n: usize) -> Modes {

@@ -7,7 +7,7 @@ use crate::provenance;
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// See [`MAJOR`].
-pub(super) const MINOR: i64 = 1;
+pub(super) const MINOR: i64 = 2;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
@@ -262,6 +262,18 @@ const SOURCE: &[Item] = &[
         "input files as a JSON array of objects with `role`, `name`, `sha256`",
         |v| text(serde_json::to_string(&v.body.source.files).expect("structs of strings are valid JSON")),
     ),
+    attribute(
+        "body_number",
+        Int,
+        ONE,
+        "which of several bodies in the same matrices this is, from 1 (`--split`)",
+        |v| count(v.body.source.number?.number),
+    )
+    .added(2),
+    attribute("bodies", Int, ONE, "how many bodies the matrices hold (`--split`)", |v| {
+        count(v.body.source.number?.of)
+    })
+    .added(2),
     attribute("n_nodes", Int, ONE, "nodes of the body", |v| count(v.body.nodes.len())).derived(""),
     attribute("n_dofs", Int, ONE, "rows of the FE matrices", |v| count(v.body.source.n_dofs)),
     attribute(

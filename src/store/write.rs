@@ -43,8 +43,16 @@ pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
 /// # Errors
 /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
 pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
-    fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))?;
+    fill_slot(body, &slot)?;
     slot.commit()
+}
+
+/// The same without the end: the file appears when the slot is committed.
+///
+/// # Errors
+/// As [`write_to`].
+pub fn fill_slot(body: &FlexBody, slot: &OutputSlot) -> Result<()> {
+    fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))
 }
 
 /// HDF5 tells the system's error number in its text only.

@@ -75,6 +75,7 @@ pub fn engine_mount() -> FlexBody {
                 file("mass", "M.mtx.gz", "2"),
                 file("nodes", "nodes.csv", "3"),
             ],
+            number: None,
             n_dofs: 24,
             mass_structure: MassStructure::RotationInvariant,
             settings: serde_json::json!({ "accuracy": "standard", "frame": "principal", "modes": 8 }),
@@ -212,6 +213,7 @@ pub fn condensed(
         source: Source {
             name: "block".to_owned(),
             files: vec![],
+            number: None,
             n_dofs: 3 * ids.len(),
             mass_structure: MassStructure::RotationInvariant,
             settings: serde_json::json!({}),

@@ -6,7 +6,7 @@ use flexbody::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
 };
 use flexbody::invariants::{DIGITS, Invariants};
-use flexbody::model::Nodes;
+use flexbody::model::{BodyNumber, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -122,6 +122,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                     sha256: format!("{:064x}", r.bits()),
                 })
                 .collect(),
+            number: (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) }),
             n_dofs: 3 * n,
             mass_structure: structures[r.below(3)],
             settings: serde_json::json!({
