@@ -313,6 +313,10 @@ fn check_diagonal(
 /// K and M together make one body, and K alone holds it together.
 fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let Assembled { raw, nodes, stiffness, mass } = body;
+    let component = connected_components(&[stiffness], 3);
+    if component.iter().all(|&c| c == 0) {
+        return;
+    }
     let bodies = groups(&connected_components(&[stiffness, mass], 3), nodes);
     if bodies.len() > 1 {
         let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
@@ -320,15 +324,13 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
         return;
     }
     // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
-    let parts = groups(&connected_components(&[stiffness], 3), nodes);
-    if parts.len() > 1 {
-        let message = format!(
-            "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
-            parts.len(),
-            in_words(&parts)
-        );
-        found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
-    }
+    let parts = groups(&component, nodes);
+    let message = format!(
+        "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
+        parts.len(),
+        in_words(&parts)
+    );
+    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
 }
 
 /// Node numbers of every component, in the order of their first nodes.
