@@ -312,7 +312,7 @@ fn check_diagonal(
 
 /// K and M together make one body, and K alone holds it together.
 fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
-    let Assembled { raw, nodes, stiffness, mass } = body;
+    let Assembled { raw, nodes, stiffness, mass, .. } = body;
     let component = connected_components(&[stiffness], 3);
     if component.iter().all(|&c| c == 0) {
         return;
