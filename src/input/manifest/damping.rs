@@ -18,7 +18,7 @@ impl Walk<'_> {
         self.known_keys(table, "[damping]", DAMPING);
         let given: Vec<&str> = DAMPING.iter().copied().filter(|key| table.contains_key(*key)).collect();
         let &[key] = given.as_slice() else {
-            let found = if given.is_empty() { "none".to_owned() } else { given.join(", ") };
+            let found = if given.is_empty() { "nothing".to_owned() } else { given.join(", ") };
             let message = format!("[damping] has {found}, expected one of {}", DAMPING.join(", "));
             self.complain(Code::ManifestSyntax, span, message);
             return None;
