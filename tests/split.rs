@@ -10,7 +10,7 @@ use flexbody::eigen::Wanted;
 use flexbody::flex_body::FlexBody;
 use flexbody::input::{read_manifest, read_model};
 use flexbody::linalg::CscMatrix;
-use flexbody::model::{BodyNumber, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel};
+use flexbody::model::{BodyNumber, Damping, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel};
 use flexbody::progress::SILENT;
 use flexbody::store;
 use serde_json::Value;
@@ -144,6 +144,32 @@ fn mass_coupling_joins_bodies_and_a_part_that_only_mass_holds_is_a_mechanism() {
         assert!(error.has(Code::Mechanism) && !error.has(Code::BodiesSeveral), "{error}");
         assert!(error.to_string().contains("2 parts that only the mass couples"), "{error}");
     }
+}
+
+#[test]
+fn a_damping_matrix_is_taken_apart_too_and_must_not_couple_bodies() {
+    let scaled = |matrix: &RawMatrix| {
+        let all: Vec<_> = entries(&matrix.matrix).map(|(r, c, v)| (r, c, 1e-6 * v)).collect();
+        let n = matrix.matrix.n_cols();
+        RawMatrix { matrix: CscMatrix::from_triplets(n, n, &all), ..matrix.clone() }
+    };
+    let with_damping = |mut raw: RawModel| {
+        raw.damping = Some(Damping::Matrix(scaled(&raw.stiffness)));
+        raw
+    };
+    let bodies = [block(2), block(3)];
+    let mut whole = with_damping(interleaved(&bodies));
+    for (b, checked) in FeModel::bodies_from_raw(whole.clone()).unwrap().iter().enumerate() {
+        let own = FeModel::from_raw(with_damping(alone(&bodies, b))).unwrap().model;
+        assert_eq!(checked.model.damping(), own.damping());
+    }
+    let Some(Damping::Matrix(d)) = &mut whole.damping else { unreachable!("just made") };
+    let mut all: Vec<_> = entries(&d.matrix).collect();
+    all.extend([(0, 1, -1.0), (1, 0, -1.0)]);
+    let n = d.matrix.n_cols();
+    d.matrix = CscMatrix::from_triplets(n, n, &all);
+    let error = FeModel::bodies_from_raw(whole).unwrap_err();
+    assert!(error.to_string().contains("damping couples node 2 of body 1 with node 3 of body 2"), "{error}");
 }
 
 /// A steel block with an interface at its first nodes.

@@ -243,7 +243,8 @@ fn refuse_overwriting(outputs: &[Places], files: &ModelFiles, schemes: &[Scheme]
         InterfaceNodes::File(path) => Some(path),
         InterfaceNodes::Listed(_) => None,
     });
-    let inputs = matrices.into_iter().chain(tables).chain(masses).chain(interfaces);
+    let damping = files.damping.as_ref().and_then(|damping| damping.matrix()).map(|place| Some(&place.path));
+    let inputs = matrices.into_iter().chain(damping).chain(tables).chain(masses).chain(interfaces);
     let place = |path: &Path| {
         std::fs::canonicalize(path)
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))

@@ -43,6 +43,8 @@ pub struct Modes {
     pub residual: Vec<f64>,
     /// Modal damping ratios, 0 when none was given.
     pub damping_ratio: Vec<f64>,
+    /// Psi' D Psi (nf x nf), where damping was given. Unit: 1/time.
+    pub modal_damping: Option<Mat<f64>>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
     pub shape: Mat<f64>,
 }

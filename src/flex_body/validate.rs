@@ -185,6 +185,9 @@ impl Check {
             }
         }
         self.matrix("modes.shape", &modes.shape, 3 * n, nf);
+        if let Some(damping) = &modes.modal_damping {
+            self.matrix("modes.modal_damping", damping, nf, nf);
+        }
     }
 
     fn invariants(&mut self, name: &str, invariants: &Invariants, nf: usize) {

@@ -1,14 +1,15 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
 use super::layout::{Layout, layout, name_some};
-use super::mass_structure::{ScalarMass, scalar_mass};
+use super::mass_structure::scalar_mass;
 use super::rigid::{centre_and_length, rigid_count, rigid_fields, rigid_residuals};
-use super::{BodyNumber, DofLabel, FeModel, Nodes, RawMatrix, RawModel};
+use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{SymmetricMatrix, connected_components};
 use rayon::prelude::*;
 use std::collections::HashSet;
+use std::path::Path;
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -38,6 +39,8 @@ pub(super) struct Assembled {
     pub stiffness: SymmetricMatrix,
     /// M (d n x d n).
     pub mass: SymmetricMatrix,
+    /// Damping, a matrix in the same order.
+    pub damping: Option<Damping<SymmetricMatrix>>,
 }
 
 impl Assembled {
@@ -66,6 +69,17 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     if !(2..=3).contains(&raw.dimension) {
         let message = format!("`dimension` is {}, expected 2 or 3", raw.dimension);
         found.push(Diagnostic::new(Code::ManifestSyntax, message));
+    }
+    if let Some(problem) = raw.damping.as_ref().and_then(Damping::problem) {
+        found.push(Diagnostic::new(Code::ManifestSyntax, problem));
+    }
+    if let Some(damping) = raw.damping.as_ref().and_then(Damping::matrix) {
+        check_matrix(damping, "damping", &mut found);
+        let nd = damping.matrix.n_cols();
+        if nd != nk {
+            let message = format!("stiffness matrix has {nk} rows, damping matrix {nd}");
+            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&damping.path));
+        }
     }
     stop_on_error(&mut found)?;
 
@@ -109,6 +123,15 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         |row: usize| DofLabel { node: nodes.ids[row / dimension], direction: (row % dimension) as u8 + 1 };
     let stiffness = symmetric(&mut raw.stiffness, &layout, "stiffness", label, &mut found);
     let mass = symmetric(&mut raw.mass, &layout, "mass", label, &mut found);
+    let damping = raw.damping.take().and_then(|damping| {
+        // Without the matrix there is an error among the diagnostics.
+        let mut ordered = |mut matrix: RawMatrix| {
+            let symmetric = symmetric(&mut matrix, &layout, "damping", label, &mut found)?;
+            check_diagonal(&symmetric, "damping", &matrix.path, label, &mut found);
+            Some(symmetric)
+        };
+        damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
+    });
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -116,7 +139,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     check_diagonals(&stiffness, &mass, label, &raw, &mut found);
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
-    Ok((Assembled { raw, nodes, stiffness, mass }, found))
+    Ok((Assembled { raw, nodes, stiffness, mass, damping }, found))
 }
 
 /// The checks of a body: its mass, its connections, its rigid motion.
@@ -136,17 +159,17 @@ pub(super) fn finish(
     };
     check_connections(&body, &mut found);
     let rigid_residual = check_rigid_motion(&body.stiffness, &body.nodes, raw, label, &mut found);
+    check_rigid_damping(&body, &mut found);
     stop_on_error(&mut found)?;
-    let ScalarMass { matrix: scalar_mass, deviation } = scalar.expect("a missing mass comes with an error");
+    let scalar = scalar.expect("a missing mass comes with an error");
+    let scalar_mass = &scalar.matrix;
     let diagonal_mass = (0..scalar_mass.n()).all(|i| scalar_mass.row(i).0.iter().all(|&j| j as usize == i));
     if diagonal_mass {
         let message = "mass matrix is diagonal: it was lumped before it came here";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }
-    check_plausibility(&scalar_mass, &body.nodes, raw, &mut found);
-    let Assembled { raw, nodes, stiffness, .. } = body;
-    let model =
-        FeModel::new(raw, nodes, stiffness, scalar_mass, rigid_residual, deviation, diagonal_mass, number);
+    check_plausibility(scalar_mass, &body.nodes, raw, &mut found);
+    let model = FeModel::new(body, scalar, rigid_residual, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found })
 }
 
@@ -269,20 +292,8 @@ fn check_diagonals(
     raw: &RawModel,
     found: &mut Vec<Diagnostic>,
 ) {
-    for (matrix, name, path) in
-        [(stiffness, "stiffness", &raw.stiffness.path), (mass, "mass", &raw.mass.path)]
-    {
-        let negative: Vec<DofLabel> =
-            matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
-        if !negative.is_empty() {
-            let message = format!(
-                "{} diagonal entries of the {name} matrix are negative: {}",
-                negative.len(),
-                name_some(&negative)
-            );
-            found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
-        }
-    }
+    check_diagonal(stiffness, "stiffness", &raw.stiffness.path, &label, found);
+    check_diagonal(mass, "mass", &raw.mass.path, &label, found);
     let empty = |m: &SymmetricMatrix, i: usize| m.row(i).0.is_empty();
     let both: Vec<DofLabel> =
         (0..stiffness.n()).filter(|&i| empty(stiffness, i) && empty(mass, i)).map(&label).collect();
@@ -292,9 +303,32 @@ fn check_diagonals(
     }
 }
 
+fn check_diagonal(
+    matrix: &SymmetricMatrix,
+    name: &str,
+    path: &Path,
+    label: impl Fn(usize) -> DofLabel,
+    found: &mut Vec<Diagnostic>,
+) {
+    let negative: Vec<DofLabel> =
+        matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
+    if !negative.is_empty() {
+        let message = format!(
+            "{} diagonal entries of the {name} matrix are negative: {}",
+            negative.len(),
+            name_some(&negative)
+        );
+        found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
+    }
+}
+
 /// K and M together make one body, and K alone holds it together.
 fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
-    let Assembled { raw, nodes, stiffness, mass } = body;
+    let Assembled { raw, nodes, stiffness, mass, .. } = body;
+    let component = connected_components(&[stiffness], body.dimension());
+    if component.iter().all(|&c| c == 0) {
+        return;
+    }
     let bodies = groups(&connected_components(&[stiffness, mass], body.dimension()), nodes);
     if bodies.len() > 1 {
         let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
@@ -302,15 +336,13 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
         return;
     }
     // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
-    let parts = groups(&connected_components(&[stiffness], body.dimension()), nodes);
-    if parts.len() > 1 {
-        let message = format!(
-            "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
-            parts.len(),
-            in_words(&parts)
-        );
-        found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
-    }
+    let parts = groups(&component, nodes);
+    let message = format!(
+        "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
+        parts.len(),
+        in_words(&parts)
+    );
+    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
 }
 
 /// Node numbers of every component, in the order of their first nodes.
@@ -366,6 +398,25 @@ fn check_rigid_motion(
         );
     }
     worst
+}
+
+/// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.
+fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
+    /// As much as node tables written with few digits leave.
+    const LIMIT: f64 = 1e-6;
+    let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
+    let (centre, length) = centre_and_length(&body.nodes.positions);
+    let residuals =
+        rigid_residuals(damping, &rigid_fields(&body.nodes.positions, body.dimension(), centre, length));
+    let damped = residuals.iter().filter(|r| **r > LIMIT).count();
+    if damped > 0 {
+        let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
+        let message = format!(
+            "D R is not zero for {damped} of {} rows: |D R| reaches {worst:.1e} of the row sum of |D|; only the damping of the modes is kept",
+            residuals.len()
+        );
+        found.push(Diagnostic::new(Code::DampingRigid, message));
+    }
 }
 
 /// Densities between aerogel and osmium, for the box around the nodes.

@@ -1,6 +1,8 @@
 //! The checked model: every used node has d displacements (d: the dimension), DOF d i + k is direction k of node i.
 
-use super::{BodyNumber, CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
+use super::checks::Assembled;
+use super::mass_structure::ScalarMass;
+use super::{BodyNumber, CheckedModel, Damping, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
 use crate::error::Result;
 use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
@@ -15,6 +17,7 @@ pub struct FeModel {
     nodes: Nodes,
     stiffness: SymmetricMatrix,
     scalar_mass: SymmetricMatrix,
+    damping: Option<Damping<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
     sources: Vec<SourceFile>,
     digits: u8,
@@ -41,17 +44,14 @@ impl FeModel {
         check_bodies(raw)
     }
 
-    #[allow(clippy::too_many_arguments)] // private, called once
     pub(super) fn new(
-        raw: RawModel,
-        nodes: Nodes,
-        stiffness: SymmetricMatrix,
-        scalar_mass: SymmetricMatrix,
+        body: Assembled,
+        mass: ScalarMass,
         rigid_residual: f64,
-        mass_deviation: f64,
         diagonal_mass: bool,
         number: Option<BodyNumber>,
     ) -> Self {
+        let Assembled { raw, nodes, stiffness, damping, .. } = body;
         Self {
             digits: raw.stiffness.digits,
             name: raw.name,
@@ -59,11 +59,12 @@ impl FeModel {
             units: raw.units,
             nodes,
             stiffness,
-            scalar_mass,
+            scalar_mass: mass.matrix,
+            damping,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
-            mass_deviation,
+            mass_deviation: mass.deviation,
             diagonal_mass,
             number,
         }
@@ -97,6 +98,11 @@ impl FeModel {
     /// Ms (n x n): M = Ms kron I_d.
     pub fn scalar_mass(&self) -> &SymmetricMatrix {
         &self.scalar_mass
+    }
+
+    /// Damping, where it was given; a matrix D is 3n x 3n, row 3 i + k.
+    pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
+        self.damping.as_ref()
     }
 
     /// Named node sets.

@@ -1,6 +1,7 @@
 //! The finite element model of one free body: nodes, degrees of freedom, K, M. Knows no file format.
 
 mod checks;
+mod damping;
 mod fe_model;
 mod layout;
 mod mass_structure;
@@ -10,6 +11,7 @@ mod rigid;
 mod several;
 
 pub use checks::{CheckedModel, check};
+pub use damping::{Damping, DampingBand};
 pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel};

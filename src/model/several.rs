@@ -1,12 +1,13 @@
 //! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
 
 use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
-use super::{NodeSet, Nodes, RawModel};
+use super::{Damping, NodeSet, Nodes, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{CscMatrix, SymmetricMatrix, connected_components};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
+use std::convert::Infallible;
 
 /// Which of several bodies in the same matrices a model is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +31,8 @@ impl std::fmt::Display for BodyNumber {
 /// # Errors
 /// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
 /// [`ModelTooSmall`](Code::ModelTooSmall) for bodies of one or two nodes;
-/// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies.
+/// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies;
+/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping matrix that couples bodies.
 pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     let (whole, shared) = assemble(raw)?;
     let bodies = match separate(whole) {
@@ -60,7 +62,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 /// The bodies, in the order of their first nodes.
 fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
     let dimension = whole.dimension();
-    let Assembled { raw, nodes, stiffness, mass } = whole;
+    let Assembled { raw, nodes, stiffness, mass, damping } = whole;
     let component = connected_components(&[&stiffness, &mass], dimension);
     let bodies = groups(&component, &nodes);
     let mut found = Vec::new();
@@ -79,6 +81,9 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
         );
     }
     let interfaces = distribute(&raw.interfaces, &component, &nodes, &mut found);
+    if let Some(matrix) = damping.as_ref().and_then(Damping::matrix) {
+        found.extend(coupling(matrix, &component, &nodes));
+    }
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
     }
@@ -101,6 +106,12 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
         },
         stiffness: restricted(&stiffness, dimension, own, &local),
         mass: restricted(&mass, dimension, own, &local),
+        damping: damping.as_ref().map(|damping| {
+            let Ok(own) = damping
+                .borrowed()
+                .try_map(|matrix| Ok::<_, Infallible>(restricted(matrix, dimension, own, &local)));
+            own
+        }),
     };
     Ok(members.iter().zip(interfaces).enumerate().map(one).collect())
 }
@@ -134,6 +145,17 @@ fn distribute(
         }
     }
     own
+}
+
+/// A complaint when an entry of D couples two bodies.
+fn coupling(damping: &SymmetricMatrix, component: &[usize], nodes: &Nodes) -> Option<Diagnostic> {
+    let (a, b) = (0..damping.n()).find_map(|row| {
+        let other = |&column: &u32| (component[row / 3] != component[column as usize / 3]).then_some(column);
+        damping.row(row).0.iter().find_map(other).map(|column| (row / 3, column as usize / 3))
+    })?;
+    let place = |i: usize| format!("node {} of body {}", nodes.ids[i], component[i] + 1);
+    let message = format!("damping couples {} with {}", place(a), place(b));
+    Some(Diagnostic::new(Code::BodiesCoupled, message))
 }
 
 /// Rows and columns of some nodes, ascending, that no other node is coupled to; `local` is the place of each.

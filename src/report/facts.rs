@@ -4,6 +4,7 @@ use super::completeness::Completeness;
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
+use super::numbers::{percent, significant};
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, MassStructure};
@@ -81,7 +82,51 @@ pub(super) struct ModeFacts {
     pub residual: Vec<f64>,
     pub damping_ratio: Vec<f64>,
     pub worst_residual: f64,
+    /// Where damping was given.
+    pub damping: Option<DampingFacts>,
 }
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct DampingFacts {
+    pub lowest_ratio: f64,
+    pub highest_ratio: f64,
+    /// Largest |D_ij| / sqrt(D_ii D_jj) of two modes.
+    pub coupling: f64,
+}
+
+impl DampingFacts {
+    fn of(body: &FlexBody) -> Option<Self> {
+        let (d, ratio) = (body.modes().modal_damping.as_ref()?, &body.modes().damping_ratio);
+        let pairs = (0..d.ncols()).flat_map(|j| (0..j).map(move |i| (i, j)));
+        let coupled = |(i, j): (usize, usize)| {
+            let size = d[(i, i)].max(0.0).sqrt() * d[(j, j)].max(0.0).sqrt();
+            if size > 0.0 { d[(i, j)].abs() / size } else { 0.0 }
+        };
+        Some(Self {
+            lowest_ratio: ratio.iter().copied().fold(f64::INFINITY, f64::min),
+            highest_ratio: ratio.iter().copied().fold(0.0, f64::max),
+            coupling: pairs.map(coupled).fold(0.0, f64::max),
+        })
+    }
+
+    /// `ratios from 0.01 to 0.03, modes coupled by up to 4.2 %`.
+    pub fn in_words(&self) -> String {
+        let (lowest, highest) = (significant(self.lowest_ratio, 4), significant(self.highest_ratio, 4));
+        let ratios = if lowest == highest {
+            format!("ratio {lowest} of every mode")
+        } else {
+            format!("ratios from {lowest} to {highest}")
+        };
+        if self.coupling > UNCOUPLED {
+            format!("{ratios}, modes coupled by up to {}", percent(self.coupling))
+        } else {
+            ratios
+        }
+    }
+}
+
+/// Coupling of modes by damping up to this is rounding.
+const UNCOUPLED: f64 = 1e-6;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct RunFacts {
@@ -127,6 +172,7 @@ impl Facts {
                 eigenvalue: body.modes().eigenvalue.clone(),
                 residual: body.modes().residual.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
+                damping: DampingFacts::of(body),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
             completeness: Completeness::of(body),

@@ -180,6 +180,9 @@ fn modes(html: &mut String, facts: &Facts) {
         items.push(("Eigenvalues", escape(&sentence(&guarantee.eigenvalues()))));
         items.push(("Invariants", escape(&sentence(&guarantee.invariants()))));
     }
+    if let Some(damping) = &modes.damping {
+        items.push(("Damping", escape(&sentence(&damping.in_words()))));
+    }
     terms(html, items);
     section(html, "Frequencies");
     // Without damping a column of zeros would say nothing.

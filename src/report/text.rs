@@ -133,6 +133,9 @@ fn modes(page: &mut Page, facts: &Facts) {
     let residual = significant(modes.worst_residual, 2);
     page.entry("modes", &format!("{} flexible, worst residual {residual}{accuracy}", modes.count));
     page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
+    if let Some(damping) = &modes.damping {
+        page.entry("damping", &damping.in_words());
+    }
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {

@@ -136,9 +136,12 @@ impl Take<'_> {
     fn modes(&mut self, n: usize) -> Modes {
         let eigenvalue = self.floats("/modes/eigenvalue");
         let shape = self.floats("/modes/shape");
+        let damping = "/invariants/modal_damping";
+        let damped = self.scan.values.contains_key(damping);
         Modes {
             residual: self.floats("/modes/residual"),
             damping_ratio: self.floats("/modes/damping_ratio"),
+            modal_damping: damped.then(|| self.matrix(damping, eigenvalue.len())),
             shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
             eigenvalue,
         }

@@ -103,6 +103,7 @@ const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
 const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
 const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
 const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
+const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
 const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 
 /// A required dataset of version 1.0.
@@ -440,6 +441,17 @@ const INVARIANTS: &[Item] = &[
         .derived("S"),
 ];
 
+/// Damping has nothing to do with the mass: lumped masses have none of their own.
+const DAMPING: &[Item] = &[dataset(
+    "modal_damping",
+    Floats(&[Modes, Modes]),
+    PER_TIME,
+    "D_ff",
+    "Psi' D Psi, where damping was given; `/modes/damping_ratio` is its diagonal over 2 sqrt(lambda)",
+    |v| matrix(v.body.modes.modal_damping.as_ref()?.as_ref()),
+)
+.added(2)];
+
 const LUMPED: &[Item] = &[attribute("negative_masses", Int, ONE, "number of negative nodal masses", |v| {
     count(v.lumped?.negative_masses)
 })];
@@ -603,7 +615,7 @@ pub(super) const TABLE: &[Group] = &[
         path: "/invariants",
         per: Per::Body,
         description: "Exact invariants from the consistent mass, about the frame origin, in body axes.",
-        items: &[INVARIANTS],
+        items: &[INVARIANTS, DAMPING],
     },
     Group {
         path: "/lumped/<scheme>",

@@ -140,6 +140,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             eigenvalue,
             residual: (0..nf).map(|_| r.value().abs()).collect(),
             damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
+            modal_damping: (r.below(2) == 1).then(|| Mat::from_fn(nf, nf, |_, _| r.value())),
             shape: r.matrix(3 * n, nf),
         },
         invariants: r.invariants(nf),
