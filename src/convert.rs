@@ -11,14 +11,16 @@ use crate::flex_body::{
     Truncation,
 };
 use crate::invariants::{
-    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame, condense,
-    condense_certified, condense_lumped, error_norms,
+    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
+    choose_plane_frame, condense, condense_certified, condense_lumped, error_norms,
 };
-use crate::linalg::{Pencil, SymmetricMatrix, gram};
-use crate::model::{FeModel, Nodes};
+use crate::linalg::{SymmetricMatrix, gram, multiply};
+use crate::model::{Damping, FeModel, Nodes, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
+
+mod damping;
 
 /// A lumped comparator that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,9 +118,12 @@ pub fn convert_resumed(
     let found = settings.basis.basis().modes(&task)?;
     watch(Event::Phase("invariants"));
     let positions = &model.nodes().positions;
-    let (frame, mass_properties) = choose_frame(model.scalar_mass(), positions, settings.frame)?;
+    let (frame, mass_properties) = match model.dimension() {
+        2 => choose_plane_frame(model.scalar_mass(), positions, settings.frame)?,
+        _ => choose_frame(model.scalar_mass(), positions, settings.frame)?,
+    };
     let place = Place { frame, positions: frame.to_body(positions) };
-    let (shapes, modal_stiffness) = place.modes(model, &found.solution.vectors);
+    let BodyModes { shapes, modal_stiffness, signs } = place.modes(model, &found.solution.vectors);
     let (mass, positions) = (model.scalar_mass(), &place.positions);
     let (invariants, guarantee) = match &found.solution.bounds {
         None => (condense(mass, positions, shapes.as_ref(), modal_stiffness), None),
@@ -135,6 +140,10 @@ pub fn convert_resumed(
             (own.invariants, Some(guarantee))
         }
     };
+    let vectors = found.solution.vectors.as_ref();
+    let damping = damping::modal_damping(model, vectors, &signs, &found.solution.eigenvalues, &invariants)?;
+    let mut diagnostics = found.diagnostics.clone();
+    diagnostics.extend(damping.as_ref().and_then(|damping| damping.warning.clone()));
     watch(Event::Phase("lumped comparison"));
     let lumped: Vec<LumpedBody> = schemes
         .iter()
@@ -160,24 +169,31 @@ pub fn convert_resumed(
     };
     let certificate = certificate(model, &found, guarantee);
     let solution = found.solution;
+    let (damping_ratio, modal_damping) = match damping {
+        Some(damping) => (damping.ratio, Some(damping.matrix)),
+        None => (vec![0.0; solution.eigenvalues.len()], None),
+    };
     let body = FlexBody::new(Parts {
         source: Source {
             name: model.name().to_owned(),
             files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
+            number: model.number(),
             n_dofs: model.stiffness().n(),
             mass_structure: if model.has_diagonal_mass() {
                 MassStructure::Diagonal
             } else {
                 MassStructure::RotationInvariant
             },
-            settings: describe(settings),
+            settings: describe(settings, model),
         },
+        dimension: model.dimension(),
         units: model.units().clone(),
         frame,
         interfaces: interfaces(model),
         nodes: Nodes { ids: model.nodes().ids.clone(), positions: place.positions },
         modes: Modes {
-            damping_ratio: vec![0.0; solution.eigenvalues.len()],
+            damping_ratio,
+            modal_damping,
             eigenvalue: solution.eigenvalues,
             residual: solution.residuals,
             provenance: found.provenance,
@@ -198,7 +214,7 @@ pub fn convert_resumed(
         lumped_modes,
         counters: solution.counters,
         plan: solution.plan,
-        diagnostics: found.diagnostics,
+        diagnostics,
     })
 }
 
@@ -209,23 +225,47 @@ struct Place {
 }
 
 impl Place {
-    /// Modes in body axes with canonical signs there, and Psi' K Psi.
-    fn modes(&self, model: &FeModel, vectors: &Mat<f64>) -> (Mat<f64>, Mat<f64>) {
-        let mut shapes = vectors.clone();
+    /// Modes in body axes (3n x nf) with canonical signs there, and Psi' K Psi.
+    fn modes(&self, model: &FeModel, vectors: &Mat<f64>) -> BodyModes {
+        let mut shapes = in_space(vectors, model.dimension());
         self.frame.rotate_shapes(&mut shapes);
         let unsigned = shapes.clone();
         canonical_basis(shapes.as_mut(), &[]);
-        // K lives in model axes: its reduction is taken there, and the signs are carried over.
-        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
-        let k = gram(vectors.as_ref(), pencil.apply_stiffness(vectors.as_ref()).as_ref());
-        let flipped: Vec<f64> = (0..shapes.ncols())
+        let signs: Vec<f64> = (0..shapes.ncols())
             .map(|j| if (0..shapes.nrows()).all(|i| shapes[(i, j)] == unsigned[(i, j)]) { 1.0 } else { -1.0 })
             .collect();
-        let modal = Mat::from_fn(k.nrows(), k.ncols(), |i, j| {
-            0.5 * (k[(i, j)] + k[(j, i)]) * flipped[i] * flipped[j]
-        });
-        (shapes, modal)
+        let modal_stiffness = reduced(model.stiffness(), vectors.as_ref(), &signs);
+        BodyModes { shapes, modal_stiffness, signs }
     }
+}
+
+/// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
+pub(crate) fn in_space(shapes: &Mat<f64>, dimension: usize) -> Mat<f64> {
+    if dimension == 3 {
+        return shapes.clone();
+    }
+    Mat::from_fn(shapes.nrows() / 2 * 3, shapes.ncols(), |row, j| match row % 3 {
+        2 => 0.0,
+        k => shapes[(row / 3 * 2 + k, j)],
+    })
+}
+
+/// The modes of a body.
+struct BodyModes {
+    /// In body axes.
+    shapes: Mat<f64>,
+    modal_stiffness: Mat<f64>,
+    /// What each mode was multiplied by.
+    signs: Vec<f64>,
+}
+
+/// Psi' A Psi, where a matrix A and `vectors` are in model axes, as they come from the search: there it is reduced, and
+/// the signs of the modes are carried over.
+fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>, signs: &[f64]) -> Mat<f64> {
+    let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
+    multiply(a, 1, vectors, product.as_mut());
+    let k = gram(vectors, product.as_ref());
+    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]) * signs[i] * signs[j])
 }
 
 fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
@@ -296,9 +336,11 @@ fn lumped_pipeline(
     if found.eigenvalues.len() < nf {
         return Ok(none(format!("the lumped mass has {} modes only", found.eigenvalues.len())));
     }
-    let (shapes, modal_stiffness) = exact.place.modes(exact.model, &found.vectors);
-    let pencil = Pencil::new(exact.model.stiffness(), exact.model.scalar_mass(), 3);
-    let cross = gram(exact.shapes, pencil.apply_mass(shapes.as_ref()).as_ref());
+    let BodyModes { shapes, modal_stiffness, .. } = exact.place.modes(exact.model, &found.vectors);
+    // In the plane as in space: M = Ms kron I3 for shapes with three components.
+    let mut m_shapes = Mat::zeros(shapes.nrows(), nf);
+    multiply(exact.model.scalar_mass(), 3, shapes.as_ref(), m_shapes.as_mut());
+    let cross = gram(exact.shapes, m_shapes.as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..nf)));
     let own = condense_lumped(masses, &exact.place.positions, shapes.as_ref(), modal_stiffness);
     Ok(LumpedPipeline {
@@ -317,7 +359,7 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
         proved_modes: proved.then_some(completeness.modes_below),
         shift: completeness.shift,
         negative_pivots: completeness.negative_pivots,
-        rigid_modes: 6,
+        rigid_modes: rigid_count(model.dimension()),
         remark: completeness.remark.clone(),
         rigid_noise: found.rigid_noise,
         rigid_residual: model.rigid_residual(),
@@ -338,7 +380,7 @@ fn interfaces(model: &FeModel) -> Vec<Interface> {
 }
 
 /// The settings that can change the result, for the file.
-fn describe(settings: &ConvertSettings) -> serde_json::Value {
+fn describe(settings: &ConvertSettings, model: &FeModel) -> serde_json::Value {
     let (modes, below) = match settings.modes.wanted {
         Wanted::Lowest(count) => ((count < usize::MAX).then_some(count), None),
         Wanted::Below(lambda) => (None, Some(lambda)),
@@ -356,7 +398,7 @@ fn describe(settings: &ConvertSettings) -> serde_json::Value {
         BasisChoice::Free(free) => free.residual_vectors.iter().map(Loads::name).collect(),
         BasisChoice::Imported(_) => Vec::new(),
     };
-    serde_json::json!({
+    let mut described = serde_json::json!({
         "accuracy": settings.modes.accuracy.name(),
         "basis": settings.basis.basis().name(),
         "frame": settings.frame.name(),
@@ -364,5 +406,18 @@ fn describe(settings: &ConvertSettings) -> serde_json::Value {
         "max_eigenvalue": below,
         "modes": modes,
         "residual_vectors": loads,
-    })
+    });
+    if let Some(damping) = model.damping() {
+        let numbers = match damping {
+            Damping::Ratio(ratio) => serde_json::json!(ratio),
+            Damping::Bands(bands) => {
+                let end = |hertz: f64| hertz.is_finite().then_some(hertz);
+                bands.iter().map(|b| serde_json::json!({ "to_hz": end(b.to_hz), "ratio": b.ratio })).collect()
+            }
+            Damping::Rayleigh { alpha, beta } => serde_json::json!({ "alpha": alpha, "beta": beta }),
+            Damping::Matrix(_) => serde_json::Value::Null,
+        };
+        described["damping"] = serde_json::json!({ damping.name(): numbers });
+    }
+    described
 }

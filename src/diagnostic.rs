@@ -86,6 +86,7 @@ codes! {
     DofDirection = "FB207", Error, BadInput, "direction is not 1 to 6", "1, 2, 3 are displacements along x, y, z; 4, 5, 6 rotations";
     DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... each once", "number the rows from 0 or leave the column out";
     InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
+    InterfaceAcross = "FB210", Error, BadInput, "interface has nodes of several bodies", "give each body an interface of its own";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
@@ -116,14 +117,16 @@ codes! {
     PencilSingular = "FB411", Error, BadInput, "rows empty in both K and M: the eigenproblem is singular", "remove these degrees of freedom from the matrices";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
     InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit the stated units", "check the units of the manifest";
-    BodiesSeveral = "FB414", Error, Untrustworthy, "model falls into separate bodies", "connect them, or convert each by itself";
+    BodiesSeveral = "FB414", Error, Untrustworthy, "matrices hold several bodies", "convert each by itself with --split, or connect them";
     DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
     BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
-    ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more than six degrees of freedom";
-    DimensionUnsupported = "FB419", Error, BadInput, "dimension not supported", "this version handles bodies in three dimensions";
+    ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more degrees of freedom than rigid motions: six in space, three in the plane";
+    DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
+    DampingRigid = "FB420", Warning, Done, "damping matrix resists rigid motion", "damping to ground, or proportional to mass, acts on the motion of the whole body: model it in the multibody system";
+    BodiesCoupled = "FB421", Error, BadInput, "damping couples bodies that K and M leave separate", "leave the entries between bodies out";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
-    Mechanism = "FB502", Error, Untrustworthy, "more than six zero-energy modes: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
+    Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
     MassIndefinite = "FB503", Error, Untrustworthy, "mass matrix is indefinite", "negative lumped masses or wrong signs: export the consistent mass";
     StiffnessIndefinite = "FB504", Error, Untrustworthy, "stiffness matrix is indefinite", "check for negative springs, prestress beyond buckling, wrong signs";
     FactorizationFailed = "FB505", Error, Untrustworthy, "factorisation failed or is inaccurate", "the model may be scaled pathologically; check units and stiffness contrasts";
@@ -135,6 +138,8 @@ codes! {
     MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common for reduced integration";
     NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
     FactorPrecision = "FB513", Note, Done, "precision of the factor", "nothing to do: --factor f64 or f32 decides otherwise";
+    DampingIndefinite = "FB514", Error, Untrustworthy, "damping of the modes is not positive semidefinite or not finite", "damping must not feed energy: check the signs and the units of the damping";
+    ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "check the units of the damping: alpha is in 1/time, beta in time, D in mass/time";
     ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
     ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
     ShapesRigid = "FB522", Note, Done, "rigid motions among the shapes are removed", "nothing to do: rigid motion is the body frame's";
@@ -223,6 +228,12 @@ impl Diagnostic {
     /// Replaces the table's help by a more precise one.
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
+        self
+    }
+
+    /// Puts what it is about in front of the message.
+    pub fn about(mut self, what: impl std::fmt::Display) -> Self {
+        self.message = format!("{what}: {}", self.message);
         self
     }
 

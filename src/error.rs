@@ -54,6 +54,11 @@ impl Error {
         self.diagnostics
     }
 
+    /// Puts what it is about in front of every message.
+    pub fn about(self, what: impl std::fmt::Display) -> Self {
+        Self { diagnostics: self.diagnostics.into_iter().map(|d| d.about(&what)).collect() }
+    }
+
     /// The exit code of the first error.
     pub fn exit_code(&self) -> ExitCode {
         self.first_error().code().exit_code()

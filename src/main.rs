@@ -1,7 +1,6 @@
 //! The `flexbody` program: parses the command line, runs, exits with a documented code.
 
-use clap::Parser;
-use flexbody::cli::{Arguments, run};
+use flexbody::cli::{parse, run};
 use flexbody::diagnostic::{Code, Diagnostic};
 use flexbody::error::ExitCode;
 use std::io::{IsTerminal, Write};
@@ -13,7 +12,10 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> std::process::ExitCode {
     keep_freed_memory();
-    let arguments = Arguments::parse();
+    let arguments = match parse() {
+        Ok(arguments) => arguments,
+        Err(code) => return std::process::ExitCode::from(code as u8),
+    };
     // Where no handler can be set the work is done all the same: an interruption then leaves a temporary file.
     let _ = ctrlc::set_handler(interrupted);
     let code = std::panic::catch_unwind(|| run(&arguments)).unwrap_or_else(|_| {

@@ -138,13 +138,21 @@ impl OutputSlot {
     /// # Errors
     /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable).
     pub fn write(self, bytes: &[u8]) -> Result<()> {
+        self.fill(bytes)?;
+        self.commit()
+    }
+
+    /// Writes `bytes` to the temporary file; they appear with [`OutputSlot::commit`].
+    ///
+    /// # Errors
+    /// As [`OutputSlot::write`].
+    pub fn fill(&self, bytes: &[u8]) -> Result<()> {
         let written = OpenOptions::new()
             .write(true)
             .truncate(true)
             .open(self.temporary())
             .and_then(|mut file| file.write_all(bytes));
-        written.map_err(|e| self.failure(&e))?;
-        self.commit()
+        written.map_err(|e| self.failure(&e))
     }
 
     /// Makes the temporary file the output: flushes it to the disk, then renames it over the target.

@@ -24,6 +24,10 @@ const ROUNDING: f64 = 30.0;
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) when the nodes differ.
 pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
+    if body.dimension() != model.dimension() {
+        let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    }
     if body.nodes().ids != model.nodes().ids {
         let message = format!(
             "the body has {} nodes, the model {} with other numbers or in another order",
@@ -48,8 +52,8 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         .zip(body.nodes().positions.iter().flatten())
         .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
     let shapes = &body.modes().shape;
-    let in_model = in_model_axes(shapes, &frame.axes);
-    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+    let in_model = in_model_axes(shapes, &frame.axes, model.dimension());
+    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
     let kx = pencil.apply_stiffness(in_model.as_ref());
     let mx = pencil.apply_mass(in_model.as_ref());
     let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());
@@ -140,10 +144,10 @@ pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
         .collect()
 }
 
-/// Shapes (3n x nf) from body axes to model axes.
-fn in_model_axes(shapes: &Mat<f64>, axes: &nalgebra::Matrix3<f64>) -> Mat<f64> {
-    Mat::from_fn(shapes.nrows(), shapes.ncols(), |row, j| {
-        let (node, k) = (row / 3, row % 3);
+/// Shapes (3n x nf) from body axes to the rows of the model.
+fn in_model_axes(shapes: &Mat<f64>, axes: &nalgebra::Matrix3<f64>, dimension: usize) -> Mat<f64> {
+    Mat::from_fn(shapes.nrows() / 3 * dimension, shapes.ncols(), |row, j| {
+        let (node, k) = (row / dimension, row % dimension);
         (0..3).map(|l| axes[(k, l)] * shapes[(3 * node + l, j)]).sum()
     })
 }

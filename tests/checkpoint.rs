@@ -30,11 +30,7 @@ fn settings(count: usize, method: Method) -> ModeSettings {
 }
 
 /// Modes, and every snapshot that was taken on the way.
-fn modes(
-    model: &FeModel,
-    settings: &ModeSettings,
-    start: Option<&Snapshot>,
-) -> (ModalBasis, Vec<Snapshot>) {
+fn modes(model: &FeModel, settings: &ModeSettings, start: Option<&Snapshot>) -> (ModalBasis, Vec<Snapshot>) {
     let taken = Mutex::new(Vec::new());
     let save = |snapshot: &Snapshot| taken.lock().expect("one thread").push(snapshot.clone());
     let resume = Resume { start, save: Some(&save) };

@@ -237,6 +237,36 @@ fn json_tells_errors_too() {
 }
 
 #[test]
+fn json_tells_usage_errors_too() {
+    let folder = model();
+    for (line, said) in [
+        ("--json", "unexpected argument '--json' found"),
+        ("melt --json", "unrecognized subcommand 'melt'"),
+        (
+            "convert --json model.toml",
+            "the following required arguments were not provided: --output <BODY.flex.h5>",
+        ),
+        (
+            "convert model.toml -o b.h5 --modes ten --json",
+            "invalid value 'ten' for '--modes <N>': invalid digit",
+        ),
+        ("convert model.toml -o b.h5 --report b.pdf --json", "report b.pdf has no known extension"),
+    ] {
+        let run = flexbody(folder.path(), line);
+        assert_eq!((run.code, run.err.as_str()), (2, ""), "{line}");
+        let json = run.json();
+        assert_eq!((&json["exit_code"], &json["errors"]), (&2.into(), &1.into()), "{line}");
+        let diagnostic = &json["diagnostics"][0];
+        assert_eq!(diagnostic["code"], "FB801", "{line}");
+        assert!(diagnostic["message"].as_str().unwrap().starts_with(said), "{line}: {diagnostic}");
+    }
+    // Help stays text; what stands behind `--` is no option.
+    assert!(done(folder.path(), "convert --json --help").out.starts_with("Make a flexible body"));
+    let run = flexbody(folder.path(), "inspect -- a --json");
+    assert!(run.code == 2 && run.out.is_empty() && run.err.starts_with("error: unexpected"), "{}", run.err);
+}
+
+#[test]
 fn quiet_prints_errors_only() {
     let folder = model();
     let run = done(folder.path(), "convert model.toml -o b.h5 --accuracy fast --quiet");

@@ -157,7 +157,7 @@ fn free_modes_stay_what_they_are_and_proved() {
     let count = psi.ncols();
     let mass = gram(psi, pencil.apply_mass(psi).as_ref());
     assert!((mass - Mat::<f64>::identity(count, count)).norm_max() < 1e-13);
-    let rigid = flexbody::model::rigid_fields(&model.nodes().positions, [0.0; 3], 1.0);
+    let rigid = flexbody::model::rigid_fields(&model.nodes().positions, 3, [0.0; 3], 1.0);
     let momentum = gram(rigid.as_ref(), pencil.apply_mass(psi).as_ref());
     assert!(momentum.norm_max() < 1e-12, "{:e}", momentum.norm_max());
 }

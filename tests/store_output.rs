@@ -133,3 +133,16 @@ mod unix {
         assert_eq!(mode(&output), mode(&ordinary));
     }
 }
+
+#[test]
+fn a_lock_that_another_process_holds_does_not_keep_a_body_from_being_read() {
+    // A program started while a file is open inherits the lock, and holds it until it ends.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.flex.h5");
+    let written = body(3, 4, 2, 1, 1);
+    store::write(&written, &path).unwrap();
+    let locked = std::fs::File::open(&path).unwrap();
+    locked.lock().unwrap();
+    assert_eq!(store::read(&path).unwrap(), written);
+    assert_eq!(store::validate(&path), vec![]);
+}

@@ -3,16 +3,40 @@
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::EigenFailure;
 use crate::error::Error;
-use crate::model::FeModel;
+use crate::model::{FeModel, rigid_count};
 use faer::Mat;
+
+/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then. Energies are
+/// another matter: they come from K in double precision.
+fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
+    let (code, why) = match failure {
+        EigenFailure::NotConverged { converged, wanted } => {
+            (Code::NotConverged, format!("{converged} of {wanted} modes converged"))
+        }
+        EigenFailure::NotPositiveDefinite { shift } => {
+            (Code::FactorizationFailed, format!("rounded, K + {shift:.3e} M is not positive definite"))
+        }
+        EigenFailure::Inaccurate { residual } => {
+            (Code::FactorizationFailed, format!("a probe has a relative residual of {residual:.1e}"))
+        }
+        _ => return None,
+    };
+    let message = format!("the modes cannot be found with a single-precision factor: {why}");
+    Some(
+        Diagnostic::new(code, message)
+            .with_help("use --factor auto or f64: the model may be too thin, or unsound"),
+    )
+}
 
 /// Turns a failure of the eigen-solver into a diagnostic that names nodes.
 pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
+    let d = model.dimension();
+    let rigid = rigid_count(d);
     let moving = |vectors: &Mat<f64>| {
         let mut size: Vec<(usize, f64)> = (0..model.nodes().len())
             .map(|i| {
                 let square = (0..vectors.ncols())
-                    .flat_map(|j| (0..3).map(move |k| (3 * i + k, j)))
+                    .flat_map(|j| (0..d).map(move |k| (d * i + k, j)))
                     .map(|(r, j)| vectors[(r, j)].powi(2))
                     .sum::<f64>();
                 (i, square)
@@ -24,6 +48,10 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         named.join(", ")
     };
     let diagnostic = match failure {
+        EigenFailure::SinglePrecision(failure) => match too_poor(&failure) {
+            Some(found) => found,
+            None => return explain(model, *failure),
+        },
         EigenFailure::NotConverged { converged, wanted } => {
             Diagnostic::new(Code::NotConverged, format!("{converged} of {wanted} modes converged"))
         }
@@ -38,15 +66,21 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         EigenFailure::MassIndefinite => {
             Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
         }
-        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => Diagnostic::new(
-            Code::Mechanism,
-            format!(
-                "{} zero-energy modes: six rigid ones and {count} more (lambda {:.1e}), which move nodes {} most",
-                count + 6,
-                eigenvalues.iter().fold(0.0f64, |m, l| m.max(l.abs())),
-                moving(&vectors)
-            ),
-        ),
+        // Their eigenvalues are rounding: no two machines would print the same.
+        EigenFailure::ZeroEnergy { count, vectors, .. } => {
+            let (all, moved) = (count + rigid, moving(&vectors));
+            let message = format!(
+                "{all} zero-energy modes: {rigid} rigid ones and {count} more, which move nodes {moved} most"
+            );
+            if all % rigid == 0 {
+                let message = format!("{message}; {} separate bodies have as many", all / rigid);
+                Diagnostic::new(Code::Mechanism, message).with_help(
+                    "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
+                )
+            } else {
+                Diagnostic::new(Code::Mechanism, message)
+            }
+        }
         EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
             Code::CompletenessFailed,
             format!(

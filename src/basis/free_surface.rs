@@ -6,10 +6,12 @@ use super::modal_basis::{Basis, ModalBasis, Task, input_error};
 use super::residual_vectors::{NamedLoads, with_residual_vectors};
 use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve};
+use crate::eigen::{
+    Accuracy, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve,
+};
 use crate::error::Result;
 use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
-use crate::model::{FeModel, centre_and_length};
+use crate::model::{FeModel, centre_and_length, rigid_count};
 use crate::progress::Watch;
 use faer::{Mat, MatRef};
 
@@ -34,7 +36,7 @@ impl Basis for FreeSurface {
         if self.residual_vectors.is_empty() {
             return modes();
         }
-        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
         let rigid = rigid_modes(&pencil, &model.nodes().positions)?;
         let problem = EigenProblem {
             pencil,
@@ -89,7 +91,7 @@ fn compute(
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    let pencil = Pencil::new(model.stiffness(), scalar_mass, 3);
+    let pencil = Pencil::new(model.stiffness(), scalar_mass, model.dimension());
     let positions = &model.nodes().positions;
     let rigid = rigid_modes(&pencil, positions)?;
     let first_estimate = quadratic_estimate(&pencil, positions, rigid.as_ref());
@@ -102,7 +104,7 @@ fn compute(
     };
     let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
     let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
-    describe(&basis.solution, settings, scalar_mass, &mut basis.diagnostics);
+    describe(&basis.solution, settings, &pencil, &mut basis.diagnostics);
     basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
     Ok(basis)
 }
@@ -124,11 +126,12 @@ fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> O
 fn describe(
     solution: &EigenSolution,
     settings: &ModeSettings,
-    scalar_mass: &SymmetricMatrix,
+    pencil: &Pencil<'_>,
     notes: &mut Vec<Diagnostic>,
 ) {
     let given = solution.eigenvalues.len();
-    let at_most = 3 * scalar_mass.n() - 6;
+    let (scalar_mass, dimension) = (pencil.mass(), pencil.block());
+    let at_most = pencil.n() - rigid_count(dimension);
     // Known from the rank of Ms, or because all there are were found.
     let mut finite = solution.finite_modes;
     if let Wanted::Lowest(wanted) = settings.wanted
@@ -147,7 +150,7 @@ fn describe(
         }
         None if massless > 0 => Some(format!(
             "nodes without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
-            at_most - 3 * massless
+            at_most - dimension * massless
         )),
         _ => None,
     };
@@ -167,7 +170,13 @@ fn describe(
     if solution.completeness.proof == Proof::NotProved {
         let message =
             format!("completeness of the {given} modes is not proved: {}", solution.completeness.remark);
-        notes.push(Diagnostic::new(Code::CompletenessUnproved, message));
+        let note = Diagnostic::new(Code::CompletenessUnproved, message);
+        notes.push(match settings.accuracy {
+            Accuracy::Fast => note,
+            _ => note.with_help(
+                "the modes keep their accuracy; a larger --memory-limit or machine allows the proof",
+            ),
+        });
     }
 }
 
@@ -176,13 +185,14 @@ fn describe(
 fn quadratic_estimate(pencil: &Pencil<'_>, positions: &[[f64; 3]], rigid: MatRef<'_, f64>) -> f64 {
     let (centre, length) = centre_and_length(positions);
     let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
-    let mut fields = Mat::zeros(pencil.n(), 27);
+    let d = pencil.block();
+    let mut fields = Mat::zeros(pencil.n(), exponents.len() * d);
     for (i, x) in positions.iter().enumerate() {
         let r = [0, 1, 2].map(|k| (x[k] - centre[k]) / length);
         for (e, &(a, b)) in exponents.iter().enumerate() {
             let value = r[a] * r.get(b).copied().unwrap_or(1.0);
-            for k in 0..3 {
-                fields[(3 * i + k, 3 * e + k)] = value;
+            for k in 0..d {
+                fields[(d * i + k, d * e + k)] = value;
             }
         }
     }

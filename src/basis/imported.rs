@@ -17,7 +17,7 @@ use faer::Mat;
 /// Shapes in the order of a model's degrees of freedom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedShapes {
-    /// 3n x k, row 3 i + k.
+    /// d n x k, row d i + k, d the dimension.
     shapes: Mat<f64>,
     digits: u8,
     source: Option<SourceFile>,
@@ -52,7 +52,7 @@ impl Basis for ImportedShapes {
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         let Task { model, settings, resume, watch } = *task;
-        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
         let rigid = rigid_modes(&pencil, &model.nodes().positions)?;
         let criterion = self.dependent();
         let failed = |failure| explain(model, failure);

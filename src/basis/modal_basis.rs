@@ -68,6 +68,9 @@ pub struct ModalBasis {
 /// Relative energy of rigid motion above which the first mode is not a free mode: the body is tied to ground weakly.
 const RIGID_ENERGY: f64 = 0.05;
 
+/// Decimal digits of numbers written without loss.
+const ALL_DIGITS: u8 = 17;
+
 /// Noise of lambda above which the user is told.
 const NOISE_TOLD: f64 = 1e-6;
 
@@ -122,7 +125,14 @@ impl ModalBasis {
                 "the {} digits of the stiffness values leave a relative noise of {noise:.0e} in the lowest eigenvalues",
                 model.digits()
             );
-            diagnostics.push(Diagnostic::new(Code::NoiseFloor, message));
+            let diagnostic = Diagnostic::new(Code::NoiseFloor, message);
+            diagnostics.push(if model.digits() < ALL_DIGITS {
+                diagnostic
+            } else {
+                diagnostic.with_help(
+                    "double precision holds no more digits: expect no better of a body as thin or stiff as this",
+                )
+            });
         }
         let provenance = vec![provenance.to_owned(); solution.eigenvalues.len()];
         Ok(Self { solution, rigid_noise, input_noise, provenance, truncation: Vec::new(), diagnostics })

@@ -54,7 +54,8 @@ pub(super) fn independent(
     let mut products = pencil.apply_mass(shapes.as_ref());
     let mut moving = vec![true; k];
     for (j, square) in column_products(shapes.as_ref(), products.as_ref()).into_iter().enumerate() {
-        let bound: f64 = pencil.mass_diagonal().zip(shapes.col(j).iter()).map(|(m, s)| m * s * s).sum();
+        let bound: f64 =
+            pencil.mass_diagonal().iter().zip(shapes.col(j).iter()).map(|(m, s)| m * s * s).sum();
         if square < -MASSLESS.sqrt() * bound {
             return None;
         }

@@ -16,6 +16,7 @@ use crate::progress::{Event, Watch};
 use crate::provenance::SourceFile;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::HashSet;
 
 /// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
 const LEFT: f64 = 1e-8;
@@ -87,14 +88,17 @@ impl Loads {
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
-    let mut loads = Vec::new();
-    for (k, l) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] {
+    let (mut loads, d) = (Vec::new(), model.dimension());
+    // A plane body spins about z alone.
+    let spins: &[(usize, usize)] =
+        if d == 2 { &[(2, 2)] } else { &[(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] };
+    for &(k, l) in spins {
         // The acceleration w x (w x x) = (w w' - w'w I) x. Where its origin lies makes a rigid motion of difference.
         let mut outward = Mat::zeros(problem.pencil.n(), 1);
         for (i, x) in model.nodes().positions.iter().enumerate() {
-            let mut add = |component: usize, value: f64| outward[(3 * i + component, 0)] += value;
+            let mut add = |component: usize, value: f64| outward[(d * i + component, 0)] += value;
             if k == l {
-                (0..3).filter(|&c| c != k).for_each(|c| add(c, x[c]));
+                (0..d).filter(|&c| c != k).for_each(|c| add(c, x[c]));
             } else {
                 add(k, -x[l]);
                 add(l, -x[k]);
@@ -107,10 +111,11 @@ fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<
 }
 
 fn interfaces(model: &FeModel) -> Vec<(String, Mat<f64>)> {
-    let nodes = model.nodes();
+    let (nodes, d) = (model.nodes(), model.dimension());
     let mut loads = Vec::new();
     for set in model.interfaces() {
-        let places: Vec<usize> = (0..nodes.len()).filter(|&i| set.nodes.contains(&nodes.ids[i])).collect();
+        let members: HashSet<i64> = set.nodes.iter().copied().collect();
+        let places: Vec<usize> = (0..nodes.len()).filter(|&i| members.contains(&nodes.ids[i])).collect();
         let count = places.len() as f64;
         let at = |i: usize| Vector3::from(nodes.positions[i]);
         let centre = places.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / count;
@@ -120,17 +125,17 @@ fn interfaces(model: &FeModel) -> Vec<(String, Mat<f64>)> {
         // Nodes on one line transmit no torque about it, a single node none at all.
         let inverse = inertia.pseudo_inverse(1e-12 * inertia.trace()).unwrap_or_else(|_| Matrix3::zeros());
         let mut push = |kind: &str, axis: usize, force: &dyn Fn(usize) -> Vector3<f64>| {
-            let mut load = Mat::zeros(3 * nodes.len(), 1);
+            let mut load = Mat::zeros(d * nodes.len(), 1);
             for (place, &i) in places.iter().enumerate() {
                 let force = force(place);
-                (0..3).for_each(|k| load[(3 * i + k, 0)] = force[k]);
+                (0..d).for_each(|k| load[(d * i + k, 0)] = force[k]);
             }
             loads.push((format!("{} {kind} {}", set.name, AXES[axis]), load));
         };
-        for axis in 0..3 {
+        for axis in 0..d {
             push("force", axis, &|_| Vector3::ith(axis, 1.0 / count));
         }
-        for axis in 0..3 {
+        for axis in if d == 2 { 2..3 } else { 0..3 } {
             let turn = inverse * Vector3::ith(axis, 1.0);
             push("torque", axis, &|place| turn.cross(&arms[place]));
         }

@@ -6,10 +6,10 @@ use crate::linalg::{Pencil, combine, gram, symmetric_eigen};
 use crate::model::{centre_and_length, rigid_fields};
 use faer::Mat;
 
-/// Six M-orthonormal rigid modes from the node positions.
+/// The M-orthonormal rigid modes from the node positions: six, in the plane three.
 pub(super) fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> {
     let (centre, length) = centre_and_length(positions);
-    let fields = rigid_fields(positions, centre, length);
+    let fields = rigid_fields(positions, pencil.block(), centre, length);
     let orthonormal = |r: &Mat<f64>| {
         let mass = gram(r.as_ref(), pencil.apply_mass(r.as_ref()).as_ref());
         let eigen = symmetric_eigen(mass.as_ref())?;
@@ -18,7 +18,7 @@ pub(super) fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result
         if eigen.values[0].is_nan() || eigen.values[0] <= 1e-14 * largest {
             return None;
         }
-        let root = Mat::from_fn(6, 6, |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+        let root = Mat::from_fn(r.ncols(), r.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
         Some(combine(r.as_ref(), root.as_ref()))
     };
     // Twice: the second pass removes what the condition of the first Gram matrix left.

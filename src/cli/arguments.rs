@@ -37,7 +37,7 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
     /// Manifest of the model (see docs/input.md)
-    #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "units"])]
+    #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "units", "dimension"])]
     pub model: Option<PathBuf>,
     /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
@@ -54,6 +54,9 @@ pub struct ConvertArguments {
     /// Units of length, mass and time [default: m,kg,s, not checked]
     #[arg(long, value_name = "L,M,T", requires = "stiffness")]
     pub units: Option<String>,
+    /// 2 for a plane model, with x and y only [default: 3]
+    #[arg(long, value_name = "N", requires = "stiffness", value_parser = clap::value_parser!(u8).range(2..=3))]
+    pub dimension: Option<u8>,
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
@@ -96,6 +99,9 @@ pub struct ConvertArguments {
     /// Keep the search for modes in this file; a run that was interrupted or asks for more modes goes on from it
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
+    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports and checkpoint likewise)
+    #[arg(long, conflicts_with_all = ["shapes", "residual_vectors"])]
+    pub split: bool,
     /// Threads; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,

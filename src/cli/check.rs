@@ -2,11 +2,12 @@
 
 use super::arguments::CheckArguments;
 use super::output::{Outcome, tell};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::input::{read_manifest, read_model};
 use crate::invariants::{BodyFrame, Expected, IdentityCheck, identities};
-use crate::model::FeModel;
+use crate::model::{FeModel, RawModel};
 use crate::report::{identities_json, identities_text};
 use crate::store;
 use crate::verification::{changed_sources, verify};
@@ -15,12 +16,24 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     let body = store::read(&arguments.body)?;
     let mut checks = own_identities(&body);
     if let Some(manifest) = &arguments.against {
-        let checked = FeModel::from_raw(read_model(&read_manifest(manifest)?)?)?;
-        tell(arguments.printing, &changed_sources(&body, &checked.model));
-        checks.extend(verify(&body, &checked.model)?);
+        let model = model_of(&body, read_model(&read_manifest(manifest)?)?)?;
+        tell(arguments.printing, &changed_sources(&body, &model));
+        checks.extend(verify(&body, &model)?);
     }
     let passed = checks.iter().all(|check| check.passed);
     Ok(Outcome { text: identities_text(&checks), json: format!("{:#}", identities_json(&checks)), passed })
+}
+
+/// The model that `body` was made of: all of `raw`, or one of the bodies in it.
+fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
+    let Some(number) = body.source().number else { return Ok(FeModel::from_raw(raw)?.model) };
+    let bodies = FeModel::bodies_from_raw(raw)?;
+    let of = bodies.len();
+    let found = bodies.into_iter().map(|checked| checked.model).find(|model| model.number() == Some(number));
+    found.ok_or_else(|| {
+        let message = format!("the file holds {number}, the model has {of}");
+        Diagnostic::new(Code::BodyIncomparable, message).into()
+    })
 }
 
 fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {

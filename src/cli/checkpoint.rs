@@ -82,10 +82,11 @@ impl ModelCheckpoint {
     }
 }
 
-/// What modes depend on: a line with role and SHA-256 of each file but the manifest and the interfaces, and the groups
-/// of HDF5 files that hold several matrices.
+/// What modes depend on: a line with role and SHA-256 of each file but the manifest, the damping and the interfaces, the groups
+/// of HDF5 files that hold several matrices, and which of several bodies it is.
 fn identity(files: &ModelFiles, model: &FeModel) -> String {
-    let relevant = model.sources().iter().filter(|s| !["manifest", "interface"].contains(&s.role.as_str()));
+    let relevant =
+        model.sources().iter().filter(|s| !["manifest", "interface", "damping"].contains(&s.role.as_str()));
     let group = |role: &str| {
         let location = match role {
             "stiffness" => &files.stiffness,
@@ -94,7 +95,8 @@ fn identity(files: &ModelFiles, model: &FeModel) -> String {
         };
         location.group.as_ref().map(|group| format!(" {group}")).unwrap_or_default()
     };
-    relevant.map(|s| format!("{} {}{}\n", s.role, s.sha256, group(&s.role))).collect()
+    let files = relevant.map(|s| format!("{} {}{}\n", s.role, s.sha256, group(&s.role)));
+    files.chain(model.number().map(|number| format!("{number}\n"))).collect()
 }
 
 /// The start and the keeper of a search, for a run with or without a checkpoint.

@@ -1,8 +1,9 @@
 //! `flexbody convert`.
 
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName};
-use super::checkpoint::{CheckpointFile, resume};
+use super::checkpoint::resume;
 use super::output::{Outcome, tell};
+use super::places::{Places, Reserved};
 use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
 use crate::basis::{BasisChoice, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads};
@@ -14,7 +15,7 @@ use crate::input::{
     InterfaceNodes, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
 };
 use crate::invariants::BodyFrame;
-use crate::model::FeModel;
+use crate::model::{CheckedModel, FeModel};
 use crate::output::OutputSlot;
 use crate::progress::Event;
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, render};
@@ -28,71 +29,154 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     refuse_contradictions(arguments)?;
     let loads = load_sets(arguments.residual_vectors.as_deref().unwrap_or(""))?;
     let files = model_files(arguments)?;
-    refuse_overwriting(arguments, &files, &schemes, &loads)?;
-    let slot = store::prepare_output(&arguments.output)?;
-    let report_slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let checkpoint = arguments.checkpoint.as_deref().map(CheckpointFile::open).transpose()?;
+    // How many bodies there are is known after reading; that outputs can be written, before.
+    let places = Places::of(arguments, arguments.split.then_some(1));
+    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads)?;
+    let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
 
-    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let lumped = schemes.into_iter().map(|scheme| scheme.read()).collect::<Result<Vec<_>>>()?;
+    let watcher = watcher(arguments, "reading");
+    let lumped = schemes.iter().map(Scheme::read).collect::<Result<Vec<_>>>()?;
     let raw = read_model(&files)?;
     watcher.hear(Event::Phase("checks"));
-    let checked = FeModel::from_raw(raw)?;
-    let model = checked.model;
-    let checkpoint = checkpoint.map(|file| file.for_model(&files, &model)).transpose()?;
-    let basis = basis(arguments, &loads, &model).inspect_err(|_| {
-        watcher.clear();
-        tell(arguments.printing, &checked.diagnostics);
-    })?;
-    let settings = ConvertSettings {
-        modes: ModeSettings {
-            wanted: wanted(arguments, model.units()),
-            accuracy: match arguments.accuracy {
-                AccuracyName::Fast => Accuracy::Fast,
-                AccuracyName::Standard => Accuracy::Standard,
-                AccuracyName::Certified => Accuracy::Certified,
-            },
-            method: Method::Auto,
-            factor: match arguments.factor {
-                FactorName::Auto => FactorChoice::Auto,
-                FactorName::F64 => FactorChoice::Always(Precision::Double),
-                FactorName::F32 => FactorChoice::Always(Precision::Single),
-            },
-            memory: memory_left(arguments.memory_limit),
-        },
-        basis,
-        frame: match arguments.frame {
-            FrameName::Principal => BodyFrame::Principal,
-            FrameName::Com => BodyFrame::Com,
-            FrameName::Model => BodyFrame::Model,
-        },
-        lumped,
-        lumped_modes: arguments.lumped_modes,
-    };
-    let resident = resident_bytes();
-    let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
-    let resume = resume(checkpoint.as_ref(), &save);
-    let conversion =
-        convert_resumed(&model, &settings, resume, &|event| watcher.hear(event)).inspect_err(|_| {
-            watcher.clear();
-            tell(arguments.printing, &checked.diagnostics);
-        })?;
-    watcher.hear(Event::Phase("writing"));
-    store::write_to(&conversion.body, slot)?;
-    let phases = watcher.finish();
-    let mut diagnostics = checked.diagnostics;
-    diagnostics.extend(conversion.diagnostics.iter().cloned());
-    let taken_up = conversion.counters.taken_up;
-    diagnostics.extend(checkpoint.into_iter().flat_map(|file| file.diagnostics(taken_up)));
-    tell(arguments.printing, &diagnostics);
-    let mut run = run_data(arguments, &conversion, diagnostics, phases, threads);
-    run.memory_estimate_bytes = conversion.plan.map(|plan| resident + plan.bytes);
-    let facts = Facts::new(&conversion.body, &run);
-    for (slot, format) in report_slots.into_iter().zip(&formats) {
-        slot.write(render(&facts, *format).as_bytes())?;
+    let job = Job { arguments, files: &files, lumped: &lumped, loads: &loads, formats: &formats, threads };
+    if !arguments.split {
+        let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
+        tell(arguments.printing, &done.diagnostics);
+        return done.finish();
     }
-    Ok(Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true })
+    let bodies = FeModel::bodies_from_raw(raw)?;
+    let mut all = vec![places];
+    all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
+    refuse_overwriting(arguments, &all, &files, &schemes, &loads)?;
+    let mut slots = vec![reserved];
+    for places in &all[1..] {
+        slots.push(places.reserve()?);
+    }
+    let (mut finished, mut told) = (Vec::<Done>::new(), Vec::new());
+    for ((checked, places), reserved) in bodies.into_iter().zip(&all).zip(slots) {
+        let number = checked.model.number().expect("every body of several has a number");
+        let watcher = if finished.is_empty() { &watcher } else { &self::watcher(arguments, "start") };
+        let done = job.convert(checked, places, reserved, watcher).map_err(|error| error.about(number))?;
+        // What holds for all of the matrices is told once.
+        let new: Vec<_> = done.diagnostics.iter().filter(|d| !told.contains(*d)).cloned().collect();
+        tell(arguments.printing, &new);
+        told.extend(new);
+        finished.push(done);
+    }
+    // Nothing appears before everything is done.
+    let outcomes = finished.into_iter().map(Done::finish).collect::<Result<Vec<_>>>()?;
+    let texts: Vec<String> = outcomes.iter().map(|outcome| outcome.text.clone()).collect();
+    let reports: Vec<&str> = outcomes.iter().map(|outcome| outcome.json.trim_end()).collect();
+    Ok(Outcome { text: texts.join("\n"), json: format!("[{}]", reports.join(",\n")), passed: true })
+}
+
+fn watcher(arguments: &ConvertArguments, first: &str) -> Watcher {
+    Watcher::new(arguments.printing.quiet || arguments.printing.json, first)
+}
+
+/// What every body of a run has in common.
+struct Job<'a> {
+    arguments: &'a ConvertArguments,
+    files: &'a ModelFiles,
+    lumped: &'a [Lumping],
+    loads: &'a [LoadSet],
+    formats: &'a [Format],
+    threads: usize,
+}
+
+/// A body with its files written, but not yet in their places.
+struct Done {
+    slots: Vec<OutputSlot>,
+    outcome: Outcome,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Done {
+    fn finish(self) -> Result<Outcome> {
+        self.slots.into_iter().try_for_each(OutputSlot::commit)?;
+        Ok(self.outcome)
+    }
+}
+
+impl Job<'_> {
+    fn convert(
+        &self,
+        checked: CheckedModel,
+        places: &Places,
+        reserved: Reserved,
+        watcher: &Watcher,
+    ) -> Result<Done> {
+        let Self { arguments, .. } = *self;
+        let CheckedModel { model, mut diagnostics } = checked;
+        let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, &model)).transpose()?;
+        let basis = basis(arguments, self.loads, &model).inspect_err(|_| {
+            watcher.clear();
+            tell(arguments.printing, &diagnostics);
+        })?;
+        let settings = self.settings(&model, basis);
+        let (resident, peak) = (resident_bytes(), peak_memory_bytes());
+        let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
+        let resume = resume(checkpoint.as_ref(), &save);
+        let conversion = convert_resumed(&model, &settings, resume, &|event| watcher.hear(event))
+            .inspect_err(|_| {
+                watcher.clear();
+                tell(arguments.printing, &diagnostics);
+            })?;
+        watcher.hear(Event::Phase("writing"));
+        store::fill_slot(&conversion.body, &reserved.body)?;
+        let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
+        let output = (places.body.display().to_string(), size);
+        let phases = watcher.finish();
+        let taken_up = conversion.counters.taken_up;
+        let late = checkpoint.into_iter().flat_map(|file| file.diagnostics(taken_up));
+        let found = conversion.diagnostics.iter().cloned().chain(late);
+        diagnostics.extend(found.map(|diagnostic| match model.number() {
+            Some(number) => diagnostic.about(number),
+            None => diagnostic,
+        }));
+        let mut run = run_data(output, &conversion, diagnostics.clone(), phases, self.threads);
+        // Reading may have taken more than the work will.
+        run.memory_estimate_bytes = conversion.plan.map(|plan| peak.unwrap_or(0).max(resident + plan.bytes));
+        let facts = Facts::new(&conversion.body, &run);
+        for (slot, format) in reserved.reports.iter().zip(self.formats) {
+            slot.fill(render(&facts, *format).as_bytes())?;
+        }
+        let outcome =
+            Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true };
+        let slots = std::iter::once(reserved.body).chain(reserved.reports).collect();
+        Ok(Done { slots, outcome, diagnostics })
+    }
+
+    fn settings(&self, model: &FeModel, basis: BasisChoice) -> ConvertSettings {
+        let Self { arguments, .. } = *self;
+        ConvertSettings {
+            modes: ModeSettings {
+                wanted: wanted(arguments, model.units()),
+                accuracy: match arguments.accuracy {
+                    AccuracyName::Fast => Accuracy::Fast,
+                    AccuracyName::Standard => Accuracy::Standard,
+                    AccuracyName::Certified => Accuracy::Certified,
+                },
+                method: Method::Auto,
+                factor: match arguments.factor {
+                    FactorName::Auto => FactorChoice::Auto,
+                    FactorName::F64 => FactorChoice::Always(Precision::Double),
+                    FactorName::F32 => FactorChoice::Always(Precision::Single),
+                },
+                memory: memory_left(arguments.memory_limit),
+                ..ModeSettings::default()
+            },
+            basis,
+            frame: match arguments.frame {
+                FrameName::Principal => BodyFrame::Principal,
+                FrameName::Com => BodyFrame::Com,
+                FrameName::Model => BodyFrame::Model,
+            },
+            lumped: self.lumped.to_vec(),
+            lumped_modes: arguments.lumped_modes,
+        }
+    }
 }
 
 /// Loads of residual vectors as named on the command line.
@@ -180,10 +264,10 @@ enum Scheme {
 }
 
 impl Scheme {
-    fn read(self) -> Result<Lumping> {
+    fn read(&self) -> Result<Lumping> {
         match self {
-            Self::Ready(lumping) => Ok(lumping),
-            Self::User(path) => read_nodal_masses(&path).map(Lumping::User),
+            Self::Ready(lumping) => Ok(lumping.clone()),
+            Self::User(path) => read_nodal_masses(path).map(Lumping::User),
         }
     }
 }
@@ -229,7 +313,8 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             nodes,
             arguments.dofs.clone(),
             arguments.units.as_deref(),
-        ),
+        )
+        .map(|files| ModelFiles { dimension: arguments.dimension.unwrap_or(files.dimension), ..files }),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
 }
@@ -237,6 +322,7 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
 /// No output may replace an input or another output.
 fn refuse_overwriting(
     arguments: &ConvertArguments,
+    outputs: &[Places],
     files: &ModelFiles,
     schemes: &[Scheme],
     loads: &[LoadSet],
@@ -257,13 +343,14 @@ fn refuse_overwriting(
         LoadSet::File(location) => Some(&location.path),
         _ => None,
     });
-    let inputs = matrices.chain(loads).chain(tables).chain(masses).chain(interfaces);
+    let damping = files.damping.as_ref().and_then(|damping| damping.matrix()).map(|place| Some(&place.path));
+    let inputs = matrices.chain(loads).chain(damping).chain(tables).chain(masses).chain(interfaces);
     let place = |path: &Path| {
         std::fs::canonicalize(path)
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
     };
     let mut taken: Vec<_> = inputs.flatten().map(|path| place(path)).collect();
-    for output in std::iter::once(&arguments.output).chain(&arguments.report).chain(&arguments.checkpoint) {
+    for output in outputs.iter().flat_map(Places::all) {
         let path = place(output);
         if taken.contains(&path) {
             let message = format!("output {} is an input or another output of this run", output.display());
@@ -295,7 +382,7 @@ fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
 }
 
 fn run_data(
-    arguments: &ConvertArguments,
+    output: (String, u64),
     conversion: &Conversion,
     diagnostics: Vec<Diagnostic>,
     phases: Vec<Phase>,
@@ -327,7 +414,6 @@ fn run_data(
             remark: pipeline.remark.clone(),
         })
         .collect();
-    let size = std::fs::metadata(&arguments.output).map(|meta| meta.len()).unwrap_or(0);
     RunData {
         phases,
         peak_memory_bytes: peak_memory_bytes(),
@@ -336,7 +422,7 @@ fn run_data(
         diagnostics,
         counters: counters.iter().map(|&(name, count)| (name.to_owned(), count)).collect(),
         accuracy: conversion.body.source().settings["accuracy"].as_str().unwrap_or_default().to_owned(),
-        output: Some((arguments.output.display().to_string(), size)),
+        output: Some(output),
         lumped_modes,
     }
 }

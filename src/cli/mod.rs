@@ -7,8 +7,9 @@ mod compare;
 mod convert;
 mod inspect;
 mod output;
+mod places;
 mod resources;
 mod watcher;
 
 pub use arguments::Arguments;
-pub use output::run;
+pub use output::{parse, run};

@@ -2,9 +2,10 @@
 
 use super::arguments::{Arguments, Command, Printing};
 use super::{check, compare, convert, inspect};
-use crate::diagnostic::{Diagnostic, Severity};
+use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{ExitCode, Result};
 use crate::report::diagnostics_json;
+use clap::Parser;
 use std::io::Write;
 
 /// What a command found: text for stdout (or JSON with `--json`), and whether its checks passed.
@@ -12,6 +13,30 @@ pub(super) struct Outcome {
     pub text: String,
     pub json: String,
     pub passed: bool,
+}
+
+/// The arguments of this process; where there is nothing to run, help or what is wrong is printed, and the exit code given.
+///
+/// # Errors
+/// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for a command line that is not understood.
+pub fn parse() -> std::result::Result<Arguments, ExitCode> {
+    Arguments::try_parse().map_err(|error| {
+        let json = std::env::args_os().take_while(|word| word != "--").any(|word| word == "--json");
+        if json && error.use_stderr() {
+            let printing = Printing { json, quiet: false };
+            return finish(printing, Err(Diagnostic::new(Code::Usage, first_paragraph(&error)).into()));
+        }
+        // Nobody is left to tell when the stream is closed.
+        let _ = error.print();
+        if error.use_stderr() { ExitCode::BadInput } else { ExitCode::Done }
+    })
+}
+
+/// What clap says is wrong, in one line, without its tips and its usage.
+fn first_paragraph(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
 }
 
 /// Runs the command and prints its outcome.

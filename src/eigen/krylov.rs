@@ -61,7 +61,7 @@ impl<'a> Krylov<'a> {
             coupling: Mat::zeros(0, 0),
             reach: 0,
             random: 0,
-            mass_diagonal: problem.pencil.mass_diagonal().collect(),
+            mass_diagonal: problem.pencil.mass_diagonal(),
         }
     }
 

@@ -12,6 +12,16 @@ pub enum Precision {
     Single,
 }
 
+impl Precision {
+    /// Bytes of a number.
+    fn bytes(self) -> u64 {
+        match self {
+            Self::Double => 8,
+            Self::Single => 4,
+        }
+    }
+}
+
 /// What the user says about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FactorChoice {
@@ -38,16 +48,20 @@ pub struct Plan {
     pub proof_too_large: Option<(u64, u64)>,
 }
 
-/// Work of a factorisation above which single precision is faster: below, the columns that its corrections solve cost
-/// what the factorisation saves.
-const SINGLE_PAYS: f64 = 4e11;
-
-/// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products, corrections.
+/// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products, corrections, and
+/// the copy of the basis that a checkpoint is written from.
 fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
     // Measured: five columns for each wanted mode.
-    let basis = (5 * wanted + 16).min(2 * wanted + 128) + 4 * wanted + 24;
-    let corrected = if precision == Precision::Single { 9 * wanted + 50 } else { 0 };
-    8 * (problem.pencil.n() * basis.max(corrected)) as u64
+    let basis = (5 * wanted + 16).min(2 * wanted + 128);
+    let searched = basis + 4 * wanted + 24;
+    let columns = match precision {
+        Precision::Double => searched,
+        // A span of twice its first size, 1.5 for each wanted mode, and the corrections, all with both products; one more
+        // while they are combined.
+        Precision::Single => (searched + 2 * wanted).max(15 * wanted + 128),
+    };
+    let saved = if problem.resume.save.is_some() { basis } else { 0 };
+    8 * (problem.pencil.n() * (columns + saved)) as u64
 }
 
 /// What an inertia count of `inertia` numbers needs, with the modes and their products.
@@ -68,8 +82,8 @@ impl Plan {
     ) -> Result<Self, EigenFailure> {
         let Peaks { factor, cholesky, inertia } = analysis.peaks(rayon::current_num_threads());
         let available = settings.memory.unwrap_or(u64::MAX);
-        let search = |precision| {
-            let size = if precision == Precision::Double { 8 } else { 4 };
+        let search = |precision: Precision| {
+            let size = precision.bytes();
             (size * cholesky).max(size * factor + vectors(problem, wanted, precision))
         };
         // The factor is given back before the count.
@@ -78,8 +92,8 @@ impl Plan {
         let precision = match settings.factor {
             _ if certified => Precision::Double,
             FactorChoice::Always(precision) => precision,
-            FactorChoice::Auto if with_slack(search(Precision::Double)) > available => Precision::Single,
-            FactorChoice::Auto if analysis.flops() > SINGLE_PAYS => Precision::Single,
+            FactorChoice::Auto if resident(search(Precision::Double)) > available => Precision::Single,
+            FactorChoice::Auto if analysis.flops() > settings.single_pays => Precision::Single,
             FactorChoice::Auto => Precision::Double,
         };
         let needed = if certified {
@@ -89,17 +103,15 @@ impl Plan {
         } else {
             search(precision)
         };
-        if with_slack(needed) > available {
-            return Err(EigenFailure::Memory { bytes: with_slack(needed), available });
+        if resident(needed) > available {
+            return Err(EigenFailure::Memory { bytes: resident(needed), available });
         }
-        let proof_too_large = (settings.accuracy != Accuracy::Fast && with_slack(count) > available)
-            .then_some((count, available));
-        let counted = settings.accuracy != Accuracy::Fast && proof_too_large.is_none();
-        let size = if precision == Precision::Double { 8 } else { 4 };
+        let count = if settings.accuracy == Accuracy::Fast { 0 } else { count };
+        let proof_too_large = (resident(count) > available).then_some((resident(count), available));
         Ok(Self {
             precision,
-            bytes: with_slack(if counted { needed.max(count) } else { needed }),
-            factor_bytes: size * factor,
+            bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
+            factor_bytes: precision.bytes() * factor,
             flops: analysis.flops(),
             single_failed: false,
             proof_too_large,
@@ -108,7 +120,7 @@ impl Plan {
 
     /// Bytes that an inertia count beside `found` modes needs.
     pub(super) fn count_bytes(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
-        with_slack(count_bytes(problem, analysis.peaks(rayon::current_num_threads()).inertia, found))
+        resident(count_bytes(problem, analysis.peaks(rayon::current_num_threads()).inertia, found))
     }
 
     /// The same in double precision, where that fits.
@@ -131,9 +143,11 @@ impl std::fmt::Display for Plan {
     }
 }
 
-/// What the allocator holds beyond what is in use (measured: 8 to 16 % of it), in blocks given back and not yet taken again.
-fn with_slack(bytes: u64) -> u64 {
-    bytes + bytes / 8
+/// What a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given back and not yet
+/// taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its own, and buffers of the dense
+/// products (measured on models of 4 000 to 20 000 degrees of freedom: 42 to 52 MB on one thread, 50 to 90 MB on two).
+fn resident(bytes: u64) -> u64 {
+    bytes + bytes / 8 + 24_000_000 + 24_000_000 * rayon::current_num_threads() as u64
 }
 
 /// Bytes in GB, or MB where that is less.

@@ -84,6 +84,8 @@ pub struct EigenSettings {
     pub method: Method,
     /// Precision of the factor.
     pub factor: FactorChoice,
+    /// Multiplications and additions of a factorisation above which [`FactorChoice::Auto`] tries single precision for its speed.
+    pub single_pays: f64,
     /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
     pub memory: Option<u64>,
 }
@@ -101,6 +103,8 @@ impl Default for EigenSettings {
             accuracy: Accuracy::Standard,
             method: Method::Auto,
             factor: FactorChoice::Auto,
+            // Below, the columns that its corrections solve cost what the factorisation saves.
+            single_pays: 4e11,
             memory: None,
         }
     }
@@ -189,6 +193,9 @@ pub enum EigenFailure {
         /// Modes asked for.
         wanted: usize,
     },
+    /// What a search with a single-precision factor came to, where double precision was not allowed or does not fit: often it
+    /// says nothing about the model.
+    SinglePrecision(Box<EigenFailure>),
     /// K + tau M is not positive definite: K or M is indefinite.
     NotPositiveDefinite {
         /// The shift tau.

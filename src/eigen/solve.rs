@@ -169,12 +169,16 @@ impl Sparse<'_> {
         let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, block: BLOCK, rough: false, attempt };
         let found = if self.plan.precision == Precision::Single {
             match single::search(problem, analysis, &goal, watch, counters) {
-                Err(failure) if self.settings.factor == FactorChoice::Auto => {
-                    let double = Plan::in_double(problem, self.settings, analysis, wanted);
-                    self.plan = Plan { single_failed: true, ..double.map_err(|_| failure)? };
+                Ok(found) => Some(found),
+                Err(failure) => {
+                    let double = match self.settings.factor {
+                        FactorChoice::Auto => Plan::in_double(problem, self.settings, analysis, wanted).ok(),
+                        FactorChoice::Always(_) => None,
+                    };
+                    let plan = double.ok_or_else(|| EigenFailure::SinglePrecision(Box::new(failure)))?;
+                    self.plan = Plan { single_failed: true, ..plan };
                     None
                 }
-                found => Some(found?),
             }
         } else {
             None

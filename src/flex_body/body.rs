@@ -16,10 +16,10 @@ pub struct FlexBody {
 impl FlexBody {
     /// Checks `parts` and makes a body of them.
     ///
-    /// With n nodes and nf modes: n >= 1, 1 <= nf <= 3n; every array has the shape that [`Parts`] states and
+    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1, 1 <= nf <= 3n; every array has the shape that [`Parts`] states and
     /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
     /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
-    /// names of lumping schemes and of interfaces are unique and not empty; interfaces name existing nodes;
+    /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty; interfaces name existing nodes;
     /// no text contains a NUL character (no file could hold it).
     ///
     /// # Errors
@@ -47,6 +47,11 @@ impl FlexBody {
     /// Number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.parts.modes.eigenvalue.len()
+    }
+
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    pub fn dimension(&self) -> usize {
+        self.parts.dimension
     }
 
     /// Provenance.

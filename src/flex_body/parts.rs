@@ -1,7 +1,7 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
 use crate::invariants::{DIGITS, Frame, Invariants};
-use crate::model::Nodes;
+use crate::model::{BodyNumber, Nodes};
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -13,6 +13,8 @@ pub struct Source {
     pub name: String,
     /// Files and fingerprints.
     pub files: Vec<SourceFile>,
+    /// Which body of several in the same matrices it is, where these were split.
+    pub number: Option<BodyNumber>,
     /// Number of matrix rows of the FE model.
     pub n_dofs: usize,
     /// `rotation-invariant`: M = Ms kron I3; `diagonal`: the same and diagonal; `general`: neither.
@@ -57,6 +59,8 @@ pub struct Modes {
     pub truncation: Vec<Truncation>,
     /// Modal damping ratios, 0 when none was given.
     pub damping_ratio: Vec<f64>,
+    /// Psi' D Psi (nf x nf), where damping was given. Unit: 1/time.
+    pub modal_damping: Option<Mat<f64>>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
     pub shape: Mat<f64>,
 }
@@ -128,6 +132,8 @@ pub struct Interface {
 pub struct Parts {
     /// Provenance.
     pub source: Source,
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    pub dimension: usize,
     /// Units of all numbers.
     pub units: UnitSystem,
     /// Body frame.

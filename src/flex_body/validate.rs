@@ -21,6 +21,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     let mut check = Check { problems: Vec::new() };
     let (n, nf) = (parts.nodes.ids.len(), parts.modes.eigenvalue.len());
     check.sizes(n, nf);
+    check.plane(parts);
     check.frame(parts);
     check.nodes(parts);
     check.modes(parts, n, nf);
@@ -40,6 +41,9 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.guarantee(parts, nf);
     check.interfaces(parts, n);
     check.text("source.name", &parts.source.name);
+    if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
+        check.add(format!("`source.number` is {number}"));
+    }
     check.text("certificate.remark", &c.remark);
     check.problems
 }
@@ -107,6 +111,29 @@ impl Check {
         }
     }
 
+    /// A plane body has its frame in the plane, and neither nodes nor modes leave it.
+    fn plane(&mut self, parts: &Parts) {
+        match parts.dimension {
+            3 => return,
+            2 => {}
+            other => return self.add(format!("`dimension` is {other}, expected 2 or 3")),
+        }
+        let z = parts.frame.axes.column(2);
+        if (z[0], z[1], z[2]) != (0.0, 0.0, 1.0) {
+            self.add(format!("`frame.axes` of a plane body have the third axis {z:?}, expected z"));
+        }
+        if let Some(i) = parts.nodes.positions.iter().position(|x| x[2] != 0.0) {
+            self.add(format!(
+                "`nodes.positions` of a plane body has z = {:e} at index {i}",
+                parts.nodes.positions[i][2]
+            ));
+        }
+        let shape = &parts.modes.shape;
+        if (0..shape.ncols()).any(|j| (2..shape.nrows()).step_by(3).any(|row| shape[(row, j)] != 0.0)) {
+            self.add("`modes.shape` of a plane body has components along z".to_owned());
+        }
+    }
+
     fn frame(&mut self, parts: &Parts) {
         let frame = &parts.frame;
         self.finite("frame.origin", frame.origin.iter().copied());
@@ -162,6 +189,9 @@ impl Check {
         }
         self.finite("modes.truncation", modes.truncation.iter().flat_map(|t| [t.before, t.after]));
         self.matrix("modes.shape", &modes.shape, 3 * n, nf);
+        if let Some(damping) = &modes.modal_damping {
+            self.matrix("modes.modal_damping", damping, nf, nf);
+        }
     }
 
     fn invariants(&mut self, name: &str, invariants: &Invariants, nf: usize) {

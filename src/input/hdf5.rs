@@ -93,8 +93,8 @@ fn search(file: &File, role: MatrixRole) -> Found<(String, Group)> {
         return Err(vec![layout("file holds no sparse matrix".into())]);
     }
     if let [(name, _)] = found.as_slice() {
-        let other = role.other().name();
-        if role.other().is_named(&last(name)) {
+        let named = |other: &&MatrixRole| **other != role && other.is_named(&last(name));
+        if let Some(other) = MatrixRole::ALL.iter().find(named).map(|other| other.name()) {
             let message = format!("the only matrix of the file, `{name}`, is named like the {other} matrix");
             let help = format!("if it is the {} matrix, name the group: FILE.h5:{name}", role.name());
             return Err(vec![layout(message).with_help(help)]);

@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-const TOP: &[&str] = &["model", "files", "interface"];
+mod damping;
+
+const TOP: &[&str] = &["model", "files", "interface", "damping"];
 const MODEL: &[&str] = &["name", "dimension", "units"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs"];
@@ -86,6 +88,7 @@ impl Walk<'_> {
             None => UnitSystem::default(),
         };
         let interfaces = self.interfaces(top);
+        let damping = self.damping(top);
         let Some((files, span)) = self.table(top, "files") else {
             if !top.contains_key("files") {
                 let message = "table [files] is missing".to_owned();
@@ -116,6 +119,7 @@ impl Walk<'_> {
             nodes: folder.join(nodes?),
             dofs: dofs.map(|dofs| folder.join(dofs)),
             interfaces: interfaces?,
+            damping,
             manifest: Some(self.path.to_path_buf()),
         })
     }
@@ -322,6 +326,7 @@ fn with_article(kind: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::damping::{BAND, DAMPING, RAYLEIGH};
     use super::*;
 
     /// The schema and the reader name the same keys.
@@ -339,6 +344,9 @@ mod tests {
             ("/properties/model/properties/units/properties", UNITS),
             ("/properties/files/properties", FILES),
             ("/properties/interface/items/properties", INTERFACE),
+            ("/properties/damping/properties", DAMPING),
+            ("/properties/damping/properties/bands/items/properties", BAND),
+            ("/properties/damping/properties/rayleigh/properties", RAYLEIGH),
         ] {
             let mut known: Vec<&str> = known.to_vec();
             known.sort_unstable();

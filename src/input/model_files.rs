@@ -2,6 +2,7 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
+use crate::model::Damping;
 use crate::units::UnitSystem;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,8 @@ pub struct ModelFiles {
     pub dofs: Option<PathBuf>,
     /// Named node sets.
     pub interfaces: Vec<InterfaceSource>,
+    /// Damping, where it is given.
+    pub damping: Option<Damping<MatrixLocation>>,
     /// The manifest, when there is one.
     pub manifest: Option<PathBuf>,
 }
@@ -114,6 +117,7 @@ impl ModelFiles {
             nodes: nodes.into(),
             dofs,
             interfaces: Vec::new(),
+            damping: None,
             manifest: None,
         })
     }

@@ -7,7 +7,7 @@ use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
-use crate::model::{NodeSet, RawMatrix, RawModel};
+use crate::model::{Damping, NodeSet, RawMatrix, RawModel};
 use crate::provenance::SourceFile;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -27,11 +27,11 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 /// and mechanics are the business of [`crate::model`].
 ///
 /// # Errors
-/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, interfaces.
+/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, interfaces.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let opened = OpenFiles::new(files);
     let (parsed, fingerprints) = rayon::join(|| parse(files, &opened), || opened.fingerprints());
-    let Parsed { manifest, stiffness, mass, nodes, dofs, interfaces } = parsed;
+    let Parsed { manifest, stiffness, mass, nodes, dofs, damping, interfaces } = parsed;
 
     let mut diagnostics = Vec::new();
     manifest.unwrap_or_else(|found| collect(&mut diagnostics, found));
@@ -39,6 +39,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let mass = take(&mut diagnostics, mass);
     let nodes = take(&mut diagnostics, nodes);
     let dofs = dofs.and_then(|dofs| take(&mut diagnostics, dofs));
+    let damping = damping.and_then(|damping| take(&mut diagnostics, damping));
     let interfaces: Vec<NodeSet> =
         interfaces.into_iter().filter_map(|interface| take(&mut diagnostics, interface)).collect();
     diagnostics.extend(stiffness.as_ref().and_then(few_digits));
@@ -58,6 +59,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         dofs,
         dofs_path: files.dofs.clone().unwrap_or_default(),
         interfaces,
+        damping,
         sources: sources(files, &fingerprints),
         diagnostics,
     })
@@ -79,6 +81,7 @@ struct Parsed {
     mass: Found<RawMatrix>,
     nodes: Found<crate::model::Nodes>,
     dofs: Option<Found<Vec<crate::model::DofLabel>>>,
+    damping: Option<Found<Damping<RawMatrix>>>,
     interfaces: Vec<Found<NodeSet>>,
 }
 
@@ -109,8 +112,10 @@ fn parse(files: &ModelFiles, opened: &OpenFiles) -> Parsed {
         Ok(NodeSet { name: interface.name.clone(), nodes })
     });
     let interfaces = interfaces.collect();
+    let damping = files.damping.as_ref();
+    let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
     let manifest = files.manifest.as_ref().map_or(Ok(()), |path| opened.get(path).map(|_| ()));
-    Parsed { manifest, stiffness, mass, nodes, dofs, interfaces }
+    Parsed { manifest, stiffness, mass, nodes, dofs, damping, interfaces }
 }
 
 fn read_opened(file: &InputFile, group: Option<&str>, role: MatrixRole) -> Result<RawMatrix> {
@@ -181,6 +186,8 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles.push((MatrixRole::Mass.name(), &files.mass.path));
     roles.push(("nodes", &files.nodes));
     roles.extend(files.dofs.as_deref().map(|path| ("dofs", path)));
+    let damping = files.damping.as_ref().and_then(Damping::matrix);
+    roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
     roles.extend(files.interfaces.iter().filter_map(|interface| match &interface.nodes {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),
         InterfaceNodes::Listed(_) => None,

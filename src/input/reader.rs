@@ -14,32 +14,32 @@ pub enum MatrixRole {
     Stiffness,
     /// M.
     Mass,
+    /// D.
+    Damping,
 }
 
 impl MatrixRole {
+    /// Every role.
+    pub const ALL: [Self; 3] = [Self::Stiffness, Self::Mass, Self::Damping];
+
     /// Its name in messages and in [`crate::provenance::SourceFile::role`].
     pub fn name(self) -> &'static str {
         match self {
             Self::Stiffness => "stiffness",
             Self::Mass => "mass",
+            Self::Damping => "damping",
         }
     }
 
-    /// Whether a matrix called `name` (any case) is meant to be this one: `K` or `stiffness`, `M` or `mass`.
+    /// Whether a matrix called `name` (any case) is meant to be this one: `K` or `stiffness`, `M` or `mass`, `D`
+    /// or `damping`.
     pub fn is_named(self, name: &str) -> bool {
         let letter = match self {
             Self::Stiffness => "k",
             Self::Mass => "m",
+            Self::Damping => "d",
         };
         name.eq_ignore_ascii_case(letter) || name.eq_ignore_ascii_case(self.name())
-    }
-
-    /// The other one.
-    pub fn other(self) -> Self {
-        match self {
-            Self::Stiffness => Self::Mass,
-            Self::Mass => Self::Stiffness,
-        }
     }
 }
 

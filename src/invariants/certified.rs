@@ -3,7 +3,7 @@
 //! The guarantee is about the numbers that a flex-body file holds: nodes, modes and axes as stored, M and K as given.
 //! What separates these modes from the exact ones is another matter (`/modes/shape_error`).
 
-use super::condense::{CHUNK, Columns, MAX_GROUPS, from_gram};
+use super::condense::{CHUNK, Columns, MAX_GROUPS, fill_symmetric, from_gram, group_length};
 use super::dense::worst;
 use super::derived::CYCLIC;
 use super::{CauchySchwarz, Invariants};
@@ -55,7 +55,7 @@ pub struct CertifiedInvariants {
 /// [`condense`](super::condense()) and K_ff = Psi' K Psi with compensated products and guaranteed digits.
 ///
 /// * `mass`, `positions`, `shapes`: as for [`condense`](super::condense()); body axes.
-/// * `stiffness`: K (3n x 3n), model axes.
+/// * `stiffness`: K (3n x 3n; of a plane body 2n x 2n), model axes.
 /// * `axes`: columns are the body axes in model axes.
 ///
 /// # Panics
@@ -69,8 +69,9 @@ pub fn condense_certified(
 ) -> CertifiedInvariants {
     assert_eq!(mass.n(), positions.len(), "rows of Ms and positions");
     assert!(
-        shapes.nrows() == 3 * positions.len() && stiffness.n() == shapes.nrows(),
-        "rows of shapes and stiffness: three per position"
+        shapes.nrows() == 3 * positions.len()
+            && (stiffness.n() == shapes.nrows() || stiffness.n() == 2 * positions.len()),
+        "rows of shapes: three per position; of the stiffness three or two"
     );
     let (gram, gram_error) = mass_gram(mass, Columns { positions, shapes });
     let (modal, modal_error) = modal_stiffness(stiffness, axes, shapes);
@@ -88,12 +89,7 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
         // Rows of X' beyond the block are the transpose of a later block.
         let end = (start + WIDTH).min(count);
         let block = gram_block(mass, columns, start..end);
-        for column in start..end {
-            for row in 0..=column {
-                gram[(row, column)] = block[row][column - start].hi;
-                gram[(column, row)] = gram[(row, column)];
-            }
-        }
+        fill_symmetric(&mut gram, start..end, |row, column| block[row][column - start].hi);
     }
     // sum_ij |x_i| |M_ij| |y_j| <= sqrt(sum_i rho_i x_i^2) sqrt(sum_i rho_i y_i^2) with rho_i the row sums of |M|.
     let weights: Vec<f64> = (0..n).map(|i| mass.row(i).1.iter().map(|v| v.abs()).sum()).collect();
@@ -108,20 +104,11 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
     (gram, error)
 }
 
-/// Rows of a group: the partition depends on the number of nodes only.
-fn group_length(n: usize) -> usize {
-    CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
-}
-
 /// Node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
 fn by_node(columns: Columns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
     let mut rows = vec![[0.0; WIDTH]; columns.positions.len()];
     rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
-        for (slot, column) in block.clone().enumerate() {
-            for (i, row) in rows.iter_mut().enumerate() {
-                row[slot] = columns.get(CHUNK * chunk + i, column);
-            }
-        }
+        columns.by_node(CHUNK * chunk, block.clone(), WIDTH, rows.as_flattened_mut());
     });
     rows
 }
@@ -196,11 +183,13 @@ fn modal_stiffness(
     axes: &Matrix3<f64>,
     shapes: MatRef<'_, f64>,
 ) -> (Mat<f64>, Mat<f64>) {
-    let (n, nf) = (shapes.nrows(), shapes.ncols());
+    let (n, nf) = (stiffness.n(), shapes.ncols());
+    // Rows of the stiffness per node: a plane body has none along z.
+    let d = n / (shapes.nrows() / 3).max(1);
     // Turned shapes as sums of two blocks of f64.
     let turned = |row: usize, p: usize| {
         (0..3).fold(DoubleDouble::default(), |sum, l| {
-            sum + DoubleDouble::product(axes[(row % 3, l)], shapes[(row - row % 3 + l, p)])
+            sum + DoubleDouble::product(axes[(row % d, l)], shapes[(row / d * 3 + l, p)])
         })
     };
     let (mut hi, mut lo) = (Mat::zeros(n, nf), Mat::zeros(n, nf));
@@ -210,8 +199,7 @@ fn modal_stiffness(
         for row in 0..n {
             let value = turned(row, p);
             (hi[(row, p)], lo[(row, p)]) = (value.hi, value.lo);
-            let terms: f64 =
-                (0..3).map(|l| (axes[(row % 3, l)] * shapes[(row - row % 3 + l, p)]).abs()).sum();
+            let terms: f64 = (0..3).map(|l| (axes[(row % d, l)] * shapes[(row / d * 3 + l, p)]).abs()).sum();
             size[p] += weights[row] * terms * terms;
         }
         size[p] = size[p].sqrt();
@@ -226,12 +214,9 @@ fn modal_stiffness(
         product.add(&multiply_compensated(stiffness, 1, lo.as_ref().subcols(start, width)));
         let (large, small) =
             (gram_compensated(hi.as_ref(), &product), gram_compensated(lo.as_ref(), &product));
-        for c in 0..width {
-            for i in 0..=start + c {
-                value[(i, start + c)] = (large[i][c] + small[i][c]).hi;
-                value[(start + c, i)] = value[(i, start + c)];
-            }
-        }
+        fill_symmetric(&mut value, start..start + width, |row, column| {
+            (large[row][column - start] + small[row][column - start]).hi
+        });
     }
     let error = Mat::from_fn(nf, nf, |i, j| ROOM * (U * value[(i, j)].abs() + terms * size[i] * size[j]));
     (value, error)

@@ -171,7 +171,7 @@ impl Columns<'_> {
     }
 
     /// Copies some columns of the nodes `first`, `first + 1`, ... into rows of `width` values, as many as there is room for.
-    fn by_node(&self, first: usize, columns: Range<usize>, width: usize, rows: &mut [f64]) {
+    pub fn by_node(&self, first: usize, columns: Range<usize>, width: usize, rows: &mut [f64]) {
         for (slot, column) in columns.enumerate() {
             for (k, row) in rows.chunks_exact_mut(width).enumerate() {
                 row[slot] = self.get(first + k, column);
@@ -213,14 +213,28 @@ fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>) -> Mat<f
         // Rows of X' beyond the panel are the transpose of a later panel.
         let end = (start + PANEL).min(n_columns);
         let panel = gram_panel(mass, columns, start..end);
-        for column in start..end {
-            for row in 0..=column {
-                gram[(row, column)] = panel[(row, column - start)];
-                gram[(column, row)] = gram[(row, column)];
-            }
-        }
+        fill_symmetric(&mut gram, start..end, |row, column| panel[(row, column - start)]);
     }
     gram
+}
+
+/// Some columns of a symmetric matrix down to the diagonal, and their mirror image.
+pub(super) fn fill_symmetric(
+    matrix: &mut Mat<f64>,
+    columns: Range<usize>,
+    value: impl Fn(usize, usize) -> f64,
+) {
+    for column in columns {
+        for row in 0..=column {
+            matrix[(row, column)] = value(row, column);
+            matrix[(column, row)] = matrix[(row, column)];
+        }
+    }
+}
+
+/// Nodes of a group: the partition depends on the number of nodes `n` only.
+pub(super) fn group_length(n: usize) -> usize {
+    CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
 }
 
 /// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the panel.
@@ -235,7 +249,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Rang
     let x = x.get();
     let x_lanes = x.as_chunks::<LANE>().0;
     let arch = Arch::new();
-    let group = CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1);
+    let group = group_length(n);
     let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
         .into_par_iter()
         .map(|g| {

@@ -133,6 +133,28 @@ pub fn choose_frame(
     Ok((frame, MassProperties { mass: m, centre_of_mass, inertia, principal_moments }))
 }
 
+/// The same for a body that stays in the plane z = 0: the third axis is z whatever the moments are, the first the axis of the
+/// smaller moment in the plane.
+///
+/// # Errors
+/// As [`choose_frame`].
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn choose_plane_frame(
+    mass: &SymmetricMatrix,
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+) -> Result<(Frame, MassProperties)> {
+    let (mut frame, mut properties) = choose_frame(mass, positions, choice)?;
+    if choice == BodyFrame::Principal {
+        let first = frame.axes.column(0).into_owned();
+        frame.axes = Matrix3::from_columns(&[first, Vector3::z().cross(&first), Vector3::z()]);
+        properties.principal_moments = (frame.axes.transpose() * properties.inertia * frame.axes).diagonal();
+    }
+    Ok((frame, properties))
+}
+
 fn bounding_box_middle(positions: &[[f64; 3]]) -> Vector3<f64> {
     let mut low = Vector3::repeat(f64::INFINITY);
     let mut high = Vector3::repeat(f64::NEG_INFINITY);

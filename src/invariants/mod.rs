@@ -22,7 +22,7 @@ pub use certified::{CertifiedInvariants, DIGITS, condense_certified};
 pub use comparison::{ERROR_NORMS, error_norms};
 pub use condense::condense;
 pub use derived::Derived;
-pub use frame::{BodyFrame, Frame, MassProperties, choose_frame};
+pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_plane_frame};
 pub use identities::{Expected, IdentityCheck, derived_identities, identities};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use primary::Invariants;

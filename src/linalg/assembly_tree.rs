@@ -72,7 +72,7 @@ impl AssemblyTree {
             }
         }
         sort_for_memory(&supernodes, &mut children);
-        let sequence = postorder(&roots, &children);
+        let sequence = postorder(&roots, |s| &children[s as usize]);
         let mut number = vec![NONE; count];
         for (new, &old) in sequence.iter().enumerate() {
             number[old as usize] = new as u32;
@@ -122,6 +122,11 @@ impl AssemblyTree {
             (columns.len() + at) as u32
         };
         self.rows(s).iter().map(place).collect()
+    }
+
+    /// Rows of the front of `s` that are eliminated, and those below them, with `block` rows per vertex.
+    pub fn front(&self, s: usize, block: usize) -> (usize, usize) {
+        (self.columns(s).len() * block, self.rows(s).len() * block)
     }
 
     /// Number of supernodes.
@@ -196,10 +201,8 @@ impl Columns {
             }
         }
         let (at, children) = children_of(&parent);
-        let lists: Vec<Vec<u32>> =
-            (0..n).map(|j| children[at[j] as usize..at[j + 1] as usize].to_vec()).collect();
         let roots: Vec<u32> = (0..n as u32).filter(|&j| parent[j as usize] == NONE).collect();
-        let sequence = postorder(&roots, &lists);
+        let sequence = postorder(&roots, |j| &children[at[j as usize] as usize..at[j as usize + 1] as usize]);
         let mut number = vec![NONE; n];
         for (new, &old) in sequence.iter().enumerate() {
             number[old as usize] = new as u32;
@@ -364,13 +367,13 @@ fn children_of(parent: &[u32]) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// Children before parents, without recursion: trees of slender bodies are as deep as they are long.
-fn postorder(roots: &[u32], children: &[Vec<u32>]) -> Vec<u32> {
+fn postorder<'a>(roots: &[u32], children: impl Fn(u32) -> &'a [u32]) -> Vec<u32> {
     let mut sequence = Vec::new();
     let mut stack: Vec<(u32, usize)> = Vec::new();
     for &root in roots {
         stack.push((root, 0));
         while let Some((vertex, next)) = stack.last_mut() {
-            if let Some(&child) = children[*vertex as usize].get(*next) {
+            if let Some(&child) = children(*vertex).get(*next) {
                 *next += 1;
                 stack.push((child, 0));
             } else {

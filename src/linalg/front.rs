@@ -8,7 +8,7 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
-use std::ops::{AddAssign, DivAssign, Mul, MulAssign, Neg, SubAssign};
+use std::ops::{AddAssign, Mul, Neg};
 
 /// Columns of a panel: large enough for products at full speed, small enough for its triangles to cost little.
 pub(super) const PANEL: usize = 128;
@@ -28,9 +28,6 @@ pub trait Real:
     + Sync
     + PartialOrd
     + AddAssign
-    + SubAssign
-    + MulAssign
-    + DivAssign
     + Mul<Output = Self>
     + Neg<Output = Self>
 {
@@ -201,8 +198,7 @@ fn subtract<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
 }
 
 /// Subtracts from one panel (rows from its own first column on) the product of the eliminated panels `left` with
-/// `right`: A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B. `offset` is the row of the
-/// eliminated trapezoid at which the panel starts.
+/// `right`: A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B.
 pub(super) fn subtract_eliminated<T: Real>(
     target: &mut [T],
     width: usize,

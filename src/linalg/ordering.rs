@@ -110,9 +110,13 @@ fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
     (status == metis_sys::rstatus_et_METIS_OK).then_some(order)
 }
 
-/// Connected component of every block of rows, numbered from 0 in the order of their first block.
-pub fn connected_components(a: &SymmetricMatrix, block: usize) -> Vec<usize> {
-    let vertices = a.n() / block;
+/// Connected component of every block of rows, numbered from 0 in the order of their first block. Any entry of any of
+/// the matrices, all of one size, connects.
+///
+/// # Panics
+/// When there is no matrix.
+pub fn connected_components(matrices: &[&SymmetricMatrix], block: usize) -> Vec<usize> {
+    let vertices = matrices[0].n() / block;
     let mut component = vec![usize::MAX; vertices];
     let mut count = 0;
     let mut stack = Vec::new();
@@ -123,10 +127,11 @@ pub fn connected_components(a: &SymmetricMatrix, block: usize) -> Vec<usize> {
         component[first] = count;
         stack.push(first);
         while let Some(vertex) = stack.pop() {
-            for row in vertex * block..(vertex + 1) * block {
+            let rows = vertex * block..(vertex + 1) * block;
+            for list in matrices.iter().flat_map(|matrix| rows.clone().map(|row| matrix.row(row).0)) {
                 // Entries of one block stand side by side: it is looked up once.
-                let mut known = vertex * block..(vertex + 1) * block;
-                for &column in a.row(row).0 {
+                let mut known = rows.clone();
+                for &column in list {
                     if known.contains(&(column as usize)) {
                         continue;
                     }
@@ -194,8 +199,11 @@ mod tests {
     #[test]
     fn components_are_numbered_in_the_order_of_their_first_block() {
         let (matrix, _) = scattered(500);
-        let component = connected_components(&matrix, 3);
+        let component = connected_components(&[&matrix], 3);
         assert!(component[..498].iter().all(|&c| c == 0));
         assert_eq!(component[498..], [1, 2]);
+        let tie = [(3 * 499, 4, 1e-300), (4, 3 * 499, 1e-300)];
+        let other = SymmetricMatrix::new(CscMatrix::from_triplets(1500, 1500, &tie)).expect("symmetric");
+        assert_eq!(connected_components(&[&matrix, &other], 3)[498..], [1, 0]);
     }
 }

@@ -56,17 +56,7 @@ impl<'a> Pencil<'a> {
     }
 
     /// The diagonal of M, row by row.
-    pub fn mass_diagonal(&self) -> impl Iterator<Item = f64> {
-        (0..self.n()).map(|i| self.mass_entry(i))
-    }
-
-    /// Entry i of the diagonal of K.
-    pub(super) fn stiffness_diagonal(&self, i: usize) -> f64 {
-        self.stiffness.as_csc().get(i, i)
-    }
-
-    /// Entry i of the diagonal of M.
-    pub(super) fn mass_entry(&self, i: usize) -> f64 {
-        self.mass.as_csc().get(i / self.block, i / self.block)
+    pub fn mass_diagonal(&self) -> Vec<f64> {
+        self.mass.diagonal().into_iter().flat_map(|m| std::iter::repeat_n(m, self.block)).collect()
     }
 }

@@ -320,6 +320,11 @@ impl SymmetricMatrix {
 
     /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every other.
     pub(super) fn with_raised_diagonal(&self, factor: f64) -> Self {
+        if self.diagonal().iter().all(|&d| d > 0.0)
+            && let Some(raised) = self.with_diagonal(|_, d| d * factor)
+        {
+            return raised;
+        }
         let mut triplets = Vec::with_capacity(self.0.nnz() + self.n());
         for j in 0..self.n() {
             let (rows, values) = self.row(j);

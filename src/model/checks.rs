@@ -1,14 +1,15 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
 use super::layout::{Layout, layout, name_some};
-use super::mass_structure::{ScalarMass, scalar_mass};
-use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
-use super::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
+use super::mass_structure::scalar_mass;
+use super::rigid::{centre_and_length, rigid_count, rigid_fields, rigid_residuals};
+use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{SymmetricMatrix, connected_components};
 use rayon::prelude::*;
 use std::collections::HashSet;
+use std::path::Path;
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -23,7 +24,42 @@ pub struct CheckedModel {
 ///
 /// # Errors
 /// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and rigid motion.
-pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
+pub fn check(raw: RawModel) -> Result<CheckedModel> {
+    let (assembled, found) = assemble(raw)?;
+    finish(assembled, None, found)
+}
+
+/// A model in the internal order whose matrices are sound by themselves.
+pub(super) struct Assembled {
+    /// What was read, without matrices, nodes and labels.
+    pub raw: RawModel,
+    /// Nodes with degrees of freedom.
+    pub nodes: Nodes,
+    /// K (d n x d n, d the dimension).
+    pub stiffness: SymmetricMatrix,
+    /// M (d n x d n).
+    pub mass: SymmetricMatrix,
+    /// Internal row of each matrix row; none when they are the same, or when this is one of several bodies.
+    pub row_to_internal: Option<Vec<u32>>,
+    /// Damping, a matrix in the same order.
+    pub damping: Option<Damping<SymmetricMatrix>>,
+}
+
+impl Assembled {
+    /// Rows per node.
+    pub fn dimension(&self) -> usize {
+        usize::from(self.raw.dimension)
+    }
+
+    /// Label of an internal row.
+    fn label(&self, row: usize) -> DofLabel {
+        let d = self.dimension();
+        DofLabel { node: self.nodes.ids[row / d], direction: (row % d) as u8 + 1 }
+    }
+}
+
+/// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes so far.
+pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)> {
     let mut found = std::mem::take(&mut raw.diagnostics);
     check_matrix(&raw.stiffness, "stiffness", &mut found);
     check_matrix(&raw.mass, "mass", &mut found);
@@ -32,12 +68,24 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
         let message = format!("stiffness matrix has {nk} rows, mass matrix {nm}");
         found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&raw.mass.path));
     }
-    if raw.dimension != 3 {
-        let message = format!("model has dimension {}", raw.dimension);
-        found.push(Diagnostic::new(Code::DimensionUnsupported, message));
+    if !(2..=3).contains(&raw.dimension) {
+        let message = format!("`dimension` is {}, expected 2 or 3", raw.dimension);
+        found.push(Diagnostic::new(Code::ManifestSyntax, message));
+    }
+    if let Some(problem) = raw.damping.as_ref().and_then(Damping::problem) {
+        found.push(Diagnostic::new(Code::ManifestSyntax, problem));
+    }
+    if let Some(damping) = raw.damping.as_ref().and_then(Damping::matrix) {
+        check_matrix(damping, "damping", &mut found);
+        let nd = damping.matrix.n_cols();
+        if nd != nk {
+            let message = format!("stiffness matrix has {nk} rows, damping matrix {nd}");
+            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&damping.path));
+        }
     }
     stop_on_error(&mut found)?;
 
+    let dimension = usize::from(raw.dimension);
     let layout = layout(&raw, &mut found);
     stop_on_error(&mut found)?;
     let layout = layout.expect("a missing layout comes with an error");
@@ -48,6 +96,10 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
     if nodes.positions.iter().flatten().any(|x| !x.is_finite()) {
         let message = "a node coordinate is not a finite number";
         found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
+    }
+    if let Some(i) = nodes.positions.iter().position(|x| dimension == 2 && x[2] != 0.0) {
+        let message = format!("node {} of a plane model has z = {}", nodes.ids[i], nodes.positions[i][2]);
+        found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
     }
     check_names(&raw, &mut found);
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
@@ -63,42 +115,64 @@ pub fn check(mut raw: RawModel) -> Result<CheckedModel> {
             found.push(Diagnostic::new(Code::InterfaceNode, message));
         }
     }
-    if nk <= 6 {
+    if nk <= rigid_count(dimension) {
         let message = format!("model has {nk} degrees of freedom");
         found.push(Diagnostic::new(Code::ModelTooSmall, message));
     }
     stop_on_error(&mut found)?;
 
-    let label = |row: usize| DofLabel { node: nodes.ids[row / 3], direction: (row % 3) as u8 + 1 };
+    let label =
+        |row: usize| DofLabel { node: nodes.ids[row / dimension], direction: (row % dimension) as u8 + 1 };
     let stiffness = symmetric(&mut raw.stiffness, &layout, "stiffness", label, &mut found);
     let mass = symmetric(&mut raw.mass, &layout, "mass", label, &mut found);
+    let damping = raw.damping.take().and_then(|damping| {
+        // Without the matrix there is an error among the diagnostics.
+        let mut ordered = |mut matrix: RawMatrix| {
+            let symmetric = symmetric(&mut matrix, &layout, "damping", label, &mut found)?;
+            check_diagonal(&symmetric, "damping", &matrix.path, label, &mut found);
+            Some(symmetric)
+        };
+        damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
+    });
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
     };
     check_diagonals(&stiffness, &mass, label, &raw, &mut found);
     stop_on_error(&mut found)?;
+    (raw.nodes, raw.dofs) = (Nodes::default(), None);
+    let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
+    Ok((Assembled { raw, nodes, stiffness, mass, row_to_internal, damping }, found))
+}
 
-    let scalar = match scalar_mass(&mass, block_tolerance(raw.mass.digits), label) {
+/// The checks of a body: its mass, its connections, its rigid motion.
+pub(super) fn finish(
+    body: Assembled,
+    number: Option<BodyNumber>,
+    mut found: Vec<Diagnostic>,
+) -> Result<CheckedModel> {
+    let label = |row: usize| body.label(row);
+    let raw = &body.raw;
+    let scalar = match scalar_mass(&body.mass, body.dimension(), block_tolerance(raw.mass.digits), label) {
         Ok(scalar) => Some(scalar),
         Err(diagnostic) => {
             found.push(diagnostic.in_file(&raw.mass.path));
             None
         }
     };
-    drop(mass);
-    check_connections(&stiffness, &nodes, &raw, &mut found);
-    let rigid_residual = check_rigid_motion(&stiffness, &nodes, &raw, label, &mut found);
+    check_connections(&body, &mut found);
+    let rigid_residual = check_rigid_motion(&body.stiffness, &body.nodes, raw, label, &mut found);
+    check_rigid_damping(&body, &mut found);
     stop_on_error(&mut found)?;
-    let ScalarMass { matrix: scalar_mass, deviation } = scalar.expect("a missing mass comes with an error");
+    let scalar = scalar.expect("a missing mass comes with an error");
+    let scalar_mass = &scalar.matrix;
     let diagonal_mass = (0..scalar_mass.n()).all(|i| scalar_mass.row(i).0.iter().all(|&j| j as usize == i));
     if diagonal_mass {
         let message = "mass matrix is diagonal: it was lumped before it came here";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }
-    check_plausibility(&scalar_mass, &nodes, &raw, &mut found);
-    let model = FeModel::new(raw, nodes, stiffness, scalar_mass, rigid_residual, deviation, diagonal_mass);
-    let model = if layout.is_identity() { model } else { model.reordered(layout.row_to_internal) };
+    check_plausibility(scalar_mass, &body.nodes, raw, &mut found);
+    let model = FeModel::new(body, scalar, rigid_residual, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found })
 }
 
@@ -221,20 +295,8 @@ fn check_diagonals(
     raw: &RawModel,
     found: &mut Vec<Diagnostic>,
 ) {
-    for (matrix, name, path) in
-        [(stiffness, "stiffness", &raw.stiffness.path), (mass, "mass", &raw.mass.path)]
-    {
-        let negative: Vec<DofLabel> =
-            matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
-        if !negative.is_empty() {
-            let message = format!(
-                "{} diagonal entries of the {name} matrix are negative: {}",
-                negative.len(),
-                name_some(&negative)
-            );
-            found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
-        }
-    }
+    check_diagonal(stiffness, "stiffness", &raw.stiffness.path, &label, found);
+    check_diagonal(mass, "mass", &raw.mass.path, &label, found);
     let empty = |m: &SymmetricMatrix, i: usize| m.row(i).0.is_empty();
     let both: Vec<DofLabel> =
         (0..stiffness.n()).filter(|&i| empty(stiffness, i) && empty(mass, i)).map(&label).collect();
@@ -244,27 +306,64 @@ fn check_diagonals(
     }
 }
 
-fn check_connections(
-    stiffness: &SymmetricMatrix,
-    nodes: &Nodes,
-    raw: &RawModel,
+fn check_diagonal(
+    matrix: &SymmetricMatrix,
+    name: &str,
+    path: &Path,
+    label: impl Fn(usize) -> DofLabel,
     found: &mut Vec<Diagnostic>,
 ) {
-    let component = connected_components(stiffness, 3);
-    let count = component.iter().max().map_or(0, |last| last + 1);
-    if count > 1 {
-        let mut sizes = vec![0usize; count];
-        let mut first = vec![0i64; count];
-        for (i, &c) in component.iter().enumerate().rev() {
-            sizes[c] += 1;
-            first[c] = nodes.ids[i];
-        }
-        let bodies: Vec<String> =
-            sizes.iter().zip(&first).map(|(size, id)| format!("{size} nodes with node {id}")).collect();
-        let message =
-            format!("stiffness connects the nodes to {count} separate bodies: {}", name_some(&bodies));
-        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
+    let negative: Vec<DofLabel> =
+        matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
+    if !negative.is_empty() {
+        let message = format!(
+            "{} diagonal entries of the {name} matrix are negative: {}",
+            negative.len(),
+            name_some(&negative)
+        );
+        found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
     }
+}
+
+/// K and M together make one body, and K alone holds it together.
+fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
+    let Assembled { raw, nodes, stiffness, mass, .. } = body;
+    let component = connected_components(&[stiffness], body.dimension());
+    if component.iter().all(|&c| c == 0) {
+        return;
+    }
+    let bodies = groups(&connected_components(&[stiffness, mass], body.dimension()), nodes);
+    if bodies.len() > 1 {
+        let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
+        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
+        return;
+    }
+    // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
+    let parts = groups(&component, nodes);
+    let message = format!(
+        "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
+        parts.len(),
+        in_words(&parts)
+    );
+    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
+}
+
+/// Node numbers of every component, in the order of their first nodes.
+pub(super) fn groups(component: &[usize], nodes: &Nodes) -> Vec<Vec<i64>> {
+    let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
+    for (&c, &id) in component.iter().zip(&nodes.ids) {
+        groups[c].push(id);
+    }
+    groups
+}
+
+/// `8 nodes (1, 2, 3, 4, 5 and 3 more), 1 node (9)`.
+pub(super) fn in_words(groups: &[Vec<i64>]) -> String {
+    let group = |nodes: &Vec<i64>| {
+        let plural = if nodes.len() == 1 { "" } else { "s" };
+        format!("{} node{plural} ({})", nodes.len(), name_some(nodes))
+    };
+    name_some(&groups.iter().map(group).collect::<Vec<_>>())
 }
 
 /// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body.
@@ -276,7 +375,7 @@ fn check_rigid_motion(
     found: &mut Vec<Diagnostic>,
 ) -> f64 {
     let (centre, length) = centre_and_length(&nodes.positions);
-    let fields = rigid_fields(&nodes.positions, centre, length);
+    let fields = rigid_fields(&nodes.positions, usize::from(raw.dimension), centre, length);
     let residuals = rigid_residuals(stiffness, &fields);
     let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
     // Node tables written with few digits leave 1e-6 without harm; supports leave 0.01 to 1.
@@ -302,6 +401,25 @@ fn check_rigid_motion(
         );
     }
     worst
+}
+
+/// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.
+fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
+    /// As much as node tables written with few digits leave.
+    const LIMIT: f64 = 1e-6;
+    let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
+    let (centre, length) = centre_and_length(&body.nodes.positions);
+    let residuals =
+        rigid_residuals(damping, &rigid_fields(&body.nodes.positions, body.dimension(), centre, length));
+    let damped = residuals.iter().filter(|r| **r > LIMIT).count();
+    if damped > 0 {
+        let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
+        let message = format!(
+            "D R is not zero for {damped} of {} rows: |D R| reaches {worst:.1e} of the row sum of |D|; only the damping of the modes is kept",
+            residuals.len()
+        );
+        found.push(Diagnostic::new(Code::DampingRigid, message));
+    }
 }
 
 /// Densities between aerogel and osmium, for the box around the nodes.

@@ -1,20 +1,24 @@
-//! The checked model: every used node has three displacements, DOF 3 i + k is direction k of node i.
+//! The checked model: every used node has d displacements (d: the dimension), DOF d i + k is direction k of node i.
 
-use super::{CheckedModel, DofLabel, NodeSet, Nodes, RawModel, check};
+use super::checks::Assembled;
+use super::mass_structure::ScalarMass;
+use super::{BodyNumber, CheckedModel, Damping, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
 use crate::error::Result;
 use crate::linalg::SymmetricMatrix;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
 
-/// A checked free body. Internal order of degrees of freedom: node-major x, y, z in the order of `nodes`.
+/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the order of `nodes`.
 #[derive(Debug, Clone)]
 pub struct FeModel {
     name: String,
+    dimension: usize,
     units: UnitSystem,
     nodes: Nodes,
     stiffness: SymmetricMatrix,
     scalar_mass: SymmetricMatrix,
+    damping: Option<Damping<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
     sources: Vec<SourceFile>,
     digits: u8,
@@ -23,6 +27,7 @@ pub struct FeModel {
     diagonal_mass: bool,
     /// Internal row of each matrix row; none when they are the same.
     row_to_internal: Option<Vec<u32>>,
+    number: Option<BodyNumber>,
 }
 
 impl FeModel {
@@ -34,40 +39,49 @@ impl FeModel {
         check(raw)
     }
 
+    /// The same for matrices that hold several bodies: each becomes a model of its own.
+    ///
+    /// # Errors
+    /// See [`check_bodies`].
+    pub fn bodies_from_raw(raw: RawModel) -> Result<Vec<CheckedModel>> {
+        check_bodies(raw)
+    }
+
     pub(super) fn new(
-        raw: RawModel,
-        nodes: Nodes,
-        stiffness: SymmetricMatrix,
-        scalar_mass: SymmetricMatrix,
+        body: Assembled,
+        mass: ScalarMass,
         rigid_residual: f64,
-        mass_deviation: f64,
         diagonal_mass: bool,
+        number: Option<BodyNumber>,
     ) -> Self {
+        let Assembled { raw, nodes, stiffness, damping, .. } = body;
         Self {
             digits: raw.stiffness.digits,
             name: raw.name,
+            dimension: usize::from(raw.dimension),
             units: raw.units,
             nodes,
             stiffness,
-            scalar_mass,
+            scalar_mass: mass.matrix,
+            damping,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
-            mass_deviation,
+            mass_deviation: mass.deviation,
             diagonal_mass,
-            row_to_internal: None,
+            row_to_internal: body.row_to_internal,
+            number,
         }
-    }
-
-    /// The same for matrices whose rows stood in another order: the internal row of each.
-    pub(super) fn reordered(mut self, row_to_internal: Vec<u32>) -> Self {
-        self.row_to_internal = Some(row_to_internal);
-        self
     }
 
     /// Model name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// 3, or 2 for a body in the plane: displacements per node.
+    pub fn dimension(&self) -> usize {
+        self.dimension
     }
 
     /// Units of all numbers.
@@ -80,14 +94,19 @@ impl FeModel {
         &self.nodes
     }
 
-    /// K (3n x 3n), row 3 i + k.
+    /// K (d n x d n), row d i + k.
     pub fn stiffness(&self) -> &SymmetricMatrix {
         &self.stiffness
     }
 
-    /// Ms (n x n): M = Ms kron I3.
+    /// Ms (n x n): M = Ms kron I_d.
     pub fn scalar_mass(&self) -> &SymmetricMatrix {
         &self.scalar_mass
+    }
+
+    /// Damping, where it was given; a matrix D is 3n x 3n, row 3 i + k.
+    pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
+        self.damping.as_ref()
     }
 
     /// Named node sets.
@@ -136,8 +155,13 @@ impl FeModel {
         ordered
     }
 
+    /// Which body of several in the same matrices it is; `None` for a model that was not split.
+    pub fn number(&self) -> Option<BodyNumber> {
+        self.number
+    }
+
     /// Label of an internal row.
     pub fn label(&self, row: usize) -> DofLabel {
-        DofLabel { node: self.nodes.ids[row / 3], direction: (row % 3) as u8 + 1 }
+        DofLabel { node: self.nodes.ids[row / self.dimension], direction: (row % self.dimension) as u8 + 1 }
     }
 }

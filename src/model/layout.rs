@@ -1,4 +1,5 @@
-//! From labelled matrix rows to the internal order: every used node with three displacements, node-major.
+//! From labelled matrix rows to the internal order: every used node with as many displacements as the model has dimensions,
+//! node-major.
 
 use super::{DofLabel, RawModel};
 use crate::diagnostic::{Code, Diagnostic};
@@ -7,7 +8,7 @@ use std::collections::HashMap;
 
 /// Where each matrix row goes.
 pub(super) struct Layout {
-    /// Internal index 3 i + k of each matrix row.
+    /// Internal index d i + k of each matrix row, d the dimension.
     pub row_to_internal: Vec<u32>,
     /// Indices into the node table of the used nodes, ascending.
     pub used: Vec<usize>,
@@ -35,6 +36,7 @@ pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
 /// Assigns the rows to nodes and directions; all that is wrong is collected into `found`.
 pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layout> {
     let n = raw.stiffness.matrix.n_cols();
+    let dimension = usize::from(raw.dimension);
     let implied: Vec<DofLabel>;
     let labels =
         match &raw.dofs {
@@ -50,11 +52,11 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
                 labels
             }
             None => {
-                if 3 * raw.nodes.len() != n {
+                if dimension * raw.nodes.len() != n {
                     let message = format!(
                         "{} nodes have {} displacements, but the matrices have {n} rows",
                         raw.nodes.len(),
-                        3 * raw.nodes.len()
+                        dimension * raw.nodes.len()
                     );
                     found.push(Diagnostic::new(Code::DofCount, message).in_file(&raw.nodes_path).with_help(
                         "give a dofs table that says which node and direction each matrix row is",
@@ -65,7 +67,7 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
                     .nodes
                     .ids
                     .iter()
-                    .flat_map(|&node| (1..=3).map(move |direction| DofLabel { node, direction }))
+                    .flat_map(|&node| (1..=raw.dimension).map(move |direction| DofLabel { node, direction }))
                     .collect();
                 &implied
             }
@@ -83,7 +85,17 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
         let message = format!("{} rotational degrees of freedom: {}", rotations.len(), name_some(&rotations));
         found.push(Diagnostic::new(Code::RotationsUnsupported, message).in_file(&raw.dofs_path));
     }
-    // Looked up once: the labels are three times as many as the nodes.
+    let normal: Vec<DofLabel> =
+        labels.iter().filter(|l| (raw.dimension + 1..=3).contains(&l.direction)).copied().collect();
+    if !normal.is_empty() {
+        let message = format!(
+            "{} degrees of freedom of a plane model lead out of the plane: {}",
+            normal.len(),
+            name_some(&normal)
+        );
+        found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.dofs_path));
+    }
+    // Looked up once: the labels are several times as many as the nodes.
     let places: Vec<Option<usize>> = labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
     let mut missing: Vec<i64> = labels
         .iter()
@@ -119,10 +131,10 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     let mut unused = Vec::new();
     for (i, rows) in row_of.iter().enumerate() {
         match rows.iter().filter(|&&row| row != u32::MAX).count() {
-            3 => used.push(i),
             0 => unused.push(raw.nodes.ids[i]),
+            given if given == dimension => used.push(i),
             _ => incomplete.extend(
-                (0..3u8)
+                (0..raw.dimension)
                     .filter(|&k| rows[usize::from(k)] == u32::MAX)
                     .map(|k| DofLabel { node: raw.nodes.ids[i], direction: k + 1 }),
             ),
@@ -130,7 +142,11 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     }
     if !incomplete.is_empty() {
         let message = format!("{} displacements are missing: {}", incomplete.len(), name_some(&incomplete));
-        found.push(Diagnostic::new(Code::DofIncomplete, message).in_file(&raw.dofs_path));
+        let mut diagnostic = Diagnostic::new(Code::DofIncomplete, message).in_file(&raw.dofs_path);
+        if used.is_empty() && incomplete.iter().all(|label| label.direction == 3) {
+            diagnostic = diagnostic.with_help("for a plane model, set `dimension = 2` (--dimension 2)");
+        }
+        found.push(diagnostic);
     }
     if found.len() > before {
         return None;
@@ -145,8 +161,8 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     }
     let mut row_to_internal = vec![0u32; n];
     for (internal, &node) in used.iter().enumerate() {
-        for (k, &row) in row_of[node].iter().enumerate() {
-            row_to_internal[row as usize] = (3 * internal + k) as u32;
+        for (k, &row) in row_of[node][..dimension].iter().enumerate() {
+            row_to_internal[row as usize] = (dimension * internal + k) as u32;
         }
     }
     Some(Layout { row_to_internal, used })

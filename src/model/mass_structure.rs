@@ -1,4 +1,4 @@
-//! The test M = Ms kron I3, block by block, and Ms itself.
+//! The test M = Ms kron I_d, block by block (d: the dimension), and Ms itself.
 
 use super::DofLabel;
 use crate::diagnostic::{Code, Diagnostic};
@@ -11,23 +11,24 @@ const NODES: usize = 2048;
 
 /// What the mass matrix turned out to be.
 pub(super) struct ScalarMass {
-    /// Ms: the mean of the three directions.
+    /// Ms: the mean of the directions.
     pub matrix: SymmetricMatrix,
     /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj).
     pub deviation: f64,
 }
 
-/// Reduces M (3n x 3n, internal order, symmetric) to Ms; `label` names a row for messages. Deviations up to `tolerance` are
+/// Reduces M (d n x d n, internal order, symmetric, d = `dimension`) to Ms; `label` names a row for messages. Deviations up to `tolerance` are
 /// rounding.
 pub(super) fn scalar_mass(
     m: &SymmetricMatrix,
+    dimension: usize,
     tolerance: f64,
     label: impl Fn(usize) -> DofLabel,
 ) -> Result<ScalarMass, Diagnostic> {
-    let n = m.n() / 3;
+    let n = m.n() / dimension;
     let chunks: Vec<Range<usize>> = (0..n).step_by(NODES).map(|i| i..(i + NODES).min(n)).collect();
     let parts: Vec<([f64; 3], f64)> =
-        chunks.par_iter().map(|nodes| directional_mass(m, nodes.clone())).collect();
+        chunks.par_iter().map(|nodes| directional_mass(m, dimension, nodes.clone())).collect();
     let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
     for (part, part_magnitude) in parts {
         for (total, part) in totals.iter_mut().zip(part) {
@@ -35,24 +36,26 @@ pub(super) fn scalar_mass(
         }
         magnitude += part_magnitude;
     }
-    let mean = totals.iter().sum::<f64>() / 3.0;
+    let totals = &totals[..dimension];
+    let mean = totals.iter().sum::<f64>() / dimension as f64;
     if mean.is_nan() || mean <= tolerance * magnitude {
         let message = format!("total mass is {mean:e}");
         return Err(Diagnostic::new(Code::MassNotPositive, message));
     }
     let spread = totals.iter().fold(0.0f64, |s, t| s.max((t - mean).abs())) / mean;
     if spread > tolerance.max(1e-9) {
-        let [x, y, z] = totals;
-        let message = format!("total mass is {x} along x, {y} along y and {z} along z");
+        let along: Vec<String> =
+            totals.iter().zip(["x", "y", "z"]).map(|(total, axis)| format!("{total} along {axis}")).collect();
+        let message = format!("total mass is {}", along.join(", "));
         return Err(Diagnostic::new(Code::MassDirectional, message));
     }
     let diagonal = m.diagonal();
     let size = |d: &[f64]| d.iter().fold(0.0f64, |s, d| s.max(d.abs())).sqrt();
-    let sizes: Vec<f64> = diagonal.chunks_exact(3).map(size).collect();
+    let sizes: Vec<f64> = diagonal.chunks_exact(dimension).map(size).collect();
     // Massless nodes have no scale of their own: compare with the mean nodal mass.
     let smallest = f64::EPSILON * mean / n as f64;
     let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
-    let parts: Vec<Part> = chunks.into_par_iter().map(|nodes| reduce(m, nodes, scale)).collect();
+    let parts: Vec<Part> = chunks.into_par_iter().map(|nodes| reduce(m, dimension, nodes, scale)).collect();
     let entries = parts.iter().map(|part| part.row_idx.len()).sum();
     let (mut worst, mut worst_at) = (0.0f64, (0, 0));
     let mut col_ptr = Vec::with_capacity(n + 1);
@@ -78,20 +81,20 @@ pub(super) fn scalar_mass(
     }
     let csc = CscMatrix::from_parts(n, n, col_ptr, row_idx, values);
     let matrix = SymmetricMatrix::new(csc)
-        .expect("the mean of three entries is symmetric because each of them is, to the bit");
+        .expect("the mean of entries is symmetric because each of them is, to the bit");
     Ok(ScalarMass { matrix, deviation: worst })
 }
 
-/// Sum of M along each direction over the rows of some nodes, and a third of the sum of the absolute values.
-fn directional_mass(m: &SymmetricMatrix, nodes: Range<usize>) -> ([f64; 3], f64) {
+/// Sum of M along each direction over the rows of some nodes, and the mean of the sums of the absolute values.
+fn directional_mass(m: &SymmetricMatrix, dimension: usize, nodes: Range<usize>) -> ([f64; 3], f64) {
     let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
     for node in nodes {
-        for (k, total) in totals.iter_mut().enumerate() {
-            let (columns, values) = m.row(3 * node + k);
+        for (k, total) in totals[..dimension].iter_mut().enumerate() {
+            let (columns, values) = m.row(dimension * node + k);
             for (&j, &v) in columns.iter().zip(values) {
-                if j % 3 == k as u32 {
+                if j as usize % dimension == k {
                     *total += v;
-                    magnitude += v.abs() / 3.0;
+                    magnitude += v.abs() / dimension as f64;
                 }
             }
         }
@@ -110,30 +113,38 @@ struct Part {
 }
 
 /// Reduces the rows of some nodes; deviations are relative to `scale` of the two nodes.
-fn reduce(m: &SymmetricMatrix, nodes: Range<usize>, scale: impl Fn(usize, usize) -> f64) -> Part {
+fn reduce(
+    m: &SymmetricMatrix,
+    dimension: usize,
+    nodes: Range<usize>,
+    scale: impl Fn(usize, usize) -> f64,
+) -> Part {
+    let d = dimension as u32;
     let mut part = Part::default();
     for node in nodes {
-        let rows = [0, 1, 2].map(|k| m.row(3 * node + k));
+        let rows: Vec<_> = (0..dimension).map(|k| m.row(dimension * node + k)).collect();
         let mut at = [0usize; 3];
-        // The three rows are merged: blocks come in the order of the other node.
-        while let Some(other) = (0..3).filter_map(|k| rows[k].0.get(at[k])).min().map(|j| j / 3) {
+        // The rows are merged: blocks come in the order of the other node.
+        while let Some(other) = (0..dimension).filter_map(|k| rows[k].0.get(at[k])).min().map(|j| j / d) {
             let scale = scale(node, other as usize);
             let mut diagonal = [0.0; 3];
-            for k in 0..3 {
+            for k in 0..dimension {
                 let (columns, values) = rows[k];
-                while let Some(&j) = columns.get(at[k]).filter(|&&j| j / 3 == other) {
+                while let Some(&j) = columns.get(at[k]).filter(|&&j| j / d == other) {
                     let v = values[at[k]];
                     at[k] += 1;
-                    if j as usize % 3 == k {
+                    if j as usize % dimension == k {
                         diagonal[k] = v;
                     } else {
-                        part.deviates(v.abs() / scale, 3 * node + k, j as usize);
+                        part.deviates(v.abs() / scale, dimension * node + k, j as usize);
                     }
                 }
             }
-            let alpha = (diagonal[0] + diagonal[1] + diagonal[2]) / 3.0;
+            let diagonal = &diagonal[..dimension];
+            let alpha = diagonal.iter().sum::<f64>() / dimension as f64;
             for (k, &v) in diagonal.iter().enumerate() {
-                part.deviates((v - alpha).abs() / scale, 3 * node + k, 3 * other as usize + k);
+                let (row, column) = (dimension * node + k, dimension * other as usize + k);
+                part.deviates((v - alpha).abs() / scale, row, column);
             }
             if alpha != 0.0 {
                 part.row_idx.push(other);

@@ -1,15 +1,19 @@
 //! The finite element model of one free body: nodes, degrees of freedom, K, M. Knows no file format.
 
 mod checks;
+mod damping;
 mod fe_model;
 mod layout;
 mod mass_structure;
 mod nodes;
 mod raw;
 mod rigid;
+mod several;
 
 pub use checks::{CheckedModel, check};
+pub use damping::{Damping, DampingBand};
 pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
-pub use rigid::{centre_and_length, rigid_fields};
+pub use rigid::{centre_and_length, rigid_count, rigid_fields};
+pub use several::{BodyNumber, check_bodies};

@@ -1,6 +1,6 @@
 //! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
 
-use super::{DofLabel, NodeSet, Nodes};
+use super::{Damping, DofLabel, NodeSet, Nodes};
 use crate::diagnostic::Diagnostic;
 use crate::linalg::CscMatrix;
 use crate::provenance::SourceFile;
@@ -56,7 +56,9 @@ pub struct RawModel {
     pub dofs_path: PathBuf,
     /// Named node sets.
     pub interfaces: Vec<NodeSet>,
-    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `manifest`), file name and SHA-256 (hex) of every file read.
+    /// Damping, where it is given; a matrix has the rows of K and M.
+    pub damping: Option<Damping<RawMatrix>>,
+    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Vec<SourceFile>,
     /// Warnings and notes of the readers; never an error.
     pub diagnostics: Vec<Diagnostic>,
@@ -79,6 +81,7 @@ impl RawModel {
             dofs: None,
             dofs_path: PathBuf::new(),
             interfaces: Vec::new(),
+            damping: None,
             sources: Vec::new(),
             diagnostics: Vec::new(),
         }

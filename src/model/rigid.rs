@@ -4,8 +4,23 @@ use crate::linalg::SymmetricMatrix;
 use faer::Mat;
 use rayon::prelude::*;
 
-/// The six rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x - centre) / `length`.
-pub fn rigid_fields(positions: &[[f64; 3]], centre: [f64; 3], length: f64) -> Mat<f64> {
+/// Number of rigid motions of a body with so many dimensions: six in space, three in the plane.
+pub fn rigid_count(dimension: usize) -> usize {
+    if dimension == 2 { 3 } else { 6 }
+}
+
+/// The rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x - centre) / `length`; in the
+/// plane (`dimension` 2) those that stay in it (2n x 3): two translations, the rotation about z.
+pub fn rigid_fields(positions: &[[f64; 3]], dimension: usize, centre: [f64; 3], length: f64) -> Mat<f64> {
+    if dimension == 2 {
+        let mut fields = Mat::zeros(2 * positions.len(), 3);
+        for (i, x) in positions.iter().enumerate() {
+            (fields[(2 * i, 0)], fields[(2 * i + 1, 1)]) = (1.0, 1.0);
+            fields[(2 * i, 2)] = -(x[1] - centre[1]) / length;
+            fields[(2 * i + 1, 2)] = (x[0] - centre[0]) / length;
+        }
+        return fields;
+    }
     let mut fields = Mat::zeros(3 * positions.len(), 6);
     for (i, x) in positions.iter().enumerate() {
         let r = [0, 1, 2].map(|k| (x[k] - centre[k]) / length);
@@ -41,14 +56,14 @@ pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
     (centre, if length > 0.0 { length } else { 1.0 })
 }
 
-/// For each row i: max over the six fields of |(K R)_i| / sum_j |K_ij|, zero for empty rows. The fields have
+/// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij|, zero for empty rows. The fields have
 /// components of at most one, so that values near one mean a support and values near roundoff a free body.
 pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>) -> Vec<f64> {
     // Row by row: what a matrix entry needs lies in one or two cache lines.
     let rows: Vec<[f64; 6]> = (0..k.n())
         .into_par_iter()
         .with_min_len(1024)
-        .map(|i| std::array::from_fn(|c| fields[(i, c)]))
+        .map(|i| std::array::from_fn(|c| if c < fields.ncols() { fields[(i, c)] } else { 0.0 }))
         .collect();
     (0..k.n())
         .into_par_iter()

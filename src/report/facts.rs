@@ -4,6 +4,7 @@ use super::completeness::Completeness;
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
+use super::numbers::{percent, significant};
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, MassStructure, Truncation};
@@ -40,7 +41,9 @@ pub struct Facts {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ModelFacts {
     pub name: String,
-    pub dimension: u8,
+    pub dimension: usize,
+    /// Of several bodies in the same matrices.
+    pub body: Option<BodyFacts>,
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
@@ -48,6 +51,12 @@ pub(super) struct ModelFacts {
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
     pub settings: serde_json::Value,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct BodyFacts {
+    pub number: usize,
+    pub of: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,7 +86,51 @@ pub(super) struct ModeFacts {
     pub truncation: Vec<Truncation>,
     pub damping_ratio: Vec<f64>,
     pub worst_residual: f64,
+    /// Where damping was given.
+    pub damping: Option<DampingFacts>,
 }
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct DampingFacts {
+    pub lowest_ratio: f64,
+    pub highest_ratio: f64,
+    /// Largest |D_ij| / sqrt(D_ii D_jj) of two modes.
+    pub coupling: f64,
+}
+
+impl DampingFacts {
+    fn of(body: &FlexBody) -> Option<Self> {
+        let (d, ratio) = (body.modes().modal_damping.as_ref()?, &body.modes().damping_ratio);
+        let pairs = (0..d.ncols()).flat_map(|j| (0..j).map(move |i| (i, j)));
+        let coupled = |(i, j): (usize, usize)| {
+            let size = d[(i, i)].max(0.0).sqrt() * d[(j, j)].max(0.0).sqrt();
+            if size > 0.0 { d[(i, j)].abs() / size } else { 0.0 }
+        };
+        Some(Self {
+            lowest_ratio: ratio.iter().copied().fold(f64::INFINITY, f64::min),
+            highest_ratio: ratio.iter().copied().fold(0.0, f64::max),
+            coupling: pairs.map(coupled).fold(0.0, f64::max),
+        })
+    }
+
+    /// `ratios from 0.01 to 0.03, modes coupled by up to 4.2 %`.
+    pub fn in_words(&self) -> String {
+        let (lowest, highest) = (significant(self.lowest_ratio, 4), significant(self.highest_ratio, 4));
+        let ratios = if lowest == highest {
+            format!("ratio {lowest} of every mode")
+        } else {
+            format!("ratios from {lowest} to {highest}")
+        };
+        if self.coupling > UNCOUPLED {
+            format!("{ratios}, modes coupled by up to {}", percent(self.coupling))
+        } else {
+            ratios
+        }
+    }
+}
+
+/// Coupling of modes by damping up to this is rounding.
+const UNCOUPLED: f64 = 1e-6;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct RunFacts {
@@ -125,6 +178,7 @@ impl Facts {
                 provenance: body.modes().provenance.clone(),
                 truncation: body.modes().truncation.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
+                damping: DampingFacts::of(body),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
             completeness: Completeness::of(body),
@@ -142,7 +196,8 @@ impl ModelFacts {
         let (source, units) = (body.source(), body.units());
         Self {
             name: source.name.clone(),
-            dimension: 3,
+            dimension: body.dimension(),
+            body: source.number.map(|n| BodyFacts { number: n.number, of: n.of }),
             n_nodes: body.n_nodes(),
             n_dofs: source.n_dofs,
             mass_structure: match source.mass_structure {

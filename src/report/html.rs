@@ -131,10 +131,14 @@ fn body(html: &mut String, facts: &Facts) {
             (
                 "Model",
                 format!(
-                    "{} nodes, {} degrees of freedom, {}",
+                    "{} nodes, {} degrees of freedom, {}{}",
                     model.n_nodes,
                     model.n_dofs,
-                    model.mass_in_words()
+                    model.mass_in_words(),
+                    model.body.as_ref().map_or(String::new(), |b| format!(
+                        "; body {} of {} in the matrices",
+                        b.number, b.of
+                    ))
                 ),
             ),
             ("Units", escape(&units.in_words())),
@@ -176,6 +180,9 @@ fn modes(html: &mut String, facts: &Facts) {
     if let Some(guarantee) = &facts.guarantee {
         items.push(("Eigenvalues", escape(&sentence(&guarantee.eigenvalues()))));
         items.push(("Invariants", escape(&sentence(&guarantee.invariants()))));
+    }
+    if let Some(damping) = &modes.damping {
+        items.push(("Damping", escape(&sentence(&damping.in_words()))));
     }
     terms(html, items);
     section(html, "Frequencies");

@@ -109,6 +109,9 @@ fn heading(page: &mut Page, facts: &Facts) {
         "model",
         &format!("{} nodes, {} degrees of freedom, {}", model.n_nodes, model.n_dofs, model.mass_in_words()),
     );
+    if let Some(body) = &model.body {
+        page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
+    }
     page.entry("mass", &format!("{} {}", significant(body.mass, 6), units.mass()));
     let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
     let centre = coordinates(&body.centre_of_mass, size, &units.length());
@@ -138,6 +141,9 @@ fn modes(page: &mut Page, facts: &Facts) {
         let (before, after) = (significant(t.before, 2), significant(t.after, 2));
         format!("{}: error {before} with free modes alone, {after} with residual vectors", plain(&t.load))
     });
+    if let Some(damping) = &modes.damping {
+        page.entry("damping", &damping.in_words());
+    }
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {

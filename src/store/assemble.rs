@@ -5,7 +5,7 @@ use super::schema::MASS_STRUCTURES;
 use super::value::Value;
 use crate::flex_body::{Certificate, Frame, Guarantee, Interface, LumpedBody, Modes, Parts, Source};
 use crate::invariants::{DIGITS, Invariants};
-use crate::model::Nodes;
+use crate::model::{BodyNumber, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -16,6 +16,7 @@ use std::collections::HashMap;
 /// `scan` had no problems before, so every required entry is there, of its kind and with its shape.
 pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let mut take = Take { scan };
+    let dimension = take.count("/@dimension");
     let source = take.source();
     let frame = Frame {
         origin: Vector3::from_column_slice(&take.floats("/frame/origin")),
@@ -32,7 +33,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
     let source = source.filter(|_| scan.problems.is_empty())?;
-    Some(Parts { source, units, frame, nodes, modes, invariants, lumped, certificate, interfaces })
+    Some(Parts { source, dimension, units, frame, nodes, modes, invariants, lumped, certificate, interfaces })
 }
 
 /// Moves values out of a scan.
@@ -108,6 +109,7 @@ impl Take<'_> {
     fn source(&mut self) -> Option<Source> {
         let name = self.text("/source@model");
         let files = self.json("/source@files", "a JSON array of files");
+        let number = self.number();
         let n_dofs = self.count("/source@n_dofs");
         let structure = self.text("/source@mass_structure");
         let mass_structure = MASS_STRUCTURES.iter().find(|(name, _)| *name == structure).map(|(_, s)| *s);
@@ -116,7 +118,25 @@ impl Take<'_> {
             self.scan.add(format!("/source@mass_structure: expected one of {known}, found {structure:?}"));
         }
         let settings = self.json("/source@settings", "JSON");
-        Some(Source { name, files: files?, n_dofs, mass_structure: mass_structure?, settings: settings? })
+        Some(Source {
+            name,
+            files: files?,
+            number,
+            n_dofs,
+            mass_structure: mass_structure?,
+            settings: settings?,
+        })
+    }
+
+    /// Both counts or none.
+    fn number(&mut self) -> Option<BodyNumber> {
+        let paths = ["/source@body_number", "/source@bodies"];
+        let there = paths.map(|path| self.scan.values.contains_key(path));
+        let [number, of] = paths.map(|path| self.optional_count(path));
+        if there[0] != there[1] {
+            self.scan.add(format!("{} and {}: expected both or none, found one", paths[0], paths[1]));
+        }
+        Some(BodyNumber { number: number?, of: of? })
     }
 
     fn modes(&mut self, n: usize) -> Modes {
@@ -124,11 +144,14 @@ impl Take<'_> {
         let shape = self.floats("/modes/shape");
         let provenance = self.optional_json("/modes@provenance", "a JSON array of texts");
         let truncation = self.optional_json("/modes@truncation", "a JSON array of loads");
+        let damping = "/invariants/modal_damping";
+        let damped = self.scan.values.contains_key(damping);
         Modes {
             residual: self.floats("/modes/residual"),
             provenance,
             truncation,
             damping_ratio: self.floats("/modes/damping_ratio"),
+            modal_damping: damped.then(|| self.matrix(damping, eigenvalue.len())),
             shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
             eigenvalue,
         }

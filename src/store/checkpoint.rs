@@ -3,14 +3,13 @@
 use super::hdf5_value::{self, Sizes, Stored};
 use super::read::open_sound;
 use super::schema::Extent;
-use super::write::{put_text, system_error};
+use super::write::{create, put_text, system_error};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::Snapshot;
 use crate::error::Result;
 use crate::output::OutputSlot;
 use crate::provenance::{Fingerprint, generator};
 use faer::{Mat, MatRef};
-use hdf5::file::LibraryVersion;
 use hdf5::{Hyperslab, SliceOrIndex};
 use hdf5_metno as hdf5;
 use std::path::Path;
@@ -38,10 +37,7 @@ pub fn write_checkpoint(snapshot: &Snapshot, model: &str, slot: OutputSlot) -> R
 
 fn fill(snapshot: &Snapshot, model: &str, path: &Path) -> hdf5::Result<()> {
     let Snapshot { shift, eigenvalues, basis, coupling, converged } = snapshot;
-    let file = hdf5::File::with_options()
-        .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18))
-        .with_fcpl(|p| p.obj_track_times(false))
-        .create(path)?;
+    let file = create(path)?;
     put_text(&file, "format", FORMAT)?;
     put_text(&file, "generator", &generator())?;
     put_text(&file, "model", model)?;

@@ -20,4 +20,4 @@ pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
 pub use document::{format_markdown, format_schema};
 pub use read::{read, validate};
 pub use structure::structure;
-pub use write::{prepare_output, write, write_to};
+pub use write::{fill_slot, prepare_output, write, write_to};

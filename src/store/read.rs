@@ -68,7 +68,9 @@ pub(super) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5
         let why = format!("the text heap at byte {position} is damaged");
         return Err(unreadable(foreign, why));
     }
-    let file = hdf5::File::open(path).map_err(|e| unreadable(foreign, e.to_string()))?;
+    // Without a lock: no file of this program changes once it has its name, and some file systems know no locks.
+    let opened = hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path);
+    let file = opened.map_err(|e| unreadable(foreign, e.to_string()))?;
     // The check of the heaps knows 8-byte sizes only; nothing else is in use.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
     if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {

@@ -103,6 +103,7 @@ const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
 const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
 const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
 const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
+const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
 const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 
 /// A required dataset of version 1.0.
@@ -224,7 +225,13 @@ const ROOT: &[Item] = &[
     attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
         text(provenance::generator())
     }),
-    constant("dimension", Int, ConstantInt(3), "space dimension in this version"),
+    attribute(
+        "dimension",
+        Int,
+        ONE,
+        "3; 2: the body stays in its plane z = 0, all components along z are zero",
+        |v| count(v.body.dimension),
+    ),
     attribute(
         "units_length",
         Text,
@@ -256,6 +263,18 @@ const SOURCE: &[Item] = &[
         "input files as a JSON array of objects with `role`, `name`, `sha256`",
         |v| text(serde_json::to_string(&v.body.source.files).expect("structs of strings are valid JSON")),
     ),
+    attribute(
+        "body_number",
+        Int,
+        ONE,
+        "which of several bodies in the same matrices this is, from 1 (`--split`)",
+        |v| count(v.body.source.number?.number),
+    )
+    .added(2),
+    attribute("bodies", Int, ONE, "how many bodies the matrices hold (`--split`)", |v| {
+        count(v.body.source.number?.of)
+    })
+    .added(2),
     attribute("n_nodes", Int, ONE, "nodes of the body", |v| count(v.body.nodes.len())).derived(""),
     attribute("n_dofs", Int, ONE, "rows of the FE matrices", |v| count(v.body.source.n_dofs)),
     attribute(
@@ -446,6 +465,17 @@ const INVARIANTS: &[Item] = &[
         .derived("S"),
 ];
 
+/// Damping has nothing to do with the mass: lumped masses have none of their own.
+const DAMPING: &[Item] = &[dataset(
+    "modal_damping",
+    Floats(&[Modes, Modes]),
+    PER_TIME,
+    "D_ff",
+    "Psi' D Psi, where damping was given; `/modes/damping_ratio` is its diagonal over 2 sqrt(lambda)",
+    |v| matrix(v.body.modes.modal_damping.as_ref()?.as_ref()),
+)
+.added(2)];
+
 const LUMPED: &[Item] = &[attribute("negative_masses", Int, ONE, "number of negative nodal masses", |v| {
     count(v.lumped?.negative_masses)
 })];
@@ -609,7 +639,7 @@ pub(super) const TABLE: &[Group] = &[
         path: "/invariants",
         per: Per::Body,
         description: "Exact invariants from the consistent mass, about the frame origin, in body axes.",
-        items: &[INVARIANTS],
+        items: &[INVARIANTS, DAMPING],
     },
     Group {
         path: "/lumped/<scheme>",

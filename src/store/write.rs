@@ -43,8 +43,16 @@ pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
 /// # Errors
 /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
 pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
-    fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))?;
+    fill_slot(body, &slot)?;
     slot.commit()
+}
+
+/// The same without the end: the file appears when the slot is committed.
+///
+/// # Errors
+/// As [`write_to`].
+pub fn fill_slot(body: &FlexBody, slot: &OutputSlot) -> Result<()> {
+    fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))
 }
 
 /// HDF5 tells the system's error number in its text only.
@@ -56,13 +64,19 @@ pub(super) fn system_error(text: &str) -> std::io::Error {
     number.map_or_else(|| std::io::Error::other(text), std::io::Error::from_raw_os_error)
 }
 
-fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
-    let file = hdf5::File::with_options()
-        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums.
-        .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18))
+/// An empty file at a temporary `path`.
+pub(super) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
+    hdf5::File::with_options()
+        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else knows the file, and
+        // a process started meanwhile would inherit a lock and hold it on the finished file.
+        .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
         // Time stamps would make equal bodies differ.
         .with_fcpl(|p| p.obj_track_times(false))
-        .create(path)?;
+        .create(path)
+}
+
+fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
+    let file = create(path)?;
     for group in TABLE {
         if group.per != Per::Body {
             make(&file, group.parent())?;

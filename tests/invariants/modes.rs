@@ -21,7 +21,7 @@ struct Modes {
 fn modes(model: &Model, positions: &[[f64; 3]], count: usize) -> Modes {
     let stiffness = model.stiffness();
     let pencil = Pencil::new(&stiffness, &model.scalar_mass, 3);
-    let rigid = rigid_fields(positions, [0.0; 3], 1.0);
+    let rigid = rigid_fields(positions, 3, [0.0; 3], 1.0);
     let rigid = orthonormalised(&model.scalar_mass, positions, &rigid, false);
     // CalculiX writes 14 digits.
     let first_estimate = 2.0 * model.reference["flexible_eigenvalues"][0].as_f64().expect("number");

@@ -7,7 +7,7 @@ use flexbody::flex_body::{
     Truncation,
 };
 use flexbody::invariants::{DIGITS, Invariants};
-use flexbody::model::Nodes;
+use flexbody::model::{BodyNumber, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -123,12 +123,14 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                     sha256: format!("{:064x}", r.bits()),
                 })
                 .collect(),
+            number: (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) }),
             n_dofs: 3 * n,
             mass_structure: structures[r.below(3)],
             settings: serde_json::json!({
                 "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
             }),
         },
+        dimension: 3,
         units: units[r.below(3)].clone(),
         frame: Frame { origin: Vector3::from_fn(|_, _| r.value()), axes: *axes.matrix() },
         nodes: Nodes {
@@ -144,6 +146,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 .map(|_| Truncation { load: r.name(), before: r.value(), after: r.value() })
                 .collect(),
             damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
+            modal_damping: (r.below(2) == 1).then(|| Mat::from_fn(nf, nf, |_, _| r.value())),
             shape: r.matrix(3 * n, nf),
         },
         invariants: r.invariants(nf),

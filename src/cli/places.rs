@@ -1,0 +1,82 @@
+//! Where the outputs of a conversion go: each is reserved before the work, and appears after it.
+
+use super::arguments::ConvertArguments;
+use super::checkpoint::CheckpointFile;
+use crate::error::Result;
+use crate::output::OutputSlot;
+use crate::store;
+use std::path::{Path, PathBuf};
+
+/// Output files of one body.
+pub(super) struct Places {
+    pub body: PathBuf,
+    pub reports: Vec<PathBuf>,
+    pub checkpoint: Option<PathBuf>,
+}
+
+/// The same, reserved.
+pub(super) struct Reserved {
+    pub body: OutputSlot,
+    pub reports: Vec<OutputSlot>,
+    pub checkpoint: Option<CheckpointFile>,
+}
+
+impl Places {
+    /// What the command line names, with a number in every name for one of several bodies.
+    pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
+        let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| numbered(path, number));
+        Self {
+            body: place(&arguments.output),
+            reports: arguments.report.iter().map(place).collect(),
+            checkpoint: arguments.checkpoint.as_ref().map(place),
+        }
+    }
+
+    /// Every file.
+    pub(super) fn all(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.body).chain(&self.reports).chain(&self.checkpoint)
+    }
+
+    pub(super) fn reserve(&self) -> Result<Reserved> {
+        Ok(Reserved {
+            body: store::prepare_output(&self.body)?,
+            reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
+            checkpoint: self.checkpoint.as_deref().map(CheckpointFile::open).transpose()?,
+        })
+    }
+}
+
+/// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let (Some(stem), extension) = (path.file_stem(), path.extension()) else { return path.to_path_buf() };
+    let inner = Path::new(stem);
+    let double = inner.extension().filter(|inner| *inner == "flex");
+    let stem = double.and(inner.file_stem()).unwrap_or(stem);
+    let mut name = stem.to_os_string();
+    name.push(format!("-{number}"));
+    for extension in double.into_iter().chain(extension) {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_stands_before_the_extension() {
+        for (path, with_number) in [
+            ("a/rotor.flex.h5", "a/rotor-12.flex.h5"),
+            ("rotor.h5", "rotor-12.h5"),
+            ("v1.2/rotor.v3.flex.h5", "v1.2/rotor.v3-12.flex.h5"),
+            ("report.html", "report-12.html"),
+            ("rotor", "rotor-12"),
+            (".flex.h5", ".flex-12.h5"),
+            ("..", ".."),
+        ] {
+            assert_eq!(numbered(Path::new(path), 12), Path::new(with_number), "{path}");
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
+
+use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
+use super::{Damping, NodeSet, Nodes, RawModel};
+use crate::diagnostic::{Code, Diagnostic, Severity};
+use crate::error::{Error, Result};
+use crate::linalg::{CscMatrix, SymmetricMatrix, connected_components};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, HashMap};
+use std::convert::Infallible;
+
+/// Which of several bodies in the same matrices a model is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyNumber {
+    /// From 1, in the order of the first node of each body in the node table.
+    pub number: usize,
+    /// How many bodies there are.
+    pub of: usize,
+}
+
+impl std::fmt::Display for BodyNumber {
+    /// `body 1 of 2`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "body {} of {}", self.number, self.of)
+    }
+}
+
+/// Checks `raw`, takes the bodies in it apart and checks each. Two nodes belong to one body when K or M couples them,
+/// directly or through others. The nodes of a body keep their order, and its model is named `<name>-<number>`.
+///
+/// # Errors
+/// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
+/// [`ModelTooSmall`](Code::ModelTooSmall) for bodies of one or two nodes;
+/// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies;
+/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping matrix that couples bodies.
+pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
+    let (whole, shared) = assemble(raw)?;
+    let bodies = match separate(whole) {
+        Ok(bodies) => bodies,
+        Err(found) => return Err(Error::new(shared.into_iter().chain(found).collect())),
+    };
+    let of = bodies.len();
+    let (mut checked, mut failed) = (Vec::new(), Vec::new());
+    for (i, body) in bodies.into_iter().enumerate() {
+        let number = BodyNumber { number: i + 1, of };
+        match finish(body, Some(number), Vec::new()) {
+            Ok(mut one) => {
+                let own = one.diagnostics.into_iter().map(|diagnostic| diagnostic.about(number));
+                one.diagnostics = shared.iter().cloned().chain(own).collect();
+                checked.push(one);
+            }
+            Err(error) => failed.push(error.about(number)),
+        }
+    }
+    if failed.is_empty() {
+        return Ok(checked);
+    }
+    failed.sort_by_key(|error| Reverse(error.exit_code()));
+    Err(Error::new(shared.into_iter().chain(failed.into_iter().flat_map(Error::into_diagnostics)).collect()))
+}
+
+/// The bodies, in the order of their first nodes.
+fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
+    let dimension = whole.dimension();
+    let Assembled { raw, nodes, stiffness, mass, damping, .. } = whole;
+    let component = connected_components(&[&stiffness, &mass], dimension);
+    let bodies = groups(&component, &nodes);
+    let mut found = Vec::new();
+    let small: Vec<Vec<i64>> = bodies.iter().filter(|body| body.len() <= 2).cloned().collect();
+    if !small.is_empty() {
+        let message = format!(
+            "{} of {} bodies have no flexible degree of freedom: {}",
+            small.len(),
+            bodies.len(),
+            in_words(&small)
+        );
+        found.push(
+            Diagnostic::new(Code::ModelTooSmall, message)
+                .in_file(&raw.stiffness.path)
+                .with_help("connect these nodes, or remove them from the matrices"),
+        );
+    }
+    let interfaces = distribute(&raw.interfaces, &component, &nodes, &mut found);
+    if let Some(matrix) = damping.as_ref().and_then(Damping::matrix) {
+        found.extend(coupling(matrix, &component, &nodes));
+    }
+    if found.iter().any(|d| d.severity() == Severity::Error) {
+        return Err(found);
+    }
+    // Place of every node within its body.
+    let mut next = vec![0u32; bodies.len()];
+    let local: Vec<u32> = component
+        .iter()
+        .map(|&c| {
+            next[c] += 1;
+            next[c] - 1
+        })
+        .collect();
+    let mut members = vec![Vec::new(); bodies.len()];
+    component.iter().enumerate().for_each(|(i, &c)| members[c].push(i));
+    let one = |(i, (own, interfaces)): (usize, (&Vec<usize>, Vec<NodeSet>))| Assembled {
+        raw: RawModel { name: format!("{}-{}", raw.name, i + 1), interfaces, ..raw.clone() },
+        nodes: Nodes {
+            ids: own.iter().map(|&node| nodes.ids[node]).collect(),
+            positions: own.iter().map(|&node| nodes.positions[node]).collect(),
+        },
+        stiffness: restricted(&stiffness, dimension, own, &local),
+        mass: restricted(&mass, dimension, own, &local),
+        row_to_internal: None,
+        damping: damping.as_ref().map(|damping| {
+            let Ok(own) = damping
+                .borrowed()
+                .try_map(|matrix| Ok::<_, Infallible>(restricted(matrix, dimension, own, &local)));
+            own
+        }),
+    };
+    Ok(members.iter().zip(interfaces).enumerate().map(one).collect())
+}
+
+/// The interfaces of every body; a complaint about each that belongs to several.
+fn distribute(
+    interfaces: &[NodeSet],
+    component: &[usize],
+    nodes: &Nodes,
+    found: &mut Vec<Diagnostic>,
+) -> Vec<Vec<NodeSet>> {
+    let body: HashMap<i64, usize> = nodes.ids.iter().copied().zip(component.iter().copied()).collect();
+    let mut own = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
+    for set in interfaces {
+        let mut first: BTreeMap<usize, i64> = BTreeMap::new();
+        for id in &set.nodes {
+            first.entry(body[id]).or_insert(*id);
+        }
+        if let ([_, _, ..], bodies) = (first.keys().collect::<Vec<_>>().as_slice(), &first) {
+            let named: Vec<String> =
+                bodies.iter().map(|(b, id)| format!("node {id} of body {}", b + 1)).collect();
+            let message = format!(
+                "interface `{}` has nodes of {} bodies: {}",
+                set.name,
+                bodies.len(),
+                super::layout::name_some(&named)
+            );
+            found.push(Diagnostic::new(Code::InterfaceAcross, message));
+        } else if let Some((&b, _)) = first.first_key_value() {
+            own[b].push(set.clone());
+        }
+    }
+    own
+}
+
+/// A complaint when an entry of D couples two bodies.
+fn coupling(damping: &SymmetricMatrix, component: &[usize], nodes: &Nodes) -> Option<Diagnostic> {
+    let (a, b) = (0..damping.n()).find_map(|row| {
+        let other = |&column: &u32| (component[row / 3] != component[column as usize / 3]).then_some(column);
+        damping.row(row).0.iter().find_map(other).map(|column| (row / 3, column as usize / 3))
+    })?;
+    let place = |i: usize| format!("node {} of body {}", nodes.ids[i], component[i] + 1);
+    let message = format!("damping couples {} with {}", place(a), place(b));
+    Some(Diagnostic::new(Code::BodiesCoupled, message))
+}
+
+/// Rows and columns of some nodes, ascending, that no other node is coupled to; `local` is the place of each.
+fn restricted(matrix: &SymmetricMatrix, dimension: usize, nodes: &[usize], local: &[u32]) -> SymmetricMatrix {
+    let d = dimension as u32;
+    let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
+    for column in nodes.iter().flat_map(|node| dimension * node..dimension * (node + 1)) {
+        let (rows, entries) = matrix.row(column);
+        row_idx.extend(rows.iter().map(|&row| d * local[(row / d) as usize] + row % d));
+        values.extend_from_slice(entries);
+        col_ptr.push(row_idx.len());
+    }
+    let n = dimension * nodes.len();
+    SymmetricMatrix::new(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+        .expect("all entries of some rows and columns of a symmetric matrix")
+}

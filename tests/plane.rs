@@ -1,0 +1,323 @@
+//! Plane bodies: two displacements per node, three rigid motions (theory section 4).
+
+mod support;
+
+use faer::Mat;
+use faer::linalg::solvers::Solve;
+use flexbody::basis::ModeSettings;
+use flexbody::convert::{Conversion, ConvertSettings, convert};
+use flexbody::diagnostic::Code;
+use flexbody::eigen::{Accuracy, Wanted};
+use flexbody::flex_body::FlexBody;
+use flexbody::input::{ModelFiles, read_model};
+use flexbody::invariants::{BodyFrame, Expected, identities};
+use flexbody::linalg::CscMatrix;
+use flexbody::model::{FeModel, Nodes, RawModel, check};
+use flexbody::progress::SILENT;
+use flexbody::verification::verify;
+use nalgebra::{Matrix2, Vector2};
+use std::path::{Path, PathBuf};
+use support::random::Random;
+
+const LENGTH: f64 = 2.0;
+const HEIGHT: f64 = 0.5;
+const YOUNGS: f64 = 70e9;
+const POISSON: f64 = 0.3;
+const DENSITY: f64 = 2700.0;
+
+/// A rectangle of unit thickness from bilinear elements in plane stress, turned by `angle` about the origin and moved.
+fn rectangle(columns: usize, rows: usize, angle: f64, origin: [f64; 2]) -> RawModel {
+    let (a, b) = (LENGTH / columns as f64, HEIGHT / rows as f64);
+    let node = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
+    let rotation = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());
+    let turned = |x: f64, y: f64| rotation * Vector2::new(x, y) + Vector2::from(origin);
+    let positions = (0..=rows)
+        .flat_map(|j| (0..=columns).map(move |i| (i as f64 * a, j as f64 * b)))
+        .map(|(x, y)| {
+            let p = turned(x, y);
+            [p.x, p.y, 0.0]
+        })
+        .collect();
+    let (mut k, mut m) = (Vec::new(), Vec::new());
+    for j in 0..rows {
+        for i in 0..columns {
+            let nodes = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            let mut stiffness = [[0.0f64; 8]; 8];
+            let mut mass = [[0.0f64; 4]; 4];
+            let g = 1.0 / 3f64.sqrt();
+            for (xi, eta) in [(-g, -g), (g, -g), (g, g), (-g, g)] {
+                let weight = 0.25 * a * b;
+                let shape = corners.map(|(s, t)| 0.25 * (1.0 + s * xi) * (1.0 + t * eta));
+                let slope = corners.map(|(s, t)| {
+                    rotation
+                        * Vector2::new(
+                            0.25 * s * (1.0 + t * eta) * 2.0 / a,
+                            0.25 * t * (1.0 + s * xi) * 2.0 / b,
+                        )
+                });
+                let c = YOUNGS / (1.0 - POISSON * POISSON);
+                for p in 0..4 {
+                    for q in 0..4 {
+                        mass[p][q] += weight * DENSITY * shape[p] * shape[q];
+                        let (u, v) = (slope[p], slope[q]);
+                        let shear = 0.5 * (1.0 - POISSON) * c;
+                        for r in 0..2 {
+                            for s in 0..2 {
+                                let dilation = if r == s { c } else { POISSON * c };
+                                let mut value = dilation * u[r] * v[s];
+                                value += shear * u[1 - r] * v[1 - s];
+                                stiffness[2 * p + r][2 * q + s] += weight * value;
+                            }
+                        }
+                    }
+                }
+            }
+            for p in 0..8 {
+                for q in 0..8 {
+                    let (r, s) = (2 * nodes[p / 2] + p as u32 % 2, 2 * nodes[q / 2] + q as u32 % 2);
+                    k.push((r, s, stiffness[p][q]));
+                    if p % 2 == q % 2 {
+                        m.push((r, s, mass[p / 2][q / 2]));
+                    }
+                }
+            }
+        }
+    }
+    let count = (columns + 1) * (rows + 1);
+    let matrix = |entries: &[(u32, u32, f64)]| {
+        let a = CscMatrix::from_triplets(2 * count, 2 * count, entries);
+        // Exactly symmetric, as FE programs write it.
+        let b: Vec<(u32, u32, f64)> = (0..2 * count as u32)
+            .flat_map(|j| {
+                let a = &a;
+                (0..2 * count as u32).map(move |i| {
+                    (i, j, 0.5 * (a.get(i as usize, j as usize) + a.get(j as usize, i as usize)))
+                })
+            })
+            .filter(|(.., v)| *v != 0.0)
+            .collect();
+        CscMatrix::from_triplets(2 * count, 2 * count, &b)
+    };
+    let nodes = Nodes { ids: (1..=count as i64).collect(), positions };
+    RawModel { dimension: 2, ..RawModel::in_memory("rectangle", matrix(&k), matrix(&m), nodes) }
+}
+
+fn model(raw: RawModel) -> FeModel {
+    check(raw).expect("a sound body").model
+}
+
+fn settings(modes: usize, frame: BodyFrame) -> ConvertSettings {
+    let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
+    ConvertSettings { modes, frame, ..ConvertSettings::default() }
+}
+
+fn converted(model: &FeModel, modes: usize, frame: BodyFrame) -> Conversion {
+    convert(model, &settings(modes, frame), SILENT).expect("a sound body")
+}
+
+fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found}, expected {expected}");
+}
+
+#[test]
+fn rigid_properties_of_a_turned_rectangle_are_exact() {
+    let (angle, origin) = (0.3, [5.0, -2.0]);
+    let body = converted(&model(rectangle(6, 3, angle, origin)), 5, BodyFrame::Principal).body;
+    assert_eq!(body.dimension(), 2);
+    assert_eq!(body.certificate().rigid_modes, 3);
+    assert_eq!(
+        body.certificate().negative_pivots,
+        Some(3 + body.certificate().proved_modes.expect("proved"))
+    );
+    let (mass, inertia) = (DENSITY * LENGTH * HEIGHT, body.invariants().inertia());
+    close(body.invariants().mass, mass, 1e-13, "m");
+    close(inertia[(2, 2)], mass * (LENGTH.powi(2) + HEIGHT.powi(2)) / 12.0, 1e-12, "J0");
+    close(inertia[(0, 0)], mass * HEIGHT.powi(2) / 12.0, 1e-12, "axis along the length");
+    let centre = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos())
+        * Vector2::new(0.5 * LENGTH, 0.5 * HEIGHT)
+        + Vector2::from(origin);
+    close(body.frame().origin.x, centre.x, 1e-13, "centre x");
+    close(body.frame().origin.y, centre.y, 1e-13, "centre y");
+    close(body.frame().axes[(0, 0)], angle.cos(), 1e-12, "first axis");
+    assert_eq!(body.frame().axes.column(2).as_slice(), [0.0, 0.0, 1.0]);
+}
+
+/// The kinetic energy of every nodal motion equals that of the condensed terms: the mass matrix of theory section 4,
+/// J0 = I0_zz, b = W1_zz / 2, C2 and W3 their z rows.
+#[test]
+fn kinetic_energy_equals_that_of_the_nodes() {
+    for frame in BodyFrame::ALL {
+        let model = model(rectangle(5, 2, 0.7, [1.0, 2.0]));
+        let body = converted(&model, 12, frame).body;
+        let invariants = body.invariants();
+        let nf = invariants.n_modes();
+        let (derived, i0) = (invariants.derived(), invariants.inertia());
+        let shape = &body.modes().shape;
+        let x = &body.nodes().positions;
+        let mut random = Random(11);
+        for _ in 0..20 {
+            let v = Vector2::from(random.vector::<2>());
+            let spin = random.signed();
+            let q: Vec<f64> = (0..nf).map(|_| 3.0 * random.signed()).collect();
+            let qd: Vec<f64> = (0..nf).map(|_| 3.0 * random.signed()).collect();
+            let field = |coordinates: &[f64], row: usize| -> f64 {
+                coordinates.iter().enumerate().map(|(j, c)| c * shape[(row, j)]).sum()
+            };
+            // v + theta' x r + u', all in body axes.
+            let velocity: Vec<[f64; 2]> = (0..x.len())
+                .map(|i| {
+                    let r = [x[i][0] + field(&q, 3 * i), x[i][1] + field(&q, 3 * i + 1)];
+                    [v.x - spin * r[1] + field(&qd, 3 * i), v.y + spin * r[0] + field(&qd, 3 * i + 1)]
+                })
+                .collect();
+            let mut nodal = 0.0;
+            for i in 0..x.len() {
+                let (columns, values) = model.scalar_mass().row(i);
+                for (&j, m) in columns.iter().zip(values) {
+                    let other = velocity[j as usize];
+                    nodal += 0.5 * m * (velocity[i][0] * other[0] + velocity[i][1] * other[1]);
+                }
+            }
+            let modal = |f: &dyn Fn(usize) -> f64, c: &[f64]| -> f64 { (0..nf).map(|j| f(j) * c[j]).sum() };
+            let s = [0, 1].map(|k| invariants.first_moment[k] + modal(&|j| invariants.c1[(k, j)], &q));
+            let squared =
+                |a: &[f64], b: &[f64]| -> f64 { modal(&|i| modal(&|j| derived.modal_mass[(i, j)], b), a) };
+            let inertia = i0[(2, 2)] + modal(&|j| derived.w1[(2, 2 * nf + j)], &q) + squared(&q, &q);
+            let coupling = modal(&|j| derived.c2[(2, j)] + modal(&|i| derived.w3[(2 * nf + i, j)], &q), &qd);
+            let drift = [0, 1].map(|k| modal(&|j| invariants.c1[(k, j)], &qd));
+            let reduced = 0.5 * invariants.mass * v.norm_squared()
+                + 0.5 * inertia * spin * spin
+                + 0.5 * squared(&qd, &qd)
+                + spin * (v.y * s[0] - v.x * s[1])
+                + v.x * drift[0]
+                + v.y * drift[1]
+                + spin * coupling;
+            close(reduced, nodal, 1e-13, frame.name());
+        }
+    }
+}
+
+#[test]
+fn identities_and_recomputation_hold() {
+    let model = model(rectangle(7, 3, 1.1, [0.0, 0.0]));
+    for accuracy in [Accuracy::Standard, Accuracy::Certified] {
+        let mut settings = settings(9, BodyFrame::Principal);
+        settings.modes.accuracy = accuracy;
+        let body = convert(&model, &settings, SILENT).expect("a sound body").body;
+        let expected = Expected {
+            mass_normalised: true,
+            free_surface: true,
+            frame: BodyFrame::Principal,
+            origin: body.frame().origin,
+            eigenvalues: Some(&body.modes().eigenvalue),
+            eigenvalue_noise: body.certificate().rigid_noise,
+        };
+        let checks = identities(body.invariants(), &expected);
+        let recomputed = verify(&body, &model).expect("the same nodes");
+        for check in checks.iter().chain(&recomputed) {
+            assert!(check.passed, "{accuracy:?}, {}: {:e} > {:e}", check.name, check.value, check.limit);
+        }
+        assert_eq!(body.lumped().len(), 2);
+    }
+}
+
+/// Bending of a slender bar: Euler and Bernoulli's first frequency, to the shear and rotary inertia that they leave out.
+#[test]
+fn first_bending_frequency_is_that_of_a_beam() {
+    let body = converted(&model(rectangle(160, 12, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
+    let (area, second) = (HEIGHT, HEIGHT.powi(3) / 12.0);
+    let slenderness = 4.730_040_744_862_704f64;
+    let omega = slenderness.powi(2) * (YOUNGS * second / (DENSITY * area * LENGTH.powi(4))).sqrt();
+    // Shear and rotary inertia, which the beam leaves out, lower it by some 15 % at this slenderness.
+    let found = body.modes().eigenvalue[0].sqrt();
+    assert!(found < omega && found > 0.75 * omega, "{found}, beam {omega}");
+    // Halving the elements changes the frequency by the square of their size.
+    let coarse = converted(&model(rectangle(40, 3, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
+    let middle = converted(&model(rectangle(80, 6, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
+    let value = |body: &FlexBody| body.modes().eigenvalue[0].sqrt();
+    let order = ((value(&coarse) - value(&middle)) / (value(&middle) - found)).log2();
+    assert!((1.8..2.2).contains(&order), "order {order}");
+}
+
+#[test]
+fn all_modes_of_a_small_plate_are_found() {
+    let raw = rectangle(3, 2, 0.2, [0.0, 0.0]);
+    let n = 2 * raw.nodes.len();
+    let dense = |a: &CscMatrix| Mat::from_fn(n, n, |i, j| a.get(i, j));
+    let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
+    let body = converted(&model(raw), 1000, BodyFrame::Principal).body;
+    assert_eq!(body.n_modes(), n - 3);
+    // The rigid eigenvalues are zero, so the flexible ones alone make the trace of M^-1 K.
+    let trace = m.partial_piv_lu().solve(&k).diagonal().column_vector().iter().sum::<f64>();
+    close(body.modes().eigenvalue.iter().sum(), trace, 1e-11, "trace");
+}
+
+#[test]
+fn what_leaves_the_plane_is_refused() {
+    let mut raw = rectangle(2, 2, 0.0, [0.0, 0.0]);
+    let mut labels = Vec::new();
+    for &node in &raw.nodes.ids {
+        labels.extend([1, 3].map(|direction| flexbody::model::DofLabel { node, direction }));
+    }
+    raw.dofs = Some(labels);
+    let error = check(raw).expect_err("direction 3");
+    assert!(error.has(Code::DirectionOutOfPlane), "{error}");
+    let mut raw = rectangle(2, 2, 0.0, [0.0, 0.0]);
+    raw.nodes.positions[3][2] = 1.0;
+    assert!(check(raw).expect_err("z").has(Code::DirectionOutOfPlane));
+    let raw = RawModel { dimension: 3, ..rectangle(2, 2, 0.0, [0.0, 0.0]) };
+    assert!(check(raw).expect_err("two rows per node").has(Code::DofCount));
+}
+
+/// A plate with two holes that scikit-fem meshed and assembled, where it lies beside the project.
+#[test]
+fn plane_stress_plate_agrees_with_its_reference() {
+    let shared = std::env::var_os("FLEXBODY_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let folder = shared.join("models/i_plane_stress");
+    let Ok(text) = std::fs::read_to_string(folder.join("ref.json")) else { return };
+    let reference: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let files = ModelFiles::from_arguments(
+        folder.join("K.mtx.gz"),
+        folder.join("M.mtx.gz"),
+        folder.join("nodes.csv"),
+        Some(folder.join("dofs.csv")),
+        Some("mm,t,s"),
+    )
+    .expect("files");
+    let raw = read_model(&ModelFiles { dimension: 2, ..files }).expect("readable");
+    let body = converted(&model(raw), 20, BodyFrame::Com).body;
+    let rigid = &reference["consistent"];
+    close(body.invariants().mass, rigid["mass"].as_f64().expect("mass"), 1e-13, "m");
+    close(body.invariants().inertia()[(2, 2)], rigid["inertia_com"][2][2].as_f64().expect("J0"), 1e-12, "J0");
+    for k in 0..2 {
+        close(body.frame().origin[k], rigid["com"][k].as_f64().expect("com"), 1e-13, "centre");
+    }
+    let lambda = reference["modes"]["lambda_"].as_array().expect("eigenvalues");
+    for (found, expected) in body.modes().eigenvalue.iter().zip(lambda) {
+        close(*found, expected.as_f64().expect("a number"), 1e-10, "lambda");
+    }
+}
+
+/// Shapes stay in the plane and are M-orthonormal there.
+#[test]
+fn shapes_are_orthonormal_in_the_plane() {
+    let model = model(rectangle(6, 2, 0.4, [3.0, 1.0]));
+    let body = converted(&model, 8, BodyFrame::Principal).body;
+    let shape = &body.modes().shape;
+    let mut gram = Mat::<f64>::zeros(8, 8);
+    for i in 0..model.nodes().len() {
+        let (columns, values) = model.scalar_mass().row(i);
+        for (&j, m) in columns.iter().zip(values) {
+            for p in 0..8 {
+                for q in 0..8 {
+                    for k in 0..3 {
+                        gram[(p, q)] += m * shape[(3 * i + k, p)] * shape[(3 * j as usize + k, q)];
+                    }
+                }
+            }
+        }
+    }
+    assert!((&gram - Mat::<f64>::identity(8, 8)).norm_max() < 1e-12);
+}
