@@ -84,7 +84,7 @@ fn mixed_shapes_with_rigid_motion_in_them_give_the_body_of_the_free_path() {
     let model = bracket();
     let modes = free(&model);
     let free_body = converted(&model, BasisChoice::default(), Accuracy::Standard).body;
-    let rigid = rigid_fields(&model.nodes().positions, [0.3, -1.0, 2.0], 0.1);
+    let rigid = rigid_fields(&model.nodes().positions, 3, [0.3, -1.0, 2.0], 0.1);
     for seed in 0..3 {
         let mut r = Random(seed);
         let size = modes.norm_max();
@@ -150,7 +150,7 @@ fn single_precision_costs_what_it_must_and_is_said() {
 fn what_adds_nothing_is_left_out_and_named() {
     let model = bracket();
     let modes = free(&model);
-    let rigid = rigid_fields(&model.nodes().positions, [0.0; 3], 1.0);
+    let rigid = rigid_fields(&model.nodes().positions, 3, [0.0; 3], 1.0);
     // Twelve modes, the third again, six rigid motions, a sum of two.
     let shapes = Mat::from_fn(modes.nrows(), COUNT + 8, |i, j| match j {
         _ if j < COUNT => modes[(i, j)],
@@ -225,7 +225,7 @@ fn shapes_that_do_not_fit_are_refused() {
     let both = refused(Mat::from_fn(n, 3, |i, j| [1.0, 0.0, if i == 4 { f64::NAN } else { 1.0 }][j]));
     assert!(both.has(Code::ShapesZero) && both.has(Code::MatrixNotFinite));
     assert!(both.to_string().contains("shape 3 has NaN in row 5"), "{both}");
-    let rigid = rigid_fields(&model.nodes().positions, [0.0; 3], 1.0);
+    let rigid = rigid_fields(&model.nodes().positions, 3, [0.0; 3], 1.0);
     let none = modes_of(&model, imported(&model, &rigid, 17), Accuracy::Standard).expect_err("nothing left");
     assert!(none.has(Code::ShapesNone) && none.has(Code::ShapesRigid));
 }
