@@ -240,9 +240,17 @@ fn values_that_are_not_finite_are_named_with_their_place() {
 }
 
 #[test]
+fn a_body_in_space_is_no_plane_body() {
+    let error = damaged(|f| set_int(f, "/", "dimension", 2));
+    assert_says(&error, Code::BodySchema, &["`nodes.positions` of a plane body has z = "]);
+    assert_says(&error, Code::BodySchema, &["`modes.shape` of a plane body has components along z"]);
+    let error = damaged(|f| set_int(f, "/", "dimension", 4));
+    assert_says(&error, Code::BodySchema, &["`dimension` is 4, expected 2 or 3"]);
+}
+
+#[test]
 fn constants_units_and_texts_are_checked() {
     let error = damaged(|f| {
-        set_int(f, "/", "dimension", 2);
         set_text(&f.group("terms").unwrap(), "W2", "dropped");
         set_text(&f.dataset("invariants/I0").unwrap(), "units", "bananas");
         f.dataset("modes/shape").unwrap().delete_attr("description").unwrap();
@@ -251,7 +259,6 @@ fn constants_units_and_texts_are_checked() {
         &error,
         Code::BodySchema,
         &[
-            "/@dimension: expected 3, found 2",
             "/terms@W2: expected `kept`, found \"dropped\"",
             "/invariants/I0@units: expected `",
             "/modes/shape@description: expected a text attribute, found nothing",

@@ -120,7 +120,10 @@ impl Check {
         }
         let z = parts.frame.axes.column(2);
         if (z[0], z[1], z[2]) != (0.0, 0.0, 1.0) {
-            self.add(format!("`frame.axes` of a plane body have the third axis {z:?}, expected z"));
+            self.add(format!(
+                "`frame.axes` of a plane body have the third axis {:?}, expected z",
+                [z[0], z[1], z[2]]
+            ));
         }
         if let Some(i) = parts.nodes.positions.iter().position(|x| x[2] != 0.0) {
             self.add(format!(
