@@ -242,8 +242,15 @@ fn values_that_are_not_finite_are_named_with_their_place() {
 #[test]
 fn a_body_in_space_is_no_plane_body() {
     let error = damaged(|f| set_int(f, "/", "dimension", 2));
-    assert_says(&error, Code::BodySchema, &["`nodes.positions` of a plane body has z = "]);
-    assert_says(&error, Code::BodySchema, &["`modes.shape` of a plane body has components along z"]);
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &[
+            "`frame.axes` of a plane body have the third axis",
+            "`nodes.positions` of a plane body has z = ",
+            "`modes.shape` of a plane body has components along z",
+        ],
+    );
     let error = damaged(|f| set_int(f, "/", "dimension", 4));
     assert_says(&error, Code::BodySchema, &["`dimension` is 4, expected 2 or 3"]);
 }
