@@ -1,7 +1,5 @@
 //! Damping of the modes: ratios, Rayleigh damping and matrices, against closed forms and against each other.
 
-#[path = "support/mod.rs"]
-#[allow(dead_code)]
 mod support;
 
 use flexbody::convert::{Conversion, ConvertSettings, convert};

@@ -1,7 +1,5 @@
 //! Several bodies in one pair of matrices: found, named, and on `--split` converted as each would be by itself.
 
-#[path = "support/mod.rs"]
-#[allow(dead_code)]
 mod support;
 
 use flexbody::convert::{ConvertSettings, convert};
