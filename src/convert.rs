@@ -240,7 +240,7 @@ impl Place {
 }
 
 /// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
-pub(crate) fn in_space(shapes: &Mat<f64>, dimension: usize) -> Mat<f64> {
+fn in_space(shapes: &Mat<f64>, dimension: usize) -> Mat<f64> {
     if dimension == 3 {
         return shapes.clone();
     }

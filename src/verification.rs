@@ -5,7 +5,7 @@ use crate::eigen::rounding_residual;
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::invariants::{IdentityCheck, condense, condense_certified, primary_differences};
-use crate::linalg::{Pencil, gram};
+use crate::linalg::gram;
 use crate::model::FeModel;
 use faer::{Mat, Scale};
 
@@ -53,7 +53,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
     let shapes = &body.modes().shape;
     let in_model = in_model_axes(shapes, &frame.axes, model.dimension());
-    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
+    let pencil = model.pencil();
     let kx = pencil.apply_stiffness(in_model.as_ref());
     let mx = pencil.apply_mass(in_model.as_ref());
     let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());

@@ -2,7 +2,7 @@
 
 use super::Loads;
 use super::failure::explain;
-use super::modal_basis::{Basis, ModalBasis, Task, input_error};
+use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::residual_vectors::{NamedLoads, with_residual_vectors};
 use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
@@ -36,15 +36,8 @@ impl Basis for FreeSurface {
         if self.residual_vectors.is_empty() {
             return modes();
         }
-        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
-        let rigid = rigid_modes(&pencil, &model.nodes().positions)?;
-        let problem = EigenProblem {
-            pencil,
-            rigid: rigid.as_ref(),
-            first_estimate: f64::INFINITY,
-            input_error: input_error(model),
-            resume,
-        };
+        let rigid = rigid_modes(&model.pencil(), &model.nodes().positions)?;
+        let problem = problem_of_span(model, rigid.as_ref(), resume);
         let loads = NamedLoads::new(&problem, model, &self.residual_vectors, settings)?;
         with_residual_vectors(model, &problem, modes()?, &loads, settings, watch)
     }

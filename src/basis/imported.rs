@@ -3,13 +3,12 @@
 
 use super::columns::columns;
 use super::failure::explain;
-use super::modal_basis::{Basis, ModalBasis, Task, input_error};
+use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
 use super::pseudo_free_surface::independent;
 use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, EigenFailure, EigenProblem, Proof, Wanted, modes_of_span};
+use crate::eigen::{Accuracy, EigenFailure, Proof, Wanted, modes_of_span};
 use crate::error::{Error, Result};
-use crate::linalg::Pencil;
 use crate::model::{FeModel, RawShapes};
 use crate::provenance::SourceFile;
 use faer::Mat;
@@ -52,24 +51,17 @@ impl Basis for ImportedShapes {
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         let Task { model, settings, resume, watch } = *task;
-        let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), model.dimension());
-        let rigid = rigid_modes(&pencil, &model.nodes().positions)?;
+        let rigid = rigid_modes(&model.pencil(), &model.nodes().positions)?;
+        let problem = problem_of_span(model, rigid.as_ref(), resume);
         let criterion = self.dependent();
         let failed = |failure| explain(model, failure);
-        let independent = independent(&pencil, rigid.as_ref(), self.shapes.clone(), criterion)
+        let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let notes = independent.notes("imported shapes", criterion, |j| format!("shape {}", j + 1));
         if independent.kept.is_empty() {
             let message = format!("none of {} imported shapes deforms the body", self.shapes.ncols());
             return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
         }
-        let problem = EigenProblem {
-            pencil,
-            rigid: rigid.as_ref(),
-            first_estimate: f64::INFINITY,
-            input_error: input_error(model),
-            resume,
-        };
         let solution = modes_of_span(&problem, independent.vectors, settings, watch).map_err(failed)?;
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "imported shape")?;
         basis.diagnostics.extend(notes);

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::linalg::gram;
 use crate::model::FeModel;
 use crate::progress::Watch;
+use faer::MatRef;
 
 /// A kind of basis. A new one is one file of this room and one variant of [`BasisChoice`](super::BasisChoice).
 pub trait Basis {
@@ -77,6 +78,16 @@ const NOISE_TOLD: f64 = 1e-6;
 /// Relative error of the entries of K: half a unit of the last digit that they carry.
 pub(super) fn input_error(model: &FeModel) -> f64 {
     0.5 * 10f64.powi(1 - i32::from(model.digits()))
+}
+
+/// The eigenproblem of a model for vectors that are there already: nothing is searched, so no estimate is needed.
+pub(super) fn problem_of_span<'a>(
+    model: &'a FeModel,
+    rigid: MatRef<'a, f64>,
+    resume: Resume<'a>,
+) -> EigenProblem<'a> {
+    let first_estimate = f64::INFINITY;
+    EigenProblem { pencil: model.pencil(), rigid, first_estimate, input_error: input_error(model), resume }
 }
 
 impl ModalBasis {

@@ -256,7 +256,7 @@ pub(super) fn with_residual_vectors(
 
     let modal = gram(ritz.vectors.as_ref(), forces.as_ref());
     let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
-    let mut rest = whole.clone();
+    let mut rest = whole;
     add_combination(rest.as_mut(), ritz.vectors.as_ref(), amplitudes.as_ref());
     let rest = column_products(rest.as_ref(), pencil.apply_stiffness(rest.as_ref()).as_ref());
     let truncation = names.iter().enumerate().map(|(j, name)| Truncation {

@@ -4,7 +4,7 @@ use super::checks::Assembled;
 use super::mass_structure::ScalarMass;
 use super::{BodyNumber, CheckedModel, Damping, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
 use crate::error::Result;
-use crate::linalg::SymmetricMatrix;
+use crate::linalg::{Pencil, SymmetricMatrix};
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -107,6 +107,11 @@ impl FeModel {
     /// Damping, where it was given; a matrix D is 3n x 3n, row 3 i + k.
     pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
         self.damping.as_ref()
+    }
+
+    /// K and M.
+    pub fn pencil(&self) -> Pencil<'_> {
+        Pencil::new(&self.stiffness, &self.scalar_mass, self.dimension)
     }
 
     /// Named node sets.
