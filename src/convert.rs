@@ -394,10 +394,7 @@ fn describe(settings: &ConvertSettings, model: &FeModel) -> serde_json::Value {
             Lumping::User(_) => LumpedScheme::User.name(),
         })
         .collect();
-    let loads: Vec<&str> = match &settings.basis {
-        BasisChoice::Free(free) => free.residual_vectors.iter().map(Loads::name).collect(),
-        BasisChoice::Imported(_) => Vec::new(),
-    };
+    let loads: Vec<&str> = settings.basis.residual_vectors().iter().map(Loads::name).collect();
     let mut described = serde_json::json!({
         "accuracy": settings.modes.accuracy.name(),
         "basis": settings.basis.basis().name(),

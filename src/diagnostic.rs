@@ -124,6 +124,9 @@ codes! {
     DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
     DampingRigid = "FB420", Warning, Done, "damping matrix resists rigid motion", "damping to ground, or proportional to mass, acts on the motion of the whole body: model it in the multibody system";
     BodiesCoupled = "FB421", Error, BadInput, "damping couples bodies that K and M leave separate", "leave the entries between bodies out";
+    InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
+    InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
+    InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

@@ -3,6 +3,7 @@
 mod checks;
 mod damping;
 mod fe_model;
+mod interface;
 mod layout;
 mod mass_structure;
 mod nodes;
@@ -13,7 +14,8 @@ mod several;
 pub use checks::{CheckedModel, check};
 pub use damping::{Damping, DampingBand};
 pub use fe_model::FeModel;
-pub use nodes::{DofLabel, NodeSet, Nodes};
+pub use interface::{Coupling, InterfaceMotion, NodeSet, Reference};
+pub use nodes::{DofLabel, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
 pub use rigid::{centre_and_length, rigid_count, rigid_fields};
 pub use several::{BodyNumber, check_bodies};

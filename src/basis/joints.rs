@@ -1,0 +1,169 @@
+//! Interfaces as rows of the matrices: the coordinates of a joint, what they do to the nodes, and what they measure of them.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::{Error, Result};
+use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference};
+use faer::{Mat, MatRef};
+use std::collections::HashMap;
+
+/// Axes in names.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// An interface with r coordinates: the motion of its reference point, or, without one, all displacements of its nodes.
+pub(super) struct Joint {
+    pub name: String,
+    pub coupling: Coupling,
+    /// Indices of its nodes.
+    pub nodes: Vec<usize>,
+    /// Their rows in the matrices.
+    pub rows: Vec<usize>,
+    /// What each coordinate is, as in `ux` or `node 7 ux`.
+    pub coordinates: Vec<String>,
+    /// The load that works on each coordinate, as in `force x` or `torque z`.
+    pub loads: Vec<String>,
+    /// Displacements of the rows for unit coordinates that deform nothing at the interface, and weights of the rows with
+    /// measure' motion = I, which are also the loads that work on unit coordinates (both rows x r).
+    motion: Mat<f64>,
+    measure: Mat<f64>,
+    /// Whether the nodes determine every coordinate.
+    determined: bool,
+}
+
+impl Joint {
+    fn new(model: &FeModel, set: &NodeSet, places: &HashMap<i64, usize>) -> Self {
+        let (table, d) = (model.nodes(), model.dimension());
+        // In the order of the node table: equal sets give equal results.
+        let mut nodes: Vec<usize> = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
+        let coupling = set.coupling();
+        let joint = |coordinates: Vec<String>, loads, motion, measure, determined| Self {
+            name: set.name.clone(),
+            coupling,
+            nodes: nodes.clone(),
+            rows: rows.clone(),
+            coordinates,
+            loads,
+            motion,
+            measure,
+            determined,
+        };
+        if coupling == Coupling::Free {
+            let named = |kind: &dyn Fn(&str) -> String| {
+                let of = |&i: &usize| AXES[..d].iter().map(move |axis| (table.ids[i], axis));
+                nodes.iter().flat_map(of).map(|(id, axis)| format!("node {id} {}", kind(axis))).collect()
+            };
+            let unit = || Mat::identity(rows.len(), rows.len());
+            let (coordinates, loads) =
+                (named(&|axis| format!("u{axis}")), named(&|axis| format!("force {axis}")));
+            return joint(coordinates, loads, unit(), unit(), true);
+        }
+        let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| table.positions[i]).collect();
+        let reference = match set.reference {
+            Reference::Point(x) => Some(x),
+            _ => None,
+        };
+        let motion = InterfaceMotion::new(&positions, d, reference);
+        let named = |along: &str, about: &str| {
+            let turning = if d == 2 { &AXES[2..] } else { &AXES[..] };
+            let along = AXES[..d].iter().map(|axis| format!("{along}{axis}"));
+            along.chain(turning.iter().map(|axis| format!("{about}{axis}"))).collect()
+        };
+        joint(
+            named("u", "r"),
+            named("force ", "torque "),
+            motion.rigid().to_owned(),
+            motion.average().to_owned(),
+            motion.is_determined(),
+        )
+    }
+
+    /// R (rows x r): displacements of the nodes for unit coordinates, nothing deformed at the interface.
+    pub fn motion(&self) -> MatRef<'_, f64> {
+        self.motion.as_ref()
+    }
+
+    /// A (rows x r), A'R = I: weights that take the coordinates from the displacements, and nodal forces of unit loads on the
+    /// coordinates.
+    pub fn measure(&self) -> MatRef<'_, f64> {
+        self.measure.as_ref()
+    }
+
+    /// Adds the columns of `part` (rows x r) to `whole` (N x c) from column `first` on.
+    pub fn scatter(&self, part: MatRef<'_, f64>, whole: &mut Mat<f64>, first: usize) {
+        for (i, &row) in self.rows.iter().enumerate() {
+            for j in 0..part.ncols() {
+                whole[(row, first + j)] += part[(i, j)];
+            }
+        }
+    }
+
+    /// The rows of the nodes.
+    pub fn gather(&self, whole: MatRef<'_, f64>) -> Mat<f64> {
+        Mat::from_fn(self.rows.len(), whole.ncols(), |i, j| whole[(self.rows[i], j)])
+    }
+}
+
+/// All interfaces of a model.
+///
+/// # Errors
+/// [`InterfaceNode`](Code::InterfaceNode) when there is none; `what` needs one, as in `interface loads`.
+pub(super) fn joints(model: &FeModel, what: &str) -> Result<Vec<Joint>> {
+    if model.interfaces().is_empty() {
+        let message = format!("the model has no interfaces, so there are no {what}");
+        return Err(Diagnostic::new(Code::InterfaceNode, message)
+            .with_help("name node sets as [[interface]] in the manifest")
+            .into());
+    }
+    let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+    Ok(model.interfaces().iter().map(|set| Joint::new(model, set, &places)).collect())
+}
+
+/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are zero.
+///
+/// # Errors
+/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that are found.
+pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()> {
+    let (table, d) = (model.nodes(), model.dimension());
+    let mut found = Vec::new();
+    let (place, least) = if d == 2 {
+        ("one point", "two nodes")
+    } else {
+        ("one line", "three nodes that do not lie on one line")
+    };
+    for joint in joints.iter().filter(|joint| !joint.determined) {
+        let message = format!(
+            "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
+            joint.name,
+            joint.nodes.len()
+        );
+        let help = format!("give the interface {least}, or coupling = \"free\"");
+        found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+    }
+    let mut owner: HashMap<usize, &str> = HashMap::new();
+    for joint in joints {
+        let shared: Vec<(i64, &str)> = joint
+            .nodes
+            .iter()
+            .filter_map(|&i| owner.insert(i, &joint.name).map(|other| (table.ids[i], other)))
+            .collect();
+        if let Some((node, other)) = shared.first() {
+            let message = format!(
+                "interface `{}` shares {} nodes with others, node {node} with `{other}`: their motions are not independent",
+                joint.name,
+                shared.len()
+            );
+            found.push(Diagnostic::new(Code::InterfaceShared, message));
+        }
+    }
+    let held: Vec<[f64; 3]> =
+        joints.iter().flat_map(|joint| &joint.nodes).map(|&i| table.positions[i]).collect();
+    if found.is_empty() && !InterfaceMotion::new(&held, d, None).is_determined() {
+        let message =
+            format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
+        let help = format!("the interfaces together need {least}");
+        found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+    }
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
