@@ -1,13 +1,13 @@
 //! The main job: from a checked model to a flexible body, with what lumped masses would have given.
 
 use crate::basis::{
-    BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
+    self, BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
 };
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, canonical_basis};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+    Certificate, FlexBody, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, Source,
     Truncation,
 };
 use crate::invariants::{
@@ -15,7 +15,7 @@ use crate::invariants::{
     choose_plane_frame, condense, condense_certified, condense_lumped, error_norms,
 };
 use crate::linalg::{SymmetricMatrix, gram, multiply};
-use crate::model::{Damping, FeModel, Nodes, rigid_count};
+use crate::model::{Coupling, Damping, FeModel, Nodes, Reference, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
@@ -168,7 +168,16 @@ pub fn convert_resumed(
         Vec::new()
     };
     let certificate = certificate(model, &found, guarantee);
+    let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
+    let interfaces = interfaces(model, &frame);
+    let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, shapes.as_ref(), model.dimension()));
+    diagnostics.extend(fits);
     let solution = found.solution;
+    let coordinates = found.coordinates.map(|own| {
+        let turned = own.in_axes(&frame.axes, model.dimension(), &signs);
+        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
+        InterfaceCoordinates { names, stiffness, mass, of_modes }
+    });
     let (damping_ratio, modal_damping) = match damping {
         Some(damping) => (damping.ratio, Some(damping.matrix)),
         None => (vec![0.0; solution.eigenvalues.len()], None),
@@ -189,8 +198,9 @@ pub fn convert_resumed(
         dimension: model.dimension(),
         units: model.units().clone(),
         frame,
-        interfaces: interfaces(model),
-        nodes: Nodes { ids: model.nodes().ids.clone(), positions: place.positions },
+        interfaces,
+        coordinates,
+        nodes,
         modes: Modes {
             damping_ratio,
             modal_damping,
@@ -367,16 +377,58 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
     }
 }
 
-fn interfaces(model: &FeModel) -> Vec<Interface> {
+/// The interfaces of a model in the body frame.
+fn interfaces(model: &FeModel, frame: &Frame) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     model
         .interfaces()
         .iter()
-        .map(|set| Interface {
-            name: set.name.clone(),
-            nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
+        .map(|set| {
+            let nodes: Vec<usize> = set.nodes.iter().filter_map(|id| index.get(id)).copied().collect();
+            let reference = match set.reference {
+                Reference::Point(x) => Some(x),
+                _ => None,
+            };
+            Interface {
+                name: set.name.clone(),
+                nodes,
+                coupling: set.coupling,
+                reference: reference.map(|x| frame.to_body(&[x])[0]),
+            }
         })
         .collect()
+}
+
+/// Part of the motion of an interface that is rounding.
+const RIGID_FIT: f64 = 1e-8;
+
+/// A warning about an interface that was declared rigid, but is not in these modes.
+fn poor_fit(
+    interface: &Interface,
+    nodes: &Nodes,
+    shapes: MatRef<'_, f64>,
+    dimension: usize,
+) -> Option<Diagnostic> {
+    if interface.coupling != Some(Coupling::Rigid) {
+        return None;
+    }
+    let rows = interface.rows(nodes, shapes, dimension)?;
+    let count = (interface.nodes.len() as f64).sqrt();
+    let moved = |j: usize| -> f64 {
+        let squares = interface.nodes.iter().flat_map(|&i| (0..3).map(move |k| shapes[(3 * i + k, j)].powi(2)));
+        squares.sum::<f64>().sqrt() / count
+    };
+    let largest = (0..shapes.ncols()).map(moved).fold(0.0, f64::max);
+    let (mode, worst) = (rows.misfit.iter().enumerate()).max_by(|a, b| a.1.total_cmp(b.1))?;
+    (*worst > RIGID_FIT * largest).then(|| {
+        let message = format!(
+            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
+            interface.name,
+            100.0 * worst / largest,
+            mode + 1
+        );
+        Diagnostic::new(Code::InterfaceFit, message)
+    })
 }
 
 /// The settings that can change the result, for the file.

@@ -57,7 +57,7 @@ pub struct NodeSet {
     pub nodes: Vec<i64>,
     /// How it is coupled to its reference point, where that was said.
     pub coupling: Option<Coupling>,
-    /// Its reference point; in a checked model never a node.
+    /// Its reference point; in a checked model a point, but of a free interface.
     pub reference: Reference,
 }
 
@@ -73,7 +73,7 @@ impl NodeSet {
     }
 }
 
-/// Puts the places of reference nodes in place of their numbers, and complains about reference points that cannot be.
+/// Puts the places of reference points in place of what says where they are, and complains about those that cannot be.
 pub(super) fn resolve_references(raw: &mut RawModel, found: &mut Vec<Diagnostic>) {
     let places: HashMap<i64, [f64; 3]> =
         raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
@@ -83,14 +83,20 @@ pub(super) fn resolve_references(raw: &mut RawModel, found: &mut Vec<Diagnostic>
             let message = format!("interface `{name}` is free, but has a reference point");
             found.push(Diagnostic::new(Code::ManifestSyntax, message));
         }
-        if let Reference::Node(id) = set.reference {
-            match places.get(&id) {
+        match set.reference {
+            Reference::Node(id) => match places.get(&id) {
                 Some(&place) => set.reference = Reference::Point(place),
                 None => {
                     let message = format!("reference node {id} of interface `{name}` is unknown");
                     found.push(Diagnostic::new(Code::InterfaceNode, message));
                 }
+            },
+            Reference::Mean if set.coupling != Some(Coupling::Free) => {
+                let of_nodes: Vec<[f64; 3]> =
+                    set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
+                set.reference = Reference::Point(centre_and_length(&of_nodes).0);
             }
+            Reference::Mean | Reference::Point(_) => {}
         }
         if let Reference::Point(x) = set.reference {
             if x.iter().any(|x| !x.is_finite()) {
@@ -118,17 +124,21 @@ pub struct InterfaceMotion {
 impl InterfaceMotion {
     /// For nodes at `positions` (at least one) and a reference point, the mean of the positions where none is given.
     pub fn new(positions: &[[f64; 3]], dimension: usize, reference: Option<[f64; 3]>) -> Self {
-        let (centre, _) = centre_and_length(positions);
+        let (centre, length) = centre_and_length(positions);
         let reference = reference.unwrap_or(centre);
         let (d, count) = (dimension, positions.len() as f64);
         let centre = Vector3::from(centre);
-        let arms: Vec<Vector3<f64>> = positions.iter().map(|&x| Vector3::from(x) - centre).collect();
+        // Of unit size: squares of coordinates in any unit stay in range.
+        let arms: Vec<Vector3<f64>> = positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
         let inertia: Matrix3<f64> =
             arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
         let threshold = COLLINEAR * COLLINEAR * inertia.trace();
-        // Nodes on one line follow no rotation about it, a single node none at all.
-        let inverse = inertia.pseudo_inverse(threshold).unwrap_or_else(|_| Matrix3::zeros());
-        let turning = if d == 2 { inertia[(2, 2)] } else { inertia.symmetric_eigenvalues().min() };
+        let (mut inverse, mut turning) = (Matrix3::zeros(), 0.0);
+        if threshold.is_finite() {
+            // Nodes on one line follow no rotation about it, a single node none at all.
+            inverse = inertia.pseudo_inverse(threshold).unwrap_or_else(|_| Matrix3::zeros()) / length;
+            turning = if d == 2 { inertia[(2, 2)] } else { inertia.symmetric_eigenvalues().min() };
+        }
         let axes = if d == 2 { 2..3 } else { 0..3 };
         // About the centre; the translation of the reference point adds the rotation times its distance.
         let offset = Vector3::from(reference) - centre;

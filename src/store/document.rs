@@ -13,7 +13,7 @@ const INTRODUCTION: &str = "\
 A flex-body file is an HDF5 file (readable by HDF5 1.8 and later). All arrays are row-major in the shapes given here
 (MATLAB and Fortran show the extents in reverse order); numbers are 64-bit little-endian; texts are UTF-8 of variable
 length. Every dataset has the text attributes `units`, `symbol` and `description`. Numbers are in the units of the root
-group. n is the number of nodes, nf the number of modes, k the number of nodes of an interface.
+group. n is the number of nodes, nf the number of modes, k the number of nodes of an interface, nc the number of interface coordinates.
 
 W1, W2, W3 are component-blocked: the column (or row) of component b = 0, 1, 2 and mode j is b nf + j.
 
@@ -107,6 +107,7 @@ fn symbol(extent: Extent) -> String {
         Extent::Modes => "nf".to_owned(),
         Extent::ThreeModes => "3nf".to_owned(),
         Extent::InterfaceNodes => "k".to_owned(),
+        Extent::Coordinates => "nc".to_owned(),
     }
 }
 
@@ -121,7 +122,7 @@ pub fn format_schema() -> String {
         let mut target = &mut root;
         for name in group.path.split('/').filter(|name| !name.is_empty()) {
             let key = if name.starts_with('<') { "additionalProperties" } else { name };
-            target = descend(target, key);
+            target = descend(target, key, !group.is_optional());
         }
         fill(target, group);
     }
@@ -137,7 +138,7 @@ pub fn format_schema() -> String {
 }
 
 /// Schema of the member group `key`, made when it is not there yet.
-fn descend<'a>(group: &'a mut Value, key: &str) -> &'a mut Value {
+fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));
     require(schema, "groups");
@@ -146,7 +147,9 @@ fn descend<'a>(group: &'a mut Value, key: &str) -> &'a mut Value {
     if key == "additionalProperties" {
         return groups.entry(key).or_insert_with(|| json!({}));
     }
-    require(groups, key);
+    if required {
+        require(groups, key);
+    }
     member(groups, "properties").entry(key).or_insert_with(|| json!({}))
 }
 

@@ -23,6 +23,7 @@ pub(super) struct Sizes {
     nodes: Option<usize>,
     modes: Option<usize>,
     pub interface_nodes: Option<usize>,
+    coordinates: Option<usize>,
 }
 
 /// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
@@ -48,6 +49,12 @@ pub(super) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, S
         group = group.group(name).map_err(|_| "another object".to_owned())?;
     }
     Ok(group)
+}
+
+/// Whether a group lies in the root group.
+pub(super) fn has_group(file: &hdf5::File, path: &str) -> Result<bool, String> {
+    let root = file.as_group().map_err(|e| e.to_string())?;
+    has(&root, path.trim_start_matches('/'))
 }
 
 /// Names of the members of a group, in creation order where the file tracks it.
@@ -158,6 +165,7 @@ impl Sizes {
             Extent::Modes => size == *self.modes.get_or_insert(size),
             Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
+            Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
         }
     }
 
@@ -172,6 +180,7 @@ impl Sizes {
             Extent::Modes => known("nf", self.modes),
             Extent::ThreeModes => known("3 nf", self.modes.map(|nf| 3 * nf)),
             Extent::InterfaceNodes => known("k", self.interface_nodes),
+            Extent::Coordinates => known("nc", self.coordinates),
         }
     }
 }

@@ -23,8 +23,10 @@ pub(super) enum Extent {
     ThreeModes,
     /// Nodes of the group's interface.
     InterfaceNodes,
+    /// nc, the interface coordinates.
+    Coordinates,
 }
-use Extent::{Fixed, InterfaceNodes, Modes, Nodes, ThreeModes};
+use Extent::{Coordinates, Fixed, InterfaceNodes, Modes, Nodes, ThreeModes};
 
 /// How an entry is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,6 +105,7 @@ const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
 const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
 const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
 const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
+const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
 const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
 const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 
@@ -179,6 +182,7 @@ impl Item {
             Modes => nf,
             ThreeModes => 3 * nf,
             InterfaceNodes => view.interface_nodes().len(),
+            Coordinates => view.body.coordinates.as_ref().map_or(0, |c| c.names.len()),
         };
         self.shape().unwrap_or(&[]).iter().map(size).collect()
     }
@@ -188,6 +192,11 @@ impl Group {
     /// All entries, in the order of the table.
     pub fn entries(&self) -> impl Iterator<Item = &'static Item> + use<> {
         self.items.iter().flat_map(|part| part.iter())
+    }
+
+    /// Whether a file may do without it: it brings nothing that is required, and is no list of others.
+    pub fn is_optional(&self) -> bool {
+        self.per == Per::Body && self.entries().all(|item| !item.required)
     }
 
     /// Path without the last name.
@@ -621,6 +630,85 @@ const INTERFACES: &[Item] = &[
         |v| Some(v.shape_rows(v.interface_nodes().iter().copied())),
     )
     .derived("shape"),
+    attribute(
+        "coupling",
+        Text,
+        ONE,
+        "`rigid`: the nodes follow the reference point as one rigid body (RBE2); `averaging`: the reference point follows their mean motion (RBE3); `free`: no reference point; absent: not stated",
+        |v| text(v.interface?.coupling?.name()),
+    )
+    .added(2),
+    dataset("reference", Floats(&[Fixed(3)]), LENGTH, "x_ref", "reference point in the body frame", |v| {
+        Some(Value::Floats(v.interface?.reference?.to_vec()))
+    })
+    .added(2),
+    dataset(
+        "translation",
+        Floats(&[Fixed(3), Modes]),
+        PER_ROOT_MASS,
+        "Phi_t",
+        "translation of the reference point in each mode, body axes: with the rotation the rigid motion that fits the nodes best (least squares, the same weight for each)",
+        |v| matrix(v.interface_rows()?.translation.as_ref()),
+    )
+    .added(2)
+    .derived("shape"),
+    dataset(
+        "rotation",
+        Floats(&[Fixed(3), Modes]),
+        PER_ROOT_MASS_LENGTH,
+        "Phi_r",
+        "rotation vector of the reference point in each mode, body axes; absent: the nodes lie on one line",
+        |v| matrix(v.interface_rows()?.rotation?.as_ref()),
+    )
+    .added(2)
+    .derived("rotation"),
+    dataset(
+        "misfit",
+        Floats(&[Modes]),
+        PER_ROOT_MASS,
+        "e",
+        "root mean square over the nodes of what this rigid motion leaves of their displacement: zero to rounding where they move as a rigid body",
+        |v| Some(Value::Floats(v.interface_rows()?.misfit)),
+    )
+    .added(2)
+    .derived("shape"),
+];
+
+/// Of a Craig-Bampton basis.
+const COORDINATES: &[Item] = &[
+    attribute(
+        "names",
+        Text,
+        ONE,
+        "what each of the nc coordinates is, as a JSON array of texts: for every interface in the order of `/interfaces` the translations and rotations of its reference point (in the plane two and one; of a free interface the displacements of its nodes in the order of `/nodes`), along body axes, then the fixed-interface modes",
+        |v| {
+            let names = &v.body.coordinates.as_ref()?.names;
+            text(serde_json::to_string(names).expect("strings are valid JSON"))
+        },
+    )
+    .added(2),
+    dataset(
+        "stiffness",
+        Floats(&[Coordinates, Coordinates]),
+        Units::Mixed,
+        "K_c",
+        "stiffness; translations carry length, rotations none, fixed-interface modes mass^(1/2) length",
+        |v| matrix(v.body.coordinates.as_ref()?.stiffness.as_ref()),
+    )
+    .added(2),
+    dataset("mass", Floats(&[Coordinates, Coordinates]), Units::Mixed, "M_c", "mass, in the same units", |v| {
+        matrix(v.body.coordinates.as_ref()?.mass.as_ref())
+    })
+    .added(2),
+    dataset(
+        "of_modes",
+        Floats(&[Coordinates, Modes]),
+        Units::Mixed,
+        "B",
+        "coordinates of each mode: B' K_c B = diag(lambda), B' M_c B = I",
+        |v| matrix(v.body.coordinates.as_ref()?.of_modes.as_ref()),
+    )
+    .added(2),
 ];
 
 /// The groups, in the order in which they are written.
@@ -668,8 +756,14 @@ pub(super) const TABLE: &[Group] = &[
     Group {
         path: "/interfaces/<name>",
         per: Per::Interface,
-        description: "Named node sets.",
+        description: "Named node sets, what they are coupled to, and the modes there.",
         items: &[INTERFACES],
+    },
+    Group {
+        path: "/interface_coordinates",
+        per: Per::Body,
+        description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",
+        items: &[COORDINATES],
     },
 ];
 
