@@ -7,8 +7,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, canonical_basis};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, Source,
-    Truncation,
+    Certificate, FlexBody, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
+    Modes, Parts, Source, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
@@ -413,18 +413,12 @@ fn poor_fit(
         return None;
     }
     let rows = interface.rows(nodes, shapes, dimension)?;
-    let count = (interface.nodes.len() as f64).sqrt();
-    let moved = |j: usize| -> f64 {
-        let squares = interface.nodes.iter().flat_map(|&i| (0..3).map(move |k| shapes[(3 * i + k, j)].powi(2)));
-        squares.sum::<f64>().sqrt() / count
-    };
-    let largest = (0..shapes.ncols()).map(moved).fold(0.0, f64::max);
-    let (mode, worst) = (rows.misfit.iter().enumerate()).max_by(|a, b| a.1.total_cmp(b.1))?;
-    (*worst > RIGID_FIT * largest).then(|| {
+    let (mode, part) = rows.deformation();
+    (part > RIGID_FIT).then(|| {
         let message = format!(
             "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
             interface.name,
-            100.0 * worst / largest,
+            100.0 * part,
             mode + 1
         );
         Diagnostic::new(Code::InterfaceFit, message)

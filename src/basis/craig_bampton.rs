@@ -67,7 +67,10 @@ impl Basis for CraigBampton {
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
         let shares = largest_shares(parted.as_ref()).into_iter();
         let provenance = shares
-            .map(|(j, share)| format!("Craig-Bampton: {:.0} % {}", 100.0 * share, parts.name(found.kept[j])))
+            .map(|(j, share)| {
+                let (kind, name) = parts.name(found.kept[j]);
+                format!("{kind}: {:.0} % {name}", 100.0 * share)
+            })
             .collect();
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         solution.completeness = parts.completeness(model, &solution);
@@ -143,11 +146,11 @@ impl<'a> Parts<'a> {
         self.elimination.expand(self.fixed.vectors.as_ref())
     }
 
-    /// Name of a shape: fixed-interface modes come first.
-    fn name(&self, shape: usize) -> String {
+    /// Kind and name of a shape: fixed-interface modes come first.
+    fn name(&self, shape: usize) -> (&'static str, String) {
         match shape.checked_sub(self.fixed.eigenvalues.len()) {
-            None => format!("fixed-interface mode {}", shape + 1),
-            Some(constraint) => format!("constraint mode {}", self.names[constraint]),
+            None => ("fixed-interface mode", format!("number {}", shape + 1)),
+            Some(constraint) => ("constraint mode", self.names[constraint].clone()),
         }
     }
 
@@ -157,7 +160,8 @@ impl<'a> Parts<'a> {
         let mut removed: Vec<usize> = removed.chain(&found.massless).copied().collect();
         removed.sort_unstable();
         let expected = removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len();
-        let which: Vec<String> = removed.iter().map(|&j| self.name(j)).collect();
+        let which = removed.iter().map(|&j| self.name(j));
+        let which: Vec<String> = which.map(|(kind, name)| format!("{kind} {name}")).collect();
         let of = found.kept.len() + removed.len();
         let which = which.join(", ");
         let note = if expected {

@@ -30,6 +30,17 @@ pub struct InterfaceRows {
     pub rotation: Option<Mat<f64>>,
     /// Root mean square over the nodes of what the fit leaves of the displacement (nf): zero where they move as a rigid body.
     pub misfit: Vec<f64>,
+    /// Root mean square over the nodes of their largest displacement in any mode.
+    largest: f64,
+}
+
+impl InterfaceRows {
+    /// The mode in which the interface deforms most, and how much, relative to its largest motion in any mode.
+    pub fn deformation(&self) -> (usize, f64) {
+        let worst = |most: (usize, f64), (j, &e): (usize, &f64)| if e > most.1 { (j, e) } else { most };
+        let (mode, misfit) = self.misfit.iter().enumerate().fold((0, 0.0), worst);
+        (mode, if self.largest > 0.0 { misfit / self.largest } else { 0.0 })
+    }
 }
 
 impl Interface {
@@ -46,7 +57,9 @@ impl Interface {
         let u = Mat::from_fn(d * k, nf, |row, j| shape[(3 * self.nodes[row / d] + row % d, j)]);
         let q = motion.fit(u.as_ref());
         let left = &u - motion.rigid() * &q;
-        let misfit: Vec<f64> = (0..nf).map(|j| left.col(j).norm_l2() / (k as f64).sqrt()).collect();
+        let root_mean_square = |a: &Mat<f64>, j: usize| a.col(j).norm_l2() / (k as f64).sqrt();
+        let misfit: Vec<f64> = (0..nf).map(|j| root_mean_square(&left, j)).collect();
+        let largest = (0..nf).map(|j| root_mean_square(&u, j)).fold(0.0, f64::max);
         let translation = Mat::from_fn(3, nf, |i, j| if i < d { q[(i, j)] } else { 0.0 });
         let rotation = Mat::from_fn(3, nf, |i, j| match (d, i) {
             (2, 0 | 1) => 0.0,
@@ -54,7 +67,8 @@ impl Interface {
             _ => q[(3 + i, j)],
         });
         let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
-        let rows = InterfaceRows { translation, rotation: motion.is_determined().then_some(rotation), misfit };
+        let rotation = motion.is_determined().then_some(rotation);
+        let rows = InterfaceRows { translation, rotation, misfit, largest };
         (finite(&rows.translation)
             && rows.rotation.as_ref().is_none_or(finite)
             && rows.misfit.iter().all(|v| v.is_finite()))
@@ -124,13 +138,20 @@ impl Parts {
             checks.push(check(
                 "interface_rigid_mass",
                 "R' M R = [m, -c~; c~, I0]",
-                worst(&|i, j| (own[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(), r, r),
+                worst(
+                    &|i, j| (own[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
+                    r,
+                    r,
+                ),
                 ENERGY,
             ));
             let forces = stiffness * &rigid;
-            // Relative to what the parts of the motion take by themselves.
+            // |K_il| <= sqrt(K_ii K_ll): what the parts of the motion may take by themselves.
             let nc = stiffness.nrows();
-            let alone = |i: usize, j: usize| -> f64 { (0..nc).map(|l| (stiffness[(i, l)] * rigid[(l, j)]).abs()).sum() };
+            let diagonal = |i: usize| stiffness[(i, i)].max(0.0).sqrt();
+            let alone = |i: usize, j: usize| -> f64 {
+                diagonal(i) * (0..nc).map(|l| diagonal(l) * rigid[(l, j)].abs()).sum::<f64>()
+            };
             checks.push(check(
                 "interface_rigid_motion",
                 "K R = 0",
@@ -158,9 +179,10 @@ impl Parts {
             let moved = fields(&positions);
             rows.extend((0..moved.nrows()).map(|i| moved.row(i).iter().copied().collect()));
             if interface.reference.is_some() {
-                rows.extend((d..rigid_count(d)).map(|turn| {
-                    (0..rigid_count(d)).map(|column| f64::from(column == turn)).collect()
-                }));
+                rows.extend(
+                    (d..rigid_count(d))
+                        .map(|turn| (0..rigid_count(d)).map(|column| f64::from(column == turn)).collect()),
+                );
             }
         }
         let size = coordinates.names.len();
@@ -171,8 +193,7 @@ impl Parts {
 
     /// The mass matrix of the rigid body about the origin of the body frame.
     fn rigid_mass(&self) -> Mat<f64> {
-        let (m, c, inertia) =
-            (self.invariants.mass, self.invariants.first_moment, self.invariants.inertia());
+        let (m, c, inertia) = (self.invariants.mass, self.invariants.first_moment, self.invariants.inertia());
         let lever: Matrix3<f64> = Vector3::cross_matrix(&c);
         // Translations and rotations that are there: in the plane two and the third.
         let axes: Vec<usize> = if self.dimension == 2 { vec![0, 1, 5] } else { (0..6).collect() };

@@ -8,6 +8,4 @@ mod validate;
 pub use crate::invariants::Frame;
 pub use body::FlexBody;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
-pub use parts::{
-    Certificate, Guarantee, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
-};
+pub use parts::{Certificate, Guarantee, LumpedBody, MassStructure, Modes, Parts, Source, Truncation};

@@ -129,7 +129,8 @@ impl InterfaceMotion {
         let (d, count) = (dimension, positions.len() as f64);
         let centre = Vector3::from(centre);
         // Of unit size: squares of coordinates in any unit stay in range.
-        let arms: Vec<Vector3<f64>> = positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
+        let arms: Vec<Vector3<f64>> =
+            positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
         let inertia: Matrix3<f64> =
             arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
         let threshold = COLLINEAR * COLLINEAR * inertia.trace();

@@ -291,7 +291,8 @@ impl Take<'_> {
         let [stiffness, mass, of_modes] = matrices.map(|path| self.floats(&path));
         if stiffness.len() != names.len().pow(2) {
             let found = format!("found {} for {} numbers in `stiffness`", names.len(), stiffness.len());
-            self.scan.add(format!("/interface_coordinates@names: expected a name for each coordinate, {found}"));
+            self.scan
+                .add(format!("/interface_coordinates@names: expected a name for each coordinate, {found}"));
             return None;
         }
         let matrix = |values: Vec<f64>, columns: usize| {

@@ -9,5 +9,6 @@ pub mod integrate;
 pub mod mesh;
 pub mod nodal;
 pub mod pipeline;
+pub mod plane;
 pub mod random;
 pub mod reference;
