@@ -10,7 +10,7 @@ use super::ModeSettings;
 use super::failure::explain;
 use super::free_surface::{quadratic_estimate, single_precision_note};
 use super::interface_coordinates::InterfaceCoordinates;
-use super::joints::{Joint, check_prescribable, joints};
+use super::joints::{Joint, check_prescribable, hold, joints};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, side_by_side};
 use super::rigid_modes::rigid_modes;
@@ -20,8 +20,8 @@ use crate::eigen::{
     modes_of_span, solve, static_responses,
 };
 use crate::error::Result;
-use crate::linalg::{Dependents, Elimination, ReducedPencil, gram, subtract_combination};
-use crate::model::{Coupling, FeModel, rigid_count};
+use crate::linalg::{Elimination, ReducedPencil, gram, subtract_combination};
+use crate::model::{FeModel, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 
@@ -100,7 +100,7 @@ impl<'a> Parts<'a> {
     fn new(model: &FeModel, joints: &'a [Joint], settings: &ModeSettings, watch: Watch<'_>) -> Result<Self> {
         let pencil = model.pencil();
         let failed = |failure| explain(model, failure);
-        let elimination = eliminate(pencil.n(), joints, settings).map_err(failed)?;
+        let elimination = hold(pencil.n(), joints, settings.memory).map_err(failed)?;
         if elimination.is_empty() {
             let message = "the interfaces hold every node of the body: nothing is left to deform";
             return Err(Diagnostic::new(Code::InterfaceCoupling, message)
@@ -306,58 +306,6 @@ fn starts(joints: &[Joint]) -> impl Iterator<Item = (&Joint, usize)> {
         *next += joint.coordinates.len();
         Some((joint, first))
     })
-}
-
-/// T: the rows of rigid and free interfaces are zero, those of averaging ones have no mean.
-fn eliminate(
-    n: usize,
-    joints: &[Joint],
-    settings: &ModeSettings,
-) -> std::result::Result<Elimination, EigenFailure> {
-    let averaging = |joint: &&Joint| joint.coupling == Coupling::Averaging;
-    // Each couples all of its rows with each other, in K and in M. Bytes of an entry: in both matrices, one of them twice while
-    // it is made symmetric.
-    let entries: u64 = joints.iter().filter(averaging).map(|joint| (joint.rows.len() as u64).pow(2)).sum();
-    let bytes = 48 * entries;
-    if let Some(available) = settings.memory.filter(|&available| bytes > available) {
-        return Err(EigenFailure::Memory { bytes, available });
-    }
-    let dependents = joints.iter().filter(averaging).map(without_mean).collect();
-    let zero = joints.iter().filter(|joint| !averaging(joint)).flat_map(|joint| joint.rows.iter().copied());
-    Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
-}
-
-/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of the size of one.
-fn without_mean(joint: &Joint) -> Dependents {
-    let measure = joint.measure();
-    let (rows, r) = (measure.nrows(), measure.ncols());
-    // Rows of one size: rotations are in other units than displacements.
-    let mut a = Mat::from_fn(r, rows, |i, j| measure[(j, i)] / measure.col(i).norm_l2());
-    let mut pivots: Vec<usize> = Vec::new();
-    for step in 0..r {
-        let places = (step..r).flat_map(|i| (0..rows).map(move |j| (i, j)));
-        let (i, j) = places
-            .filter(|(_, j)| !pivots.contains(j))
-            .max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs()))
-            .expect("an averaging interface has more rows than coordinates");
-        for column in 0..rows {
-            let (upper, lower) = (a[(step, column)], a[(i, column)]);
-            (a[(step, column)], a[(i, column)]) = (lower, upper);
-        }
-        let pivot = a[(step, j)];
-        (0..rows).for_each(|column| a[(step, column)] /= pivot);
-        for other in (0..r).filter(|&other| other != step) {
-            let factor = a[(other, j)];
-            (0..rows).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
-        }
-        pivots.push(j);
-    }
-    let others: Vec<usize> = (0..rows).filter(|j| !pivots.contains(j)).collect();
-    Dependents {
-        rows: pivots.iter().map(|&j| joint.rows[j]).collect(),
-        on: others.iter().map(|&j| joint.rows[j]).collect(),
-        weights: Mat::from_fn(r, others.len(), |i, j| -a[(i, others[j])]),
-    }
 }
 
 /// A failure of the fixed-interface problem with its vectors in the rows of the model.

@@ -1,5 +1,6 @@
 //! K and M in interface coordinates, as joints of multibody packages want them.
 
+use crate::linalg::combine;
 use faer::Mat;
 use nalgebra::Matrix3;
 
@@ -33,10 +34,10 @@ impl InterfaceCoordinates {
             }
         }
         let turned = |a: &Mat<f64>| {
-            let b = &turn * a * turn.transpose();
+            let b = combine(turn.as_ref(), combine(a.as_ref(), turn.as_ref().transpose()).as_ref());
             Mat::from_fn(size, size, |i, j| 0.5 * (b[(i, j)] + b[(j, i)]))
         };
-        let of_modes = &turn * &self.of_modes;
+        let of_modes = combine(turn.as_ref(), self.of_modes.as_ref());
         Self {
             names: self.names.clone(),
             vectors: self.vectors.clone(),

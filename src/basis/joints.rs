@@ -1,7 +1,9 @@
 //! Interfaces as rows of the matrices: the coordinates of a joint, what they do to the nodes, and what they measure of them.
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::eigen::EigenFailure;
 use crate::error::{Error, Result};
+use crate::linalg::{Dependents, Elimination};
 use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
@@ -166,4 +168,59 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()
         found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
     }
     if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of averaging ones have no
+/// mean.
+///
+/// # Errors
+/// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not fit.
+pub(super) fn hold(
+    n: usize,
+    joints: &[Joint],
+    memory: Option<u64>,
+) -> std::result::Result<Elimination, EigenFailure> {
+    let averaging = |joint: &&Joint| joint.coupling == Coupling::Averaging;
+    // In K and in M. Bytes of an entry: in both matrices, one of them twice while it is made symmetric.
+    let entries: u64 = joints.iter().filter(averaging).map(|joint| (joint.rows.len() as u64).pow(2)).sum();
+    let bytes = 48 * entries;
+    if let Some(available) = memory.filter(|&available| bytes > available) {
+        return Err(EigenFailure::Memory { bytes, available });
+    }
+    let dependents = joints.iter().filter(averaging).map(without_mean).collect();
+    let zero = joints.iter().filter(|joint| !averaging(joint)).flat_map(|joint| joint.rows.iter().copied());
+    Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
+}
+
+/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of the size of one.
+fn without_mean(joint: &Joint) -> Dependents {
+    let measure = joint.measure();
+    let (rows, r) = (measure.nrows(), measure.ncols());
+    // Rows of one size: rotations are in other units than displacements.
+    let mut a = Mat::from_fn(r, rows, |i, j| measure[(j, i)] / measure.col(i).norm_l2());
+    let mut pivots: Vec<usize> = Vec::new();
+    for step in 0..r {
+        let places = (step..r).flat_map(|i| (0..rows).map(move |j| (i, j)));
+        let (i, j) = places
+            .filter(|(_, j)| !pivots.contains(j))
+            .max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs()))
+            .expect("an averaging interface has more rows than coordinates");
+        for column in 0..rows {
+            let (upper, lower) = (a[(step, column)], a[(i, column)]);
+            (a[(step, column)], a[(i, column)]) = (lower, upper);
+        }
+        let pivot = a[(step, j)];
+        (0..rows).for_each(|column| a[(step, column)] /= pivot);
+        for other in (0..r).filter(|&other| other != step) {
+            let factor = a[(other, j)];
+            (0..rows).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
+        }
+        pivots.push(j);
+    }
+    let others: Vec<usize> = (0..rows).filter(|j| !pivots.contains(j)).collect();
+    Dependents {
+        rows: pivots.iter().map(|&j| joint.rows[j]).collect(),
+        on: others.iter().map(|&j| joint.rows[j]).collect(),
+        weights: Mat::from_fn(r, others.len(), |i, j| -a[(i, others[j])]),
+    }
 }

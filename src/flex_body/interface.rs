@@ -2,7 +2,7 @@
 
 use super::Parts;
 use crate::invariants::IdentityCheck;
-use crate::linalg::gram;
+use crate::linalg::{combine, gram};
 use crate::model::{Coupling, InterfaceMotion, Nodes, rigid_count, rigid_fields};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -56,7 +56,7 @@ impl Interface {
         let motion = self.motion(nodes, d)?;
         let u = Mat::from_fn(d * k, nf, |row, j| shape[(3 * self.nodes[row / d] + row % d, j)]);
         let q = motion.fit(u.as_ref());
-        let left = &u - motion.rigid() * &q;
+        let left = &u - combine(motion.rigid(), q.as_ref());
         let root_mean_square = |a: &Mat<f64>, j: usize| a.col(j).norm_l2() / (k as f64).sqrt();
         let misfit: Vec<f64> = (0..nf).map(|j| root_mean_square(&left, j)).collect();
         let largest = (0..nf).map(|j| root_mean_square(&u, j)).fold(0.0, f64::max);
@@ -106,7 +106,7 @@ impl Parts {
             limit,
             passed: value <= limit,
         };
-        let twice = |a: &Mat<f64>, b: &Mat<f64>| gram(b.as_ref(), (a * b).as_ref());
+        let twice = |a: &Mat<f64>, b: &Mat<f64>| gram(b.as_ref(), combine(a.as_ref(), b.as_ref()).as_ref());
         let (energy, inertia) = (twice(stiffness, of_modes), twice(mass, of_modes));
         let root: Vec<f64> = self.modes.eigenvalue.iter().map(|l| l.sqrt()).collect();
         let nf = root.len();
@@ -145,7 +145,7 @@ impl Parts {
                 ),
                 ENERGY,
             ));
-            let forces = stiffness * &rigid;
+            let forces = combine(stiffness.as_ref(), rigid.as_ref());
             // |K_il| <= sqrt(K_ii K_ll): what the parts of the motion may take by themselves.
             let nc = stiffness.nrows();
             let diagonal = |i: usize| stiffness[(i, i)].max(0.0).sqrt();

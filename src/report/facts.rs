@@ -8,7 +8,6 @@ use super::numbers::{counted, percent, significant};
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, Interface, MassStructure, Truncation};
-use crate::model::Coupling;
 use crate::provenance::{self, SourceFile};
 use serde::{Serialize, Serializer};
 
@@ -86,7 +85,7 @@ impl InterfaceFacts {
         Self {
             name: interface.name.clone(),
             n_nodes: interface.nodes.len(),
-            coupling: interface.coupling.map(Coupling::name),
+            coupling: interface.coupling.map(|coupling| coupling.name()),
             reference: interface.reference,
             deformation: rows.map(|rows| rows.deformation().1),
         }
