@@ -169,7 +169,8 @@ pub fn convert_resumed(
     };
     let certificate = certificate(model, &found, guarantee);
     let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
-    let interfaces = interfaces(model, &frame);
+    let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+    let interfaces = interfaces(model, &frame, coupled);
     let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, shapes.as_ref(), model.dimension()));
     diagnostics.extend(fits);
     let solution = found.solution;
@@ -377,8 +378,8 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
     }
 }
 
-/// The interfaces of a model in the body frame.
-fn interfaces(model: &FeModel, frame: &Frame) -> Vec<Interface> {
+/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.
+fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     model
         .interfaces()
@@ -392,7 +393,7 @@ fn interfaces(model: &FeModel, frame: &Frame) -> Vec<Interface> {
             Interface {
                 name: set.name.clone(),
                 nodes,
-                coupling: set.coupling,
+                coupling: if coupled { Some(set.coupling()) } else { set.coupling },
                 reference: reference.map(|x| frame.to_body(&[x])[0]),
             }
         })

@@ -445,6 +445,18 @@ fn the_span_does_not_depend_on_the_reference_points() {
     }
 }
 
+/// Interfaces that state nothing are averaging ones.
+#[test]
+fn averaging_is_the_default() {
+    let stated = bracket([Coupling::Averaging, Coupling::Averaging]);
+    let mut raw = stated.clone();
+    raw.interfaces.iter_mut().for_each(|set| set.coupling = None);
+    let body = body(&model(raw), 4);
+    let expected = craig_bampton(&model(stated), 4).solution.eigenvalues;
+    assert_eq!(body.modes().eigenvalue, expected);
+    assert!(body.interfaces().iter().all(|interface| interface.coupling == Some(Coupling::Averaging)));
+}
+
 #[test]
 fn one_interface_gives_fixed_interface_modes_alone() {
     let mut raw = bracket([Coupling::Rigid, Coupling::Rigid]);
@@ -509,7 +521,9 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
     let certified = ModeSettings { accuracy: Accuracy::Certified, ..lowest(5) };
     assert!(refused(sound(), &certified).has(Code::Usage));
     let few = |bytes| ModeSettings { memory: Some(bytes), ..lowest(5) };
-    assert!(refused(sound(), &few(10_000)).has(Code::MemoryShort));
+    assert!(refused(sound(), &few(10_000)).has(Code::MemoryShort), "the rows of the averaging interface");
+    let rigid = bracket([Coupling::Rigid, Coupling::Rigid]);
+    assert!(refused(rigid, &few(100_000)).has(Code::MemoryShort), "the constraint modes");
     let mut raw = sound();
     let all = raw.nodes.ids.clone();
     raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new("all", all) }];

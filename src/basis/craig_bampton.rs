@@ -28,6 +28,9 @@ use faer::{Mat, MatRef};
 /// Part of the M-norm of a shape that must be left beside those before it.
 const LEFT: f64 = 1e-8;
 
+/// Copies of the constraint modes that are held at the same time, while they are made independent.
+const COPIES: u64 = 8;
+
 /// Modes with all interfaces held, constraint modes of all interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CraigBampton;
@@ -108,6 +111,10 @@ impl<'a> Parts<'a> {
                 .into());
         }
         let count = joints.iter().map(|joint| joint.coordinates.len()).sum();
+        let bytes = 8 * COPIES * (pencil.n() as u64) * (count as u64);
+        if let Some(available) = settings.memory.filter(|&available| bytes > available) {
+            return Err(failed(EigenFailure::Memory { bytes, available }));
+        }
         let names = joints.iter().flat_map(|joint| {
             joint.coordinates.iter().map(|coordinate| format!("{} {coordinate}", joint.name))
         });

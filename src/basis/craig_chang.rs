@@ -1,4 +1,4 @@
-//! Craig-Chang basis: free modes with the attachment modes of the interfaces (Craig and Chang, NASA CP-2001 (1976) 1193; theory
+//! Craig-Chang basis: free modes with the attachment modes of the interfaces (Craig and Chang, NASA CR-2781, 1977; theory
 //! section 5).
 
 use super::Loads;

@@ -27,6 +27,8 @@ pub(super) struct Joint {
     /// measure' motion = I, which are also the loads that work on unit coordinates (both rows x r).
     motion: Mat<f64>,
     measure: Mat<f64>,
+    /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference point costs no digits.
+    centred: Mat<f64>,
     /// Whether the nodes determine every coordinate.
     determined: bool,
 }
@@ -40,7 +42,7 @@ impl Joint {
         nodes.dedup();
         let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
         let coupling = set.coupling();
-        let joint = |coordinates: Vec<String>, loads, motion, measure, determined| Self {
+        let joint = |coordinates: Vec<String>, loads, motion, measure, centred, determined| Self {
             name: set.name.clone(),
             coupling,
             nodes: nodes.clone(),
@@ -49,6 +51,7 @@ impl Joint {
             loads,
             motion,
             measure,
+            centred,
             determined,
         };
         if coupling == Coupling::Free {
@@ -59,7 +62,7 @@ impl Joint {
             let unit = || Mat::identity(rows.len(), rows.len());
             let (coordinates, loads) =
                 (named(&|axis| format!("u{axis}")), named(&|axis| format!("force {axis}")));
-            return joint(coordinates, loads, unit(), unit(), true);
+            return joint(coordinates, loads, unit(), unit(), unit(), true);
         }
         let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| table.positions[i]).collect();
         let reference = match set.reference {
@@ -77,6 +80,7 @@ impl Joint {
             named("force ", "torque "),
             motion.rigid().to_owned(),
             motion.average().to_owned(),
+            InterfaceMotion::new(&positions, d, None).average().to_owned(),
             motion.is_determined(),
         )
     }
@@ -194,7 +198,7 @@ pub(super) fn hold(
 
 /// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of the size of one.
 fn without_mean(joint: &Joint) -> Dependents {
-    let measure = joint.measure();
+    let measure = joint.centred.as_ref();
     let (rows, r) = (measure.nrows(), measure.ncols());
     // Rows of one size: rotations are in other units than displacements.
     let mut a = Mat::from_fn(r, rows, |i, j| measure[(j, i)] / measure.col(i).norm_l2());

@@ -147,7 +147,7 @@ fn body(html: &mut String, facts: &Facts) {
     if !model.interfaces.is_empty() {
         let rows: Vec<_> =
             model.interfaces.iter().map(|i| vec![escape(&i.name), escape(&i.in_words())]).collect();
-        table(html, "Interfaces", &texts(["Name", ""]), &[0, 1], &rows);
+        table(html, "Interfaces", &texts(["Name", "Nodes and coupling"]), &[0, 1], &rows);
     }
 }
 
