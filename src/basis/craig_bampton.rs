@@ -12,15 +12,17 @@ use super::free_surface::{quadratic_estimate, single_precision_note};
 use super::interface_coordinates::InterfaceCoordinates;
 use super::joints::{Joint, check_prescribable, hold, joints};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
-use super::pseudo_free_surface::{Independent, independent, largest_shares, side_by_side};
+use super::pseudo_free_surface::{Independent, independent, largest_shares, named, side_by_side};
 use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
-    Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Precision, Proof, Resume, Wanted,
-    modes_of_span, solve, static_responses,
+    Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof, Resume,
+    Wanted, modes_of_span, solve, static_responses,
 };
 use crate::error::Result;
-use crate::linalg::{Elimination, ReducedPencil, gram, subtract_combination};
+use crate::linalg::{
+    Elimination, ReducedPencil, add_combination, combine, gram, subtract_combination, symmetric_eigen,
+};
 use crate::model::{FeModel, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
@@ -28,8 +30,8 @@ use faer::{Mat, MatRef};
 /// Part of the M-norm of a shape that must be left beside those before it.
 const LEFT: f64 = 1e-8;
 
-/// Copies of the constraint modes that are held at the same time, while they are made independent.
-const COPIES: u64 = 8;
+/// Copies of the shapes that are held at the same time while they are made independent (measured: 18).
+const COPIES: u64 = 20;
 
 /// Modes with all interfaces held, constraint modes of all interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -77,7 +79,8 @@ impl Basis for CraigBampton {
             .collect();
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         solution.completeness = parts.completeness(model, &solution);
-        solution.plan = parts.fixed.plan;
+        let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
+        solution.plan = parts.fixed.plan.map(|plan| Plan { bytes: plan.bytes.max(bytes), ..plan });
         add_work(&mut solution, &parts.fixed);
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
         basis.provenance = provenance;
@@ -111,7 +114,7 @@ impl<'a> Parts<'a> {
                 .into());
         }
         let count = joints.iter().map(|joint| joint.coordinates.len()).sum();
-        let bytes = 8 * COPIES * (pencil.n() as u64) * (count as u64);
+        let bytes = shape_bytes(pencil.n(), count);
         if let Some(available) = settings.memory.filter(|&available| bytes > available) {
             return Err(failed(EigenFailure::Memory { bytes, available }));
         }
@@ -136,7 +139,11 @@ impl<'a> Parts<'a> {
             resume: Resume::default(),
         };
         let in_model = |failure| failed(expanded(failure, &elimination));
-        let mut fixed = solve(&problem, settings, watch).map_err(in_model)?;
+        let own = reduced.bytes();
+        let left =
+            ModeSettings { memory: settings.memory.map(|bytes| bytes.saturating_sub(own)), ..*settings };
+        let mut fixed = solve(&problem, &left, watch).map_err(in_model)?;
+        fixed.plan = fixed.plan.map(|plan| Plan { bytes: plan.bytes + own, ..plan });
         watch(Event::Phase("constraint modes"));
         let lowest = fixed.eigenvalues.first().copied().or(fixed.next_eigenvalue).unwrap_or(first_estimate);
         let precision = fixed.plan.map_or(Precision::Double, |plan| plan.precision);
@@ -145,7 +152,9 @@ impl<'a> Parts<'a> {
         let interior =
             static_responses(&problem, none.as_ref(), loads, lowest, precision, &mut fixed.counters)
                 .map_err(in_model)?;
-        let constraint = moved + elimination.expand(interior.as_ref());
+        let mut constraint = moved + elimination.expand(interior.as_ref());
+        restore_rigid_motion(joints, rigid.as_ref(), &mut constraint)
+            .ok_or_else(|| failed(EigenFailure::Inaccurate { residual: f64::NAN }))?;
         Ok(Self { joints, names: names.collect(), elimination, reduced, fixed, constraint })
     }
 
@@ -167,10 +176,9 @@ impl<'a> Parts<'a> {
         let mut removed: Vec<usize> = removed.chain(&found.massless).copied().collect();
         removed.sort_unstable();
         let expected = removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len();
-        let which = removed.iter().map(|&j| self.name(j));
-        let which: Vec<String> = which.map(|(kind, name)| format!("{kind} {name}")).collect();
+        let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
         let of = found.kept.len() + removed.len();
-        let which = which.join(", ");
+        let which = named(which.collect());
         let note = if expected {
             let message = format!(
                 "the constraint modes hold the {rigid} rigid motions, which leaves {} of {of} shapes; without: {which}",
@@ -270,18 +278,12 @@ impl<'a> Parts<'a> {
         let mass = gram(shapes.as_ref(), pencil.apply_mass(shapes.as_ref()).as_ref());
         let mean = |a: &Mat<f64>, i: usize, j: usize| 0.5 * (a[(i, j)] + a[(j, i)]);
         let size = c + lambda.len();
-        let mut of_modes = Mat::zeros(size, modes.ncols());
-        for (joint, first) in starts(self.joints) {
-            let measured = gram(joint.measure(), joint.gather(modes).as_ref());
-            of_modes.as_mut().subrows_mut(first, measured.nrows()).copy_from(&measured);
-        }
-        let q = of_modes.as_ref().subrows(0, c).to_owned();
+        let q = coordinates_of(self.joints, modes);
         // T y = psi - (D + T Y) q, and eta = Phi' (T'MT) y.
         let mut left = modes.to_owned();
         subtract_combination(left.as_mut(), self.constraint.as_ref(), q.as_ref());
         let y = self.elimination.free_rows(left.as_ref());
         let eta = gram(self.fixed.vectors.as_ref(), self.reduced.pencil().apply_mass(y.as_ref()).as_ref());
-        of_modes.as_mut().subrows_mut(c, lambda.len()).copy_from(&eta);
         let modal = (1..=lambda.len()).map(|j| format!("fixed-interface mode {j}"));
         InterfaceCoordinates {
             names: self.names.iter().cloned().chain(modal).collect(),
@@ -292,7 +294,11 @@ impl<'a> Parts<'a> {
                 _ => 0.0,
             }),
             mass: Mat::from_fn(size, size, |i, j| mean(&mass, i, j)),
-            of_modes,
+            of_modes: Mat::from_fn(
+                size,
+                modes.ncols(),
+                |i, j| if i < c { q[(i, j)] } else { eta[(i - c, j)] },
+            ),
         }
     }
 
@@ -304,6 +310,41 @@ impl<'a> Parts<'a> {
         };
         starts(self.joints).flat_map(of).collect()
     }
+}
+
+/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi + (R - Psi Q) Q^+ with their
+/// coordinates Q = C'R: K annihilates them only as well as its digits allow, and a slender body magnifies that. The
+/// coordinates of the shapes stay what they are.
+fn restore_rigid_motion(joints: &[Joint], rigid: MatRef<'_, f64>, constraint: &mut Mat<f64>) -> Option<()> {
+    let q = coordinates_of(joints, rigid);
+    let scale: Vec<f64> = (0..q.nrows()).map(|i| q.row(i).norm_l2()).collect();
+    // Coordinates of one size: rotations are in other units than displacements.
+    let weighted =
+        Mat::from_fn(
+            q.nrows(),
+            q.ncols(),
+            |i, j| {
+                if scale[i] > 0.0 { q[(i, j)] / scale[i].powi(2) } else { 0.0 }
+            },
+        );
+    let eigen = symmetric_eigen(gram(weighted.as_ref(), q.as_ref()).as_ref())?;
+    let root = Mat::from_fn(q.ncols(), q.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+    let root = combine(root.as_ref(), root.as_ref().transpose());
+    let inverse = combine(root.as_ref(), weighted.as_ref().transpose());
+    for _ in 0..2 {
+        let mut missing = rigid.to_owned();
+        subtract_combination(missing.as_mut(), constraint.as_ref(), q.as_ref());
+        add_combination(constraint.as_mut(), missing.as_ref(), inverse.as_ref());
+    }
+    Some(())
+}
+
+/// C'u: the interface coordinates of displacements (N x k).
+fn coordinates_of(joints: &[Joint], u: MatRef<'_, f64>) -> Mat<f64> {
+    let blocks = joints.iter().map(|joint| gram(joint.measure(), joint.gather(u).as_ref()));
+    let blocks: Vec<Mat<f64>> = blocks.collect();
+    let rows: Vec<_> = blocks.iter().flat_map(|block| block.row_iter()).collect();
+    Mat::from_fn(rows.len(), u.ncols(), |i, j| rows[i][j])
 }
 
 /// The joints, each with its first coordinate.
@@ -330,6 +371,11 @@ fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
         }
         other => other,
     }
+}
+
+/// Bytes for so many shapes of n rows.
+fn shape_bytes(n: usize, count: usize) -> u64 {
+    8 * COPIES * (n as u64) * (count as u64)
 }
 
 /// Adds the work of the fixed-interface problem.

@@ -44,6 +44,11 @@ pub struct ReducedPencil {
 }
 
 impl ReducedPencil {
+    /// Bytes of both matrices.
+    pub fn bytes(&self) -> u64 {
+        12 * (self.stiffness.as_csc().nnz() + self.mass.as_csc().nnz()) as u64
+    }
+
     /// As a pencil.
     pub fn pencil(&self) -> Pencil<'_> {
         Pencil::new(&self.stiffness, &self.mass, self.block)
@@ -163,10 +168,9 @@ impl Elimination {
         let chunk = |first: usize| {
             let mut column = Column { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
             let (mut lengths, mut row_idx, mut values) = (Vec::new(), Vec::new(), Vec::new());
-            for j in first..(first + COLUMNS).min(m) {
-                for (row, weight) in
-                    std::iter::once((self.free[j] as usize, 1.0)).chain(taken[j].iter().copied())
-                {
+            let last = (first + COLUMNS).min(m);
+            for (&own, others) in self.free[first..last].iter().zip(&taken[first..last]) {
+                for (row, weight) in std::iter::once((own as usize, 1.0)).chain(others.iter().copied()) {
                     let (nodes, entries) = a.row(row / block);
                     for (&node, &value) in nodes.iter().zip(entries) {
                         self.add(&mut column, node as usize * block + row % block, weight * value);
