@@ -11,11 +11,13 @@ use flexbody::diagnostic::Code;
 use flexbody::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
 use flexbody::error::Result;
 use flexbody::flex_body::FlexBody;
+use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, Expected, identities};
-use flexbody::linalg::gram;
+use flexbody::linalg::{CscMatrix, gram};
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody::progress::SILENT;
 use flexbody::verification::verify;
+use std::path::Path;
 use support::elements::{Kind, MassRule, Material};
 use support::mesh::Mesh;
 use support::plane::rectangle;
@@ -301,7 +303,7 @@ fn free_frequencies_come_from_above_to_those_of_the_body() {
         let zero = if raw.dimension == 2 { 3 } else { 6 };
         let exact = oracle.eigenvalues(oracle.allowed().as_ref(), zero);
         let model = model(raw);
-        let mut before = vec![f64::INFINITY; 8];
+        let mut before = [f64::INFINITY; 8];
         for count in [4, 10, 25, usize::MAX] {
             let found = craig_bampton(&model, count).solution.eigenvalues;
             for (j, before) in before.iter_mut().enumerate().take(found.len()) {
@@ -416,6 +418,69 @@ fn interface_coordinates_hold_the_modes_and_as_many_rigid_motions() {
             close(*found, *expected, 1e-8, "lambda");
         }
     }
+}
+
+/// Checks of the interface coordinates that do not hold.
+fn broken(body: &FlexBody) -> Vec<String> {
+    let checks = body.parts().interface_identities();
+    assert_eq!(checks.len(), 4);
+    let wrong = checks.iter().filter(|check| !check.passed);
+    wrong.map(|check| format!("{}: {:e} > {:e}", check.name, check.value, check.limit)).collect()
+}
+
+/// K of few digits annihilates rigid motion badly, and a slender body magnifies that: its rigid mass is exact all the same.
+#[test]
+fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
+    let mesh = Mesh::block(Kind::Hex8, [30, 1, 1], [3.0, 0.05, 0.04]);
+    let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let digits = 11;
+    let rounded = |v: f64| format!("{v:.*e}", digits - 1).parse::<f64>().expect("a number");
+    let entries: Vec<_> =
+        support::mesh::entries(&raw.stiffness.matrix).map(|(r, c, v)| (r, c, rounded(v))).collect();
+    let n = raw.stiffness.matrix.n_cols();
+    raw.stiffness.matrix = CscMatrix::from_triplets(n, n, &entries);
+    raw.stiffness.digits = digits as u8;
+    let x = &raw.nodes.positions;
+    let end = |at: f64| (0..x.len()).filter(|&i| (x[i][0] - at).abs() < 1e-9).map(|i| i as i64 + 1).collect();
+    let ends: [Vec<i64>; 2] = [end(0.0), end(3.0)];
+    for coupling in [Coupling::Rigid, Coupling::Averaging, Coupling::Free] {
+        raw.interfaces = ["first", "second"]
+            .into_iter()
+            .zip(&ends)
+            .map(|(name, nodes)| NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes.clone()) })
+            .collect();
+        let body = body(&model(raw.clone()), 6);
+        assert!(body.certificate().rigid_noise > 1e-9, "{:e}", body.certificate().rigid_noise);
+        assert_eq!(broken(&body), [""; 0], "{coupling:?}");
+        let coordinates = body.coordinates().expect("coordinates");
+        assert_eq!(coordinates.names.len(), body.n_modes() + 6);
+    }
+}
+
+/// Reduced integration leaves patterns without mass, also among the motions of single nodes: they are left out and told, and what
+/// stays keeps its digits.
+#[test]
+fn motions_without_mass_are_left_out_and_told() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/bar_c3d8r");
+    let files = read_manifest(folder.join("model.toml")).expect("a fixture");
+    let mut raw = read_model(&files).expect("a fixture");
+    let along = |axis: usize| {
+        let x = raw.nodes.positions.iter().map(|x| x[axis]);
+        (x.clone().fold(f64::INFINITY, f64::min), x.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let axis = (0..3).max_by(|&a, &b| (along(a).1 - along(a).0).total_cmp(&(along(b).1 - along(b).0)));
+    let axis = axis.expect("three axes");
+    let (low, high) = along(axis);
+    let end = |at: f64| {
+        let near = |i: &usize| (raw.nodes.positions[*i][axis] - at).abs() < 1e-6 * (high - low);
+        (0..raw.nodes.len()).filter(near).map(|i| raw.nodes.ids[i]).collect::<Vec<_>>()
+    };
+    let free = |name: &str, nodes| NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new(name, nodes) };
+    raw.interfaces = vec![free("low", end(low)), free("high", end(high))];
+    let done = converted(&model(raw), BasisChoice::CraigBampton(CraigBampton), 8, BodyFrame::Principal);
+    let told = done.diagnostics.iter().find(|d| d.code() == Code::ShapesDependent).expect("told");
+    assert!(told.message().contains("move no mass"), "{}", told.message());
+    assert_eq!(broken(&done.body), [""; 0]);
 }
 
 #[test]
