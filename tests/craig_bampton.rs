@@ -604,6 +604,27 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
     assert!(refused(raw, &below).has(Code::ShapesNone), "nothing but rigid motion");
 }
 
+/// Two blocks that share an edge: a mechanism when one is held, and also when both are, since the interfaces move.
+#[test]
+fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
+    let mesh = Mesh::hinge(Kind::Hex8, 2);
+    let face = |at: f64| -> Vec<i64> {
+        let kept = mesh.nodes.iter().enumerate().filter(|(_, x)| (x[0] - at).abs() < 1e-9);
+        kept.map(|(i, _)| i as i64 + 1).collect()
+    };
+    for method in [Method::Dense, Method::Lanczos] {
+        for ends in [vec![face(0.0)], vec![face(0.0), face(4.0)]] {
+            let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+            let sets = ends.into_iter().enumerate();
+            raw.interfaces = sets.map(|(i, nodes)| NodeSet::new(format!("end {i}"), nodes)).collect();
+            let settings = ModeSettings { method, ..lowest(3) };
+            let error = modes_of(&model(raw), &CraigBampton, &settings).expect_err("a mechanism");
+            assert!(error.has(Code::Mechanism), "{error}");
+            assert!(error.to_string().contains("7 zero-energy modes: 6 rigid ones and 1 more"), "{error}");
+        }
+    }
+}
+
 /// A plane body's coordinates are two translations and a rotation for each interface.
 #[test]
 fn plane_bodies_have_three_coordinates_for_each_interface() {
