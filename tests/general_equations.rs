@@ -1,0 +1,304 @@
+//! Bodies whose mass matrix does not commute with rotations (theory section 6): the equations in constant invariants against the
+//! unreduced nodal body, and both against what nature keeps.
+
+mod support;
+
+use faer::Mat;
+use flexbody::input::{read_manifest, read_model};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use serde_json::Value;
+use std::path::Path;
+use support::equations::{Coriolis, State};
+use support::general::{
+    GeneralBody, NodalBody, Row, RowKind, dense, nodal_rates, pack, rates, reduced_rates, rigid_velocities,
+    rows, unpack,
+};
+use support::integrate;
+use support::nodal::{deviation, random_state};
+use support::random::Random;
+use support::reference;
+
+fn random_matrix(random: &mut Random, rows: usize, columns: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(rows, columns, |_, _| random.signed())
+}
+
+fn to_faer(a: &DMatrix<f64>) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
+}
+
+/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M is any positive
+/// definite matrix with the given rigid mass matrix: T'M T with T R = R S, and S taking R'M R to what it has to be.
+fn random_body(seed: u64) -> NodalBody {
+    let mut random = Random(seed);
+    let positions: Vec<[f64; 3]> = (0..5).map(|_| random.vector::<3>()).collect();
+    let vectors = (0..5)
+        .map(|node| (RowKind::Displacement, node))
+        .chain((0..3).map(|node| (RowKind::Rotation, node)))
+        .chain((7..9).map(|node| (RowKind::Internal, node)));
+    let ordered: Vec<Row> =
+        vectors.flat_map(|(kind, node)| [0, 1, 2].map(|axis| Row { kind, node, axis })).collect();
+    let rows: Vec<Row> = random.permutation(ordered.len()).into_iter().map(|i| ordered[i]).collect();
+    let n = rows.len();
+    let square = |random: &mut Random, n: usize| {
+        let a = random_matrix(random, n, n);
+        &a * a.transpose() / n as f64
+    };
+    let (any, stiffness) = (square(&mut random, n), square(&mut random, n));
+
+    let rigid = rigid_velocities(&rows, &positions);
+    let (mass, first) = (2.0, Vector3::from(random.vector::<3>()) * 0.5);
+    let mixed = -support::equations::skew(&first);
+    let mut wanted = DMatrix::<f64>::identity(6, 6) * mass;
+    wanted.view_mut((0, 3), (3, 3)).copy_from(&mixed);
+    wanted.view_mut((3, 0), (3, 3)).copy_from(&mixed.transpose());
+    let inertia = square(&mut random, 3) + Matrix3::identity();
+    wanted.view_mut((3, 3), (3, 3)).copy_from(&inertia);
+    let lower = |a: DMatrix<f64>| a.cholesky().expect("positive definite").l();
+    let found = lower(rigid.transpose() * &any * &rigid);
+    let change = found.transpose().try_inverse().expect("regular") * lower(wanted).transpose();
+    let gram = (rigid.transpose() * &rigid).try_inverse().expect("regular");
+    let turn = DMatrix::identity(n, n)
+        + &rigid * (change - DMatrix::<f64>::identity(6, 6)) * gram * rigid.transpose();
+    let general = turn.transpose() * any * turn;
+    let shapes = random_matrix(&mut random, n, 4);
+    NodalBody::new(&to_faer(&stiffness), &to_faer(&general), &rows, &positions, &to_faer(&shapes))
+}
+
+#[test]
+fn invariants_give_the_accelerations_of_the_nodes() {
+    for seed in 0..20 {
+        let body = random_body(seed);
+        let reduced = body.invariants();
+        let (state, _) = random_state(&mut Random(1000 + seed), body.n_modes(), 0.7);
+        let error = deviation(&body.accelerations(&state), &reduced.accelerations(&state));
+        assert!(error < 1e-12, "seed {seed}: {error:e}");
+        let y = pack(&state);
+        let rate = nodal_rates(&body, &y);
+        assert!((&rate - reduced_rates(&reduced, &y)).norm() < 1e-12 * rate.norm(), "seed {seed}");
+
+        let scale = body.energy(&state);
+        assert!((reduced.energy(&state) - scale).abs() < 1e-13 * scale, "seed {seed}");
+        let difference = body.linear_momentum(&state) - reduced.linear_momentum(&state);
+        assert!(difference.norm() < 1e-13 * body.linear_momentum(&state).norm(), "seed {seed}");
+        let difference = body.angular_momentum(&state) - reduced.angular_momentum(&state);
+        assert!(difference.norm() < 1e-13 * body.angular_momentum(&state).norm(), "seed {seed}");
+        // M is general indeed: the formulas for M = Ms kron I would do something else.
+        let wrong =
+            deviation(&body.accelerations(&state), &body.accelerations_for_rotation_invariant_mass(&state));
+        assert!(wrong > 1e-2, "seed {seed}: {wrong:e}");
+    }
+}
+
+/// Where M = Ms kron I, inner vectors included, section 6 is section 3, and the nodal formula of [ZG19] holds.
+#[test]
+fn rotation_invariant_mass_gives_the_equations_of_section_three() {
+    for seed in 0..10 {
+        let mut random = Random(500 + seed);
+        let positions: Vec<[f64; 3]> = (0..6).map(|_| random.vector::<3>()).collect();
+        let place = |node| if node < 6 { RowKind::Displacement } else { RowKind::Internal };
+        let rows: Vec<Row> =
+            (0..8).flat_map(|node| [0, 1, 2].map(|axis| Row { kind: place(node), node, axis })).collect();
+        let a = random_matrix(&mut random, 8, 8);
+        let mass = (&a * a.transpose()).kronecker(&DMatrix::<f64>::identity(3, 3));
+        let a = random_matrix(&mut random, 24, 24);
+        let (stiffness, shapes) = (&a * a.transpose(), random_matrix(&mut random, 24, 5));
+        let body =
+            NodalBody::new(&to_faer(&stiffness), &to_faer(&mass), &rows, &positions, &to_faer(&shapes));
+        let general = body.invariants();
+        let (state, _) = random_state(&mut random, 5, 0.7);
+        let exact = general.accelerations(&state);
+        let section_three = general.reduced.free_accelerations(&state, Coriolis::Correct);
+        let error = deviation(&exact, &section_three);
+        assert!(error < 1e-12, "seed {seed}: {error:e}");
+        let error = deviation(&exact, &body.accelerations_for_rotation_invariant_mass(&state));
+        assert!(error < 1e-12, "seed {seed}, nodes: {error:e}");
+        let (c1, nf) = (&general.reduced.c1, 5);
+        for (b, j, k) in (0..3).flat_map(|b| (0..nf).flat_map(move |j| (0..3).map(move |k| (b, j, k)))) {
+            let axis = Vector3::from_fn(|i, _| f64::from(u8::from(i == b)));
+            let expected = axis.cross(&Vector3::from_fn(|i, _| c1[(i, j)]))[k];
+            assert!((general.w0[(k, b * nf + j)] - expected).abs() < 1e-13 * general.w0.norm(), "W0");
+        }
+    }
+}
+
+/// A model of the fixtures about its centre of mass in model axes, and the reference numbers beside it.
+struct Fixture {
+    name: &'static str,
+    body: NodalBody,
+    eigenvalues: Vec<f64>,
+    infinite: usize,
+    reference: Value,
+}
+
+const FIXTURES: [&str; 8] = [
+    "frame_beams",
+    "frame_lumped",
+    "hex8_bubbles",
+    "hex8_edges",
+    "mpc_block",
+    "plane_frame",
+    "shell_folded",
+    "spring_ends",
+];
+
+fn fixture(name: &'static str, modes: usize) -> Fixture {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
+    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    let text = std::fs::read_to_string(folder.join("expected.json")).expect("reference");
+    let reference: Value = serde_json::from_str(&text).expect("JSON");
+    let rows = rows(&raw);
+    let (k, m) = (reference::dense(&raw.stiffness.matrix), reference::dense(&raw.mass.matrix));
+
+    let rigid = rigid_velocities(&rows, &raw.nodes.positions);
+    let block = rigid.transpose() * dense(&m) * &rigid;
+    let com = Vector3::new(
+        // In the plane only the rotation about z exists.
+        block[(1, 5)],
+        -block[(0, 5)],
+        block[(0, 4)],
+    ) / block[(0, 0)];
+    let positions: Vec<[f64; 3]> =
+        raw.nodes.positions.iter().map(|x| (Vector3::from(*x) - com).into()).collect();
+
+    let found = reference::modes_of(&k, &m);
+    assert_eq!(found.zero, if raw.dimension == 2 { 3 } else { 6 }, "{name}");
+    let mut shapes = found.shapes.subcols(0, modes).to_owned();
+    for mut shape in shapes.col_iter_mut() {
+        let largest = (0..rows.len())
+            .filter(|&i| rows[i].kind == RowKind::Displacement)
+            .max_by(|&i, &j| shape[i].abs().total_cmp(&shape[j].abs()))
+            .expect("displacements");
+        if shape[largest] < 0.0 {
+            shape *= faer::Scale(-1.0);
+        }
+    }
+    Fixture {
+        name,
+        body: NodalBody::new(&k, &m, &rows, &positions, &shapes),
+        eigenvalues: found.eigenvalues[..modes].to_vec(),
+        infinite: found.infinite,
+        reference,
+    }
+}
+
+fn matrix(value: &Value) -> DMatrix<f64> {
+    let number = |v: &Value| v.as_f64().expect("a number");
+    let rows: Vec<Vec<f64>> = value
+        .as_array()
+        .expect("rows")
+        .iter()
+        .map(|row| row.as_array().expect("a row").iter().map(number).collect())
+        .collect();
+    DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
+}
+
+/// Two programs, two eigen-solvers: the dense invariants of scipy beside each fixture.
+#[test]
+fn invariants_of_the_fixtures_are_the_reference() {
+    for name in FIXTURES {
+        let fixture = fixture(name, 12);
+        let reference = &fixture.reference;
+        let lambda = reference["flexible_eigenvalues"].as_array().expect("eigenvalues");
+        assert_eq!(lambda.len(), 12, "{name}");
+        for (found, expected) in fixture.eigenvalues.iter().zip(lambda) {
+            let error = (found / expected.as_f64().expect("a number") - 1.0).abs();
+            assert!(error < 1e-9, "{name}: eigenvalue {error:e}");
+        }
+        assert_eq!(reference["eigenvalue_facts"]["infinite"], fixture.infinite, "{name}");
+        let GeneralBody { reduced, w0 } = fixture.body.invariants();
+        let size = reduced.inertia.norm().sqrt();
+        let mass = reference["rigid_body"]["mass"].as_f64().expect("mass");
+        assert!((reduced.mass / mass - 1.0).abs() < 1e-13, "{name}");
+        assert!(reduced.first_moment.norm() < 1e-13 * size * mass.sqrt(), "{name}");
+        let inertia = DMatrix::from_fn(3, 3, |k, l| reduced.inertia[(k, l)]);
+        // Scaled as the Cauchy-Schwarz inequality bounds them: C1, C2 vanish, W0 where M is rotation invariant.
+        for (what, found, scale) in [
+            ("I0", &inertia, size * size),
+            ("W0", &w0, mass.sqrt()),
+            ("W1", &reduced.w1, size),
+            ("W2", &reduced.w2, 1.0),
+            ("W3", &reduced.w3, 1.0),
+            ("C1", &reduced.c1, mass.sqrt()),
+            ("C2", &reduced.c2, size),
+            ("m_ff", &reduced.modal_mass, 1.0),
+        ] {
+            let expected = matrix(&reference["invariants"][what]);
+            assert_eq!(found.shape(), expected.shape(), "{name} {what}");
+            let error = (found - expected).norm() / scale;
+            assert!(error < 1e-9, "{name} {what}: {error:e}");
+        }
+    }
+}
+
+/// Largest relative drift while a body tumbles and flies, measured on the nodes, and how far it deforms.
+#[derive(Debug)]
+struct Drift {
+    energy: f64,
+    linear: f64,
+    angular: f64,
+    deformation: f64,
+    turns: f64,
+}
+
+const MODES: usize = 6;
+
+/// A body that spins about its middle axis with a fifth of its first circular frequency, bent and moving at the start.
+fn tumble(fixture: &Fixture, periods: f64, rate: impl Fn(&DVector<f64>) -> DVector<f64>) -> Drift {
+    let (body, omega) = (&fixture.body, fixture.eigenvalues.iter().map(|l| l.sqrt()).collect::<Vec<f64>>());
+    let eigen = body.invariants().reduced.inertia.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| eigen.eigenvalues[i].total_cmp(&eigen.eigenvalues[j]));
+    let radius = eigen.eigenvalues[order[1]].sqrt();
+    let [low, middle, high] = order.map(|i| eigen.eigenvectors.column(i).into_owned());
+    let spin = 0.2 * omega[0];
+    let start = State {
+        origin: Vector3::new(0.3, -0.2, 0.5) * radius,
+        axes: Random(7).rotation(),
+        velocity: Vector3::new(0.2, 0.5, -0.4) * spin * radius,
+        omega: (middle + 0.1 * low + 0.05 * high) * spin,
+        q: DVector::from_fn(MODES, |j, _| 0.05 * radius * omega[0] / omega[j]),
+        qd: DVector::zeros(MODES),
+    };
+    let energy = body.energy(&start);
+    let (linear, angular) = (body.linear_momentum(&start), body.angular_momentum(&start));
+    let step = 0.8 / omega[MODES - 1];
+    let steps = (periods * std::f64::consts::TAU / omega[0] / step).ceil() as usize;
+    let mut found = Drift { energy: 0.0, linear: 0.0, angular: 0.0, deformation: 0.0, turns: 0.0 };
+    let mut y = pack(&start);
+    for _ in 0..steps {
+        y = integrate::step(&y, step, &rate);
+        let state = unpack(&y);
+        found.energy = found.energy.max((body.energy(&state) / energy - 1.0).abs());
+        found.linear = found.linear.max((body.linear_momentum(&state) - linear).norm() / linear.norm());
+        found.angular = found.angular.max((body.angular_momentum(&state) - angular).norm() / angular.norm());
+        found.deformation = found.deformation.max(state.q.norm() / radius);
+        found.turns += state.omega.norm() * step / std::f64::consts::TAU;
+    }
+    found
+}
+
+#[test]
+fn tumbling_bodies_keep_energy_and_momenta() {
+    for name in ["frame_beams", "shell_folded", "mpc_block"] {
+        let fixture = fixture(name, MODES);
+        let reduced = fixture.body.invariants();
+        let drift = tumble(&fixture, 20.0, |y| reduced_rates(&reduced, y));
+        assert!(drift.deformation > 0.05 && drift.turns > 3.0, "{name}: {drift:?}");
+        assert!(drift.energy < 1e-9 && drift.linear < 1e-9 && drift.angular < 1e-9, "{name}: {drift:?}");
+    }
+}
+
+/// What theory section 6 warns of: formulas for M = Ms kron I on a frame whose M is not of that kind.
+#[test]
+fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
+    let fixture = fixture("frame_beams", MODES);
+    let (body, reduced) = (&fixture.body, fixture.body.invariants());
+    // By the nodes, [ZG19], and by section 3 with the right invariants: W3 is not skew, W0 is not e x C1.
+    let nodes = tumble(&fixture, 2.0, |y| rates(y, |s| body.accelerations_for_rotation_invariant_mass(s)));
+    let invariants =
+        tumble(&fixture, 2.0, |y| rates(y, |s| reduced.reduced.free_accelerations(s, Coriolis::Correct)));
+    println!("{nodes:?} {invariants:?} {}", fixture.name);
+    for drift in [nodes, invariants] {
+        assert!(drift.energy.max(drift.angular) > 1e-3, "{drift:?}");
+    }
+}
