@@ -123,7 +123,6 @@ fn rotation_invariant_mass_gives_the_equations_of_section_three() {
 
 /// A model of the fixtures about its centre of mass in model axes, and the reference numbers beside it.
 struct Fixture {
-    name: &'static str,
     body: NodalBody,
     eigenvalues: Vec<f64>,
     infinite: usize,
@@ -141,7 +140,7 @@ const FIXTURES: [&str; 8] = [
     "spring_ends",
 ];
 
-fn fixture(name: &'static str, modes: usize) -> Fixture {
+fn fixture(name: &str, modes: usize) -> Fixture {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
     let text = std::fs::read_to_string(folder.join("expected.json")).expect("reference");
@@ -151,12 +150,8 @@ fn fixture(name: &'static str, modes: usize) -> Fixture {
 
     let rigid = rigid_velocities(&rows, &raw.nodes.positions);
     let block = rigid.transpose() * dense(&m) * &rigid;
-    let com = Vector3::new(
-        // In the plane only the rotation about z exists.
-        block[(1, 5)],
-        -block[(0, 5)],
-        block[(0, 4)],
-    ) / block[(0, 0)];
+    // From the motions that a plane model has too.
+    let com = Vector3::new(block[(1, 5)], -block[(0, 5)], block[(0, 4)]) / block[(0, 0)];
     let positions: Vec<[f64; 3]> =
         raw.nodes.positions.iter().map(|x| (Vector3::from(*x) - com).into()).collect();
 
@@ -173,7 +168,6 @@ fn fixture(name: &'static str, modes: usize) -> Fixture {
         }
     }
     Fixture {
-        name,
         body: NodalBody::new(&k, &m, &rows, &positions, &shapes),
         eigenvalues: found.eigenvalues[..modes].to_vec(),
         infinite: found.infinite,
@@ -202,7 +196,7 @@ fn invariants_of_the_fixtures_are_the_reference() {
         assert_eq!(lambda.len(), 12, "{name}");
         for (found, expected) in fixture.eigenvalues.iter().zip(lambda) {
             let error = (found / expected.as_f64().expect("a number") - 1.0).abs();
-            assert!(error < 1e-9, "{name}: eigenvalue {error:e}");
+            assert!(error < 1e-10, "{name}: eigenvalue {error:e}");
         }
         assert_eq!(reference["eigenvalue_facts"]["infinite"], fixture.infinite, "{name}");
         let GeneralBody { reduced, w0 } = fixture.body.invariants();
@@ -225,7 +219,7 @@ fn invariants_of_the_fixtures_are_the_reference() {
             let expected = matrix(&reference["invariants"][what]);
             assert_eq!(found.shape(), expected.shape(), "{name} {what}");
             let error = (found - expected).norm() / scale;
-            assert!(error < 1e-9, "{name} {what}: {error:e}");
+            assert!(error < 1e-10, "{name} {what}: {error:e}");
         }
     }
 }
@@ -261,7 +255,7 @@ fn tumble(fixture: &Fixture, periods: f64, rate: impl Fn(&DVector<f64>) -> DVect
     };
     let energy = body.energy(&start);
     let (linear, angular) = (body.linear_momentum(&start), body.angular_momentum(&start));
-    let step = 0.8 / omega[MODES - 1];
+    let step = 0.6 / omega[MODES - 1];
     let steps = (periods * std::f64::consts::TAU / omega[0] / step).ceil() as usize;
     let mut found = Drift { energy: 0.0, linear: 0.0, angular: 0.0, deformation: 0.0, turns: 0.0 };
     let mut y = pack(&start);
@@ -284,7 +278,7 @@ fn tumbling_bodies_keep_energy_and_momenta() {
         let reduced = fixture.body.invariants();
         let drift = tumble(&fixture, 20.0, |y| reduced_rates(&reduced, y));
         assert!(drift.deformation > 0.05 && drift.turns > 3.0, "{name}: {drift:?}");
-        assert!(drift.energy < 1e-9 && drift.linear < 1e-9 && drift.angular < 1e-9, "{name}: {drift:?}");
+        assert!(drift.energy < 1e-10 && drift.linear < 1e-10 && drift.angular < 1e-10, "{name}: {drift:?}");
     }
 }
 
@@ -292,13 +286,20 @@ fn tumbling_bodies_keep_energy_and_momenta() {
 #[test]
 fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
     let fixture = fixture("frame_beams", MODES);
-    let (body, reduced) = (&fixture.body, fixture.body.invariants());
-    // By the nodes, [ZG19], and by section 3 with the right invariants: W3 is not skew, W0 is not e x C1.
-    let nodes = tumble(&fixture, 2.0, |y| rates(y, |s| body.accelerations_for_rotation_invariant_mass(s)));
-    let invariants =
-        tumble(&fixture, 2.0, |y| rates(y, |s| reduced.reduced.free_accelerations(s, Coriolis::Correct)));
-    println!("{nodes:?} {invariants:?} {}", fixture.name);
-    for drift in [nodes, invariants] {
-        assert!(drift.energy.max(drift.angular) > 1e-3, "{drift:?}");
+    let (body, exact) = (&fixture.body, fixture.body.invariants());
+    // The nodal formula of [ZG19]; section 3 with the right invariants, though W3 is not skew and W0 is not e x C1; section 6 with
+    // W0 as it would follow from C1, which vanishes.
+    let nodes = |y: &DVector<f64>| rates(y, |s| body.accelerations_for_rotation_invariant_mass(s));
+    let section_three =
+        |y: &DVector<f64>| rates(y, |s| exact.reduced.free_accelerations(s, Coriolis::Correct));
+    let mut shortened = body.invariants();
+    shortened.w0.fill(0.0);
+    for (what, drift) in [
+        ("nodes", tumble(&fixture, 20.0, nodes)),
+        ("section 3", tumble(&fixture, 20.0, section_three)),
+        ("no W0", tumble(&fixture, 20.0, |y| reduced_rates(&shortened, y))),
+    ] {
+        // Measured: energy 1.2e-3 to 4e-3, angular momentum 1.2e-2 to 1.6e-2.
+        assert!(drift.energy > 5e-4 && drift.angular > 5e-3, "{what}: {drift:?}");
     }
 }
