@@ -108,13 +108,12 @@ codes! {
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "one row of dofs.csv per matrix row; without dofs.csv three per node";
     DofDuplicate = "FB403", Error, BadInput, "the same direction of the same node is given twice", "every (node, direction) pair labels one matrix row";
     DofIncomplete = "FB404", Error, BadInput, "nodes lack displacement directions, so that the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
-    RotationsUnsupported = "FB405", Error, BadInput, "model has nodal rotations", "this version handles nodes with three displacements only";
     NodesUnused = "FB406", Note, Done, "nodes without any degree of freedom are left out", "nothing to do if they are reference or deleted nodes";
     MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
-    MassDirectional = "FB408", Error, BadInput, "mass differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
-    MassBlockStructure = "FB409", Error, BadInput, "3x3 node blocks of the mass matrix are not multiples of the identity", "this version handles displacement-based solid elements without eliminated constraints";
+    MassDirectional = "FB408", Error, BadInput, "mass is not that of a rigid body: it differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
+    MassBlockStructure = "FB409", Note, Done, "mass matrix does not commute with rotations", "nothing to do for beams, shells and eliminated constraints; the report says what stays approximate";
     RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "the body is constrained or grounded, rotations are labelled as displacements, or coordinates are in other units or another order than the matrix";
-    PencilSingular = "FB411", Error, BadInput, "rows empty in both K and M: the eigenproblem is singular", "remove these degrees of freedom from the matrices";
+    PencilSingular = "FB411", Error, BadInput, "rows that neither K nor M holds: the eigenproblem is singular", "remove these degrees of freedom from the matrices, or hold them";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
     InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit the stated units", "check the units of the manifest";
     BodiesSeveral = "FB414", Error, Untrustworthy, "matrices hold several bodies", "convert each by itself with --split, or connect them";
@@ -124,6 +123,8 @@ codes! {
     DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
     DampingRigid = "FB420", Warning, Done, "damping matrix resists rigid motion", "damping to ground, or proportional to mass, acts on the motion of the whole body: model it in the multibody system";
     BodiesCoupled = "FB421", Error, BadInput, "damping couples bodies that K and M leave separate", "leave the entries between bodies out";
+    RowsUnheld = "FB422", Error, BadInput, "stiffness leaves rows without coordinates free", "add the nodes to the node table, or remove these degrees of freedom";
+    RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

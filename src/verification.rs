@@ -1,10 +1,11 @@
 //! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
 
+use crate::convert::{BodyModes, Place};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::rounding_residual;
 use crate::error::Result;
 use crate::flex_body::FlexBody;
-use crate::invariants::{IdentityCheck, condense, condense_certified, primary_differences};
+use crate::invariants::{IdentityCheck, condense_certified, primary_differences};
 use crate::linalg::gram;
 use crate::model::FeModel;
 use faer::{Mat, Scale};
@@ -44,20 +45,24 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         passed: value <= limit,
     };
     let frame = body.frame();
-    let positions = frame.to_body(&model.nodes().positions);
+    let place = Place::new(model, *frame);
+    let Some(modes) = BodyModes::of_body(model, body) else {
+        let message = "the rows of the body's modes are not those of the model";
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    };
+    let positions = &place.positions;
     let size = positions.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
     let moved = positions
         .iter()
         .flatten()
         .zip(body.nodes().positions.iter().flatten())
         .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-    let shapes = &body.modes().shape;
-    let in_model = in_model_axes(shapes, &frame.axes, model.dimension());
+    let in_model = &modes.vectors;
     let pencil = model.pencil();
     let kx = pencil.apply_stiffness(in_model.as_ref());
     let mx = pencil.apply_mass(in_model.as_ref());
     let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());
-    let own = condense(model.scalar_mass(), &positions, shapes.as_ref(), modal_stiffness);
+    let own = modes.condensed(model, &place, modal_stiffness);
     let differences = primary_differences(body.invariants(), &own);
     let worst_of = |kept: &dyn Fn(&str) -> bool| {
         let kept = differences.iter().filter(|(name, _)| kept(name));
@@ -99,10 +104,9 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         ),
         check("orthonormal_recomputed", "Psi' M Psi = I", orthonormality.norm_max(), 1e-9),
     ];
-    if let Some(guarantee) = &body.certificate().guarantee {
-        let stored = &body.nodes().positions;
-        let own =
-            condense_certified(model.scalar_mass(), stored, shapes.as_ref(), model.stiffness(), &frame.axes);
+    if let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, model.scalar_mass()) {
+        let (stored, shapes) = (&body.nodes().positions, modes.displacements.as_ref());
+        let own = condense_certified(mass, stored, shapes, model.stiffness(), &frame.axes);
         let excess =
             primary_differences(body.invariants(), &own.invariants).iter().zip(&guarantee.digits).fold(
                 0.0f64,
@@ -142,12 +146,4 @@ pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
             })
         })
         .collect()
-}
-
-/// Shapes (3n x nf) from body axes to the rows of the model.
-fn in_model_axes(shapes: &Mat<f64>, axes: &nalgebra::Matrix3<f64>, dimension: usize) -> Mat<f64> {
-    Mat::from_fn(shapes.nrows() / 3 * dimension, shapes.ncols(), |row, j| {
-        let (node, k) = (row / dimension, row % dimension);
-        (0..3).map(|l| axes[(k, l)] * shapes[(3 * node + l, j)]).sum()
-    })
 }

@@ -4,7 +4,14 @@
 mod support;
 
 use faer::Mat;
+use flexbody::basis::ModeSettings;
+use flexbody::convert::{Conversion, ConvertSettings, convert};
+use flexbody::eigen::Wanted;
+use flexbody::flex_body::FlexBody;
 use flexbody::input::{read_manifest, read_model};
+use flexbody::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
+use flexbody::linalg::CscMatrix;
+use flexbody::model::FeModel;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde_json::Value;
 use std::path::Path;
@@ -301,5 +308,190 @@ fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
     ] {
         // Measured: energy 1.2e-3 to 4e-3, angular momentum 1.2e-2 to 1.6e-2.
         assert!(drift.energy > 5e-4 && drift.angular > 5e-3, "{what}: {drift:?}");
+    }
+}
+
+/// What flexbody makes of a fixture, about its centre of mass in model axes.
+fn converted(name: &str, modes: usize) -> Conversion {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
+    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    let model = FeModel::from_raw(raw).expect("a body").model;
+    let settings = ConvertSettings {
+        modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
+        frame: BodyFrame::Com,
+        ..ConvertSettings::default()
+    };
+    convert(&model, &settings, &|_| {}).expect("converts")
+}
+
+/// The invariants of a conversion with the signs of `like`: signs are free where rotations decide them.
+fn signed(conversion: &Conversion, like: &GeneralBody) -> GeneralBody {
+    let own = conversion.body.invariants();
+    let nf = own.n_modes();
+    let w2 = own.w2();
+    // Modes 0 and j: the sign of their largest product.
+    let sign = |j: usize| {
+        let products = (0..9).map(|ab| (ab / 3 * nf, ab % 3 * nf + j));
+        let (a, b) = products
+            .max_by(|&(a, b), &(c, d)| {
+                like.reduced.w2[(a, b)].abs().total_cmp(&like.reduced.w2[(c, d)].abs())
+            })
+            .expect("nine products");
+        if w2[(a, b)] * like.reduced.w2[(a, b)] < 0.0 { -1.0 } else { 1.0 }
+    };
+    let t = Mat::from_fn(nf, nf, |i, j| if i == j { sign(j) } else { 0.0 });
+    let own = own.with_basis(t.as_ref());
+    // The sign of the first mode itself shows in what is linear.
+    let mut result = GeneralBody { reduced: support::nodal::reduced(&own), w0: dense(&own.w0()) };
+    let linear = |body: &GeneralBody| body.reduced.w1.dot(&like.reduced.w1) + body.w0.dot(&like.w0);
+    if linear(&result) < 0.0 {
+        result.reduced.w1 *= -1.0;
+        result.w0 *= -1.0;
+    }
+    result
+}
+
+/// Rows that describe the rotation about z and displacements in the plane, of a matrix with these blocks of rows.
+fn in_plane(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    a.select_rows(rows).select_columns(columns)
+}
+
+#[test]
+fn conversions_have_these_invariants_and_move_like_the_nodes() {
+    for name in FIXTURES {
+        let nf = 8;
+        let fixture = fixture(name, nf);
+        let conversion = converted(name, nf);
+        let expected = fixture.body.invariants();
+        for (found, expected) in conversion.body.modes().eigenvalue.iter().zip(&fixture.eigenvalues) {
+            assert!((found / expected - 1.0).abs() < 1e-10, "{name}: {found} {expected}");
+        }
+        let found = signed(&conversion, &expected);
+        let size = expected.reduced.inertia.norm().sqrt();
+        let mass = expected.reduced.mass.sqrt();
+        assert!((found.reduced.mass / expected.reduced.mass - 1.0).abs() < 1e-13, "{name}");
+        let plane = conversion.body.dimension() == 2;
+        let (space, all): (Vec<usize>, Vec<usize>) = ((0..3).collect(), (0..3 * nf).collect());
+        let (z, blocks, axes): (Vec<usize>, Vec<usize>, Vec<usize>) = if plane {
+            (vec![2], (2 * nf..3 * nf).collect(), vec![0, 1])
+        } else {
+            (space.clone(), all, space)
+        };
+        let modes: Vec<usize> = (0..nf).collect();
+        let inertia = |body: &GeneralBody| DMatrix::from_fn(3, 3, |k, l| body.reduced.inertia[(k, l)]);
+        for (what, a, b, rows, columns, scale) in [
+            ("I0", &inertia(&found), &inertia(&expected), &z, &z, size * size),
+            ("W0", &found.w0, &expected.w0, &axes, &blocks, mass),
+            ("W1", &found.reduced.w1, &expected.reduced.w1, &z, &blocks, size),
+            ("W2", &found.reduced.w2, &expected.reduced.w2, &blocks, &blocks, 1.0),
+            ("W3", &found.reduced.w3, &expected.reduced.w3, &blocks, &modes, 1.0),
+            ("C1", &found.reduced.c1, &expected.reduced.c1, &axes, &modes, mass),
+            ("C2", &found.reduced.c2, &expected.reduced.c2, &z, &modes, size),
+            ("m_ff", &found.reduced.modal_mass, &expected.reduced.modal_mass, &modes, &modes, 1.0),
+        ] {
+            let error = (in_plane(a, rows, columns) - in_plane(b, rows, columns)).norm() / scale;
+            assert!(error < 1e-9, "{name} {what}: {error:e}");
+        }
+        if plane {
+            continue;
+        }
+        // The unreduced nodes, moved by the conversion's own modes.
+        let nodes = nodal_body(name, &conversion.body);
+        let own = conversion.body.invariants();
+        let own = GeneralBody { reduced: support::nodal::reduced(own), w0: dense(&own.w0()) };
+        let (mut state, _) = random_state(&mut Random(77), nf, 0.05 * size);
+        // Spin and modes of one time scale: elastic forces would hide all others.
+        let rate = fixture.eigenvalues[0].sqrt();
+        state.omega *= 0.1 * rate;
+        state.velocity *= rate * size;
+        for j in 0..nf {
+            state.q[j] *= fixture.eigenvalues[0] / fixture.eigenvalues[j];
+            state.qd[j] *= rate;
+        }
+        // About the centre of mass the origin of some bodies is not accelerated at all.
+        let scale = state.omega.norm_squared() * size / mass;
+        let (a, b) = (nodes.accelerations(&state), own.accelerations(&state));
+        let error = (a.rows(0, 3) - b.rows(0, 3)).norm() / scale.max(a.rows(0, 3).norm());
+        assert!(error < 1e-10, "{name}: accelerations {error:e}");
+        for (start, count) in [(3, 3), (6, nf)] {
+            let (a, b) = (a.rows(start, count), b.rows(start, count));
+            let error = (a - b).norm() / a.norm();
+            assert!(error < 1e-10, "{name}: accelerations {error:e}");
+        }
+    }
+}
+
+/// The unreduced model of a fixture with the modes that its body has, rotations and rows without a place included.
+fn nodal_body(name: &str, body: &FlexBody) -> NodalBody {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
+    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    let (modes, ids) = (body.modes(), &body.nodes().ids);
+    let rows = rows(&raw);
+    let place =
+        |node: usize| ids.iter().position(|id| *id == raw.nodes.ids[node]).expect("a node of the body");
+    let shapes = Mat::from_fn(rows.len(), body.n_modes(), |i, j| {
+        let Row { kind, node, axis } = rows[i];
+        match kind {
+            RowKind::Displacement => modes.shape[(3 * place(node) + axis, j)],
+            RowKind::Rotation => modes.rotation.as_ref().expect("rotations")[(3 * place(node) + axis, j)],
+            RowKind::Internal => {
+                let internal = modes.internal.as_ref().expect("rows without a place");
+                let label = [node as i64, axis as i64 + 1];
+                internal.shape[(internal.dofs.iter().position(|dof| *dof == label).expect("labelled"), j)]
+            }
+        }
+    });
+    let mut positions = raw.nodes.positions.clone();
+    for (node, x) in positions.iter_mut().enumerate() {
+        *x = body.nodes().positions[place(node)];
+    }
+    let (k, m) = (reference::dense(&raw.stiffness.matrix), reference::dense(&raw.mass.matrix));
+    NodalBody::new(&k, &m, &rows, &positions, &shapes)
+}
+
+/// The conversion's own invariants keep energy and momenta of what they describe.
+#[test]
+fn converted_bodies_keep_energy_and_momenta() {
+    for name in ["frame_beams", "shell_folded", "mpc_block"] {
+        let fixture = fixture(name, MODES);
+        let found = signed(&converted(name, MODES), &fixture.body.invariants());
+        let drift = tumble(&fixture, 20.0, |y| reduced_rates(&found, y));
+        assert!(drift.deformation > 0.05 && drift.turns > 3.0, "{name}: {drift:?}");
+        assert!(drift.energy < 1e-9 && drift.linear < 1e-9 && drift.angular < 1e-9, "{name}: {drift:?}");
+    }
+}
+
+/// Section 6 and sections 2 to 3 on solids, about any frame.
+#[test]
+fn the_general_condensation_of_a_solid_is_that_of_its_scalar_mass() {
+    for name in ["cube_hex8", "bracket_hex20"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
+        let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+        let model = FeModel::from_raw(raw).expect("a body").model;
+        let scalar = model.scalar_mass().expect("a solid");
+        let n = 3 * scalar.n();
+        let entries: Vec<(u32, u32, f64)> = (0..n as u32)
+            .flat_map(|row| {
+                let (columns, values) = scalar.row(row as usize / 3);
+                columns.iter().zip(values).map(move |(&j, &v)| (row, 3 * j + row % 3, v)).collect::<Vec<_>>()
+            })
+            .collect();
+        let whole = flexbody::linalg::SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries));
+        let whole = whole.expect("symmetric");
+        let mut random = Random(3);
+        let shapes = Mat::from_fn(n, 5, |_, _| random.signed());
+        let axes = random.rotation();
+        let frame = flexbody::invariants::Frame { origin: Vector3::new(0.3, -0.1, 0.2), axes };
+        let mut turned = shapes.clone();
+        frame.rotate_shapes(&mut turned);
+        let stiffness = Mat::identity(5, 5);
+        let positions = frame.to_body(&model.nodes().positions);
+        let expected = condense(scalar, &positions, turned.as_ref(), stiffness.clone());
+        let fields = model.rigid_fields(frame.origin.into(), 1.0);
+        let motion = RigidMotion { fields: fields.as_ref(), displacements: n, axes };
+        let general = condense_general(&whole, &motion, shapes.as_ref(), stiffness);
+        for (what, error) in primary_differences(&expected, &general) {
+            assert!(error < 1e-13, "{name} {what}: {error:e}");
+        }
     }
 }

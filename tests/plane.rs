@@ -173,7 +173,7 @@ fn kinetic_energy_equals_that_of_the_nodes() {
                 .collect();
             let mut nodal = 0.0;
             for i in 0..x.len() {
-                let (columns, values) = model.scalar_mass().row(i);
+                let (columns, values) = model.scalar_mass().expect("a solid").row(i);
                 for (&j, m) in columns.iter().zip(values) {
                     let other = velocity[j as usize];
                     nodal += 0.5 * m * (velocity[i][0] * other[0] + velocity[i][1] * other[1]);
@@ -308,7 +308,7 @@ fn shapes_are_orthonormal_in_the_plane() {
     let shape = &body.modes().shape;
     let mut gram = Mat::<f64>::zeros(8, 8);
     for i in 0..model.nodes().len() {
-        let (columns, values) = model.scalar_mass().row(i);
+        let (columns, values) = model.scalar_mass().expect("a solid").row(i);
         for (&j, m) in columns.iter().zip(values) {
             for p in 0..8 {
                 for q in 0..8 {

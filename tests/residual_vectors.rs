@@ -8,7 +8,7 @@ use flexbody::basis::{Basis, FreeSurface, Loads, ModalBasis, ModeSettings, Task,
 use flexbody::diagnostic::Code;
 use flexbody::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
 use flexbody::error::Result;
-use flexbody::linalg::{Pencil, combine, gram};
+use flexbody::linalg::{combine, gram};
 use flexbody::model::{FeModel, NodeSet, RawShapes};
 use flexbody::progress::SILENT;
 use std::path::PathBuf;
@@ -85,7 +85,7 @@ fn response_error(
     let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);
     let rest = exact - combine(shapes.as_ref(), amplitudes.as_ref());
     let raw = FeModel::from_raw(plate.raw_model()).expect("sound").model;
-    let pencil = Pencil::new(raw.stiffness(), raw.scalar_mass(), 3);
+    let pencil = raw.pencil();
     let energy = |x: &Mat<f64>| gram(x.as_ref(), pencil.apply_stiffness(x.as_ref()).as_ref());
     let (part, whole) = (energy(&rest), energy(exact));
     let worst =
@@ -152,7 +152,7 @@ fn free_modes_stay_what_they_are_and_proved() {
     assert_eq!(solution.completeness, alone.completeness);
     assert!(solution.eigenvalues[8] > alone.completeness.shift);
     // M-orthonormal, M-orthogonal to rigid motion, diagonal stiffness.
-    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+    let pencil = model.pencil();
     let psi = solution.vectors.as_ref();
     let count = psi.ncols();
     let mass = gram(psi, pencil.apply_mass(psi).as_ref());
@@ -188,7 +188,7 @@ fn user_loads_that_repeat_or_only_move_the_body_are_named() {
     let plate = curved_plate();
     let model = model(&plate);
     let n = 3 * plate.nodes.len();
-    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+    let pencil = model.pencil();
     // A point force, twice that, gravity along x, the inertia load of the first mode.
     let first = modes(&model, &lowest(1), vec![]).expect("modes").solution.vectors;
     let inertia = pencil.apply_mass(first.as_ref());

@@ -54,6 +54,7 @@ fn sizes_must_agree() {
 fn a_body_has_nodes_and_modes_and_no_more_modes_than_freedoms() {
     let without = |n: usize, nf: usize| {
         let mut p = parts(Random::new(1), n.max(1), nf.max(1), 0, 0);
+        (p.modes.rotation, p.modes.internal) = (None, None);
         if n == 0 {
             p.nodes = Default::default();
             p.modes.shape = faer::Mat::zeros(0, nf);

@@ -24,14 +24,13 @@ pub(super) struct ModalDamping {
     pub warning: Option<Diagnostic>,
 }
 
-/// Damping of the modes `vectors` (3n x nf, model axes), which the body has with `signs`; `None` when none is stated.
+/// Damping of the modes `vectors` (N x nf, model axes); `None` when none is stated.
 ///
 /// # Errors
 /// [`DampingIndefinite`](Code::DampingIndefinite).
 pub(super) fn modal_damping(
     model: &FeModel,
     vectors: MatRef<'_, f64>,
-    signs: &[f64],
     eigenvalues: &[f64],
     invariants: &Invariants,
 ) -> Result<Option<ModalDamping>> {
@@ -57,7 +56,7 @@ pub(super) fn modal_damping(
             of_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
         }
         Damping::Matrix(d) => {
-            let matrix = reduced(d, vectors, signs);
+            let matrix = reduced(d, vectors);
             check_semidefinite(model, d, vectors, &matrix)?;
             of_matrix(matrix)
         }

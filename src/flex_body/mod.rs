@@ -7,5 +7,6 @@ mod validate;
 pub use crate::invariants::Frame;
 pub use body::FlexBody;
 pub use parts::{
-    Certificate, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+    Certificate, Guarantee, Interface, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source,
+    Truncation,
 };

@@ -63,6 +63,19 @@ pub struct Modes {
     pub modal_damping: Option<Mat<f64>>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
     pub shape: Mat<f64>,
+    /// Rotations of the nodes (3n x nf) in the same way, zero where the model has none; `None` for models of displacements.
+    pub rotation: Option<Mat<f64>>,
+    /// Rows without a place.
+    pub internal: Option<InternalRows>,
+}
+
+/// Rows of the modes that belong to no node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InternalRows {
+    /// Number and direction that the label of each row has (m).
+    pub dofs: Vec<[i64; 2]>,
+    /// Their values (m x nf); vectors, three rows each, in body axes.
+    pub shape: Mat<f64>,
 }
 
 /// What was proved about the modes.

@@ -6,8 +6,11 @@ mod fe_model;
 mod layout;
 mod mass_structure;
 mod nodes;
+mod placeless;
 mod raw;
 mod rigid;
+mod rigid_motion;
+mod rows;
 mod several;
 
 pub use checks::{CheckedModel, check};
@@ -16,4 +19,5 @@ pub use fe_model::FeModel;
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
 pub use rigid::{centre_and_length, rigid_count, rigid_fields};
+pub use rows::Rows;
 pub use several::{BodyNumber, check_bodies};

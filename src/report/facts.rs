@@ -8,6 +8,7 @@ use super::numbers::{percent, significant};
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, MassStructure, Truncation};
+use crate::invariants::GENERAL_REMARK;
 use crate::provenance::{self, SourceFile};
 use serde::{Serialize, Serializer};
 
@@ -47,6 +48,8 @@ pub(super) struct ModelFacts {
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
+    /// What is not exact of a mass that does not commute with rotations.
+    pub approximation: Option<&'static str>,
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
@@ -205,6 +208,7 @@ impl ModelFacts {
                 MassStructure::Diagonal => "diagonal",
                 MassStructure::General => "general",
             },
+            approximation: (source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK),
             units: UnitFacts {
                 length: units.length.name().to_owned(),
                 mass: units.mass.name().to_owned(),
@@ -226,7 +230,7 @@ impl ModelFacts {
         match self.mass_structure {
             "rotation-invariant" => "consistent mass",
             "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",
-            _ => "general mass matrix",
+            _ => "mass that does not commute with rotations",
         }
     }
 }

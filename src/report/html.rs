@@ -144,6 +144,12 @@ fn body(html: &mut String, facts: &Facts) {
             ("Units", escape(&units.in_words())),
         ],
     );
+    if let Some(remark) = model.approximation {
+        html.push_str(&format!(
+            "<p>The mass matrix does not commute with rotations: {}.</p>\n",
+            escape(remark)
+        ));
+    }
     if !model.interfaces.is_empty() {
         let rows: Vec<_> =
             model.interfaces.iter().map(|i| vec![escape(&i.name), i.n_nodes.to_string()]).collect();

@@ -109,6 +109,9 @@ fn heading(page: &mut Page, facts: &Facts) {
         "model",
         &format!("{} nodes, {} degrees of freedom, {}", model.n_nodes, model.n_dofs, model.mass_in_words()),
     );
+    if let Some(remark) = model.approximation {
+        page.entry("", remark);
+    }
     if let Some(body) = &model.body {
         page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
     }

@@ -3,8 +3,10 @@
 use super::scan::Scan;
 use super::schema::MASS_STRUCTURES;
 use super::value::Value;
-use crate::flex_body::{Certificate, Frame, Guarantee, Interface, LumpedBody, Modes, Parts, Source};
-use crate::invariants::{DIGITS, Invariants};
+use crate::flex_body::{
+    Certificate, Frame, Guarantee, Interface, InternalRows, LumpedBody, Modes, Parts, Source,
+};
+use crate::invariants::{DIGITS, GeneralTerms, Invariants};
 use crate::model::{BodyNumber, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -146,22 +148,51 @@ impl Take<'_> {
         let truncation = self.optional_json("/modes@truncation", "a JSON array of loads");
         let damping = "/invariants/modal_damping";
         let damped = self.scan.values.contains_key(damping);
+        let nf = eigenvalue.len();
+        let by_node = |shape: &[f64]| Mat::from_fn(3 * n, nf, |row, j| shape[j * 3 * n + row]);
+        let turned = self.scan.values.contains_key("/modes/rotation");
+        let rotation = turned.then(|| by_node(&self.floats("/modes/rotation")));
+        let internal = self.internal(nf);
         Modes {
             residual: self.floats("/modes/residual"),
             provenance,
             truncation,
             damping_ratio: self.floats("/modes/damping_ratio"),
-            modal_damping: damped.then(|| self.matrix(damping, eigenvalue.len())),
-            shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
+            modal_damping: damped.then(|| self.matrix(damping, nf)),
+            shape: by_node(&shape),
+            rotation,
+            internal,
             eigenvalue,
         }
+    }
+
+    /// Labels and values of the rows without a place, or neither.
+    fn internal(&mut self, nf: usize) -> Option<InternalRows> {
+        let [labels, values] = ["/modes/internal_dof", "/modes/internal"];
+        let there = [labels, values].map(|path| self.scan.values.contains_key(path));
+        if there != [true; 2] {
+            if there[0] != there[1] {
+                self.scan.add(format!("{labels} and {values}: expected both or none, found one"));
+            }
+            return None;
+        }
+        let dofs = self.ints(labels).as_chunks::<2>().0.to_vec();
+        Some(InternalRows { dofs, shape: self.matrix(values, nf) })
     }
 
     fn invariants(&mut self, place: &str, nf: usize) -> Invariants {
         let ibar = self.floats(&format!("{place}/Ibar"));
         let s = self.floats(&format!("{place}/S"));
         let block = |k: usize, l: usize| 3 * k + l;
+        // Elsewhere W3 and m_ff follow from S, and are compared with it.
+        let w0 = format!("{place}/W0");
+        let general = self.scan.values.contains_key(&w0).then(|| GeneralTerms {
+            w0: self.matrix(&w0, 3 * nf),
+            w3: self.matrix(&format!("{place}/W3"), nf),
+            modal_mass: self.matrix(&format!("{place}/modal_mass"), nf),
+        });
         Invariants {
+            general,
             mass: self.floats(&format!("{place}/mass"))[0],
             first_moment: Vector3::from_column_slice(&self.floats(&format!("{place}/first_moment"))),
             second_moment: Matrix3::from_row_slice(&self.floats(&format!("{place}/second_moment"))),

@@ -1,6 +1,7 @@
 //! The table as documentation: `docs/format.md` and `schemas/flexbody-file.schema.json` are generated here.
 
-use super::schema::{DERIVED_TOLERANCE, Extent, FORMAT, Group, Item, Kind, MAJOR, MINOR, Origin, TABLE};
+use super::item::{DERIVED_TOLERANCE, Extent, Group, Item, Kind, Origin};
+use super::schema::{FORMAT, MAJOR, MINOR, TABLE};
 use super::value::Units;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -107,6 +108,7 @@ fn symbol(extent: Extent) -> String {
         Extent::Modes => "nf".to_owned(),
         Extent::ThreeModes => "3nf".to_owned(),
         Extent::InterfaceNodes => "k".to_owned(),
+        Extent::InternalRows => "m".to_owned(),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
 
-use super::schema::Extent;
+use super::item::Extent;
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
@@ -23,6 +23,7 @@ pub(super) struct Sizes {
     nodes: Option<usize>,
     modes: Option<usize>,
     pub interface_nodes: Option<usize>,
+    pub internal_rows: Option<usize>,
 }
 
 /// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
@@ -158,6 +159,7 @@ impl Sizes {
             Extent::Modes => size == *self.modes.get_or_insert(size),
             Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
+            Extent::InternalRows => size == *self.internal_rows.get_or_insert(size),
         }
     }
 
@@ -172,6 +174,7 @@ impl Sizes {
             Extent::Modes => known("nf", self.modes),
             Extent::ThreeModes => known("3 nf", self.modes.map(|nf| 3 * nf)),
             Extent::InterfaceNodes => known("k", self.interface_nodes),
+            Extent::InternalRows => known("m", self.internal_rows),
         }
     }
 }

@@ -2,8 +2,9 @@
 //! the file declares before it is checked against the rest.
 
 use super::hdf5_value::{self as hdf5_value, Sizes, Stored};
+use super::item::{Group, Item, Kind, Origin, Per};
 use super::names;
-use super::schema::{Group, Item, Kind, Origin, Per, TABLE};
+use super::schema::TABLE;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::units::UnitSystem;

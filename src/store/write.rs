@@ -1,8 +1,9 @@
 //! Writes a body as the table says.
 
+use super::item::{Extent, Item, Kind, Per};
 use super::names;
 use super::scan::place;
-use super::schema::{Extent, Item, Kind, Per, TABLE};
+use super::schema::TABLE;
 use super::value::{Value, View};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;

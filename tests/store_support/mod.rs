@@ -3,10 +3,10 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FlexBody, Frame, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
-    Truncation,
+    Certificate, FlexBody, Frame, Guarantee, Interface, InternalRows, LumpedBody, MassStructure, Modes,
+    Parts, Source, Truncation,
 };
-use flexbody::invariants::{DIGITS, Invariants};
+use flexbody::invariants::{DIGITS, GeneralTerms, Invariants};
 use flexbody::model::{BodyNumber, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
@@ -77,7 +77,22 @@ impl Random {
             ibar: [(); 3].map(|()| [(); 3].map(|()| (0..nf).map(|_| self.value()).collect())),
             s: [(); 3].map(|()| [(); 3].map(|()| self.matrix(nf, nf))),
             modal_stiffness: self.matrix(nf, nf),
+            general: None,
         }
+    }
+
+    fn general(&mut self, nf: usize) -> GeneralTerms {
+        GeneralTerms {
+            w0: self.matrix(3, 3 * nf),
+            w3: self.matrix(3 * nf, nf),
+            modal_mass: self.matrix(nf, nf),
+        }
+    }
+
+    fn internal(&mut self, nf: usize) -> Option<InternalRows> {
+        let rows = self.below(4);
+        let dofs = (0..rows).map(|i| [1000 + i as i64, 1 + self.below(6) as i64]).collect();
+        (rows > 0).then(|| InternalRows { dofs, shape: self.matrix(rows, nf) })
     }
 }
 
@@ -113,6 +128,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         })
         .collect();
     let bounded = eigenvalue.clone();
+    let mass_structure = structures[r.below(3)];
+    let general = (mass_structure == MassStructure::General).then(|| r.general(nf));
     Parts {
         source: Source {
             name: r.name(),
@@ -125,7 +142,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 .collect(),
             number: (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) }),
             n_dofs: 3 * n,
-            mass_structure: structures[r.below(3)],
+            mass_structure,
             settings: serde_json::json!({
                 "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
             }),
@@ -145,11 +162,13 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 .filter(|_| n * nf % 2 == 1)
                 .map(|_| Truncation { load: r.name(), before: r.value(), after: r.value() })
                 .collect(),
+            rotation: (r.below(2) == 1).then(|| r.matrix(3 * n, nf)),
+            internal: r.internal(nf),
             damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
             modal_damping: (r.below(2) == 1).then(|| Mat::from_fn(nf, nf, |_, _| r.value())),
             shape: r.matrix(3 * n, nf),
         },
-        invariants: r.invariants(nf),
+        invariants: Invariants { general, ..r.invariants(nf) },
         lumped,
         certificate: Certificate {
             proved_modes: (r.below(2) == 0).then(|| r.below(100)),
