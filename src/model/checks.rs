@@ -153,8 +153,8 @@ pub(super) fn finish(
     check_connections(&body, &mut found);
     if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
         found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        stop_on_error(&mut found)?;
     }
-    stop_on_error(&mut found)?;
     let label = |row: usize| body.rows.label(&body.nodes, row);
     if let Some(diagnostic) = misplaced(&body.rows) {
         found.push(diagnostic.in_file(&body.raw.nodes_path));
