@@ -21,6 +21,10 @@ use faer::{Mat, MatRef};
 use std::collections::HashMap;
 
 mod damping;
+mod geometric_stiffness;
+
+pub(crate) use damping::modal_damping;
+pub(crate) use geometric_stiffness::modal_geometric_stiffness;
 
 /// A lumped comparator that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -141,9 +145,11 @@ pub fn convert_resumed(
         }
     };
     let vectors = found.solution.vectors.as_ref();
-    let damping = damping::modal_damping(model, vectors, &signs, &found.solution.eigenvalues, &invariants)?;
+    let damping = modal_damping(model, vectors, &signs, &found.solution.eigenvalues, &invariants)?;
+    let geometric_stiffness = modal_geometric_stiffness(model, vectors, &signs, &frame.axes)?;
     let mut diagnostics = found.diagnostics.clone();
     diagnostics.extend(damping.as_ref().and_then(|damping| damping.warning.clone()));
+    diagnostics.extend(geometric_stiffness::softening_warning(model, &settings.basis, &invariants));
     watch(Event::Phase("lumped comparison"));
     let lumped: Vec<LumpedBody> = schemes
         .iter()
@@ -205,6 +211,7 @@ pub fn convert_resumed(
             shape: shapes,
         },
         invariants,
+        geometric_stiffness,
         lumped,
         certificate,
     })?;

@@ -35,6 +35,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     if parts.invariants.mass.is_finite() && parts.invariants.mass <= 0.0 {
         check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass));
     }
+    check.geometric_stiffness(parts, nf);
     check.lumped(parts, nf);
     let c = &parts.certificate;
     check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
@@ -211,6 +212,20 @@ impl Check {
             }
         }
         self.matrix(&format!("{name}.modal_stiffness"), &invariants.modal_stiffness, nf, nf);
+    }
+
+    fn geometric_stiffness(&mut self, parts: &Parts, nf: usize) {
+        let labels: Vec<String> = parts.geometric_stiffness.iter().map(|one| one.load.label()).collect();
+        self.names("geometric stiffness", labels.iter());
+        for (one, label) in parts.geometric_stiffness.iter().zip(&labels) {
+            self.text("geometric_stiffness", label);
+            self.matrix(&format!("geometric_stiffness `{label}`"), &one.matrix, nf, nf);
+            let load = &one.load;
+            if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
+                let dimension = parts.dimension;
+                self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
+            }
+        }
     }
 
     fn lumped(&mut self, parts: &Parts, nf: usize) {

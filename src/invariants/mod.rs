@@ -14,6 +14,7 @@ mod identity_terms;
 mod lumped;
 mod primary;
 mod principal_axes;
+mod softening;
 mod transform;
 
 pub use alignment::{Alignment, align, compare_invariants};
@@ -26,3 +27,4 @@ pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_plane_fra
 pub use identities::{Expected, IdentityCheck, derived_identities, identities};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use primary::Invariants;
+pub use softening::relative_norm;

@@ -2,7 +2,10 @@
 
 use super::checks::Assembled;
 use super::mass_structure::ScalarMass;
-use super::{BodyNumber, CheckedModel, Damping, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
+use super::{
+    BodyNumber, CheckedModel, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawModel, check,
+    check_bodies,
+};
 use crate::error::Result;
 use crate::linalg::{Pencil, SymmetricMatrix};
 use crate::provenance::SourceFile;
@@ -19,6 +22,7 @@ pub struct FeModel {
     stiffness: SymmetricMatrix,
     scalar_mass: SymmetricMatrix,
     damping: Option<Damping<SymmetricMatrix>>,
+    geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
     sources: Vec<SourceFile>,
     digits: u8,
@@ -54,7 +58,7 @@ impl FeModel {
         diagonal_mass: bool,
         number: Option<BodyNumber>,
     ) -> Self {
-        let Assembled { raw, nodes, stiffness, damping, .. } = body;
+        let Assembled { raw, nodes, stiffness, damping, geometric_stiffness, .. } = body;
         Self {
             digits: raw.stiffness.digits,
             name: raw.name,
@@ -64,6 +68,7 @@ impl FeModel {
             stiffness,
             scalar_mass: mass.matrix,
             damping,
+            geometric_stiffness,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
@@ -107,6 +112,11 @@ impl FeModel {
     /// Damping, where it was given; a matrix D is 3n x 3n, row 3 i + k.
     pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
         self.damping.as_ref()
+    }
+
+    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows of K.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
+        &self.geometric_stiffness
     }
 
     /// K and M.

@@ -1,7 +1,7 @@
 //! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
 
 use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
-use super::{Damping, NodeSet, Nodes, RawModel};
+use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawModel};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::{CscMatrix, SymmetricMatrix, connected_components};
@@ -32,7 +32,7 @@ impl std::fmt::Display for BodyNumber {
 /// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
 /// [`ModelTooSmall`](Code::ModelTooSmall) for bodies of one or two nodes;
 /// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies;
-/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping matrix that couples bodies.
+/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping or geometric stiffness matrix that couples bodies.
 pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     let (whole, shared) = assemble(raw)?;
     let bodies = match separate(whole) {
@@ -62,7 +62,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 /// The bodies, in the order of their first nodes.
 fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
     let dimension = whole.dimension();
-    let Assembled { raw, nodes, stiffness, mass, damping, .. } = whole;
+    let Assembled { raw, nodes, stiffness, mass, damping, geometric_stiffness, .. } = whole;
     let component = connected_components(&[&stiffness, &mass], dimension);
     let bodies = groups(&component, &nodes);
     let mut found = Vec::new();
@@ -81,8 +81,24 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
         );
     }
     let interfaces = distribute(&raw.interfaces, &component, &nodes, &mut found);
-    if let Some(matrix) = damping.as_ref().and_then(Damping::matrix) {
-        found.extend(coupling(matrix, &component, &nodes));
+    let damping_matrix = damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
+    let geometric =
+        geometric_stiffness.iter().map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
+    for (matrix, name) in damping_matrix.into_iter().chain(geometric) {
+        found.extend(coupling(matrix, &name, dimension, &component, &nodes));
+    }
+    for GeometricStiffness { load, matrix } in &geometric_stiffness {
+        let at = load.kind.interface();
+        let own = interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
+        let elsewhere =
+            |b| (0..matrix.n()).find(|&row| component[row / dimension] != b && !matrix.row(row).0.is_empty());
+        if let Some((body, row)) = own.and_then(|b| Some((b + 1, elsewhere(b)?))) {
+            let (node, other) = (nodes.ids[row / dimension], component[row / dimension] + 1);
+            let message = format!(
+                "geometric stiffness for {load} has entries at node {node} of body {other}, the interface belongs to body {body}"
+            );
+            found.push(Diagnostic::new(Code::BodiesCoupled, message));
+        }
     }
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
@@ -113,6 +129,15 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
                 .try_map(|matrix| Ok::<_, Infallible>(restricted(matrix, dimension, own, &local)));
             own
         }),
+        // What a load does to the other bodies is nothing: no rows of it are theirs.
+        geometric_stiffness: geometric_stiffness
+            .iter()
+            .map(|one| GeometricStiffness {
+                load: one.load.clone(),
+                matrix: restricted(&one.matrix, dimension, own, &local),
+            })
+            .filter(|one| one.matrix.as_csc().nnz() > 0)
+            .collect(),
     };
     Ok(members.iter().zip(interfaces).enumerate().map(one).collect())
 }
@@ -148,14 +173,24 @@ fn distribute(
     own
 }
 
-/// A complaint when an entry of D couples two bodies.
-fn coupling(damping: &SymmetricMatrix, component: &[usize], nodes: &Nodes) -> Option<Diagnostic> {
-    let (a, b) = (0..damping.n()).find_map(|row| {
-        let other = |&column: &u32| (component[row / 3] != component[column as usize / 3]).then_some(column);
-        damping.row(row).0.iter().find_map(other).map(|column| (row / 3, column as usize / 3))
+/// A complaint when an entry of the matrix called `name` couples two bodies.
+fn coupling(
+    matrix: &SymmetricMatrix,
+    name: &str,
+    dimension: usize,
+    component: &[usize],
+    nodes: &Nodes,
+) -> Option<Diagnostic> {
+    let node = |row: usize| row / dimension;
+    let (a, b) = (0..matrix.n()).find_map(|row| {
+        let other = |&column: &u32| {
+            let (a, b) = (node(row), node(column as usize));
+            (component[a] != component[b]).then_some((a, b))
+        };
+        matrix.row(row).0.iter().find_map(other)
     })?;
     let place = |i: usize| format!("node {} of body {}", nodes.ids[i], component[i] + 1);
-    let message = format!("damping couples {} with {}", place(a), place(b));
+    let message = format!("{name} couples {} with {}", place(a), place(b));
     Some(Diagnostic::new(Code::BodiesCoupled, message))
 }
 

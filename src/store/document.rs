@@ -121,7 +121,7 @@ pub fn format_schema() -> String {
         let mut target = &mut root;
         for name in group.path.split('/').filter(|name| !name.is_empty()) {
             let key = if name.starts_with('<') { "additionalProperties" } else { name };
-            target = descend(target, key);
+            target = descend(target, key, group.since() == 0);
         }
         fill(target, group);
     }
@@ -136,8 +136,9 @@ pub fn format_schema() -> String {
     text
 }
 
-/// Schema of the member group `key`, made when it is not there yet.
-fn descend<'a>(group: &'a mut Value, key: &str) -> &'a mut Value {
+/// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those that are not
+/// required.
+fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));
     require(schema, "groups");
@@ -146,7 +147,9 @@ fn descend<'a>(group: &'a mut Value, key: &str) -> &'a mut Value {
     if key == "additionalProperties" {
         return groups.entry(key).or_insert_with(|| json!({}));
     }
-    require(groups, key);
+    if required {
+        require(groups, key);
+    }
     member(groups, "properties").entry(key).or_insert_with(|| json!({}))
 }
 
