@@ -12,6 +12,9 @@ use nalgebra::Matrix3;
 /// Direction cosines up to this are rounding.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
+/// Rates of different axes within this part are the same.
+const ALIKE: f64 = 1e-9;
+
 /// Beyond this what follows from the entries would not be finite.
 const LARGEST: f64 = 1e290;
 
@@ -62,8 +65,12 @@ pub(super) fn softening_warning(
         return None;
     }
     let axes = if model.dimension() == 2 { 2..3 } else { 0..3 };
-    let rates = axes.filter_map(|axis| Some((invariants.softening_rate(axis)?, ["x", "y", "z"][axis])));
-    let (rate, axis) = rates.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let rates: Vec<(f64, usize)> =
+        axes.filter_map(|axis| Some((invariants.softening_rate(axis)?, axis))).collect();
+    let lowest = rates.iter().map(|(rate, _)| *rate).reduce(f64::min)?;
+    // The first of axes that are alike but for rounding.
+    let &(rate, axis) = rates.iter().find(|(rate, _)| *rate <= (1.0 + ALIKE) * lowest)?;
+    let axis = ["x", "y", "z"][axis];
     let hertz = model.units().frequency_of(rate * rate);
     let message = format!(
         "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about body axis {axis}"

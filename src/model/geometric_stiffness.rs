@@ -191,10 +191,10 @@ pub(super) fn check_loads(
         {
             let known: Vec<&String> = interfaces.iter().map(|set| &set.name).collect();
             let known = if known.is_empty() { "none".to_owned() } else { name_some(&known) };
-            complain(
-                Code::InterfaceNode,
-                format!("geometric stiffness is given for {name}; interfaces of the model: {known}"),
-            );
+            let message =
+                format!("geometric stiffness is given for {name}; interfaces of the model: {known}");
+            let complaint = Diagnostic::new(Code::InterfaceNode, message).in_file(&matrix.path);
+            found.push(complaint.with_help("name an [[interface]] of the manifest"));
         }
     }
 }
