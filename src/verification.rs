@@ -237,11 +237,14 @@ fn largest_difference(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
 
 /// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.
 pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
-    body.source()
-        .files
+    let files = &body.source().files;
+    files
         .iter()
-        .filter_map(|file| {
-            let now = model.sources().iter().find(|other| other.role == file.role)?;
+        .enumerate()
+        .filter_map(|(i, file)| {
+            // Several files may have one role: they are compared in their order.
+            let before = files[..i].iter().filter(|other| other.role == file.role).count();
+            let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
             (now.sha256 != file.sha256).then(|| {
                 let message =
                     format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);

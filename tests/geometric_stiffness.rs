@@ -334,7 +334,7 @@ fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_w
         let hertz = json["modes"]["softening_hz"][axis].as_f64().expect("a number");
         assert!((hertz * std::f64::consts::TAU / rate - 1.0).abs() < 1e-14);
     }
-    assert!(told(&done.body, Format::Text).contains("spin        without geometric stiffness 1 % softer at"));
+    assert!(told(&done.body, Format::Text).contains("spin        no geometric stiffness: 1 % softer at"));
 
     let stiffened = run(case.raw(case.spin()), BodyFrame::Principal, centrifugal()).expect("a sound body");
     assert!(stiffened.diagnostics.iter().all(|d| d.code() != Code::GeometricStiffnessNone));

@@ -41,6 +41,7 @@ fn model(more: &str) -> TempDir {
     let stiffness = mesh.geometric_stiffness(&Material::STEEL, &stretched);
     let save = |name: &str, text: String| fs::write(folder.path().join(name), text).expect("written");
     save("Kg.mtx", matrix_market(&stiffness, Triangle::Lower));
+    save("Kg2.mtx", matrix_market(&stiffness, Triangle::Upper));
     let loads: Vec<String> =
         (0..2 * n).map(|i| f64::from(u8::from(i == 4 || i == n + 30)).to_string()).collect();
     save("F.mtx", format!("%%MatrixMarket matrix array real general\n{n} 2\n{}\n", loads.join("\n")));
@@ -117,7 +118,7 @@ fn residual_vectors_that_cannot_be_are_refused_wherever_they_are_asked_for() {
 fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
     let folder = model(
         "[[geometric_stiffness]]\nfile = \"Kg.mtx\"\nspin = \"zz\"\n[[geometric_stiffness]]\nfile = \"Kg.mtx\"\nforce = \"x\"\ninterface = \"tip\"\n\
-         [[geometric_stiffness]]\nfile = \"Kg.mtx\"\nload = \"stretch\"\n[damping]\nrayleigh = { alpha = 2.0, beta = 1e-6 }\n",
+         [[geometric_stiffness]]\nfile = \"Kg2.mtx\"\nload = \"stretch\"\n[damping]\nrayleigh = { alpha = 2.0, beta = 1e-6 }\n",
     );
     let path = folder.path();
     let report = json(path, "convert model.toml -o b.h5 --modes 8 --frame com --json");
@@ -127,6 +128,8 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
     let notes: Vec<_> =
         report["diagnostics"].as_array().expect("a list").iter().map(|d| &d["code"]).collect();
     assert_eq!(notes, ["FB531"]);
+    let (code, _, err) = flexbody(path, "check b.h5 --against model.toml");
+    assert_eq!((code, err.as_str()), (0, ""), "no file has changed");
     let checks = json(path, "check b.h5 --against model.toml --json");
     let text = checks.to_string();
     assert!(text.contains("damping_recomputed") && text.contains("geometric_stiffness_recomputed"), "{text}");

@@ -339,6 +339,15 @@ fn plane_stress_plate_agrees_with_its_reference() {
     for (found, expected) in body.modes().eigenvalue.iter().zip(lambda) {
         close(*found, expected.as_f64().expect("a number"), 1e-10, "lambda");
     }
+    // An inertia count of another program, and the row sums of the mass matrix.
+    let sylvester = &reference["modes"]["sylvester"];
+    let (shift, count) = (&sylvester["lam"], &sylvester["count"]);
+    let below = body.modes().eigenvalue.iter().filter(|l| **l < shift.as_f64().expect("a shift")).count();
+    assert_eq!(Some(3 + below as u64), count.as_u64());
+    let row_sum = body.lumped().iter().find(|lumped| lumped.scheme == "row-sum").expect("by default");
+    let inertia = reference["rowsum_lumped"]["inertia_com"][2][2].as_f64().expect("J0");
+    close(row_sum.invariants.inertia()[(2, 2)], inertia, 1e-12, "J0 of row sums");
+    assert_eq!(Some(row_sum.negative_masses as u64), reference["rowsum_negative_rows"].as_u64());
 }
 
 /// Shapes stay in the plane and are M-orthonormal there.

@@ -49,7 +49,7 @@ pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
-/// `without geometric stiffness 1 % softer at 12.5, 80.1, 79.9 Hz about x, y, z`.
+/// `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z)`.
 pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     let axes = ["x", "y", "z"].into_iter().zip(hertz);
     let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
@@ -58,5 +58,5 @@ pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     }
     let rates: Vec<String> = known.iter().map(|(_, hz)| significant(*hz, 3)).collect();
     let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
-    format!("without geometric stiffness 1 % softer at {} Hz about {}", rates.join(", "), axes.join(", "))
+    format!("no geometric stiffness: 1 % softer at {} Hz ({})", rates.join(", "), axes.join(", "))
 }
