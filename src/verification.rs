@@ -154,9 +154,9 @@ struct Difference {
 impl Difference {
     /// Of entries up to `size`, recomputed with a rounding of `rounding`.
     fn new(largest: f64, size: f64, rounding: f64) -> Self {
-        let size = size.max(f64::MIN_POSITIVE);
-        let largest = if largest.is_nan() { f64::INFINITY } else { largest / size };
-        Self { largest, allowed: RECOMPUTED + rounding / size }
+        let relative = |value: f64| if value > 0.0 { value / size } else { 0.0 };
+        // Twice the size is what two matrices of nothing but rounding differ by at the most.
+        Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
     }
 
     /// The one that comes closer to what is allowed, or goes further beyond it.
@@ -191,10 +191,10 @@ fn damping_check(
     let (matrix, ratio) =
         found.map_or_else(|| (none(), vec![0.0; nf]), |damping| (damping.matrix, damping.ratio));
     let stored = modes.modal_damping.clone().unwrap_or_else(none);
-    let mut largest = largest_difference(&stored, &matrix);
-    for (j, lambda) in modes.eigenvalue.iter().enumerate() {
-        largest = not_less(largest, 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs());
-    }
+    let of_ratio =
+        |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
+    let largest =
+        modes.eigenvalue.iter().enumerate().map(of_ratio).fold((&stored - &matrix).norm_max(), f64::max);
     let rounding = match model.damping() {
         Some(Damping::Matrix(d)) => rounding_of(d, shapes),
         Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes),
@@ -219,20 +219,9 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
         let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
         let rounding = given.map(|one| rounding_of(&one.matrix, shapes)).sum();
         let size = stored.norm_max().max(own.norm_max());
-        Difference::new(largest_difference(&stored, &own), size, rounding)
+        Difference::new((&stored - &own).norm_max(), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))
-}
-
-/// The larger of both; NaN counts as larger than anything.
-fn not_less(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
-/// max |A - B|.
-fn largest_difference(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
-    let difference = a - b;
-    difference.col_iter().flat_map(|column| column.iter()).fold(0.0, |m, v| not_less(m, v.abs()))
 }
 
 /// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.

@@ -439,7 +439,11 @@ fn loads_and_matrices_that_do_not_fit_are_refused() {
             Code::ManifestSyntax,
             "spin yy is given twice",
         ),
-        (vec![given(LoadKind::Named(String::new()), 0, sound())], Code::ManifestSyntax, "no usable name"),
+        (
+            vec![given(LoadKind::Named(String::new()), 0, sound())],
+            Code::ManifestSyntax,
+            "has no name, or one that is too long",
+        ),
         (
             vec![given(tip("top"), 0, sound())],
             Code::InterfaceNode,
@@ -505,4 +509,57 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
         CscMatrix::from_triplets(n, n, &[(mine, other, 1.0), (other, mine, 1.0)]);
     let error = FeModel::bodies_from_raw(raw).expect_err("coupled");
     assert!(error.to_string().contains("geometric stiffness for spin xx couples node"), "{error}");
+}
+
+#[test]
+fn files_without_the_group_are_older_and_those_that_break_it_are_refused() {
+    let case = Case::skew_block();
+    let body = converted(case.raw(case.spin()), BodyFrame::Com);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("b.flex.h5");
+    let changed = |change: &dyn Fn(&hdf5_metno::File)| {
+        store::write(&body, &path).expect("written");
+        let file = hdf5_metno::File::open_rw(&path).expect("a file");
+        change(&file);
+        file.close().expect("closed");
+        store::read(&path)
+    };
+    let older = changed(&|file| file.unlink("geometric_stiffness").expect("removed")).expect("readable");
+    assert!(older.geometric_stiffness().is_empty());
+    let text = |file: &hdf5_metno::File, place: &str, name: &str, value: &str| {
+        let value: hdf5_metno::types::VarLenUnicode = value.parse().expect("text");
+        let group = file.group(place).expect("a group");
+        group.attr(name).expect("an attribute").write_scalar(&value).expect("written");
+    };
+    type Change<'a> = &'a dyn Fn(&hdf5_metno::File);
+    let refused: [(Change<'_>, &str); 6] = [
+        (
+            &|f| f.relink("geometric_stiffness/spin_xx", "geometric_stiffness/spin_xw").expect("moved"),
+            "/geometric_stiffness/spin_xw: expected a kind of load",
+        ),
+        (
+            &|f| f.relink("geometric_stiffness/spin_xx", "geometric_stiffness/spin_zx").expect("moved"),
+            "/geometric_stiffness/spin_zx: expected a kind of load",
+        ),
+        (
+            &|f| f.unlink("geometric_stiffness/spin_yy/stiffness").expect("removed"),
+            "/geometric_stiffness/spin_yy/stiffness: expected a dataset of 64-bit floats, found nothing",
+        ),
+        (
+            &|f| text(f, "geometric_stiffness/spin_yy", "kind", "force"),
+            "/geometric_stiffness/spin_yy@kind: expected `spin`, found \"force\"",
+        ),
+        (
+            &|f| text(f, "geometric_stiffness/spin_yy", "axis", "xx"),
+            "/geometric_stiffness/spin_yy@axis: expected `yy`",
+        ),
+        (
+            &|f| text(f, "geometric_stiffness/spin_yy", "load_units", "kg"),
+            "/geometric_stiffness/spin_yy@load_units: expected `s^-2`",
+        ),
+    ];
+    for (change, said) in refused {
+        let error = changed(change).expect_err(said);
+        assert!(error.has(Code::BodySchema) && error.to_string().contains(said), "{said}: {error}");
+    }
 }

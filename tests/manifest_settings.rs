@@ -153,3 +153,16 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
     let (code, _, err) = flexbody(path, "convert model.toml -o Kg.mtx");
     assert!(code == 2 && err.contains("output Kg.mtx is an input"), "{err}");
 }
+
+#[test]
+fn each_of_several_bodies_gets_its_own_residual_vectors() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let body = Mesh::two_bodies(Kind::Hex8, 2).assemble(&Material::STEEL, MassRule::Consistent);
+    let manifest = write_model(folder.path(), &body.raw_model(), Triangle::Lower);
+    let text = fs::read_to_string(&manifest).expect("a manifest");
+    fs::write(&manifest, format!("{text}[basis]\nresidual_vectors = [\"centrifugal\"]\n")).expect("written");
+    let reports = json(folder.path(), "convert model.toml -o b.h5 --split --modes 5 --json");
+    for report in reports.as_array().expect("a list") {
+        assert_eq!(loads(report).len(), 6);
+    }
+}

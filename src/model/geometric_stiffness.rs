@@ -122,6 +122,9 @@ impl UnitLoad {
 
     /// What this load (component a, axes of the model) is in units of the loads of its kind along other axes, the columns of
     /// `axes`: v_a = sum_i A_ai v_i' for vectors, w_a w_b = sum_ij A_ai A_bj w_i' w_j' for spin, a named load itself.
+    ///
+    /// # Panics
+    /// When the component is not one of the kind's.
     pub fn along(&self, axes: &Matrix3<f64>) -> Vec<f64> {
         let component = self.component;
         match self.kind {
@@ -161,6 +164,9 @@ pub struct GeometricStiffness<K> {
     pub matrix: K,
 }
 
+/// Longest name of a load in bytes: it names a group in the file.
+const LONGEST: usize = 200;
+
 /// What is wrong with the loads by themselves.
 pub(super) fn check_loads(
     given: &[GeometricStiffness<RawMatrix>],
@@ -182,8 +188,11 @@ pub(super) fn check_loads(
                     "geometric stiffness is given for {name}; a body of dimension {dimension} has {have}"
                 ),
             );
-        } else if matches!(kind, LoadKind::Named(name) if name.is_empty() || name.contains('\0')) {
-            complain(Code::ManifestSyntax, "a load of geometric stiffness has no usable name".to_owned());
+        } else if matches!(kind, LoadKind::Named(name) if name.is_empty() || name.len() > LONGEST || name.contains('\0'))
+        {
+            let message =
+                "a load of geometric stiffness has no name, or one that is too long or has a NUL in it";
+            complain(Code::ManifestSyntax, message.to_owned());
         } else if given[..i].iter().any(|other| other.load == *load) {
             complain(Code::ManifestSyntax, format!("geometric stiffness for {name} is given twice"));
         } else if let Some(at) = kind.interface()

@@ -36,7 +36,7 @@ psi = h5read('body.flex.h5', '/modes/shape', [1 1 1], [3 Inf 1])';  % first mode
 
 const RULES: &str = "\
 A reader refuses a newer `format_major` and names the `generator`; a newer `format_minor` only adds entries, which older
-readers ignore. Names that are data (lumping schemes, interfaces) are percent-encoded where they hold `/`, `%`, control
+readers ignore. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
 characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
