@@ -3,6 +3,7 @@
 use super::Parts;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::invariants::{DIGITS, Invariants};
+use crate::model::UnitLoad;
 use faer::{Mat, MatRef};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
@@ -221,7 +222,10 @@ impl Check {
             self.text("geometric_stiffness", label);
             self.matrix(&format!("geometric_stiffness `{label}`"), &one.matrix, nf, nf);
             let load = &one.load;
-            if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
+            // A file knows the load by this name only.
+            if UnitLoad::from_label(label).as_ref() != Some(load) {
+                self.add(format!("geometric stiffness `{label}` has no component, interface or name"));
+            } else if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
                 let dimension = parts.dimension;
                 self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
             }

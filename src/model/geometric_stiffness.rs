@@ -99,22 +99,17 @@ impl UnitLoad {
 
     /// The load that is called `label`; the inverse of [`UnitLoad::label`].
     pub fn from_label(label: &str) -> Option<Self> {
-        let [acceleration, angular, spin, force, moment, load] =
-            LoadKind::NAMES.map(|kind| label.strip_prefix(kind)?.strip_prefix('_'));
-        if let Some(name) = load.filter(|name| !name.is_empty()) {
-            return Some(Self { kind: LoadKind::Named(name.to_owned()), component: 0 });
-        }
-        let at = |rest: Option<&'_ str>| {
-            let (axis, interface) = rest?.split_once('_')?;
-            (!interface.is_empty()).then(|| (axis.to_owned(), interface.to_owned()))
-        };
-        let (kind, axis) = match (acceleration, angular, spin, at(force), at(moment)) {
-            (Some(axis), ..) => (LoadKind::Acceleration, axis.to_owned()),
-            (_, Some(axis), ..) => (LoadKind::AngularAcceleration, axis.to_owned()),
-            (_, _, Some(axis), ..) => (LoadKind::Spin, axis.to_owned()),
-            (.., Some((axis, interface)), _) => (LoadKind::Force(interface), axis),
-            (.., Some((axis, interface))) => (LoadKind::Moment(interface), axis),
-            _ => return None,
+        let of_kind = |kind: &&'static str| Some((*kind, label.strip_prefix(*kind)?.strip_prefix('_')?));
+        let (kind, rest) = LoadKind::NAMES.iter().find_map(of_kind)?;
+        let at_interface = || rest.split_once('_').filter(|(_, interface)| !interface.is_empty());
+        let (kind, axis) = match kind {
+            "acceleration" => (LoadKind::Acceleration, rest),
+            "angular_acceleration" => (LoadKind::AngularAcceleration, rest),
+            "spin" => (LoadKind::Spin, rest),
+            "force" => at_interface().map(|(axis, at)| (LoadKind::Force(at.to_owned()), axis))?,
+            "moment" => at_interface().map(|(axis, at)| (LoadKind::Moment(at.to_owned()), axis))?,
+            _ if rest.is_empty() => return None,
+            _ => (LoadKind::Named(rest.to_owned()), ""),
         };
         let component = kind.components().iter().position(|known| *known == axis)?;
         Some(Self { kind, component })
