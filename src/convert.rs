@@ -21,6 +21,10 @@ use std::collections::HashMap;
 
 mod body_modes;
 mod damping;
+mod geometric_stiffness;
+
+pub(crate) use damping::modal_damping;
+pub(crate) use geometric_stiffness::modal_geometric_stiffness;
 
 pub(crate) use body_modes::{BodyModes, Place};
 
@@ -153,9 +157,11 @@ pub fn convert_resumed(
         }
     };
     let eigenvalues = &found.solution.eigenvalues;
-    let damping = damping::modal_damping(model, modes.vectors.as_ref(), eigenvalues, &invariants)?;
+    let damping = modal_damping(model, modes.vectors.as_ref(), eigenvalues, &invariants)?;
+    let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
     let mut diagnostics = found.diagnostics.clone();
     diagnostics.extend(damping.as_ref().and_then(|damping| damping.warning.clone()));
+    diagnostics.extend(geometric_stiffness::softening_warning(model, &settings.basis, &invariants));
     watch(Event::Phase("lumped comparison"));
     let lumped: Vec<LumpedBody> = schemes
         .iter()
@@ -222,6 +228,7 @@ pub fn convert_resumed(
             internal: modes.internal,
         },
         invariants,
+        geometric_stiffness,
         lumped,
         certificate,
     })?;

@@ -122,7 +122,7 @@ codes! {
     ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more degrees of freedom than rigid motions: six in space, three in the plane";
     DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
     DampingRigid = "FB420", Warning, Done, "damping matrix resists rigid motion", "damping to ground, or proportional to mass, acts on the motion of the whole body: model it in the multibody system";
-    BodiesCoupled = "FB421", Error, BadInput, "damping couples bodies that K and M leave separate", "leave the entries between bodies out";
+    BodiesCoupled = "FB421", Error, BadInput, "damping or geometric stiffness couples bodies that K and M leave separate", "leave the entries between bodies out";
     RowsUnheld = "FB422", Error, BadInput, "stiffness leaves rows without coordinates free", "add the nodes to the node table, or remove these degrees of freedom";
     RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
     // FB5xx: numerics
@@ -146,6 +146,8 @@ codes! {
     ShapesRigid = "FB522", Note, Done, "rigid motions among the shapes are removed", "nothing to do: rigid motion is the body frame's";
     ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
     LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
+    GeometricStiffnessNone = "FB530", Warning, Done, "centrifugal loads without geometric stiffness: the body softens where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to rates far below the one that is named";
+    GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act along the others";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -119,6 +119,22 @@ fn names_are_unique_and_can_be_stored() {
 }
 
 #[test]
+fn loads_of_geometric_stiffness_are_those_that_a_file_can_name() {
+    use flexbody::flex_body::LoadKind::{Force, Named, Spin};
+    // The parts have a force and a spin.
+    let load = |p: &mut Parts, kind, component| {
+        (p.geometric_stiffness[0].load.kind, p.geometric_stiffness[0].load.component) = (kind, component);
+    };
+    assert_refused(|p| load(p, Spin, 6), &["has no component, interface or name"]);
+    assert_refused(|p| load(p, Force(String::new()), 0), &["has no component, interface or name"]);
+    assert_refused(|p| load(p, Named(String::new()), 0), &["has no component, interface or name"]);
+    assert_refused(|p| load(p, Named("a\0".to_owned()), 0), &["contains a NUL character"]);
+    assert_refused(|p| p.geometric_stiffness[1] = p.geometric_stiffness[0].clone(), &["is given twice"]);
+    assert_refused(|p| p.geometric_stiffness[1].matrix[(0, 0)] = f64::NAN, &["has the value NaN"]);
+    assert_refused(|p| p.geometric_stiffness[1].matrix = faer::Mat::zeros(2, 3), &["is 2 x 3, expected"]);
+}
+
+#[test]
 fn frequencies_are_in_hertz_in_any_unit_of_time() {
     let mut p = parts(Random::new(3), 4, 1, 0, 0);
     p.modes.eigenvalue = vec![4.0 * std::f64::consts::PI.powi(2)];

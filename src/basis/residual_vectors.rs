@@ -10,7 +10,7 @@ use crate::eigen::{
     Accuracy, EigenFailure, EigenProblem, EigenSolution, Precision, Wanted, modes_of_span, static_responses,
 };
 use crate::error::Result;
-use crate::linalg::{add_combination, column_products, gram};
+use crate::linalg::{add_combination, column_products, gram, side_by_side};
 use crate::model::{FeModel, RawShapes};
 use crate::progress::{Event, Watch};
 use crate::provenance::SourceFile;
@@ -174,7 +174,8 @@ impl NamedLoads {
         }
         let (names, forces): (Vec<String>, Vec<Mat<f64>>) =
             loads.iter().flat_map(|loads| loads.forces(problem, model)).unzip();
-        Ok(Self { names, forces: side_by_side(problem.pencil.n(), &forces) })
+        let forces: Vec<_> = forces.iter().map(Mat::as_ref).collect();
+        Ok(Self { names, forces: side_by_side(&forces) })
     }
 }
 
@@ -229,14 +230,14 @@ pub(super) fn with_residual_vectors(
         }
     }
     let candidates = Mat::from_fn(responses.nrows(), used.len(), |i, j| responses[(i, used[j])]);
-    let known = side_by_side(pencil.n(), &[problem.rigid.to_owned(), modes.clone()]);
+    let known = side_by_side(&[problem.rigid, modes.as_ref()]);
     let found = independent(pencil, known.as_ref(), candidates, LEFT)
         .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
     dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({left:.0e})", names[used[j]])));
     dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", names[used[j]])));
     dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", names[used[j]])));
 
-    let span = side_by_side(pencil.n(), &[modes.clone(), found.vectors]);
+    let span = side_by_side(&[modes.as_ref(), found.vectors.as_ref()]);
     let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
     let ritz = modes_of_span(problem, span.clone(), &all, watch).map_err(failed)?;
     let parts = gram(span.as_ref(), pencil.apply_mass(ritz.vectors.as_ref()).as_ref());
@@ -290,10 +291,4 @@ pub(super) fn with_residual_vectors(
     let mut basis = ModalBasis::new(model, problem, settings, solution, "")?;
     (basis.provenance, basis.truncation, basis.diagnostics) = (provenance, truncation, notes);
     Ok(basis)
-}
-
-/// The columns of all blocks.
-fn side_by_side(n: usize, blocks: &[Mat<f64>]) -> Mat<f64> {
-    let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    Mat::from_fn(n, columns.len(), |i, j| columns[j][i])
 }

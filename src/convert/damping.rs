@@ -15,7 +15,8 @@ const NOISE_FACTOR: f64 = 30.0;
 /// Smallest eigenvalue of the damping, scaled to a unit diagonal, that still is rounding.
 const SEMIDEFINITE: f64 = -1e-8;
 
-pub(super) struct ModalDamping {
+/// Damping of modes.
+pub(crate) struct ModalDamping {
     /// Psi' D Psi (nf x nf). Unit: 1/time.
     pub matrix: Mat<f64>,
     /// Its diagonal over 2 omega_j.
@@ -28,7 +29,7 @@ pub(super) struct ModalDamping {
 ///
 /// # Errors
 /// [`DampingIndefinite`](Code::DampingIndefinite).
-pub(super) fn modal_damping(
+pub(crate) fn modal_damping(
     model: &FeModel,
     vectors: MatRef<'_, f64>,
     eigenvalues: &[f64],

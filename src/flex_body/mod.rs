@@ -5,6 +5,7 @@ mod parts;
 mod validate;
 
 pub use crate::invariants::Frame;
+pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 pub use body::FlexBody;
 pub use parts::{
     Certificate, Guarantee, Interface, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source,

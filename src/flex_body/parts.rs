@@ -1,7 +1,7 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
 use crate::invariants::{DIGITS, Frame, Invariants};
-use crate::model::{BodyNumber, Nodes};
+use crate::model::{BodyNumber, GeometricStiffness, Nodes};
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -157,6 +157,9 @@ pub struct Parts {
     pub modes: Modes,
     /// Exact invariants about the frame origin, body axes.
     pub invariants: Invariants,
+    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes: the stressed body has the stiffness K_ff plus the sum of these
+    /// times their loads. What is not here is zero or not known. Unit: 1/time^2 over that of the load.
+    pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     /// Lumped comparators.
     pub lumped: Vec<LumpedBody>,
     /// Proof of completeness and noise floor.

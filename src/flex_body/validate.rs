@@ -3,6 +3,7 @@
 use super::{MassStructure, Modes, Parts};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::invariants::{DIGITS, Invariants};
+use crate::model::UnitLoad;
 use faer::{Mat, MatRef};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
@@ -36,6 +37,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
         check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass));
     }
     check.structure(parts);
+    check.geometric_stiffness(parts, nf);
     check.lumped(parts, nf);
     let c = &parts.certificate;
     check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
@@ -237,6 +239,23 @@ impl Check {
         }
         if parts.lumped.iter().any(|lumped| lumped.invariants.general.is_some()) {
             self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
+        }
+    }
+
+    fn geometric_stiffness(&mut self, parts: &Parts, nf: usize) {
+        let labels: Vec<String> = parts.geometric_stiffness.iter().map(|one| one.load.label()).collect();
+        self.names("geometric stiffness", labels.iter());
+        for (one, label) in parts.geometric_stiffness.iter().zip(&labels) {
+            self.text("geometric_stiffness", label);
+            self.matrix(&format!("geometric_stiffness `{label}`"), &one.matrix, nf, nf);
+            let load = &one.load;
+            // A file knows the load by this name only.
+            if UnitLoad::from_label(label).as_ref() != Some(load) {
+                self.add(format!("geometric stiffness `{label}` has no component, interface or name"));
+            } else if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
+                let dimension = parts.dimension;
+                self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
+            }
         }
     }
 

@@ -15,6 +15,7 @@ mod identity_terms;
 mod lumped;
 mod primary;
 mod principal_axes;
+mod softening;
 mod transform;
 
 pub use alignment::{Alignment, align, compare_invariants};
@@ -28,3 +29,4 @@ pub use general::{GENERAL_REMARK, RigidMotion, condense_general};
 pub use identities::{Expected, IdentityCheck, derived_identities, identities};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use primary::{GeneralTerms, Invariants};
+pub use softening::relative_norm;

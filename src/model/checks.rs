@@ -1,17 +1,21 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
+use super::geometric_stiffness::{check_loads, missing_components};
 use super::layout::{Layout, layout, name_some};
 use super::mass_structure::{MassForm, mass_form};
 use super::placeless::{check_massless, misplaced, recover};
 use super::rigid::{centre_and_length, rigid_count, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
-use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawMatrix, RawModel, Rows};
+use super::{BodyNumber, Damping, DofLabel, FeModel, GeometricStiffness, Nodes, RawMatrix, RawModel, Rows};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::Path;
+
+/// Name of geometric stiffness in messages.
+const GEOMETRIC: &str = "geometric stiffness";
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -47,6 +51,8 @@ pub(super) struct Assembled {
     pub row_to_internal: Option<Vec<u32>>,
     /// Damping, a matrix in the same order.
     pub damping: Option<Damping<SymmetricMatrix>>,
+    /// Geometric stiffness, in the same order.
+    pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
 }
 
 /// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes so far.
@@ -66,12 +72,14 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     if let Some(problem) = raw.damping.as_ref().and_then(Damping::problem) {
         found.push(Diagnostic::new(Code::ManifestSyntax, problem));
     }
-    if let Some(damping) = raw.damping.as_ref().and_then(Damping::matrix) {
-        check_matrix(damping, "damping", &mut found);
-        let nd = damping.matrix.n_cols();
-        if nd != nk {
-            let message = format!("stiffness matrix has {nk} rows, damping matrix {nd}");
-            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&damping.path));
+    let damping = raw.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
+    let geometric = raw.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC));
+    for (other, name) in damping.into_iter().chain(geometric) {
+        check_matrix(other, name, &mut found);
+        let rows = other.matrix.n_cols();
+        if rows != nk {
+            let message = format!("stiffness matrix has {nk} rows, {name} matrix {rows}");
+            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&other.path));
         }
     }
     stop_on_error(&mut found)?;
@@ -107,6 +115,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
             found.push(Diagnostic::new(Code::InterfaceNode, message));
         }
     }
+    check_loads(&raw.geometric_stiffness, &raw.interfaces, dimension, &mut found);
     if nk <= rigid_count(dimension) {
         let message = format!("model has {nk} degrees of freedom");
         found.push(Diagnostic::new(Code::ModelTooSmall, message));
@@ -125,6 +134,13 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         };
         damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
     });
+    let geometric_stiffness = std::mem::take(&mut raw.geometric_stiffness)
+        .into_iter()
+        .filter_map(|GeometricStiffness { load, mut matrix }| {
+            let matrix = symmetric(&mut matrix, &layout, GEOMETRIC, label, &mut found)?;
+            Some(GeometricStiffness { load, matrix })
+        })
+        .collect();
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -133,7 +149,11 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
-    Ok((Assembled { raw, nodes, rows: layout.rows, stiffness, mass, row_to_internal, damping }, found))
+    let rows = layout.rows;
+    Ok((
+        Assembled { raw, nodes, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness },
+        found,
+    ))
 }
 
 /// The checks of a body: its mass, its connections, its rigid motion.
@@ -165,6 +185,7 @@ pub(super) fn finish(
     let limit = rounding(body.raw.stiffness.digits, 3).max(1e-6);
     let rigid_residual = check_rigid_motion(&body, limit, &mut found);
     check_rigid_damping(&body, &mut found);
+    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     stop_on_error(&mut found)?;
     let mut form = form.expect("a missing mass comes with an error");
     // Vectors that rigid motion moves have no x of their own in the formulas for Ms.
@@ -308,8 +329,8 @@ fn symmetric(
             let i = i as usize;
             let other = ordered.get(j, i);
             one_sided += usize::from(other == 0.0);
-            let scale =
-                (size[i] * size[j]).max(if size[i] * size[j] > 0.0 { 0.0 } else { v.abs().max(other.abs()) });
+            // Beyond the diagonal, as only indefinite matrices go, an entry is compared with itself.
+            let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
             let difference = (v - other).abs() / scale;
             if difference > worst {
                 (worst, at) = (difference, (i, j));

@@ -4,7 +4,8 @@
 use super::checks::Assembled;
 use super::mass_structure::MassForm;
 use super::{
-    BodyNumber, CheckedModel, Damping, DofLabel, NodeSet, Nodes, RawModel, Rows, check, check_bodies,
+    BodyNumber, CheckedModel, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, check,
+    check_bodies,
 };
 use crate::error::Result;
 use crate::linalg::{Pencil, SymmetricMatrix};
@@ -28,6 +29,7 @@ pub struct FeModel {
     whole_mass: Option<SymmetricMatrix>,
     commutes: bool,
     damping: Option<Damping<SymmetricMatrix>>,
+    geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
     sources: Vec<SourceFile>,
     digits: u8,
@@ -63,7 +65,7 @@ impl FeModel {
         diagonal_mass: bool,
         number: Option<BodyNumber>,
     ) -> Self {
-        let Assembled { raw, nodes, rows, stiffness, mass, damping, .. } = body;
+        let Assembled { raw, nodes, rows, stiffness, mass, damping, geometric_stiffness, .. } = body;
         let scalar = form.commutes && rows.len() == rows.displacements();
         Self {
             digits: raw.stiffness.digits,
@@ -76,6 +78,7 @@ impl FeModel {
             whole_mass: (!scalar).then_some(mass),
             commutes: form.commutes,
             damping,
+            geometric_stiffness,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
@@ -134,6 +137,11 @@ impl FeModel {
     /// Damping, where it was given; a matrix D has the rows of K.
     pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
         self.damping.as_ref()
+    }
+
+    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows of K.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
+        &self.geometric_stiffness
     }
 
     /// K and M.

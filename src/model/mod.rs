@@ -3,6 +3,7 @@
 mod checks;
 mod damping;
 mod fe_model;
+mod geometric_stiffness;
 mod layout;
 mod mass_structure;
 mod nodes;
@@ -16,6 +17,7 @@ mod several;
 pub use checks::{CheckedModel, check};
 pub use damping::{Damping, DampingBand};
 pub use fe_model::FeModel;
+pub use geometric_stiffness::{GeometricStiffness, LoadKind, UnitLoad};
 pub use nodes::{DofLabel, NodeSet, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
 pub use rigid::{centre_and_length, rigid_count, rigid_fields};

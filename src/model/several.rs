@@ -1,7 +1,7 @@
 //! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
 
 use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
-use super::{Damping, NodeSet, Nodes, RawModel, Rows, rigid_count};
+use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
 use crate::linalg::SymmetricMatrix;
@@ -32,7 +32,7 @@ impl std::fmt::Display for BodyNumber {
 /// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
 /// [`ModelTooSmall`](Code::ModelTooSmall) for bodies with no more rows than rigid motions;
 /// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies;
-/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping matrix that couples bodies.
+/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping or geometric stiffness matrix that couples bodies.
 pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     let (whole, shared) = assemble(raw)?;
     let bodies = match separate(whole) {
@@ -61,7 +61,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 
 /// The bodies, in the order of their first nodes.
 fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
-    let Assembled { raw, nodes, rows, stiffness, mass, damping, .. } = whole;
+    let Assembled { raw, nodes, rows, stiffness, mass, damping, geometric_stiffness, .. } = whole;
     let component = rows.components(&[&stiffness, &mass]);
     let bodies = groups(&component, &rows, &nodes);
     let mut found = Vec::new();
@@ -83,8 +83,24 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
         );
     }
     let interfaces = distribute(&raw.interfaces, &component, &nodes, &mut found);
-    if let Some(matrix) = damping.as_ref().and_then(Damping::matrix) {
-        found.extend(coupling(matrix, &component, &rows, &nodes));
+    let damping_matrix = damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
+    let geometric =
+        geometric_stiffness.iter().map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
+    for (matrix, name) in damping_matrix.into_iter().chain(geometric) {
+        found.extend(coupling(matrix, &name, &component, &rows, &nodes));
+    }
+    let of = |row: usize| component[rows.vertex(row)];
+    for GeometricStiffness { load, matrix } in &geometric_stiffness {
+        let at = load.kind.interface();
+        let own = interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
+        let elsewhere = |b| (0..matrix.n()).find(|&row| of(row) != b && !matrix.row(row).0.is_empty());
+        if let Some((body, row)) = own.and_then(|b| Some((b + 1, elsewhere(b)?))) {
+            let (node, other) = (rows.label(&nodes, row).node, of(row) + 1);
+            let message = format!(
+                "geometric stiffness for {load} has entries at node {node} of body {other}, the interface belongs to body {body}"
+            );
+            found.push(Diagnostic::new(Code::BodiesCoupled, message));
+        }
     }
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
@@ -103,6 +119,12 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
             let Ok(own) = damping.borrowed().try_map(principal);
             own
         });
+        // What a load does to the other bodies is nothing: no rows of it are theirs.
+        let geometric_stiffness = geometric_stiffness
+            .iter()
+            .map(|one| GeometricStiffness { load: one.load.clone(), matrix: one.matrix.principal(&kept) })
+            .filter(|one| one.matrix.as_csc().nnz() > 0)
+            .collect();
         all.push(Assembled {
             raw: RawModel { name: format!("{}-{}", raw.name, i + 1), interfaces, ..raw.clone() },
             nodes,
@@ -111,6 +133,7 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
             mass: mass.principal(&kept),
             row_to_internal: None,
             damping,
+            geometric_stiffness,
         });
     }
     Ok(all)
@@ -147,19 +170,20 @@ fn distribute(
     own
 }
 
-/// A complaint when an entry of D couples two bodies.
+/// A complaint when an entry of the matrix called `name` couples two bodies.
 fn coupling(
-    damping: &SymmetricMatrix,
+    matrix: &SymmetricMatrix,
+    name: &str,
     component: &[usize],
     rows: &Rows,
     nodes: &Nodes,
 ) -> Option<Diagnostic> {
     let of = |row: usize| component[rows.vertex(row)];
-    let (a, b) = (0..damping.n()).find_map(|row| {
+    let (a, b) = (0..matrix.n()).find_map(|row| {
         let other = |&column: &u32| (of(row) != of(column as usize)).then_some(column);
-        damping.row(row).0.iter().find_map(other).map(|column| (row, column as usize))
+        matrix.row(row).0.iter().find_map(other).map(|column| (row, column as usize))
     })?;
     let place = |row: usize| format!("node {} of body {}", rows.label(nodes, row).node, of(row) + 1);
-    let message = format!("damping couples {} with {}", place(a), place(b));
+    let message = format!("{name} couples {} with {}", place(a), place(b));
     Some(Diagnostic::new(Code::BodiesCoupled, message))
 }

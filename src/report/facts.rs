@@ -1,6 +1,7 @@
 //! The facts of a body and of the run that made it, computed once; every format renders these.
 
 use super::completeness::Completeness;
+use super::geometric_stiffness::{GeometricStiffnessFacts, softening_hz};
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
@@ -91,6 +92,10 @@ pub(super) struct ModeFacts {
     pub worst_residual: f64,
     /// Where damping was given.
     pub damping: Option<DampingFacts>,
+    /// For each unit load.
+    pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
+    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where there is no geometric stiffness for spin.
+    pub softening_hz: Option<[Option<f64>; 3]>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -182,6 +187,8 @@ impl Facts {
                 truncation: body.modes().truncation.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
                 damping: DampingFacts::of(body),
+                geometric_stiffness: GeometricStiffnessFacts::of(body),
+                softening_hz: softening_hz(body),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
             completeness: Completeness::of(body),

@@ -2,6 +2,7 @@
 
 use super::Facts;
 use super::facts::RunFacts;
+use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
@@ -146,6 +147,10 @@ fn modes(page: &mut Page, facts: &Facts) {
     });
     if let Some(damping) = &modes.damping {
         page.entry("damping", &damping.in_words());
+    }
+    page.list("geometric", &modes.geometric_stiffness, |one| plain(&one.in_words()));
+    if let Some(hertz) = &modes.softening_hz {
+        page.entry("spin", &softening_in_words(hertz));
     }
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);

@@ -4,7 +4,8 @@ use super::scan::Scan;
 use super::schema::MASS_STRUCTURES;
 use super::value::Value;
 use crate::flex_body::{
-    Certificate, Frame, Guarantee, Interface, InternalRows, LumpedBody, Modes, Parts, Source,
+    Certificate, Frame, GeometricStiffness, Guarantee, Interface, InternalRows, LumpedBody, Modes, Parts,
+    Source, UnitLoad,
 };
 use crate::invariants::{DIGITS, GeneralTerms, Invariants};
 use crate::model::{BodyNumber, Nodes};
@@ -31,11 +32,24 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let modes = take.modes(nodes.len());
     let nf = modes.eigenvalue.len();
     let invariants = take.invariants("/invariants", nf);
+    let geometric_stiffness = take.geometric_stiffness(nf);
     let lumped = take.lumped(nf);
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
     let source = source.filter(|_| scan.problems.is_empty())?;
-    Some(Parts { source, dimension, units, frame, nodes, modes, invariants, lumped, certificate, interfaces })
+    Some(Parts {
+        source,
+        dimension,
+        units,
+        frame,
+        nodes,
+        modes,
+        invariants,
+        geometric_stiffness,
+        lumped,
+        certificate,
+        interfaces,
+    })
 }
 
 /// Moves values out of a scan.
@@ -202,6 +216,19 @@ impl Take<'_> {
                 .map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| s[(block(k, l) * nf + i) * nf + j]))),
             modal_stiffness: self.matrix(&format!("{place}/modal_stiffness"), nf),
         }
+    }
+
+    fn geometric_stiffness(&mut self, nf: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
+        let mut out = Vec::new();
+        for (label, link) in self.scan.instances("/geometric_stiffness") {
+            let place = format!("/geometric_stiffness/{link}");
+            let matrix = self.matrix(&format!("{place}/stiffness"), nf);
+            match UnitLoad::from_label(&label) {
+                Some(load) => out.push(GeometricStiffness { load, matrix }),
+                None => self.scan.add(format!("{place}: expected a kind of load with its axis or name")),
+            }
+        }
+        out
     }
 
     fn lumped(&mut self, nf: usize) -> Vec<LumpedBody> {

@@ -43,6 +43,9 @@ fn check_group(scan: &mut Scan, group: &Group, path: &str, view: &View<'_>) {
                 }
             }
             (Value::Int(a), Value::Int(b)) if a != b => scan.add(format!("{name}: expected {b}, found {a}")),
+            (Value::Text(a), Value::Text(b)) if a != b => {
+                scan.add(format!("{name}: expected `{b}`, found {a:?}"));
+            }
             _ => {}
         }
     }

@@ -37,7 +37,7 @@ psi = h5read('body.flex.h5', '/modes/shape', [1 1 1], [3 Inf 1])';  % first mode
 
 const RULES: &str = "\
 A reader refuses a newer `format_major` and names the `generator`; a newer `format_minor` only adds entries, which older
-readers ignore. Names that are data (lumping schemes, interfaces) are percent-encoded where they hold `/`, `%`, control
+readers ignore. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
 characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
@@ -123,7 +123,7 @@ pub fn format_schema() -> String {
         let mut target = &mut root;
         for name in group.path.split('/').filter(|name| !name.is_empty()) {
             let key = if name.starts_with('<') { "additionalProperties" } else { name };
-            target = descend(target, key);
+            target = descend(target, key, group.since() == 0);
         }
         fill(target, group);
     }
@@ -138,8 +138,9 @@ pub fn format_schema() -> String {
     text
 }
 
-/// Schema of the member group `key`, made when it is not there yet.
-fn descend<'a>(group: &'a mut Value, key: &str) -> &'a mut Value {
+/// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those that are not
+/// required.
+fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));
     require(schema, "groups");
@@ -148,7 +149,9 @@ fn descend<'a>(group: &'a mut Value, key: &str) -> &'a mut Value {
     if key == "additionalProperties" {
         return groups.entry(key).or_insert_with(|| json!({}));
     }
-    require(groups, key);
+    if required {
+        require(groups, key);
+    }
     member(groups, "properties").entry(key).or_insert_with(|| json!({}))
 }
 

@@ -39,12 +39,15 @@ impl Stored {
     }
 }
 
+/// What [`open_group`] finds where no group is.
+pub(super) const NOTHING: &str = "nothing";
+
 /// Opens a group by its absolute path through hard links only: a file must not lead out of itself.
 pub(super) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> {
     let mut group = file.as_group().map_err(|e| e.to_string())?;
     for name in path.split('/').filter(|name| !name.is_empty()) {
         if !has(&group, name)? {
-            return Err("nothing".to_owned());
+            return Err(NOTHING.to_owned());
         }
         group = group.group(name).map_err(|_| "another object".to_owned())?;
     }

@@ -66,6 +66,7 @@ pub(super) enum Per {
     Body,
     LumpingScheme,
     Interface,
+    UnitLoad,
 }
 
 /// A dataset or attribute.
@@ -108,6 +109,12 @@ impl Item {
         self.optional()
     }
 
+    /// Required in a group that a minor version brought.
+    pub const fn within(mut self, minor: i64) -> Self {
+        self.since = minor;
+        self
+    }
+
     /// The entry's value for a body.
     pub fn value(&self, view: &View<'_>) -> Option<Value> {
         match self.origin {
@@ -146,23 +153,32 @@ impl Group {
         self.items.iter().flat_map(|part| part.iter())
     }
 
+    /// The minor version that brought the group with all its entries.
+    pub fn since(&self) -> i64 {
+        self.entries().map(|item| item.since).min().unwrap_or(0)
+    }
+
     /// Path without the last name.
     pub fn parent(&self) -> &'static str {
         self.path.rfind('/').map_or(self.path, |i| &self.path[..i])
     }
 
     /// The groups of a body that this one stands for, with their names where these are data.
-    pub fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<&'a str>, View<'a>)> {
-        let view = View { body, lumped: None, interface: None };
+    pub fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<String>, View<'a>)> {
+        let view = View { body, lumped: None, interface: None, geometric_stiffness: None };
         match self.per {
             Per::Body => vec![(None, view)],
             Per::LumpingScheme => {
-                let one = |l: &'a LumpedBody| (Some(l.scheme.as_str()), View { lumped: Some(l), ..view });
+                let one = |l: &'a LumpedBody| (Some(l.scheme.clone()), View { lumped: Some(l), ..view });
                 body.lumped.iter().map(one).collect()
             }
             Per::Interface => {
-                let one = |i: &'a Interface| (Some(i.name.as_str()), View { interface: Some(i), ..view });
+                let one = |i: &'a Interface| (Some(i.name.clone()), View { interface: Some(i), ..view });
                 body.interfaces.iter().map(one).collect()
+            }
+            Per::UnitLoad => {
+                let view = |g| View { geometric_stiffness: Some(g), ..view };
+                body.geometric_stiffness.iter().map(|g| (Some(g.load.label()), view(g))).collect()
             }
         }
     }

@@ -64,7 +64,7 @@ impl Scan {
         for group in TABLE {
             match group.per {
                 Per::Body => scan.group(file, group, None),
-                Per::LumpingScheme | Per::Interface => {
+                Per::LumpingScheme | Per::Interface | Per::UnitLoad => {
                     scan.list(file, group);
                     for (_, link) in scan.instances(group.parent()) {
                         // Links cost nothing: a file may hold millions of them.
@@ -110,6 +110,8 @@ impl Scan {
         let parent = group.parent();
         let links = match hdf5_value::open_group(file, parent).and_then(|g| hdf5_value::members(&g)) {
             Ok(links) => links,
+            // A file of an older minor version.
+            Err(found) if group.since() > 0 && found == hdf5_value::NOTHING => Vec::new(),
             Err(found) => return self.add(format!("{parent}: expected a group, found {found}")),
         };
         let first = TABLE.iter().find(|g| g.per == group.per).map_or(parent, |g| g.parent());

@@ -1,6 +1,6 @@
 //! What an entry of the table holds, and where the writer takes it from.
 
-use crate::flex_body::{Interface, LumpedBody, Parts};
+use crate::flex_body::{GeometricStiffness, Interface, LumpedBody, Parts};
 use crate::invariants::Invariants;
 use crate::units::{Unit, UnitSystem};
 use faer::{Mat, MatRef};
@@ -23,6 +23,7 @@ pub(super) struct View<'a> {
     pub body: &'a Parts,
     pub lumped: Option<&'a LumpedBody>,
     pub interface: Option<&'a Interface>,
+    pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
 }
 
 impl<'a> View<'a> {

@@ -83,7 +83,7 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             make(&file, group.parent())?;
         }
         for (name, view) in group.instances(body.parts()) {
-            let path = place(group, name.map(names::encode).as_deref());
+            let path = place(group, name.as_deref().map(names::encode).as_deref());
             let target = if path == "/" { file.as_group()? } else { make(&file, &path)? };
             for item in group.entries() {
                 if let Some(value) = item.value(&view) {

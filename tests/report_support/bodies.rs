@@ -102,6 +102,7 @@ pub fn engine_mount() -> FlexBody {
             shape: Mat::from_fn(24, nf, |i, j| if i == j { 1.0 } else { 0.0 }),
         },
         invariants: invariants(1.25, 1.0),
+        geometric_stiffness: vec![],
         lumped: vec![lumped("row-sum", 312, 1.0), lumped("diagonal-scaling", 0, 0.125)],
         certificate: Certificate {
             proved_modes: Some(8),
@@ -240,6 +241,7 @@ pub fn condensed(
             shape,
         },
         invariants,
+        geometric_stiffness: vec![],
         lumped: vec![],
         certificate: Certificate {
             proved_modes: None,

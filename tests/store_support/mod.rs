@@ -3,8 +3,8 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FlexBody, Frame, Guarantee, Interface, InternalRows, LumpedBody, MassStructure, Modes,
-    Parts, Source, Truncation,
+    Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InternalRows, LoadKind,
+    LumpedBody, MassStructure, Modes, Parts, Source, Truncation, UnitLoad,
 };
 use flexbody::invariants::{DIGITS, GeneralTerms, Invariants};
 use flexbody::model::{BodyNumber, Nodes};
@@ -107,6 +107,23 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
     }
 }
 
+/// One of every kind, as many as there are interfaces.
+fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let kinds = [
+        LoadKind::Force(r.name()),
+        LoadKind::Spin,
+        LoadKind::Named(r.name()),
+        LoadKind::Acceleration,
+        LoadKind::Moment(r.name()),
+        LoadKind::AngularAcceleration,
+    ];
+    let load = |kind: LoadKind, r: &mut Random| {
+        let component = r.below(kind.components().len());
+        GeometricStiffness { load: UnitLoad { kind, component }, matrix: r.matrix(nf, nf) }
+    };
+    kinds.into_iter().take(count).map(|kind| load(kind, r)).collect()
+}
+
 /// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
@@ -169,6 +186,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             shape: r.matrix(3 * n, nf),
         },
         invariants: Invariants { general, ..r.invariants(nf) },
+        geometric_stiffness: geometric_stiffness(&mut r, nf, interfaces),
         lumped,
         certificate: Certificate {
             proved_modes: (r.below(2) == 0).then(|| r.below(100)),
@@ -220,6 +238,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         matrix(&mut bits, &i.modal_stiffness);
     }
     matrix(&mut bits, &p.modes.shape);
+    p.geometric_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
     let m = &p.modes;
     let c = &p.certificate;
     bits.extend(m.eigenvalue.iter().chain(&m.residual).chain(&m.damping_ratio).map(|v| v.to_bits()));
@@ -233,11 +252,12 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     }
     bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
     let texts = format!(
-        "{:?} {:?} {:?} {:?} {:?} {:?}",
+        "{:?} {:?} {:?} {:?} {:?} {:?} {:?}",
         p.source,
         p.units,
         p.nodes.ids,
         p.interfaces,
+        p.geometric_stiffness.iter().map(|g| &g.load).collect::<Vec<_>>(),
         (c.proved_modes, c.negative_pivots, c.rigid_modes, &c.remark),
         p.lumped.iter().map(|l| (&l.scheme, l.negative_masses, &l.comparison)).collect::<Vec<_>>(),
     );
