@@ -62,7 +62,7 @@ fn main() {
         FeModel::from_raw(raw.take().expect("checked once")).unwrap_or_else(|e| panic!("{e}"))
     });
     let model = checked.model;
-    let pencil = Pencil::new(model.stiffness(), model.scalar_mass(), 3);
+    let pencil = model.pencil();
     for columns in [8, 20] {
         let x = Mat::from_fn(pencil.n(), columns, |i, j| ((i + 7 * j) as f64).sin());
         let passes = f64::from(columns as u32) / 8.0;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Converts every model of fixtures/models and writes docs/accuracy.md: differences from the reference numbers beside the models.
+"""Converts the CalculiX models of fixtures/models and writes docs/accuracy.md: differences from the reference numbers beside the models.
 
     pip install numpy h5py
     cargo build --release --locked
@@ -183,7 +183,7 @@ def main():
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "accuracy.md")
     args = parser.parse_args()
-    folders = sorted(f.parent for f in (ROOT / "fixtures" / "models").glob("*/expected.json"))
+    folders = sorted(f.parent for f in (ROOT / "fixtures" / "models").glob("*/matrices.inp.gz"))
     version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
     with tempfile.TemporaryDirectory() as scratch:
         models = [evaluate(args.program, folder, Path(scratch)) for folder in folders]

@@ -4,7 +4,7 @@ use crate::basis::{
     self, BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
 };
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, canonical_basis};
+use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
@@ -12,7 +12,7 @@ use crate::flex_body::{
 };
 use crate::invariants::{
     BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
-    choose_plane_frame, condense, condense_certified, condense_lumped, error_norms,
+    choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, error_norms,
 };
 use crate::linalg::{SymmetricMatrix, gram, multiply};
 use crate::model::{Coupling, Damping, FeModel, Nodes, Reference, rigid_count};
@@ -20,7 +20,14 @@ use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
 
+mod body_modes;
 mod damping;
+mod geometric_stiffness;
+
+pub(crate) use damping::modal_damping;
+pub(crate) use geometric_stiffness::modal_geometric_stiffness;
+
+pub(crate) use body_modes::{BodyModes, Place};
 
 /// A lumped comparator that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,23 +119,33 @@ pub fn convert_resumed(
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<Conversion> {
+    // Rows that are no displacements have no place in the double-double condensation.
+    let plain = model.scalar_mass().is_some() && model.rows().len() == model.rows().displacements();
+    if settings.modes.accuracy == Accuracy::Certified && !plain {
+        let message = "accuracy certified covers displacements whose mass commutes with rotations";
+        return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+    }
     let schemes =
         settings.lumped.iter().map(|lumping| lumped_masses(model, lumping)).collect::<Result<Vec<_>>>()?;
     let task = Task { model, settings: &settings.modes, resume, watch };
     let found = settings.basis.basis().modes(&task)?;
     watch(Event::Phase("invariants"));
     let positions = &model.nodes().positions;
-    let (frame, mass_properties) = match model.dimension() {
-        2 => choose_plane_frame(model.scalar_mass(), positions, settings.frame)?,
-        _ => choose_frame(model.scalar_mass(), positions, settings.frame)?,
+    let (frame, mass_properties) = match (model.scalar_mass(), model.dimension()) {
+        (Some(mass), 2) => choose_plane_frame(mass, positions, settings.frame)?,
+        (Some(mass), _) => choose_frame(mass, positions, settings.frame)?,
+        (None, _) => {
+            choose_general_frame(|about| body_modes::rigid_mass(model, about), positions, settings.frame)?
+        }
     };
-    let place = Place { frame, positions: frame.to_body(positions) };
-    let BodyModes { shapes, modal_stiffness, signs } = place.modes(model, &found.solution.vectors);
-    let (mass, positions) = (model.scalar_mass(), &place.positions);
-    let (invariants, guarantee) = match &found.solution.bounds {
-        None => (condense(mass, positions, shapes.as_ref(), modal_stiffness), None),
-        Some(bounds) => {
-            let own = condense_certified(mass, positions, shapes.as_ref(), model.stiffness(), &frame.axes);
+    let place = Place::new(model, frame);
+    let modes = BodyModes::new(model, &place, &found.solution.vectors);
+    let modal_stiffness = || reduced(model.stiffness(), modes.vectors.as_ref());
+    let (invariants, guarantee) = match (&found.solution.bounds, model.scalar_mass()) {
+        (None, _) | (_, None) => (modes.condensed(model, &place, modal_stiffness()), None),
+        (Some(bounds), Some(mass)) => {
+            let shapes = modes.displacements.as_ref();
+            let own = condense_certified(mass, &place.positions, shapes, model.stiffness(), &frame.axes);
             let guarantee = Guarantee {
                 shift_below: bounds.shift_below,
                 pivots_below: bounds.pivots_below,
@@ -140,16 +157,21 @@ pub fn convert_resumed(
             (own.invariants, Some(guarantee))
         }
     };
-    let vectors = found.solution.vectors.as_ref();
-    let damping = damping::modal_damping(model, vectors, &signs, &found.solution.eigenvalues, &invariants)?;
+    let eigenvalues = &found.solution.eigenvalues;
+    let damping = modal_damping(model, modes.vectors.as_ref(), eigenvalues, &invariants)?;
+    let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
     let mut diagnostics = found.diagnostics.clone();
     diagnostics.extend(damping.as_ref().and_then(|damping| damping.warning.clone()));
+    diagnostics.extend(geometric_stiffness::softening_warning(model, &settings.basis, &invariants));
     watch(Event::Phase("lumped comparison"));
     let lumped: Vec<LumpedBody> = schemes
         .iter()
         .map(|masses| {
             let modal_stiffness = invariants.modal_stiffness.clone();
-            let other = condense_lumped(masses, &place.positions, shapes.as_ref(), modal_stiffness);
+            let mut other = condense_lumped(masses, &place.positions, modes.of_nodes(), modal_stiffness);
+            if only_about_z(model) {
+                other = other.about_z();
+            }
             LumpedBody {
                 scheme: masses.scheme().name().to_owned(),
                 comparison: error_norms(&invariants, &other),
@@ -159,7 +181,7 @@ pub fn convert_resumed(
         })
         .collect();
     let lumped_modes = if settings.lumped_modes {
-        let exact = Exact { model, place: &place, shapes: shapes.as_ref(), invariants: &invariants };
+        let exact = Exact { model, place: &place, modes: &modes, invariants: &invariants };
         schemes
             .iter()
             .map(|masses| lumped_pipeline(&exact, masses, settings, watch))
@@ -171,10 +193,13 @@ pub fn convert_resumed(
     let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
     let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
     let interfaces = interfaces(model, &frame, coupled);
-    let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, shapes.as_ref(), model.dimension()));
+    let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, modes.of_nodes(), model.dimension()));
     diagnostics.extend(fits);
     let solution = found.solution;
     let coordinates = found.coordinates.map(|own| {
+        let same = |j: usize| modes.vectors.col(j) == solution.vectors.col(j);
+        let signs: Vec<f64> =
+            (0..solution.eigenvalues.len()).map(|j| if same(j) { 1.0 } else { -1.0 }).collect();
         let turned = own.in_axes(&frame.axes, model.dimension(), &signs);
         let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
         InterfaceCoordinates { names, stiffness, mass, of_modes }
@@ -189,10 +214,10 @@ pub fn convert_resumed(
             files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
             number: model.number(),
             n_dofs: model.stiffness().n(),
-            mass_structure: if model.has_diagonal_mass() {
-                MassStructure::Diagonal
-            } else {
-                MassStructure::RotationInvariant
+            mass_structure: match model.scalar_mass() {
+                None => MassStructure::General,
+                Some(_) if model.has_diagonal_mass() => MassStructure::Diagonal,
+                Some(_) => MassStructure::RotationInvariant,
             },
             settings: describe(settings, model),
         },
@@ -213,9 +238,12 @@ pub fn convert_resumed(
                 .into_iter()
                 .map(|Lacking { load, before, after }| Truncation { load, before, after })
                 .collect(),
-            shape: shapes,
+            shape: modes.of_nodes().to_owned(),
+            rotation: modes.rotations,
+            internal: modes.internal,
         },
         invariants,
+        geometric_stiffness,
         lumped,
         certificate,
     })?;
@@ -229,60 +257,23 @@ pub fn convert_resumed(
     })
 }
 
-/// The body frame and the node positions in it.
-struct Place {
-    frame: Frame,
-    positions: Vec<[f64; 3]>,
-}
-
-impl Place {
-    /// Modes in body axes (3n x nf) with canonical signs there, and Psi' K Psi.
-    fn modes(&self, model: &FeModel, vectors: &Mat<f64>) -> BodyModes {
-        let mut shapes = in_space(vectors, model.dimension());
-        self.frame.rotate_shapes(&mut shapes);
-        let unsigned = shapes.clone();
-        canonical_basis(shapes.as_mut(), &[]);
-        let signs: Vec<f64> = (0..shapes.ncols())
-            .map(|j| if (0..shapes.nrows()).all(|i| shapes[(i, j)] == unsigned[(i, j)]) { 1.0 } else { -1.0 })
-            .collect();
-        let modal_stiffness = reduced(model.stiffness(), vectors.as_ref(), &signs);
-        BodyModes { shapes, modal_stiffness, signs }
-    }
-}
-
-/// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
-fn in_space(shapes: &Mat<f64>, dimension: usize) -> Mat<f64> {
-    if dimension == 3 {
-        return shapes.clone();
-    }
-    Mat::from_fn(shapes.nrows() / 2 * 3, shapes.ncols(), |row, j| match row % 3 {
-        2 => 0.0,
-        k => shapes[(row / 3 * 2 + k, j)],
-    })
-}
-
-/// The modes of a body.
-struct BodyModes {
-    /// In body axes.
-    shapes: Mat<f64>,
-    modal_stiffness: Mat<f64>,
-    /// What each mode was multiplied by.
-    signs: Vec<f64>,
-}
-
-/// Psi' A Psi, where a matrix A and `vectors` are in model axes, as they come from the search: there it is reduced, and
-/// the signs of the modes are carried over.
-fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>, signs: &[f64]) -> Mat<f64> {
+/// Psi' A Psi, where the matrix A and the modes are in model axes.
+fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
     multiply(a, 1, vectors, product.as_mut());
     let k = gram(vectors, product.as_ref());
-    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]) * signs[i] * signs[j])
+    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+}
+
+/// Whether nothing but the rotation about z is known of a body: lumped masses are compared in this alone then.
+fn only_about_z(model: &FeModel) -> bool {
+    model.dimension() == 2 && model.scalar_mass().is_none()
 }
 
 fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
     match lumping {
-        Lumping::RowSum => Ok(LumpedMasses::row_sum(model.scalar_mass())),
-        Lumping::DiagonalScaling => LumpedMasses::diagonal_scaling(model.scalar_mass()),
+        Lumping::RowSum => Ok(LumpedMasses::row_sum(&model.nodal_mass())),
+        Lumping::DiagonalScaling => LumpedMasses::diagonal_scaling(&model.nodal_mass()),
         Lumping::User(table) => {
             let ids = &model.nodes().ids;
             let by_node: HashMap<i64, f64> = table.iter().copied().collect();
@@ -306,7 +297,7 @@ fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
 struct Exact<'a> {
     model: &'a FeModel,
     place: &'a Place,
-    shapes: MatRef<'a, f64>,
+    modes: &'a BodyModes,
     invariants: &'a Invariants,
 }
 
@@ -328,32 +319,34 @@ fn lumped_pipeline(
     if masses.negative() > 0 {
         return Ok(none(format!("{} nodal masses are negative: no real modes", masses.negative())));
     }
-    let diagonal: Vec<(u32, u32, f64)> =
-        masses.masses().iter().enumerate().map(|(i, &m)| (i as u32, i as u32, m)).collect();
-    let n = diagonal.len();
-    let matrix = crate::linalg::CscMatrix::from_triplets(n, n, &diagonal);
-    let lumped = SymmetricMatrix::new(matrix).expect("a diagonal matrix is symmetric");
-    let nf = exact.shapes.ncols();
+    let nf = exact.modes.vectors.ncols();
     // A comparison needs no guarantees.
     let accuracy = match settings.modes.accuracy {
         Accuracy::Certified => Accuracy::Standard,
         other => other,
     };
     let modes = ModeSettings { wanted: Wanted::Lowest(nf), accuracy, ..settings.modes };
-    let found = match free_surface_of(exact.model, &lumped, &modes, watch) {
+    let found = match free_surface_of(exact.model, masses.masses(), &modes, watch) {
         Ok(found) => found.solution,
         Err(error) => return Ok(none(error.diagnostics()[0].message().to_owned())),
     };
     if found.eigenvalues.len() < nf {
         return Ok(none(format!("the lumped mass has {} modes only", found.eigenvalues.len())));
     }
-    let BodyModes { shapes, modal_stiffness, .. } = exact.place.modes(exact.model, &found.vectors);
-    // In the plane as in space: M = Ms kron I3 for shapes with three components.
-    let mut m_shapes = Mat::zeros(shapes.nrows(), nf);
-    multiply(exact.model.scalar_mass(), 3, shapes.as_ref(), m_shapes.as_mut());
-    let cross = gram(exact.shapes, m_shapes.as_ref());
+    let modes = BodyModes::new(exact.model, exact.place, &found.vectors);
+    let cross =
+        gram(exact.modes.vectors.as_ref(), exact.model.pencil().apply_mass(modes.vectors.as_ref()).as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..nf)));
-    let own = condense_lumped(masses, &exact.place.positions, shapes.as_ref(), modal_stiffness);
+    let shapes = modes.of_nodes();
+    let mut own = condense_lumped(
+        masses,
+        &exact.place.positions,
+        shapes,
+        reduced(exact.model.stiffness(), modes.vectors.as_ref()),
+    );
+    if only_about_z(exact.model) {
+        own = own.about_z();
+    }
     Ok(LumpedPipeline {
         scheme,
         eigenvalues: found.eigenvalues,

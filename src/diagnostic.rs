@@ -108,13 +108,12 @@ codes! {
     DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "one row of dofs.csv per matrix row; without dofs.csv three per node";
     DofDuplicate = "FB403", Error, BadInput, "the same direction of the same node is given twice", "every (node, direction) pair labels one matrix row";
     DofIncomplete = "FB404", Error, BadInput, "nodes lack displacement directions, so that the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
-    RotationsUnsupported = "FB405", Error, BadInput, "model has nodal rotations", "this version handles nodes with three displacements only";
     NodesUnused = "FB406", Note, Done, "nodes without any degree of freedom are left out", "nothing to do if they are reference or deleted nodes";
     MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
-    MassDirectional = "FB408", Error, BadInput, "mass differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
-    MassBlockStructure = "FB409", Error, BadInput, "3x3 node blocks of the mass matrix are not multiples of the identity", "this version handles displacement-based solid elements without eliminated constraints";
+    MassDirectional = "FB408", Error, BadInput, "mass is not that of a rigid body: it differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
+    MassBlockStructure = "FB409", Note, Done, "mass matrix does not commute with rotations", "nothing to do for beams, shells and eliminated constraints; the report says what stays approximate";
     RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "the body is constrained or grounded, rotations are labelled as displacements, or coordinates are in other units or another order than the matrix";
-    PencilSingular = "FB411", Error, BadInput, "rows empty in both K and M: the eigenproblem is singular", "remove these degrees of freedom from the matrices";
+    PencilSingular = "FB411", Error, BadInput, "rows that neither K nor M holds: the eigenproblem is singular", "remove these degrees of freedom from the matrices, or hold them";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
     InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit the stated units", "check the units of the manifest";
     BodiesSeveral = "FB414", Error, Untrustworthy, "matrices hold several bodies", "convert each by itself with --split, or connect them";
@@ -123,7 +122,9 @@ codes! {
     ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more degrees of freedom than rigid motions: six in space, three in the plane";
     DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
     DampingRigid = "FB420", Warning, Done, "damping matrix resists rigid motion", "damping to ground, or proportional to mass, acts on the motion of the whole body: model it in the multibody system";
-    BodiesCoupled = "FB421", Error, BadInput, "damping couples bodies that K and M leave separate", "leave the entries between bodies out";
+    BodiesCoupled = "FB421", Error, BadInput, "damping or geometric stiffness couples bodies that K and M leave separate", "leave the entries between bodies out";
+    RowsUnheld = "FB422", Error, BadInput, "stiffness leaves rows without coordinates free", "add the nodes to the node table, or remove these degrees of freedom";
+    RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
     InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
@@ -148,6 +149,8 @@ codes! {
     ShapesRigid = "FB522", Note, Done, "rigid motions among the shapes are removed", "nothing to do: rigid motion is the body frame's";
     ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
     LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
+    GeometricStiffnessNone = "FB530", Warning, Done, "centrifugal loads without geometric stiffness: the body softens where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to rates far below the one that is named";
+    GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act along the others";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -1,13 +1,14 @@
 //! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
 
+use crate::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::rounding_residual;
+use crate::eigen::{relative_residual, residual_scale, rounding_residual};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
-use crate::invariants::{IdentityCheck, condense, condense_certified, primary_differences};
-use crate::linalg::gram;
-use crate::model::FeModel;
-use faer::{Mat, Scale};
+use crate::invariants::{IdentityCheck, Invariants, condense_certified, primary_differences};
+use crate::linalg::{SymmetricMatrix, gram};
+use crate::model::{Damping, FeModel, GeometricStiffness, UnitLoad};
+use faer::Mat;
 
 /// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
 const RECOMPUTED: f64 = 1e-12;
@@ -44,20 +45,24 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         passed: value <= limit,
     };
     let frame = body.frame();
-    let positions = frame.to_body(&model.nodes().positions);
+    let place = Place::new(model, *frame);
+    let Some(modes) = BodyModes::of_body(model, body) else {
+        let message = "the rows of the body's modes are not those of the model";
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    };
+    let positions = &place.positions;
     let size = positions.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
     let moved = positions
         .iter()
         .flatten()
         .zip(body.nodes().positions.iter().flatten())
         .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-    let shapes = &body.modes().shape;
-    let in_model = in_model_axes(shapes, &frame.axes, model.dimension());
+    let in_model = &modes.vectors;
     let pencil = model.pencil();
     let kx = pencil.apply_stiffness(in_model.as_ref());
     let mx = pencil.apply_mass(in_model.as_ref());
     let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());
-    let own = condense(model.scalar_mass(), &positions, shapes.as_ref(), modal_stiffness);
+    let own = modes.condensed(model, &place, modal_stiffness);
     let differences = primary_differences(body.invariants(), &own);
     let worst_of = |kept: &dyn Fn(&str) -> bool| {
         let kept = differences.iter().filter(|(name, _)| kept(name));
@@ -67,9 +72,8 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     let rounding = rounding_residual(model.stiffness(), in_model.as_ref());
     let (mut residual, mut stored, mut long, mut loose) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
     for (j, &lambda) in body.modes().eigenvalue.iter().enumerate() {
-        let r = kx.col(j) - mx.col(j) * Scale(lambda);
-        let size = kx.col(j).norm_l2() + lambda.abs() * mx.col(j).norm_l2();
-        residual = residual.max(r.norm_l2() / size);
+        let size = residual_scale(kx.col(j), mx.col(j), lambda);
+        residual = residual.max(relative_residual(kx.col(j), mx.col(j), lambda));
         stored = stored.max(body.modes().residual[j]).max(ROUNDING * rounding[j] / size);
         // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
         long = long.max(in_model.col(j).norm_l2() / lambda.sqrt());
@@ -99,10 +103,25 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         ),
         check("orthonormal_recomputed", "Psi' M Psi = I", orthonormality.norm_max(), 1e-9),
     ];
-    if let Some(guarantee) = &body.certificate().guarantee {
-        let stored = &body.nodes().positions;
-        let own =
-            condense_certified(model.scalar_mass(), stored, shapes.as_ref(), model.stiffness(), &frame.axes);
+    checks.extend(damping_check(body, model, in_model, &own)?.map(|found| {
+        check(
+            "damping_recomputed",
+            "D_ff = Psi' D Psi, zeta = D_jj / (2 omega_j)",
+            found.largest,
+            found.allowed,
+        )
+    }));
+    checks.extend(geometric_check(body, model, in_model)?.map(|found| {
+        check(
+            "geometric_stiffness_recomputed",
+            "Psi' K_geo Psi for every unit load",
+            found.largest,
+            found.allowed,
+        )
+    }));
+    if let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, model.scalar_mass()) {
+        let (stored, shapes) = (&body.nodes().positions, modes.displacements.as_ref());
+        let own = condense_certified(mass, stored, shapes, model.stiffness(), &frame.axes);
         let excess =
             primary_differences(body.invariants(), &own.invariants).iter().zip(&guarantee.digits).fold(
                 0.0f64,
@@ -128,13 +147,96 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     Ok(checks)
 }
 
+/// How far stored and recomputed matrices are from each other, relative to the largest entry, and what rounding allows.
+#[derive(Clone, Copy)]
+struct Difference {
+    largest: f64,
+    allowed: f64,
+}
+
+impl Difference {
+    /// Of entries up to `size`, recomputed with a rounding of `rounding`.
+    fn new(largest: f64, size: f64, rounding: f64) -> Self {
+        let relative = |value: f64| if value > 0.0 { value / size } else { 0.0 };
+        // Twice the size is what two matrices of nothing but rounding differ by at the most.
+        Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
+    }
+
+    /// The one that comes closer to what is allowed, or goes further beyond it.
+    fn worse(self, other: Self) -> Self {
+        if other.largest * self.allowed > self.largest * other.allowed { other } else { self }
+    }
+}
+
+/// What rounding leaves in |psi_p' A psi_q|, at the most.
+fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>) -> f64 {
+    let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
+    ROUNDING * longest * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)
+}
+
+/// Stored damping against that of the model; `None` when neither has any.
+fn damping_check(
+    body: &FlexBody,
+    model: &FeModel,
+    shapes: &Mat<f64>,
+    own: &Invariants,
+) -> Result<Option<Difference>> {
+    let modes = body.modes();
+    let nf = modes.eigenvalue.len();
+    let found = modal_damping(model, shapes.as_ref(), &modes.eigenvalue, own)?;
+    if found.is_none()
+        && modes.modal_damping.is_none()
+        && modes.damping_ratio.iter().all(|ratio| *ratio == 0.0)
+    {
+        return Ok(None);
+    }
+    let none = || Mat::zeros(nf, nf);
+    let (matrix, ratio) =
+        found.map_or_else(|| (none(), vec![0.0; nf]), |damping| (damping.matrix, damping.ratio));
+    let stored = modes.modal_damping.clone().unwrap_or_else(none);
+    let of_ratio =
+        |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
+    let largest =
+        modes.eigenvalue.iter().enumerate().map(of_ratio).fold((&stored - &matrix).norm_max(), f64::max);
+    let rounding = match model.damping() {
+        Some(Damping::Matrix(d)) => rounding_of(d, shapes),
+        Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes),
+        _ => 0.0,
+    };
+    Ok(Some(Difference::new(largest, matrix.norm_max().max(stored.norm_max()), rounding)))
+}
+
+/// Stored geometric stiffness against that of the model; `None` when neither has any.
+fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
+    let nf = shapes.ncols();
+    let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes)?;
+    let stored = body.geometric_stiffness();
+    let of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
+        let one = list.iter().find(|one| one.load == *load);
+        one.map_or_else(|| Mat::zeros(nf, nf), |one| one.matrix.clone())
+    };
+    let loads = stored.iter().chain(&found).map(|one| &one.load);
+    let difference = |load: &UnitLoad| {
+        let (stored, own) = (of(stored, load), of(&found, load));
+        // Every component of the kind may contribute.
+        let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
+        let rounding = given.map(|one| rounding_of(&one.matrix, shapes)).sum();
+        let size = stored.norm_max().max(own.norm_max());
+        Difference::new((&stored - &own).norm_max(), size, rounding)
+    };
+    Ok(loads.map(difference).reduce(Difference::worse))
+}
+
 /// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.
 pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
-    body.source()
-        .files
+    let files = &body.source().files;
+    files
         .iter()
-        .filter_map(|file| {
-            let now = model.sources().iter().find(|other| other.role == file.role)?;
+        .enumerate()
+        .filter_map(|(i, file)| {
+            // Several files may have one role: they are compared in their order.
+            let before = files[..i].iter().filter(|other| other.role == file.role).count();
+            let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
             (now.sha256 != file.sha256).then(|| {
                 let message =
                     format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);
@@ -142,12 +244,4 @@ pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
             })
         })
         .collect()
-}
-
-/// Shapes (3n x nf) from body axes to the rows of the model.
-fn in_model_axes(shapes: &Mat<f64>, axes: &nalgebra::Matrix3<f64>, dimension: usize) -> Mat<f64> {
-    Mat::from_fn(shapes.nrows() / 3 * dimension, shapes.ncols(), |row, j| {
-        let (node, k) = (row / dimension, row % dimension);
-        (0..3).map(|l| axes[(k, l)] * shapes[(3 * node + l, j)]).sum()
-    })
 }

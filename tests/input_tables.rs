@@ -174,6 +174,24 @@ const MANIFESTS: &[(&str, bool)] = &[
         "interface=[{name='a',nodes=[1]},{name='b',nodes_file='f'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
         true,
     ),
+    (
+        "geometric_stiffness=[{file='g',spin='xz'},{file='g',load='bolts'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        true,
+    ),
+    (
+        "geometric_stiffness=[{file='g.h5:/Kg',force='x',interface='a'},{file='g',angular_acceleration='z'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        true,
+    ),
+    (
+        "basis={residual_vectors=['centrifugal','interfaces'],loads='f.npy'}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        true,
+    ),
+    ("basis={}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", true),
+    (
+        "damping={bands=[{to_hz=10,ratio=0.1},{ratio=0.2}]}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        true,
+    ),
+    ("damping={rayleigh={alpha=0,beta=1e-6}}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", true),
     ("", false),
     ("[files]\nstiffness='K'\nmass='M'\n", false),
     ("[files]\nstiffness=''\nmass='M'\nnodes='n'\n", false),
@@ -191,6 +209,38 @@ const MANIFESTS: &[(&str, bool)] = &[
     ("interface=[{name='a',nodes=[1,1]}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
     ("interface=[{name='a',nodes=[1.5]}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
     ("interface={name='a',nodes=[1]}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("geometric_stiffness=[{file='g'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("geometric_stiffness=[{spin='xx'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("geometric_stiffness=[{file='g',spin='x'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    (
+        "geometric_stiffness=[{file='g',acceleration='xx'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    (
+        "geometric_stiffness=[{file='g',spin='xx',load='a'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    ("geometric_stiffness=[{file='g',force='x'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    (
+        "geometric_stiffness=[{file='g',spin='xx',interface='a'}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    ("geometric_stiffness=[{file='g',load=''}]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("geometric_stiffness={file='g',spin='xx'}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("geometric_stiffness=[1]\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("basis={residual_vectors='centrifugal'}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("basis={residual_vectors=['gravity']}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    (
+        "basis={residual_vectors=['interfaces','interfaces']}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n",
+        false,
+    ),
+    ("basis={residual_vectors=[1]}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("basis={loads=''}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("basis={modes=3}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("basis=1\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("damping={ratio=1}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("damping={}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("damping={ratio=0.1,matrix='D'}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
 ];
 
 #[test]

@@ -12,7 +12,7 @@ use flexbody::flex_body::FlexBody;
 use flexbody::input::{ModelFiles, read_model};
 use flexbody::invariants::{BodyFrame, Expected, identities};
 use flexbody::linalg::CscMatrix;
-use flexbody::model::{FeModel, RawModel, check};
+use flexbody::model::{FeModel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad, check};
 use flexbody::progress::SILENT;
 use flexbody::verification::verify;
 use nalgebra::{Matrix2, Vector2};
@@ -90,7 +90,7 @@ fn kinetic_energy_equals_that_of_the_nodes() {
                 .collect();
             let mut nodal = 0.0;
             for i in 0..x.len() {
-                let (columns, values) = model.scalar_mass().row(i);
+                let (columns, values) = model.scalar_mass().expect("a solid").row(i);
                 for (&j, m) in columns.iter().zip(values) {
                     let other = velocity[j as usize];
                     nodal += 0.5 * m * (velocity[i][0] * other[0] + velocity[i][1] * other[1]);
@@ -187,6 +187,47 @@ fn what_leaves_the_plane_is_refused() {
     assert!(check(raw).expect_err("two rows per node").has(Code::DofCount));
 }
 
+#[test]
+fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
+    let raw = rectangle(4, 2, 0.7, [1.0, 2.0]);
+    let n = 2 * raw.nodes.len() as u32;
+    let string = [(1, 1, 2.0), (1, n - 1, -2.0), (n - 1, 1, -2.0), (n - 1, n - 1, 2.0)];
+    let matrix = CscMatrix::from_triplets(n as usize, n as usize, &string);
+    let given = |kind, component| GeometricStiffness {
+        load: UnitLoad { kind, component },
+        matrix: RawMatrix { matrix: matrix.clone(), ..raw.stiffness.clone() },
+    };
+    let with = |geometric_stiffness| RawModel { geometric_stiffness, ..raw.clone() };
+    let sound = model(with(vec![given(LoadKind::Spin, 2), given(LoadKind::Acceleration, 0)]));
+    let body = converted(&sound, 6, BodyFrame::Principal).body;
+    let (axes, shape) = (body.frame().axes, &body.modes().shape);
+    let last = 3 * (raw.nodes.len() - 1);
+    let stroke =
+        |j: usize| -> f64 { (0..3).map(|l| axes[(1, l)] * (shape[(l, j)] - shape[(last + l, j)])).sum() };
+    // Acceleration along the model's x is axes' x of it along the body's.
+    let expected = [("spin_zz", 1.0), ("acceleration_x", axes[(0, 0)]), ("acceleration_y", axes[(0, 1)])];
+    assert_eq!(body.geometric_stiffness().len(), expected.len());
+    let largest = (0..6).fold(0.0f64, |m, j| m.max(stroke(j).powi(2)));
+    for (one, (label, part)) in body.geometric_stiffness().iter().zip(expected) {
+        assert_eq!(one.load.label(), label);
+        for p in 0..6 {
+            for q in 0..6 {
+                let product = 2.0 * part * stroke(p) * stroke(q);
+                assert!((one.matrix[(p, q)] - product).abs() <= 1e-13 * largest, "{label} {p} {q}");
+            }
+        }
+    }
+    for check in verify(&body, &sound).expect("the same nodes") {
+        assert!(check.passed, "{}: {:e} > {:e}", check.name, check.value, check.limit);
+    }
+    for (kind, component) in
+        [(LoadKind::Spin, 0), (LoadKind::Acceleration, 2), (LoadKind::AngularAcceleration, 1)]
+    {
+        let error = check(with(vec![given(kind, component)])).expect_err("out of the plane");
+        assert!(error.to_string().contains("a body of dimension 2 has"), "{error}");
+    }
+}
+
 /// A plate with two holes that scikit-fem meshed and assembled, where it lies beside the project.
 #[test]
 fn plane_stress_plate_agrees_with_its_reference() {
@@ -215,6 +256,15 @@ fn plane_stress_plate_agrees_with_its_reference() {
     for (found, expected) in body.modes().eigenvalue.iter().zip(lambda) {
         close(*found, expected.as_f64().expect("a number"), 1e-10, "lambda");
     }
+    // An inertia count of another program, and the row sums of the mass matrix.
+    let sylvester = &reference["modes"]["sylvester"];
+    let (shift, count) = (&sylvester["lam"], &sylvester["count"]);
+    let below = body.modes().eigenvalue.iter().filter(|l| **l < shift.as_f64().expect("a shift")).count();
+    assert_eq!(Some(3 + below as u64), count.as_u64());
+    let row_sum = body.lumped().iter().find(|lumped| lumped.scheme == "row-sum").expect("by default");
+    let inertia = reference["rowsum_lumped"]["inertia_com"][2][2].as_f64().expect("J0");
+    close(row_sum.invariants.inertia()[(2, 2)], inertia, 1e-12, "J0 of row sums");
+    assert_eq!(Some(row_sum.negative_masses as u64), reference["rowsum_negative_rows"].as_u64());
 }
 
 /// Shapes stay in the plane and are M-orthonormal there.
@@ -225,7 +275,7 @@ fn shapes_are_orthonormal_in_the_plane() {
     let shape = &body.modes().shape;
     let mut gram = Mat::<f64>::zeros(8, 8);
     for i in 0..model.nodes().len() {
-        let (columns, values) = model.scalar_mass().row(i);
+        let (columns, values) = model.scalar_mass().expect("a solid").row(i);
         for (&j, m) in columns.iter().zip(values) {
             for p in 0..8 {
                 for q in 0..8 {

@@ -55,6 +55,7 @@ fn sizes_must_agree() {
 fn a_body_has_nodes_and_modes_and_no_more_modes_than_freedoms() {
     let without = |n: usize, nf: usize| {
         let mut p = parts(Random::new(1), n.max(1), nf.max(1), 0, 0);
+        (p.modes.rotation, p.modes.internal) = (None, None);
         if n == 0 {
             p.nodes = Default::default();
             p.modes.shape = faer::Mat::zeros(0, nf);
@@ -123,6 +124,22 @@ fn names_are_unique_and_can_be_stored() {
     assert_refused(|p| p.lumped[1].scheme = "x".repeat(1001), &["has 1001 bytes"]);
     assert_refused(|p| p.source.name.push('\0'), &["`source.name` contains a NUL character"]);
     assert_refused(|p| p.certificate.remark.push('\0'), &["`certificate.remark` contains a NUL character"]);
+}
+
+#[test]
+fn loads_of_geometric_stiffness_are_those_that_a_file_can_name() {
+    use flexbody::flex_body::LoadKind::{Force, Named, Spin};
+    // The parts have a force and a spin.
+    let load = |p: &mut Parts, kind, component| {
+        (p.geometric_stiffness[0].load.kind, p.geometric_stiffness[0].load.component) = (kind, component);
+    };
+    assert_refused(|p| load(p, Spin, 6), &["has no component, interface or name"]);
+    assert_refused(|p| load(p, Force(String::new()), 0), &["has no component, interface or name"]);
+    assert_refused(|p| load(p, Named(String::new()), 0), &["has no component, interface or name"]);
+    assert_refused(|p| load(p, Named("a\0".to_owned()), 0), &["contains a NUL character"]);
+    assert_refused(|p| p.geometric_stiffness[1] = p.geometric_stiffness[0].clone(), &["is given twice"]);
+    assert_refused(|p| p.geometric_stiffness[1].matrix[(0, 0)] = f64::NAN, &["has the value NaN"]);
+    assert_refused(|p| p.geometric_stiffness[1].matrix = faer::Mat::zeros(2, 3), &["is 2 x 3, expected"]);
 }
 
 #[test]

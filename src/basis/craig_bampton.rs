@@ -12,7 +12,7 @@ use super::free_surface::{quadratic_estimate, single_precision_note};
 use super::interface_coordinates::InterfaceCoordinates;
 use super::joints::{Joint, check_prescribable, hold, joints};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
-use super::pseudo_free_surface::{Independent, independent, largest_shares, named, side_by_side};
+use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::rigid_modes::rigid_modes;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
@@ -21,7 +21,8 @@ use crate::eigen::{
 };
 use crate::error::Result;
 use crate::linalg::{
-    Elimination, ReducedPencil, add_combination, combine, gram, subtract_combination, symmetric_eigen,
+    Elimination, ReducedPencil, add_combination, combine, gram, side_by_side, subtract_combination,
+    symmetric_eigen,
 };
 use crate::model::{FeModel, rigid_count};
 use crate::progress::{Event, Watch};
@@ -51,11 +52,11 @@ impl Basis for CraigBampton {
         let joints = joints(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
         let parts = Parts::new(model, &joints, settings, watch)?;
-        let rigid = rigid_modes(&model.pencil(), &model.nodes().positions)?;
+        let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref(), resume);
         watch(Event::Phase("pseudo-free-surface modes"));
         let failed = |failure| explain(model, failure);
-        let shapes = side_by_side(problem.pencil.n(), &[parts.fixed_shapes(), parts.constraint.clone()]);
+        let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
         let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let mut notes = parts.notes(model, settings);
@@ -129,8 +130,8 @@ impl<'a> Parts<'a> {
         let reduced = elimination.reduced(&pencil);
         let held = reduced.pencil();
         // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of the free body will do.
-        let rigid = rigid_modes(&pencil, &model.nodes().positions)?;
-        let first_estimate = quadratic_estimate(&pencil, &model.nodes().positions, rigid.as_ref());
+        let rigid = rigid_modes(model, &pencil)?;
+        let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
         let none = Mat::zeros(held.n(), 0);
         let problem = EigenProblem {
             pencil: held,
@@ -275,7 +276,7 @@ impl<'a> Parts<'a> {
             subtract_combination(deformed.as_mut(), rigid, along.as_ref());
         }
         let stiffness = gram(deformed.as_ref(), pencil.apply_stiffness(deformed.as_ref()).as_ref());
-        let shapes = side_by_side(pencil.n(), &[self.constraint.clone(), self.fixed_shapes()]);
+        let shapes = side_by_side(&[self.constraint.as_ref(), self.fixed_shapes().as_ref()]);
         let mass = gram(shapes.as_ref(), pencil.apply_mass(shapes.as_ref()).as_ref());
         let mean = |a: &Mat<f64>, i: usize, j: usize| 0.5 * (a[(i, j)] + a[(j, i)]);
         let size = c + lambda.len();

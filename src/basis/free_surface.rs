@@ -10,8 +10,10 @@ use crate::eigen::{
     Accuracy, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve,
 };
 use crate::error::Result;
-use crate::linalg::{Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen};
-use crate::model::{FeModel, centre_and_length, rigid_count};
+use crate::linalg::{
+    CscMatrix, Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen,
+};
+use crate::model::{FeModel, centre_and_length};
 use crate::progress::Watch;
 use faer::{Mat, MatRef};
 
@@ -42,7 +44,7 @@ impl Basis for FreeSurface {
 /// Free-surface modes and the static responses to `loads`, each called `what` where modes are named after it.
 pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> Result<ModalBasis> {
     let Task { model, settings, resume, watch } = *task;
-    let rigid = rigid_modes(&model.pencil(), &model.nodes().positions)?;
+    let rigid = rigid_modes(model, &model.pencil())?;
     let problem = problem_of_span(model, rigid.as_ref(), resume);
     let loads = NamedLoads::new(&problem, model, loads, what, settings)?;
     let free = free_surface_resumed(model, settings, resume, watch)?;
@@ -67,33 +69,46 @@ pub fn free_surface_resumed(
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    compute(model, model.scalar_mass(), settings, resume, watch)
+    compute(model, model.pencil(), settings, resume, watch)
 }
 
-/// The same with another mass matrix Ms (a lumped one) in place of the model's.
+/// The same with nodal masses (n), the same in every direction, in place of the model's.
 ///
 /// # Errors
 /// As [`free_surface`].
+///
+/// # Panics
+/// When there is not one mass per node.
 pub fn free_surface_of(
     model: &FeModel,
-    scalar_mass: &SymmetricMatrix,
+    masses: &[f64],
     settings: &ModeSettings,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    compute(model, scalar_mass, settings, Resume::default(), watch)
+    assert_eq!(masses.len(), model.nodes().len(), "one mass per node");
+    let d = model.dimension();
+    let diagonal = |n: usize, per_row: usize| {
+        let entries = masses.iter().flat_map(|m| std::iter::repeat_n(*m, per_row)).enumerate();
+        let entries: Vec<(u32, u32, f64)> = entries.map(|(i, m)| (i as u32, i as u32, m)).collect();
+        SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries))
+            .expect("a diagonal matrix is symmetric")
+    };
+    let (mass, block) = match model.rows().are_plain() {
+        true => (diagonal(masses.len(), 1), d),
+        false => (diagonal(model.rows().len(), d), 1),
+    };
+    compute(model, Pencil::new(model.stiffness(), &mass, block), settings, Resume::default(), watch)
 }
 
 fn compute(
     model: &FeModel,
-    scalar_mass: &SymmetricMatrix,
+    pencil: Pencil<'_>,
     settings: &ModeSettings,
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    let pencil = Pencil::new(model.stiffness(), scalar_mass, model.dimension());
-    let positions = &model.nodes().positions;
-    let rigid = rigid_modes(&pencil, positions)?;
-    let first_estimate = quadratic_estimate(&pencil, positions, rigid.as_ref());
+    let rigid = rigid_modes(model, &pencil)?;
+    let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
     let problem = EigenProblem {
         pencil,
         rigid: rigid.as_ref(),
@@ -103,7 +118,7 @@ fn compute(
     };
     let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
     let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
-    describe(&basis.solution, settings, &pencil, &mut basis.diagnostics);
+    describe(&basis.solution, settings, &problem, &mut basis.diagnostics);
     basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
     Ok(basis)
 }
@@ -125,13 +140,13 @@ pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSet
 fn describe(
     solution: &EigenSolution,
     settings: &ModeSettings,
-    pencil: &Pencil<'_>,
+    problem: &EigenProblem<'_>,
     notes: &mut Vec<Diagnostic>,
 ) {
     let given = solution.eigenvalues.len();
-    let (scalar_mass, dimension) = (pencil.mass(), pencil.block());
-    let at_most = pencil.n() - rigid_count(dimension);
-    // Known from the rank of Ms, or because all there are were found.
+    let pencil = &problem.pencil;
+    let at_most = pencil.n() - problem.rigid.ncols();
+    // Known from the rank of M, or because all there are were found.
     let mut finite = solution.finite_modes;
     if let Wanted::Lowest(wanted) = settings.wanted
         && given < wanted
@@ -142,14 +157,15 @@ fn describe(
         notes.push(Diagnostic::new(Code::ModesClamped, message));
         finite = finite.or(Some(given));
     }
-    let massless = (0..scalar_mass.n()).filter(|&i| scalar_mass.row(i).0.is_empty()).count();
+    let massless = (0..pencil.mass().n()).filter(|&i| pencil.mass().row(i).0.is_empty()).count();
     let singular = match finite {
         Some(finite) if finite < at_most => {
             Some(format!("{finite} of {at_most} flexible modes have a finite frequency"))
         }
         None if massless > 0 => Some(format!(
-            "nodes without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
-            at_most - dimension * massless
+            "{} without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
+            if pencil.block() == 1 { "rows" } else { "nodes" },
+            at_most - pencil.block() * massless
         )),
         _ => None,
     };
@@ -180,18 +196,38 @@ fn describe(
 }
 
 /// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper
-/// bound of the first flexible eigenvalue, within a factor of two for a uniform body.
-pub(super) fn quadratic_estimate(pencil: &Pencil<'_>, positions: &[[f64; 3]], rigid: MatRef<'_, f64>) -> f64 {
+/// bound of the first flexible eigenvalue, within a factor of two for a uniform body. Nodal rotations are half the curl of
+/// the field, rows without a place stay zero.
+pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
+    let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
     let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
-    let d = pencil.block();
+    let d = model.dimension();
     let mut fields = Mat::zeros(pencil.n(), exponents.len() * d);
-    for (i, x) in positions.iter().enumerate() {
-        let r = [0, 1, 2].map(|k| (x[k] - centre[k]) / length);
+    let local = |i: usize| [0, 1, 2].map(|k| (positions[i][k] - centre[k]) / length);
+    let factor = |r: &[f64; 3], b: usize| r.get(b).copied().unwrap_or(1.0);
+    for i in 0..positions.len() {
+        let r = local(i);
         for (e, &(a, b)) in exponents.iter().enumerate() {
-            let value = r[a] * r.get(b).copied().unwrap_or(1.0);
             for k in 0..d {
-                fields[(d * i + k, d * e + k)] = value;
+                fields[(d * i + k, d * e + k)] = r[a] * factor(&r, b);
+            }
+        }
+    }
+    let rows = model.rows();
+    for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
+        let r = local(node as usize);
+        let (l, m) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
+        for (e, &(a, b)) in exponents.iter().enumerate() {
+            let slope = |p: usize| {
+                let first = if a == p { factor(&r, b) } else { 0.0 };
+                (first + if b == p { r[a] } else { 0.0 }) / length
+            };
+            // (curl v e_k) along (k, l, m) cyclic: dv/dl along m for k = m, -dv/dm for k = l.
+            for (k, curl) in [(m, slope(l)), (l, -slope(m))] {
+                if k < d {
+                    fields[(row, d * e + k)] = 0.5 * curl;
+                }
             }
         }
     }

@@ -16,7 +16,7 @@ use faer::Mat;
 /// Shapes in the order of a model's degrees of freedom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedShapes {
-    /// d n x k, row d i + k, d the dimension.
+    /// N x k, by internal rows.
     shapes: Mat<f64>,
     digits: u8,
     source: Option<SourceFile>,
@@ -51,7 +51,7 @@ impl Basis for ImportedShapes {
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         let Task { model, settings, resume, watch } = *task;
-        let rigid = rigid_modes(&model.pencil(), &model.nodes().positions)?;
+        let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref(), resume);
         let criterion = self.dependent();
         let failed = |failure| explain(model, failure);

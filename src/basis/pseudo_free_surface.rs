@@ -168,12 +168,6 @@ fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
     a.as_mut().col_mut(j).iter_mut().for_each(|value| *value *= factor);
 }
 
-/// The columns of all blocks.
-pub(super) fn side_by_side(n: usize, blocks: &[Mat<f64>]) -> Mat<f64> {
-    let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    Mat::from_fn(n, columns.len(), |i, j| columns[j][i])
-}
-
 /// For each mode, the shape with the largest share in it, and that share: the square of its amplitude in `parts` (shapes x modes) for
 /// M-orthonormal shapes and modes.
 pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {

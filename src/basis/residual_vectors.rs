@@ -4,14 +4,14 @@ use super::columns::columns;
 use super::failure::explain;
 use super::joints::{AXES, Joint, joints};
 use super::modal_basis::ModalBasis;
-use super::pseudo_free_surface::{independent, side_by_side};
+use super::pseudo_free_surface::independent;
 use super::{ModeSettings, Truncation};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
     Accuracy, EigenFailure, EigenProblem, EigenSolution, Precision, Wanted, modes_of_span, static_responses,
 };
 use crate::error::Result;
-use crate::linalg::{add_combination, column_products, gram};
+use crate::linalg::{add_combination, column_products, gram, side_by_side};
 use crate::model::{FeModel, RawShapes};
 use crate::progress::{Event, Watch};
 use crate::provenance::SourceFile;
@@ -147,7 +147,8 @@ impl NamedLoads {
         }
         let named = loads.iter().map(|loads| loads.forces(problem, model)).collect::<Result<Vec<_>>>()?;
         let (names, forces): (Vec<String>, Vec<Mat<f64>>) = named.into_iter().flatten().unzip();
-        Ok(Self { what: what.to_owned(), names, forces: side_by_side(problem.pencil.n(), &forces) })
+        let forces: Vec<_> = forces.iter().map(Mat::as_ref).collect();
+        Ok(Self { what: what.to_owned(), names, forces: side_by_side(&forces) })
     }
 }
 
@@ -202,14 +203,14 @@ pub(super) fn with_residual_vectors(
         }
     }
     let candidates = Mat::from_fn(responses.nrows(), used.len(), |i, j| responses[(i, used[j])]);
-    let known = side_by_side(pencil.n(), &[problem.rigid.to_owned(), modes.clone()]);
+    let known = side_by_side(&[problem.rigid, modes.as_ref()]);
     let found = independent(pencil, known.as_ref(), candidates, LEFT)
         .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
     dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({left:.0e})", names[used[j]])));
     dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", names[used[j]])));
     dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", names[used[j]])));
 
-    let span = side_by_side(pencil.n(), &[modes.clone(), found.vectors]);
+    let span = side_by_side(&[modes.as_ref(), found.vectors.as_ref()]);
     let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
     let ritz = modes_of_span(problem, span.clone(), &all, watch).map_err(failed)?;
     let parts = gram(span.as_ref(), pencil.apply_mass(ritz.vectors.as_ref()).as_ref());

@@ -3,13 +3,14 @@
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::linalg::{Pencil, combine, gram, symmetric_eigen};
-use crate::model::{centre_and_length, rigid_fields};
+use crate::model::{FeModel, centre_and_length};
 use faer::Mat;
 
-/// The M-orthonormal rigid modes from the node positions: six, in the plane three.
-pub(super) fn rigid_modes(pencil: &Pencil<'_>, positions: &[[f64; 3]]) -> Result<Mat<f64>> {
+/// The rigid modes of a model from its node positions: six, in the plane three; orthonormal in the mass of `pencil`.
+pub(super) fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
+    let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
-    let fields = rigid_fields(positions, pencil.block(), centre, length);
+    let fields = model.rigid_fields(centre, length);
     let orthonormal = |r: &Mat<f64>| {
         let mass = gram(r.as_ref(), pencil.apply_mass(r.as_ref()).as_ref());
         let eigen = symmetric_eigen(mass.as_ref())?;

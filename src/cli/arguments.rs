@@ -72,7 +72,7 @@ pub struct ConvertArguments {
     /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array
     #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
     pub shapes: Option<PathBuf>,
-    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces, loads=FILE (nodal forces by matrix rows), comma-separated
+    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces, loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. Replaces [basis] of the manifest
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,
     /// Promise about the modes
@@ -100,7 +100,7 @@ pub struct ConvertArguments {
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
     /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports and checkpoint likewise)
-    #[arg(long, conflicts_with_all = ["shapes", "residual_vectors"])]
+    #[arg(long, conflicts_with = "shapes")]
     pub split: bool,
     /// Threads; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]

@@ -14,7 +14,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::error::Result;
 use crate::input::{
-    InterfaceNodes, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
+    InterfaceNodes, LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses,
+    read_shapes,
 };
 use crate::invariants::BodyFrame;
 use crate::model::{CheckedModel, FeModel};
@@ -28,9 +29,11 @@ use std::path::Path;
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
-    refuse_contradictions(arguments)?;
-    let loads = load_sets(arguments.residual_vectors.as_deref().unwrap_or(""))?;
+    // What the command line says replaces what the manifest says.
+    let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let files = model_files(arguments)?;
+    let loads = asked.unwrap_or_else(|| files.residual_vectors.clone());
+    refuse_contradictions(arguments, &loads)?;
     // How many bodies there are is known after reading; that outputs can be written, before.
     let places = Places::of(arguments, arguments.split.then_some(1));
     refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads)?;
@@ -82,7 +85,7 @@ struct Job<'a> {
     arguments: &'a ConvertArguments,
     files: &'a ModelFiles,
     lumped: &'a [Lumping],
-    loads: &'a [LoadSet],
+    loads: &'a [LoadSource],
     formats: &'a [Format],
     threads: usize,
 }
@@ -182,20 +185,14 @@ impl Job<'_> {
 }
 
 /// Loads of residual vectors as named on the command line.
-enum LoadSet {
-    Centrifugal,
-    Interfaces,
-    File(MatrixLocation),
-}
-
-fn load_sets(text: &str) -> Result<Vec<LoadSet>> {
+fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
     let mut sets = Vec::new();
     let mut names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
     for name in &names {
         sets.push(match (*name, name.strip_prefix("loads=")) {
-            ("centrifugal", _) => LoadSet::Centrifugal,
-            ("interfaces", _) => LoadSet::Interfaces,
-            (_, Some(path)) if !path.is_empty() => LoadSet::File(MatrixLocation::parse(path)),
+            ("centrifugal", _) => LoadSource::Centrifugal,
+            ("interfaces", _) => LoadSource::Interfaces,
+            (_, Some(path)) if !path.is_empty() => LoadSource::File(MatrixLocation::parse(path)),
             _ => {
                 let message = format!("`{name}` is no set of loads for residual vectors");
                 return Err(Diagnostic::new(Code::Usage, message)
@@ -212,11 +209,12 @@ fn load_sets(text: &str) -> Result<Vec<LoadSet>> {
     Ok(sets)
 }
 
-/// Options that say nothing together.
-fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
+/// Options that say nothing together; `loads` are those of residual vectors.
+fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
     let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang);
     let coupled = matches!(basis, BasisName::CraigBampton | BasisName::CraigChang);
+    let residual = !loads.is_empty();
     let message = match arguments {
         ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
             "--shapes needs --basis imported"
@@ -224,13 +222,16 @@ fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
         ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
             "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
         }
-        ConvertArguments { residual_vectors: Some(_), .. } if !searches_free_modes => {
-            "--residual-vectors needs --basis free or craig-chang"
+        _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
+        ConvertArguments { split: true, .. }
+            if loads.iter().any(|set| matches!(set, LoadSource::File(_))) =>
+        {
+            "--split: the rows of nodal loads are those of all bodies together"
         }
-        ConvertArguments { residual_vectors: Some(_), lumped_modes: true, .. } => {
+        ConvertArguments { lumped_modes: true, .. } if residual => {
             "--lumped-modes compares free-surface modes, not residual vectors"
         }
-        ConvertArguments { residual_vectors: Some(_), accuracy: AccuracyName::Certified, .. } => {
+        ConvertArguments { accuracy: AccuracyName::Certified, .. } if residual => {
             "residual vectors are no eigenvectors and cannot be certified"
         }
         ConvertArguments { accuracy: AccuracyName::Certified, .. } if coupled => {
@@ -245,7 +246,7 @@ fn refuse_contradictions(arguments: &ConvertArguments) -> Result<()> {
 }
 
 /// The basis, with the shapes read that it needs.
-fn basis(arguments: &ConvertArguments, loads: &[LoadSet], model: &FeModel) -> Result<BasisChoice> {
+fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) -> Result<BasisChoice> {
     match (arguments.basis, &arguments.shapes) {
         (BasisName::Imported, Some(shapes)) => {
             let raw = read_shapes(&MatrixLocation::parse(shapes), model.stiffness().n(), "shapes")?;
@@ -253,10 +254,10 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSet], model: &FeModel) -> Re
         }
         (BasisName::CraigBampton, _) => Ok(BasisChoice::CraigBampton(CraigBampton)),
         (name, _) => {
-            let read = |set: &LoadSet| match set {
-                LoadSet::Centrifugal => Ok(Loads::Centrifugal),
-                LoadSet::Interfaces => Ok(Loads::Interfaces),
-                LoadSet::File(location) => {
+            let read = |set: &LoadSource| match set {
+                LoadSource::Centrifugal => Ok(Loads::Centrifugal),
+                LoadSource::Interfaces => Ok(Loads::Interfaces),
+                LoadSource::File(location) => {
                     let raw = read_shapes(location, model.stiffness().n(), "loads")?;
                     UserLoads::new(model, raw).map(Loads::User)
                 }
@@ -338,7 +339,7 @@ fn refuse_overwriting(
     outputs: &[Places],
     files: &ModelFiles,
     schemes: &[Scheme],
-    loads: &[LoadSet],
+    loads: &[LoadSource],
 ) -> Result<()> {
     let matrices = [Some(&files.stiffness.path), Some(&files.mass.path)];
     let tables = [Some(&files.nodes), files.dofs.as_ref(), files.manifest.as_ref()];
@@ -353,11 +354,13 @@ fn refuse_overwriting(
     let shapes = arguments.shapes.as_ref().map(|path| MatrixLocation::parse(path).path);
     let matrices = matrices.into_iter().chain([shapes.as_ref()]);
     let loads = loads.iter().map(|set| match set {
-        LoadSet::File(location) => Some(&location.path),
+        LoadSource::File(location) => Some(&location.path),
         _ => None,
     });
     let damping = files.damping.as_ref().and_then(|damping| damping.matrix()).map(|place| Some(&place.path));
-    let inputs = matrices.chain(loads).chain(damping).chain(tables).chain(masses).chain(interfaces);
+    let geometric = files.geometric_stiffness.iter().map(|one| Some(&one.matrix.path));
+    let inputs =
+        matrices.chain(loads).chain(damping).chain(geometric).chain(tables).chain(masses).chain(interfaces);
     let place = |path: &Path| {
         std::fs::canonicalize(path)
             .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))

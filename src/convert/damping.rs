@@ -15,7 +15,8 @@ const NOISE_FACTOR: f64 = 30.0;
 /// Smallest eigenvalue of the damping, scaled to a unit diagonal, that still is rounding.
 const SEMIDEFINITE: f64 = -1e-8;
 
-pub(super) struct ModalDamping {
+/// Damping of modes.
+pub(crate) struct ModalDamping {
     /// Psi' D Psi (nf x nf). Unit: 1/time.
     pub matrix: Mat<f64>,
     /// Its diagonal over 2 omega_j.
@@ -24,14 +25,13 @@ pub(super) struct ModalDamping {
     pub warning: Option<Diagnostic>,
 }
 
-/// Damping of the modes `vectors` (3n x nf, model axes), which the body has with `signs`; `None` when none is stated.
+/// Damping of the modes `vectors` (N x nf, model axes); `None` when none is stated.
 ///
 /// # Errors
 /// [`DampingIndefinite`](Code::DampingIndefinite).
-pub(super) fn modal_damping(
+pub(crate) fn modal_damping(
     model: &FeModel,
     vectors: MatRef<'_, f64>,
-    signs: &[f64],
     eigenvalues: &[f64],
     invariants: &Invariants,
 ) -> Result<Option<ModalDamping>> {
@@ -57,7 +57,7 @@ pub(super) fn modal_damping(
             of_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
         }
         Damping::Matrix(d) => {
-            let matrix = reduced(d, vectors, signs);
+            let matrix = reduced(d, vectors);
             check_semidefinite(model, d, vectors, &matrix)?;
             of_matrix(matrix)
         }

@@ -25,6 +25,7 @@ pub use problem::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
     Wanted,
 };
+pub use refine::{relative_residual, residual_scale};
 pub use solve::solve;
 pub use span::modes_of_span;
 pub use start::{Resume, Save, Snapshot};

@@ -148,6 +148,15 @@ pub struct EigenvalueBounds {
     pub pivots_below: usize,
 }
 
+impl EigenvalueBounds {
+    /// Moves eigenvalues that lie outside of their bounds onto them: the bounds know more digits than a projection in f64.
+    pub(super) fn clamp(&self, eigenvalues: &mut [f64]) {
+        for ((lambda, lower), upper) in eigenvalues.iter_mut().zip(&self.lower).zip(&self.upper) {
+            *lambda = lambda.clamp(*lower, *upper);
+        }
+    }
+}
+
 /// Flexible modes, ascending.
 #[derive(Debug, Clone)]
 pub struct EigenSolution {

@@ -122,12 +122,12 @@ pub(super) fn residuals(
 }
 
 /// |K psi| + |lambda| |M psi|.
-fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
     k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
 }
 
 /// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros.
-pub(super) fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
     let scale = residual_scale(k_psi, m_psi, lambda);
     if scale > 0.0 { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale } else { 0.0 }
 }

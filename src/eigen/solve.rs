@@ -297,10 +297,7 @@ fn finish(
     let groups = clusters(&eigenvalues, CLUSTER_GAP);
     canonical_basis(vectors.as_mut(), &groups);
     if let Some(bounds) = &bounds {
-        // The bounds know more digits than the projection in f64.
-        for ((lambda, lower), upper) in eigenvalues.iter_mut().zip(&bounds.lower).zip(&bounds.upper) {
-            *lambda = lambda.clamp(*lower, *upper);
-        }
+        bounds.clamp(&mut eigenvalues);
     }
     if bounds.is_some() || groups.iter().any(|g| g.len() > 1) {
         (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);

@@ -87,9 +87,7 @@ pub fn modes_of_span(
         }
     }
     if let Some(bounds) = &bounds {
-        for ((lambda, lower), upper) in eigenvalues.iter_mut().zip(&bounds.lower).zip(&bounds.upper) {
-            *lambda = lambda.clamp(*lower, *upper);
-        }
+        bounds.clamp(&mut eigenvalues);
     }
     Ok(EigenSolution {
         eigenvalues,

@@ -5,7 +5,9 @@ use super::lanczos::factorise;
 use super::noise::rounding_residual;
 use super::plan::Precision;
 use super::problem::{Counters, EigenFailure, EigenProblem};
-use crate::linalg::{Analysis, Cholesky, Pencil, Solve, column_products, gram, subtract_combination};
+use crate::linalg::{
+    Analysis, Cholesky, Pencil, Solve, column_products, gram, side_by_side, subtract_combination,
+};
 use faer::{Mat, MatRef};
 
 /// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of six in each.
@@ -36,11 +38,7 @@ pub fn static_responses(
     counters: &mut Counters,
 ) -> Result<Mat<f64>, EigenFailure> {
     let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
-    let rigid = problem.rigid;
-    let split = rigid.ncols();
-    let known = Mat::from_fn(rigid.nrows(), split + modes.ncols(), |i, j| {
-        if j < split { rigid[(i, j)] } else { modes[(i, j - split)] }
-    });
+    let known = side_by_side(&[problem.rigid, modes]);
     // Without known modes K itself is definite, and its factor the solution but for rounding.
     let tau = if known.ncols() == 0 { 0.0 } else { 0.5 * first };
     match precision {

@@ -4,8 +4,9 @@ use super::validate::problems;
 use super::{Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source};
 use crate::error::{Error, Result};
 use crate::invariants::{Frame, Invariants};
-use crate::model::Nodes;
+use crate::model::{GeometricStiffness, Nodes};
 use crate::units::UnitSystem;
+use faer::Mat;
 
 /// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,8 +20,9 @@ impl FlexBody {
     /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1, 1 <= nf <= 3n; every array has the shape that [`Parts`] states and
     /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
     /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
-    /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty; interfaces name existing nodes, those declared free have no reference point;
-    /// matrices in interface coordinates are symmetric;
+    /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty;
+    /// loads of geometric stiffness are those of the dimension, each once; interfaces name existing nodes, those declared free have no
+    /// reference point; matrices in interface coordinates are symmetric;
     /// no text contains a NUL character (no file could hold it).
     ///
     /// # Errors
@@ -89,6 +91,11 @@ impl FlexBody {
     /// Exact invariants about the frame origin, body axes.
     pub fn invariants(&self) -> &Invariants {
         &self.parts.invariants
+    }
+
+    /// Geometric stiffness of unit loads along body axes, reduced to the modes.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<Mat<f64>>] {
+        &self.parts.geometric_stiffness
     }
 
     /// Lumped comparators.

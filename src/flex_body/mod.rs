@@ -6,6 +6,9 @@ mod parts;
 mod validate;
 
 pub use crate::invariants::Frame;
+pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 pub use body::FlexBody;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
-pub use parts::{Certificate, Guarantee, LumpedBody, MassStructure, Modes, Parts, Source, Truncation};
+pub use parts::{
+    Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+};

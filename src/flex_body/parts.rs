@@ -2,7 +2,7 @@
 
 use super::{Interface, InterfaceCoordinates};
 use crate::invariants::{DIGITS, Frame, Invariants};
-use crate::model::{BodyNumber, Nodes};
+use crate::model::{BodyNumber, GeometricStiffness, Nodes};
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -63,6 +63,19 @@ pub struct Modes {
     /// Psi' D Psi (nf x nf), where damping was given. Unit: 1/time.
     pub modal_damping: Option<Mat<f64>>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
+    pub shape: Mat<f64>,
+    /// Rotations of the nodes (3n x nf) in the same way, zero where the model has none; `None` for models of displacements.
+    pub rotation: Option<Mat<f64>>,
+    /// Rows without a place.
+    pub internal: Option<InternalRows>,
+}
+
+/// Rows of the modes that belong to no node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InternalRows {
+    /// Number and direction that the label of each row has (m).
+    pub dofs: Vec<[i64; 2]>,
+    /// Their values (m x nf); vectors, three rows each, in body axes.
     pub shape: Mat<f64>,
 }
 
@@ -136,6 +149,9 @@ pub struct Parts {
     pub modes: Modes,
     /// Exact invariants about the frame origin, body axes.
     pub invariants: Invariants,
+    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes: the stressed body has the stiffness K_ff plus the sum of these
+    /// times their loads. What is not here is zero or not known. Unit: 1/time^2 over that of the load.
+    pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     /// Lumped comparators.
     pub lumped: Vec<LumpedBody>,
     /// Proof of completeness and noise floor.

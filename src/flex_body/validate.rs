@@ -1,9 +1,9 @@
 //! What must hold for the parts of a flexible body, checked once, all violations collected.
 
-use super::Parts;
+use super::{MassStructure, Modes, Parts};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::invariants::{DIGITS, Invariants};
-use crate::model::Coupling;
+use crate::model::{Coupling, UnitLoad};
 use faer::{Mat, MatRef};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
@@ -21,7 +21,7 @@ const LONGEST_NAME: usize = 1000;
 pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     let mut check = Check { problems: Vec::new() };
     let (n, nf) = (parts.nodes.ids.len(), parts.modes.eigenvalue.len());
-    check.sizes(n, nf);
+    check.sizes(n, nf, &parts.modes);
     check.plane(parts);
     check.frame(parts);
     check.nodes(parts);
@@ -36,6 +36,8 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     if parts.invariants.mass.is_finite() && parts.invariants.mass <= 0.0 {
         check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass));
     }
+    check.structure(parts);
+    check.geometric_stiffness(parts, nf);
     check.lumped(parts, nf);
     let c = &parts.certificate;
     check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
@@ -102,14 +104,16 @@ impl Check {
         }
     }
 
-    fn sizes(&mut self, n: usize, nf: usize) {
+    fn sizes(&mut self, n: usize, nf: usize, modes: &Modes) {
+        let internal = modes.internal.as_ref().map_or(0, |internal| internal.dofs.len());
+        let rows = if modes.rotation.is_some() { 6 * n } else { 3 * n } + internal;
         if n == 0 {
             self.add("`nodes` is empty, expected at least one node".to_owned());
         }
         if nf == 0 {
             self.add("`modes` is empty, expected at least one mode".to_owned());
-        } else if n > 0 && nf > 3 * n {
-            self.add(format!("{nf} modes of {n} nodes, expected at most {}", 3 * n));
+        } else if n > 0 && nf > rows {
+            self.add(format!("{nf} modes of {n} nodes, expected at most {rows}"));
         }
     }
 
@@ -194,6 +198,12 @@ impl Check {
         }
         self.finite("modes.truncation", modes.truncation.iter().flat_map(|t| [t.before, t.after]));
         self.matrix("modes.shape", &modes.shape, 3 * n, nf);
+        if let Some(rotation) = &modes.rotation {
+            self.matrix("modes.rotation", rotation, 3 * n, nf);
+        }
+        if let Some(internal) = &modes.internal {
+            self.matrix("modes.internal", &internal.shape, internal.dofs.len(), nf);
+        }
         if let Some(damping) = &modes.modal_damping {
             self.matrix("modes.modal_damping", damping, nf, nf);
         }
@@ -213,6 +223,41 @@ impl Check {
             }
         }
         self.matrix(&format!("{name}.modal_stiffness"), &invariants.modal_stiffness, nf, nf);
+        if let Some(general) = &invariants.general {
+            self.matrix(&format!("{name}.w0"), &general.w0, 3, 3 * nf);
+            self.matrix(&format!("{name}.w3"), &general.w3, 3 * nf, nf);
+            self.matrix(&format!("{name}.modal_mass"), &general.modal_mass, nf, nf);
+        }
+    }
+
+    /// A body has the terms of a general mass when its mass is one, and lumped masses never have.
+    fn structure(&mut self, parts: &Parts) {
+        let general = parts.source.mass_structure == MassStructure::General;
+        if general != parts.invariants.general.is_some() {
+            self.add(
+                "`invariants.W0` is there for the mass structure `general`, and only for that".to_owned(),
+            );
+        }
+        if parts.lumped.iter().any(|lumped| lumped.invariants.general.is_some()) {
+            self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
+        }
+    }
+
+    fn geometric_stiffness(&mut self, parts: &Parts, nf: usize) {
+        let labels: Vec<String> = parts.geometric_stiffness.iter().map(|one| one.load.label()).collect();
+        self.names("geometric stiffness", labels.iter());
+        for (one, label) in parts.geometric_stiffness.iter().zip(&labels) {
+            self.text("geometric_stiffness", label);
+            self.matrix(&format!("geometric_stiffness `{label}`"), &one.matrix, nf, nf);
+            let load = &one.load;
+            // A file knows the load by this name only.
+            if UnitLoad::from_label(label).as_ref() != Some(load) {
+                self.add(format!("geometric stiffness `{label}` has no component, interface or name"));
+            } else if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
+                let dimension = parts.dimension;
+                self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
+            }
+        }
     }
 
     fn lumped(&mut self, parts: &Parts, nf: usize) {

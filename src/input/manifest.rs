@@ -10,10 +10,12 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+mod basis;
 mod damping;
+mod geometric_stiffness;
 mod interface;
 
-const TOP: &[&str] = &["model", "files", "interface", "damping"];
+const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs"];
@@ -88,6 +90,8 @@ impl Walk<'_> {
         };
         let interfaces = self.interfaces(top, usize::from(dimension));
         let damping = self.damping(top);
+        let geometric_stiffness = self.geometric_stiffness(top);
+        let residual_vectors = self.residual_vectors(top);
         let Some((files, span)) = self.table(top, "files") else {
             if !top.contains_key("files") {
                 let message = "table [files] is missing".to_owned();
@@ -119,6 +123,8 @@ impl Walk<'_> {
             dofs: dofs.map(|dofs| folder.join(dofs)),
             interfaces: interfaces?,
             damping,
+            geometric_stiffness,
+            residual_vectors,
             manifest: Some(self.path.to_path_buf()),
         })
     }
@@ -251,7 +257,9 @@ fn with_article(kind: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::basis::BASIS;
     use super::damping::{BAND, DAMPING, RAYLEIGH};
+    use super::geometric_stiffness::GEOMETRIC_STIFFNESS;
     use super::interface::INTERFACE;
     use super::*;
 
@@ -273,6 +281,8 @@ mod tests {
             ("/properties/damping/properties", DAMPING),
             ("/properties/damping/properties/bands/items/properties", BAND),
             ("/properties/damping/properties/rayleigh/properties", RAYLEIGH),
+            ("/properties/geometric_stiffness/items/properties", GEOMETRIC_STIFFNESS),
+            ("/properties/basis/properties", BASIS),
         ] {
             let mut known: Vec<&str> = known.to_vec();
             known.sort_unstable();

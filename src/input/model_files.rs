@@ -2,7 +2,7 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
-use crate::model::{Coupling, Damping, Reference};
+use crate::model::{Coupling, Damping, GeometricStiffness, Reference};
 use crate::units::UnitSystem;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -28,6 +28,10 @@ pub struct ModelFiles {
     pub interfaces: Vec<InterfaceSource>,
     /// Damping, where it is given.
     pub damping: Option<Damping<MatrixLocation>>,
+    /// Geometric stiffness of unit loads.
+    pub geometric_stiffness: Vec<GeometricStiffness<MatrixLocation>>,
+    /// Loads whose static responses are to join the modes.
+    pub residual_vectors: Vec<LoadSource>,
     /// The manifest, when there is one.
     pub manifest: Option<PathBuf>,
 }
@@ -52,6 +56,17 @@ pub enum InterfaceNodes {
     Listed(Vec<i64>),
     /// A table with the column `node`.
     File(PathBuf),
+}
+
+/// Loads of residual vectors and where they come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LoadSource {
+    /// The six centrifugal loads.
+    Centrifugal,
+    /// Unit forces and torques at every interface.
+    Interfaces,
+    /// Nodal forces by matrix rows in a file.
+    File(MatrixLocation),
 }
 
 /// A matrix file and, for formats that hold several matrices, the group within it.
@@ -122,6 +137,8 @@ impl ModelFiles {
             dofs,
             interfaces: Vec::new(),
             damping: None,
+            geometric_stiffness: Vec::new(),
+            residual_vectors: Vec::new(),
             manifest: None,
         })
     }

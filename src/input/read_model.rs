@@ -7,7 +7,7 @@ use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
-use crate::model::{Damping, NodeSet, RawMatrix, RawModel};
+use crate::model::{Damping, GeometricStiffness, NodeSet, RawMatrix, RawModel};
 use crate::provenance::SourceFile;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -27,11 +27,12 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 /// and mechanics are the business of [`crate::model`].
 ///
 /// # Errors
-/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, interfaces.
+/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric stiffness,
+/// interfaces.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let opened = OpenFiles::new(files);
     let (parsed, fingerprints) = rayon::join(|| parse(files, &opened), || opened.fingerprints());
-    let Parsed { manifest, stiffness, mass, nodes, dofs, damping, interfaces } = parsed;
+    let Parsed { manifest, stiffness, mass, nodes, dofs, damping, geometric_stiffness, interfaces } = parsed;
 
     let mut diagnostics = Vec::new();
     manifest.unwrap_or_else(|found| collect(&mut diagnostics, found));
@@ -40,6 +41,8 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let nodes = take(&mut diagnostics, nodes);
     let dofs = dofs.and_then(|dofs| take(&mut diagnostics, dofs));
     let damping = damping.and_then(|damping| take(&mut diagnostics, damping));
+    let geometric_stiffness =
+        geometric_stiffness.into_iter().filter_map(|one| take(&mut diagnostics, one)).collect();
     let interfaces: Vec<NodeSet> =
         interfaces.into_iter().filter_map(|interface| take(&mut diagnostics, interface)).collect();
     diagnostics.extend(stiffness.as_ref().and_then(few_digits));
@@ -60,6 +63,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         dofs_path: files.dofs.clone().unwrap_or_default(),
         interfaces,
         damping,
+        geometric_stiffness,
         sources: sources(files, &fingerprints),
         diagnostics,
     })
@@ -82,6 +86,7 @@ struct Parsed {
     nodes: Found<crate::model::Nodes>,
     dofs: Option<Found<Vec<crate::model::DofLabel>>>,
     damping: Option<Found<Damping<RawMatrix>>>,
+    geometric_stiffness: Vec<Found<GeometricStiffness<RawMatrix>>>,
     interfaces: Vec<Found<NodeSet>>,
 }
 
@@ -115,8 +120,13 @@ fn parse(files: &ModelFiles, opened: &OpenFiles) -> Parsed {
     let interfaces = interfaces.collect();
     let damping = files.damping.as_ref();
     let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
+    let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
+        let matrix = matrix(&one.matrix, MatrixRole::GeometricStiffness)?;
+        Ok(GeometricStiffness { load: one.load.clone(), matrix })
+    });
+    let geometric_stiffness = geometric_stiffness.collect();
     let manifest = files.manifest.as_ref().map_or(Ok(()), |path| opened.get(path).map(|_| ()));
-    Parsed { manifest, stiffness, mass, nodes, dofs, damping, interfaces }
+    Parsed { manifest, stiffness, mass, nodes, dofs, damping, geometric_stiffness, interfaces }
 }
 
 fn read_opened(file: &InputFile, group: Option<&str>, role: MatrixRole) -> Result<RawMatrix> {
@@ -189,6 +199,8 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles.extend(files.dofs.as_deref().map(|path| ("dofs", path)));
     let damping = files.damping.as_ref().and_then(Damping::matrix);
     roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
+    let geometric = files.geometric_stiffness.iter().map(|one| one.matrix.path.as_path());
+    roles.extend(geometric.map(|path| (MatrixRole::GeometricStiffness.name(), path)));
     roles.extend(files.interfaces.iter().filter_map(|interface| match &interface.nodes {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),
         InterfaceNodes::Listed(_) => None,

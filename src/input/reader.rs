@@ -16,11 +16,13 @@ pub enum MatrixRole {
     Mass,
     /// D.
     Damping,
+    /// K_geo of a unit load.
+    GeometricStiffness,
 }
 
 impl MatrixRole {
     /// Every role.
-    pub const ALL: [Self; 3] = [Self::Stiffness, Self::Mass, Self::Damping];
+    pub const ALL: [Self; 4] = [Self::Stiffness, Self::Mass, Self::Damping, Self::GeometricStiffness];
 
     /// Its name in messages and in [`crate::provenance::SourceFile::role`].
     pub fn name(self) -> &'static str {
@@ -28,16 +30,18 @@ impl MatrixRole {
             Self::Stiffness => "stiffness",
             Self::Mass => "mass",
             Self::Damping => "damping",
+            Self::GeometricStiffness => "geometric_stiffness",
         }
     }
 
     /// Whether a matrix called `name` (any case) is meant to be this one: `K` or `stiffness`, `M` or `mass`, `D`
-    /// or `damping`.
+    /// or `damping`, `Kg` or `geometric_stiffness`.
     pub fn is_named(self, name: &str) -> bool {
         let letter = match self {
             Self::Stiffness => "k",
             Self::Mass => "m",
             Self::Damping => "d",
+            Self::GeometricStiffness => "kg",
         };
         name.eq_ignore_ascii_case(letter) || name.eq_ignore_ascii_case(self.name())
     }

@@ -2,6 +2,7 @@
 
 use super::Invariants;
 use super::dense::worst;
+use faer::Mat;
 use nalgebra::Vector3;
 
 /// Cauchy-Schwarz bounds of the entries of a body's invariants, in the inner product of its mass.
@@ -21,7 +22,12 @@ impl CauchySchwarz {
     /// the others, J_kk >= 2.2e-16 tr J.
     pub fn of(invariants: &Invariants) -> Self {
         let floor = f64::EPSILON * invariants.second_moment.trace();
-        let norm = |p| (0..3).map(|k| invariants.s[k][k][(p, p)]).sum::<f64>().max(0.0).sqrt();
+        let norm = |p| {
+            let moved = (0..3).map(|k| invariants.s[k][k][(p, p)]).sum::<f64>();
+            // Rotations of nodes carry mass that S does not have, and S mass that m_ff does not have.
+            let whole = invariants.general.as_ref().map_or(moved, |general| general.modal_mass[(p, p)]);
+            moved.max(whole).max(0.0).sqrt()
+        };
         Self {
             mass: invariants.mass,
             second_moment: invariants.second_moment.diagonal().map(|j| j.max(floor).max(0.0)),
@@ -29,7 +35,8 @@ impl CauchySchwarz {
         }
     }
 
-    /// |psi_p| = sqrt(m_ff,pp): 1 for a mass-normalised mode.
+    /// |psi_p| = sqrt(m_ff,pp): 1 for a mass-normalised mode. The larger of this and of sqrt(tr S_pp) when M does not commute with
+    /// rotations.
     pub fn mode(&self, p: usize) -> f64 {
         self.mode[p]
     }
@@ -87,7 +94,8 @@ pub(super) fn scaled(difference: f64, bound: f64) -> f64 {
 
 /// Largest difference of each primary quantity of two bodies of the same nodes, frame and basis, relative to the
 /// Cauchy-Schwarz bounds of `a`: `mass`, `first_moment`, `second_moment`, `C1`, `Ibar`, `S`, and
-/// `modal_stiffness` relative to sqrt(K_pp K_qq). NaN when a number is.
+/// `modal_stiffness` relative to sqrt(K_pp K_qq); `W0`, `W3` and `modal_mass` where M does not commute with rotations. NaN when a
+/// number is.
 ///
 /// Two independent evaluations agree to 1e-12 in all of them.
 ///
@@ -110,7 +118,11 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
     let k_ff = |(p, q)| {
         scaled(a.modal_stiffness[(p, q)] - b.modal_stiffness[(p, q)], (stiffness(p) * stiffness(q)).sqrt())
     };
-    let table = [
+    let entries = |x: Mat<f64>, y: Mat<f64>, bound: &dyn Fn(usize, usize) -> f64| {
+        let all = (0..x.nrows()).flat_map(|i| (0..x.ncols()).map(move |j| (i, j)));
+        all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))).fold(0.0, worst)
+    };
+    let mut table = vec![
         ("mass", scaled(a.mass - b.mass, a.mass.abs())),
         ("first_moment", (0..3).map(first).fold(0.0, worst)),
         ("second_moment", axes().map(second).fold(0.0, worst)),
@@ -119,5 +131,11 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         ("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, worst)),
         ("modal_stiffness", modes().map(k_ff).fold(0.0, worst)),
     ];
+    if a.general.is_some() || b.general.is_some() {
+        let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
+        table.push(("W0", entries(a.w0(), b.w0(), &|_, column| bound.c1(column % nf))));
+        table.push(("W3", entries(a.w3(), b.w3(), &by_modes)));
+        table.push(("modal_mass", entries(a.modal_mass(), b.modal_mass(), &by_modes)));
+    }
     table.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }

@@ -67,11 +67,10 @@ pub fn condense_certified(
     stiffness: &SymmetricMatrix,
     axes: &Matrix3<f64>,
 ) -> CertifiedInvariants {
-    assert_eq!(mass.n(), positions.len(), "rows of Ms and positions");
+    assert!(mass.n() >= positions.len(), "a row of Ms for every position");
     assert!(
-        shapes.nrows() == 3 * positions.len()
-            && (stiffness.n() == shapes.nrows() || stiffness.n() == 2 * positions.len()),
-        "rows of shapes: three per position; of the stiffness three or two"
+        shapes.nrows() == 3 * mass.n() && (stiffness.n() == shapes.nrows() || stiffness.n() == 2 * mass.n()),
+        "rows of shapes: three per row of Ms; of the stiffness three or two"
     );
     let (gram, gram_error) = mass_gram(mass, Columns { positions, shapes });
     let (modal, modal_error) = modal_stiffness(stiffness, axes, shapes);
@@ -106,7 +105,7 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
 
 /// Node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
 fn by_node(columns: Columns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
-    let mut rows = vec![[0.0; WIDTH]; columns.positions.len()];
+    let mut rows = vec![[0.0; WIDTH]; columns.rows()];
     rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
         columns.by_node(CHUNK * chunk, block.clone(), WIDTH, rows.as_flattened_mut());
     });

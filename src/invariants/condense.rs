@@ -29,12 +29,19 @@ type Lane = [f64; LANE];
 
 /// A symmetric mass on the nodes, the same for every direction.
 pub(super) trait NodalMass: Sync {
+    /// Number of rows.
+    fn count(&self) -> usize;
+
     /// Lane `lane` of row `i` of Ms X, for `x` with `lanes` lanes per node.
     fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane;
 }
 
 /// The consistent mass Ms.
 impl NodalMass for SymmetricMatrix {
+    fn count(&self) -> usize {
+        self.n()
+    }
+
     #[inline(always)] // compiled once per instruction set
     fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
         let mut sum = [0.0; LANE];
@@ -50,6 +57,10 @@ impl NodalMass for SymmetricMatrix {
 
 /// A diagonal (lumped) mass: one number per node.
 impl NodalMass for [f64] {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
     #[inline(always)] // compiled once per instruction set
     fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
         x[i * lanes + lane].map(|x| self[i] * x)
@@ -62,9 +73,10 @@ impl NodalMass for [f64] {
 /// S_kl = Psi_k' Ms Psi_l, for M = Ms kron I3.
 ///
 /// * `mass`: Ms (n x n). Unit: mass.
-/// * `positions`: n node positions in the frame that the result refers to. Unit: length. Any origin is
-///   right; digits are kept best with the origin at the centre of mass ([`super::choose_frame`]).
-/// * `shapes`: 3n x nf, row 3 i + k is component k of node i along the axes of the same frame; any basis.
+/// * `positions`: node positions in the frame that the result refers to. Unit: length. Any origin is
+///   right; digits are kept best with the origin at the centre of mass ([`super::choose_frame`]). Rows of Ms beyond them are
+///   vectors that rigid motion does not move (bubbles): their 1 and x are zero.
+/// * `shapes`: 3n x nf, row 3 i + k is component k of row i of Ms along the axes of the same frame; any basis.
 /// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
 ///
 /// J and the diagonal blocks S_kk are exactly symmetric and S_lk = S_kl' exactly. The result does not depend on
@@ -92,7 +104,7 @@ pub fn condense(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    assert_eq!(mass.n(), positions.len(), "rows of Ms and positions");
+    assert!(mass.n() >= positions.len(), "a row of Ms for every position");
     condense_with(mass, positions, shapes, modal_stiffness)
 }
 
@@ -104,7 +116,7 @@ pub(super) fn condense_with<M: NodalMass + ?Sized>(
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
     let nf = shapes.ncols();
-    assert_eq!(shapes.nrows(), 3 * positions.len(), "rows of the shapes: three per position");
+    assert_eq!(shapes.nrows(), 3 * mass.count(), "rows of the shapes: three per row of Ms");
     assert_eq!(
         (modal_stiffness.nrows(), modal_stiffness.ncols()),
         (nf, nf),
@@ -127,6 +139,7 @@ pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Inv
         ibar: array(|k| array(|l| (0..nf).map(|p| gram[(1 + k, psi(l, p))]).collect())),
         s: array(|k| array(|l| Mat::from_fn(nf, nf, |p, q| gram[(psi(k, p), psi(l, q))]))),
         modal_stiffness,
+        general: None,
     }
 }
 
@@ -135,7 +148,7 @@ pub(super) fn condense_rigid<M: NodalMass + ?Sized>(
     mass: &M,
     positions: &[[f64; 3]],
 ) -> (f64, Vector3<f64>, Matrix3<f64>) {
-    let no_modes = Mat::<f64>::zeros(3 * positions.len(), 0);
+    let no_modes = Mat::<f64>::zeros(3 * mass.count(), 0);
     rigid_part(weighted_gram(mass, Columns { positions, shapes: no_modes.as_ref() }).as_ref())
 }
 
@@ -149,7 +162,7 @@ fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
     std::array::from_fn(f)
 }
 
-/// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...].
+/// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]; 1, x, y, z are zero beyond the positions.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<'a> {
     pub positions: &'a [[f64; 3]],
@@ -161,9 +174,15 @@ impl Columns<'_> {
         4 + 3 * self.shapes.ncols()
     }
 
+    /// Rows of X.
+    pub fn rows(&self) -> usize {
+        self.shapes.nrows() / 3
+    }
+
     #[inline]
     pub fn get(&self, i: usize, column: usize) -> f64 {
         match column {
+            0..4 if i >= self.positions.len() => 0.0,
             0 => 1.0,
             1..4 => self.positions[i][column - 1],
             _ => self.shapes[(3 * i + (column - 4) % 3, (column - 4) / 3)],
@@ -239,7 +258,7 @@ pub(super) fn group_length(n: usize) -> usize {
 
 /// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the panel.
 fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Range<usize>) -> Mat<f64> {
-    let n = columns.positions.len();
+    let n = columns.rows();
     let lanes = panel.len().div_ceil(LANE);
     let (before, width) = (panel.start, lanes * LANE);
     let mut x = Aligned::zeros(n * width);

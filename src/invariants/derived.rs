@@ -82,8 +82,31 @@ impl Invariants {
         })
     }
 
-    /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew.
+    /// W0 (3 x 3nf): how modes move the coupling of translation and rotation, block b column j = -C1_j~ e_b or, for a mass that
+    /// does not commute with rotations, Phi_t' M B_j e_b. s~ = c~ - W0 Q.
+    pub fn w0(&self) -> Mat<f64> {
+        if let Some(general) = &self.general {
+            return general.w0.clone();
+        }
+        let nf = self.n_modes();
+        Mat::from_fn(3, 3 * nf, |k, column| {
+            let (b, p) = (column / nf, column % nf);
+            // (e_b x C1_p)_k
+            let (_, l, m) = CYCLIC[k];
+            match b {
+                _ if b == l => self.c1[(m, p)],
+                _ if b == m => -self.c1[(l, p)],
+                _ => 0.0,
+            }
+        })
+    }
+
+    /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew; B_i' M Psi for a mass that does not commute with
+    /// rotations.
     pub fn w3(&self) -> Mat<f64> {
+        if let Some(general) = &self.general {
+            return general.w3.clone();
+        }
         let nf = self.n_modes();
         Mat::from_fn(3 * nf, nf, |row, q| {
             let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
@@ -93,6 +116,9 @@ impl Invariants {
 
     /// m_ff (nf x nf) = S11 + S22 + S33 = Psi' M Psi: the identity for mass-normalised modes.
     pub fn modal_mass(&self) -> Mat<f64> {
+        if let Some(general) = &self.general {
+            return general.modal_mass.clone();
+        }
         let nf = self.n_modes();
         Mat::from_fn(nf, nf, |p, q| (0..3).map(|k| self.s[k][k][(p, q)]).sum())
     }

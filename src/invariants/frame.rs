@@ -2,6 +2,7 @@
 
 use super::condense::condense_rigid;
 use super::derived::inertia_of;
+use super::general::rigid_inertia;
 use super::principal_axes::principal_axes;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -105,32 +106,7 @@ pub fn choose_frame(
     positions: &[[f64; 3]],
     choice: BodyFrame,
 ) -> Result<(Frame, MassProperties)> {
-    assert_eq!(mass.n(), positions.len(), "rows of Ms and positions");
-    let centred =
-        |origin: Vector3<f64>, positions: &[[f64; 3]]| Frame { origin, ..Frame::model() }.to_body(positions);
-    let middle = bounding_box_middle(positions);
-    let around_middle = centred(middle, positions);
-    let (m, c, _) = condense_rigid(mass, &around_middle);
-    if !(m > 0.0 && m.is_finite()) {
-        let message = format!("the sum of the mass matrix over one direction is {m:e}");
-        return Err(Diagnostic::new(Code::MassNotPositive, message).into());
-    }
-    let offset = c / m;
-    let (_, c, j) = condense_rigid(mass, &centred(offset, &around_middle));
-    let inertia = inertia_of(&j);
-    if !(inertia.iter().all(|v| v.is_finite()) && offset.iter().all(|v| v.is_finite())) {
-        let message = "moments of the mass overflow: coordinates are not finite or beyond 1e150";
-        return Err(Diagnostic::new(Code::CoordinateNotFinite, message).into());
-    }
-    let centre_of_mass = middle + (offset + c / m);
-    let axes = principal_axes(&inertia);
-    let principal_moments = (axes.transpose() * inertia * axes).diagonal();
-    let frame = match choice {
-        BodyFrame::Principal => Frame { origin: centre_of_mass, axes },
-        BodyFrame::Com => Frame { origin: centre_of_mass, axes: Matrix3::identity() },
-        BodyFrame::Model => Frame::model(),
-    };
-    Ok((frame, MassProperties { mass: m, centre_of_mass, inertia, principal_moments }))
+    scalar_frame(mass, positions, choice, false)
 }
 
 /// The same for a body that stays in the plane z = 0: the third axis is z whatever the moments are, the first the axis of the
@@ -146,13 +122,73 @@ pub fn choose_plane_frame(
     positions: &[[f64; 3]],
     choice: BodyFrame,
 ) -> Result<(Frame, MassProperties)> {
-    let (mut frame, mut properties) = choose_frame(mass, positions, choice)?;
-    if choice == BodyFrame::Principal {
-        let first = frame.axes.column(0).into_owned();
-        frame.axes = Matrix3::from_columns(&[first, Vector3::z().cross(&first), Vector3::z()]);
-        properties.principal_moments = (frame.axes.transpose() * properties.inertia * frame.axes).diagonal();
+    scalar_frame(mass, positions, choice, true)
+}
+
+/// The same for any mass, given the matrix R'MR of its unit translations and unit rotations about a point in model coordinates:
+/// 6x6, of a body in the plane 3x3.
+///
+/// # Errors
+/// As [`choose_frame`].
+pub fn choose_general_frame(
+    rigid_mass: impl Fn([f64; 3]) -> Mat<f64>,
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+) -> Result<(Frame, MassProperties)> {
+    let plane = rigid_mass([0.0; 3]).ncols() == 3;
+    frame_of(positions, choice, plane, |middle, offset| {
+        rigid_inertia(rigid_mass((middle + offset).into()).as_ref())
+    })
+}
+
+fn scalar_frame(
+    mass: &SymmetricMatrix,
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+    plane: bool,
+) -> Result<(Frame, MassProperties)> {
+    assert!(mass.n() >= positions.len(), "a row of Ms for every position");
+    let about =
+        |origin: Vector3<f64>, positions: &[[f64; 3]]| Frame { origin, ..Frame::model() }.to_body(positions);
+    // Twice: what is left of far coordinates is small, and so is its rounding.
+    frame_of(positions, choice, plane, |middle, offset| {
+        condense_rigid(mass, &about(offset, &about(middle, positions)))
+    })
+}
+
+/// Finds the frame from mass, first and second moment about a point, which is the sum of the two given.
+fn frame_of(
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+    plane: bool,
+    rigid: impl Fn(Vector3<f64>, Vector3<f64>) -> (f64, Vector3<f64>, Matrix3<f64>),
+) -> Result<(Frame, MassProperties)> {
+    let middle = bounding_box_middle(positions);
+    let (m, c, _) = rigid(middle, Vector3::zeros());
+    if !(m > 0.0 && m.is_finite()) {
+        let message = format!("the sum of the mass matrix over one direction is {m:e}");
+        return Err(Diagnostic::new(Code::MassNotPositive, message).into());
     }
-    Ok((frame, properties))
+    let offset = c / m;
+    let (_, c, j) = rigid(middle, offset);
+    let inertia = inertia_of(&j);
+    if !(inertia.iter().all(|v| v.is_finite()) && offset.iter().all(|v| v.is_finite())) {
+        let message = "moments of the mass overflow: coordinates are not finite or beyond 1e150";
+        return Err(Diagnostic::new(Code::CoordinateNotFinite, message).into());
+    }
+    let centre_of_mass = middle + (offset + c / m);
+    let mut axes = principal_axes(&inertia);
+    if plane {
+        let first = axes.column(0).into_owned();
+        axes = Matrix3::from_columns(&[first, Vector3::z().cross(&first), Vector3::z()]);
+    }
+    let principal_moments = (axes.transpose() * inertia * axes).diagonal();
+    let frame = match choice {
+        BodyFrame::Principal => Frame { origin: centre_of_mass, axes },
+        BodyFrame::Com => Frame { origin: centre_of_mass, axes: Matrix3::identity() },
+        BodyFrame::Model => Frame::model(),
+    };
+    Ok((frame, MassProperties { mass: m, centre_of_mass, inertia, principal_moments }))
 }
 
 fn bounding_box_middle(positions: &[[f64; 3]]) -> Vector3<f64> {

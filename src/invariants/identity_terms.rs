@@ -27,7 +27,9 @@ pub(super) fn not_finite(body: &Invariants) -> f64 {
     let modal = entries(body.c1.as_ref()).chain(entries(body.modal_stiffness.as_ref()));
     let ibar = body.ibar.iter().flatten().flatten().copied();
     let s = body.s.iter().flatten().flat_map(|s| entries(s.as_ref()));
-    rigid.chain(modal).chain(ibar).chain(s).filter(|v| !v.is_finite()).count() as f64
+    let general = body.general.iter().flat_map(|g| [&g.w0, &g.w3, &g.modal_mass]);
+    let general = general.flat_map(|a| entries(a.as_ref()));
+    rigid.chain(modal).chain(ibar).chain(s).chain(general).filter(|v| !v.is_finite()).count() as f64
 }
 
 pub(super) fn second_moment_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
@@ -130,6 +132,28 @@ pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> 
         (3..6, 3..6) => i0[(i - 3, j - 3)],
         (3..6, _) => c2[(i - 3, j - 6)],
         _ => modal_mass[(i - 6, j - 6)],
+    })
+}
+
+/// Gram matrix of [Phi_t, B, Psi], the columns of unit size: kinetic energy is never negative, whatever the modes do.
+pub(super) fn velocity_gram_negative(body: &Invariants) -> f64 {
+    let nf = body.n_modes();
+    let (w0, w2, w3, modal_mass) = (body.w0(), body.w2(), body.w3(), body.modal_mass());
+    let size = |i: usize| match i {
+        0..3 => body.mass.sqrt(),
+        _ if i < 3 + 3 * nf => w2[(i - 3, i - 3)].max(0.0).sqrt(),
+        _ => modal_mass[(i - 3 - 3 * nf, i - 3 - 3 * nf)].max(0.0).sqrt(),
+    };
+    // A direction that moves no mass: its products are rounding of those of the others.
+    let largest = (0..3 * nf).map(|i| w2[(i, i)]).fold(0.0, f64::max).sqrt();
+    let floor = |i: usize| size(i).max(f64::EPSILON.sqrt() * largest);
+    unit_gram_negative(3 + 4 * nf, floor, |i, j| match (i, j) {
+        (0..3, 0..3) => body.mass * f64::from(u8::from(i == j)),
+        (0..3, _) if j < 3 + 3 * nf => w0[(i, j - 3)],
+        (0..3, _) => body.c1[(i, j - 3 - 3 * nf)],
+        _ if j < 3 + 3 * nf => w2[(i - 3, j - 3)],
+        _ if i < 3 + 3 * nf => w3[(i - 3, j - 3 - 3 * nf)],
+        _ => modal_mass[(i - 3 - 3 * nf, j - 3 - 3 * nf)],
     })
 }
 

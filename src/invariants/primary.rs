@@ -13,7 +13,7 @@ pub struct Invariants {
     pub mass: f64,
     /// First moment c_k = 1' Ms x_k. Unit: mass length.
     pub first_moment: Vector3<f64>,
-    /// Second moment J_kl = x_k' Ms x_l. Unit: mass length^2.
+    /// Second moment J_kl = x_k' Ms x_l, or tr(I0)/2 I - I0. Unit: mass length^2.
     pub second_moment: Matrix3<f64>,
     /// C1 (3 x nf) = 1' Ms Psi_k.
     pub c1: Mat<f64>,
@@ -23,4 +23,21 @@ pub struct Invariants {
     pub s: [[Mat<f64>; 3]; 3],
     /// K_ff (nf x nf) = Psi' K Psi.
     pub modal_stiffness: Mat<f64>,
+    /// What S and C1 do not determine when M does not commute with rotations.
+    pub general: Option<GeneralTerms>,
+}
+
+/// Terms of a mass matrix that does not commute with rotations (theory section 6), with Phi_t the unit translations and the
+/// rows of B_j those of -psi_j~ at displacements and zero at rotations.
+///
+/// J, Ibar and S of such a body are those that give its I0, W1, C2 and W2 by the formulas of theory section 2; no other
+/// formula may use them: W3, m_ff and the coupling of translation and rotation stand here.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GeneralTerms {
+    /// W0 (3 x 3nf): Phi_t' M B_j, column b nf + j for axis b. -C1_j~ when M commutes with rotations.
+    pub w0: Mat<f64>,
+    /// W3 (3nf x nf): B_i' M Psi, row b nf + i for axis b.
+    pub w3: Mat<f64>,
+    /// m_ff (nf x nf) = Psi' M Psi.
+    pub modal_mass: Mat<f64>,
 }

@@ -1,15 +1,17 @@
 //! How the primary data change with the frame and with the basis (theory section 5).
 
-use super::Invariants;
 use super::dense::{product, transpose_product};
+use super::general::{ibar_of, symmetrise};
+use super::{GeneralTerms, Invariants};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
 impl Invariants {
     /// The same body about the origin `d` (frame coordinates): x' = x - d.
     ///
-    /// c' = c - m d; J' = J - c d' - d c' + m d d'; Ibar'_kl = Ibar_kl - d_k C1_l; S unchanged. Cancels when d is
-    /// far compared with the body: to get data about the centre of mass, shift the coordinates and condense.
+    /// c' = c - m d; J' = J - c d' - d c' + m d d'; Ibar'_kl = Ibar_kl - d_k C1_l; S unchanged. For a mass that does not commute
+    /// with rotations, B_x' = B_x + Phi_t d~ gives W1' = W1 - d~ W0 - (d~ W0)' block by block and C2' = C2 - d~ C1. Cancels when d
+    /// is far compared with the body: to get data about the centre of mass, shift the coordinates and condense.
     pub fn shifted(&self, d: Vector3<f64>) -> Self {
         let c = &self.first_moment;
         let mixed = c * d.transpose();
@@ -17,10 +19,17 @@ impl Invariants {
         shifted.first_moment = c - self.mass * d;
         shifted.second_moment =
             self.second_moment - (mixed + mixed.transpose()) + d * d.transpose() * self.mass;
-        for (k, row) in shifted.ibar.iter_mut().enumerate() {
-            for (l, entry) in row.iter_mut().enumerate() {
-                for (p, value) in entry.iter_mut().enumerate() {
-                    *value -= d[k] * self.c1[(l, p)];
+        let w0 = self.w0();
+        for p in 0..self.n_modes() {
+            let w0 = Matrix3::from_fn(|k, b| w0[(k, b * self.n_modes() + p)]);
+            let c1 = Vector3::from_fn(|k, _| self.c1[(k, p)]);
+            let change = match self.general {
+                None => d * c1.transpose(),
+                Some(_) => ibar_of(&(d.cross_matrix() * w0), &(d.cross(&c1))),
+            };
+            for (k, row) in shifted.ibar.iter_mut().enumerate() {
+                for (l, entry) in row.iter_mut().enumerate() {
+                    entry[p] -= change[(k, l)];
                 }
             }
         }
@@ -49,8 +58,19 @@ impl Invariants {
             }),
             s: std::array::from_fn(|k| std::array::from_fn(|l| s(k, l))),
             modal_stiffness: self.modal_stiffness.clone(),
+            general: self.general.as_ref().map(|general| GeneralTerms {
+                w0: Mat::from_fn(3, 3 * nf, |k, column| {
+                    let (l, p) = (column / nf, column % nf);
+                    terms(k, l).map(|(a, b, r)| r * general.w0[(a, b * nf + p)]).sum()
+                }),
+                w3: Mat::from_fn(3 * nf, nf, |row, q| {
+                    let (k, p) = (row / nf, row % nf);
+                    (0..3).map(|a| axes[(a, k)] * general.w3[(a * nf + p, q)]).sum()
+                }),
+                modal_mass: general.modal_mass.clone(),
+            }),
         };
-        rotated.restore_symmetry();
+        symmetrise(&mut rotated.s);
         rotated
     }
 
@@ -77,21 +97,19 @@ impl Invariants {
             modal_stiffness: Mat::from_fn(t.ncols(), t.ncols(), |p, q| {
                 0.5 * (stiffness[(p, q)] + stiffness[(q, p)])
             }),
+            general: self.general.as_ref().map(|general| {
+                let block = |a: &Mat<f64>, row: usize| a.as_ref().subrows(row, nf).to_owned();
+                let w0 = [0, 1, 2].map(|b| product(general.w0.as_ref().subcols(b * nf, nf), t));
+                let w3 = [0, 1, 2].map(|b| congruent(&block(&general.w3, b * nf)));
+                let (nt, mass) = (t.ncols(), congruent(&general.modal_mass));
+                GeneralTerms {
+                    w0: Mat::from_fn(3, 3 * nt, |k, column| w0[column / nt][(k, column % nt)]),
+                    w3: Mat::from_fn(3 * nt, nt, |row, q| w3[row / nt][(row % nt, q)]),
+                    modal_mass: Mat::from_fn(nt, nt, |p, q| 0.5 * (mass[(p, q)] + mass[(q, p)])),
+                }
+            }),
         };
-        changed.restore_symmetry();
+        symmetrise(&mut changed.s);
         changed
-    }
-
-    /// Makes S_lk = S_kl' exact again after a transformation that rounds.
-    fn restore_symmetry(&mut self) {
-        for k in 0..3 {
-            for l in 0..=k {
-                let mean = Mat::from_fn(self.n_modes(), self.n_modes(), |p, q| {
-                    0.5 * (self.s[k][l][(p, q)] + self.s[l][k][(q, p)])
-                });
-                self.s[l][k] = mean.transpose().to_owned();
-                self.s[k][l] = mean;
-            }
-        }
     }
 }

@@ -31,4 +31,4 @@ pub use pencil::Pencil;
 pub use product::{multiply, sum_terms};
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
-pub use tall::{add_combination, column_products, combine, gram, subtract_combination};
+pub use tall::{add_combination, column_products, combine, gram, side_by_side, subtract_combination};

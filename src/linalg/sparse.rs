@@ -308,6 +308,44 @@ impl SymmetricMatrix {
         (0..self.n()).into_par_iter().with_min_len(COLUMNS).map(|i| self.0.get(i, i)).collect()
     }
 
+    /// Some rows, ascending, and the same columns.
+    ///
+    /// # Panics
+    /// When the rows do not ascend or go beyond the matrix.
+    pub fn principal(&self, rows: &[usize]) -> Self {
+        assert!(rows.is_sorted_by(|a, b| a < b), "rows ascend");
+        let n = rows.len();
+        let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
+        for &row in rows {
+            let (columns, entries) = self.row(row);
+            for (&j, &v) in columns.iter().zip(entries) {
+                if let Ok(local) = rows.binary_search(&(j as usize)) {
+                    row_idx.push(local as u32);
+                    values.push(v);
+                }
+            }
+            col_ptr.push(row_idx.len());
+        }
+        Self(CscMatrix { n_rows: n, n_cols: n, col_ptr, row_idx, values })
+    }
+
+    /// D A D for a diagonal D.
+    ///
+    /// # Panics
+    /// When D has another size.
+    pub fn scaled(&self, diagonal: &[f64]) -> Self {
+        assert_eq!(diagonal.len(), self.n(), "one factor per row");
+        let mut matrix = self.0.clone();
+        for j in 0..self.n() {
+            let range = self.0.col_ptr[j]..self.0.col_ptr[j + 1];
+            for (&i, v) in self.0.row_idx[range.clone()].iter().zip(&mut matrix.values[range]) {
+                // The product of the factors first: the same to the bit on both sides of the diagonal.
+                *v *= diagonal[i as usize] * diagonal[j];
+            }
+        }
+        Self(matrix)
+    }
+
     /// The matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` when one is not stored.
     pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut matrix = self.clone();

@@ -83,6 +83,17 @@ pub fn combine(v: MatRef<'_, f64>, h: MatRef<'_, f64>) -> Mat<f64> {
     out
 }
 
+/// The columns of all blocks, in their order.
+///
+/// # Panics
+/// When the row counts differ.
+pub fn side_by_side(blocks: &[MatRef<'_, f64>]) -> Mat<f64> {
+    let n = blocks.first().map_or(0, |block| block.nrows());
+    assert!(blocks.iter().all(|block| block.nrows() == n), "rows of blocks side by side");
+    let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
+    Mat::from_fn(n, columns.len(), |i, j| columns[j][i])
+}
+
 fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
     assert!(w.nrows() == v.nrows() && v.ncols() == h.nrows() && w.ncols() == h.ncols(), "tall product");
     let chunks = w.nrows().div_ceil(ROWS);

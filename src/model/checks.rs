@@ -1,16 +1,22 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
+use super::geometric_stiffness::{check_loads, missing_components};
 use super::interface::resolve_references;
 use super::layout::{Layout, layout, name_some};
-use super::mass_structure::scalar_mass;
-use super::rigid::{centre_and_length, rigid_count, rigid_fields, rigid_residuals};
-use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawMatrix, RawModel};
+use super::mass_structure::{MassForm, mass_form};
+use super::placeless::{check_massless, misplaced, recover};
+use super::rigid::{centre_and_length, rigid_count, rigid_residuals};
+use super::rigid_motion::{check_inertia, check_rigid_motion};
+use super::{BodyNumber, Damping, DofLabel, FeModel, GeometricStiffness, Nodes, RawMatrix, RawModel, Rows};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
-use crate::linalg::{SymmetricMatrix, connected_components};
+use crate::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::Path;
+
+/// Name of geometric stiffness in messages.
+const GEOMETRIC: &str = "geometric stiffness";
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -36,27 +42,18 @@ pub(super) struct Assembled {
     pub raw: RawModel,
     /// Nodes with degrees of freedom.
     pub nodes: Nodes,
-    /// K (d n x d n, d the dimension).
+    /// What the rows are; how those without a place move is not known yet.
+    pub rows: Rows,
+    /// K.
     pub stiffness: SymmetricMatrix,
-    /// M (d n x d n).
+    /// M.
     pub mass: SymmetricMatrix,
     /// Internal row of each matrix row; none when they are the same, or when this is one of several bodies.
     pub row_to_internal: Option<Vec<u32>>,
     /// Damping, a matrix in the same order.
     pub damping: Option<Damping<SymmetricMatrix>>,
-}
-
-impl Assembled {
-    /// Rows per node.
-    pub fn dimension(&self) -> usize {
-        usize::from(self.raw.dimension)
-    }
-
-    /// Label of an internal row.
-    fn label(&self, row: usize) -> DofLabel {
-        let d = self.dimension();
-        DofLabel { node: self.nodes.ids[row / d], direction: (row % d) as u8 + 1 }
-    }
+    /// Geometric stiffness, in the same order.
+    pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
 }
 
 /// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes so far.
@@ -76,12 +73,14 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     if let Some(problem) = raw.damping.as_ref().and_then(Damping::problem) {
         found.push(Diagnostic::new(Code::ManifestSyntax, problem));
     }
-    if let Some(damping) = raw.damping.as_ref().and_then(Damping::matrix) {
-        check_matrix(damping, "damping", &mut found);
-        let nd = damping.matrix.n_cols();
-        if nd != nk {
-            let message = format!("stiffness matrix has {nk} rows, damping matrix {nd}");
-            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&damping.path));
+    let damping = raw.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
+    let geometric = raw.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC));
+    for (other, name) in damping.into_iter().chain(geometric) {
+        check_matrix(other, name, &mut found);
+        let rows = other.matrix.n_cols();
+        if rows != nk {
+            let message = format!("stiffness matrix has {nk} rows, {name} matrix {rows}");
+            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&other.path));
         }
     }
     stop_on_error(&mut found)?;
@@ -90,6 +89,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let layout = layout(&raw, &mut found);
     stop_on_error(&mut found)?;
     let layout = layout.expect("a missing layout comes with an error");
+    let rows = &layout.rows;
     let nodes = Nodes {
         ids: layout.used.iter().map(|&i| raw.nodes.ids[i]).collect(),
         positions: layout.used.iter().map(|&i| raw.nodes.positions[i]).collect(),
@@ -117,14 +117,14 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
             found.push(Diagnostic::new(Code::InterfaceNode, message));
         }
     }
+    check_loads(&raw.geometric_stiffness, &raw.interfaces, dimension, &mut found);
     if nk <= rigid_count(dimension) {
         let message = format!("model has {nk} degrees of freedom");
         found.push(Diagnostic::new(Code::ModelTooSmall, message));
     }
     stop_on_error(&mut found)?;
 
-    let label =
-        |row: usize| DofLabel { node: nodes.ids[row / dimension], direction: (row % dimension) as u8 + 1 };
+    let label = |row: usize| rows.label(&nodes, row);
     let stiffness = symmetric(&mut raw.stiffness, &layout, "stiffness", label, &mut found);
     let mass = symmetric(&mut raw.mass, &layout, "mass", label, &mut found);
     let damping = raw.damping.take().and_then(|damping| {
@@ -136,6 +136,13 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         };
         damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
     });
+    let geometric_stiffness = std::mem::take(&mut raw.geometric_stiffness)
+        .into_iter()
+        .filter_map(|GeometricStiffness { load, mut matrix }| {
+            let matrix = symmetric(&mut matrix, &layout, GEOMETRIC, label, &mut found)?;
+            Some(GeometricStiffness { load, matrix })
+        })
+        .collect();
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -144,38 +151,99 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
-    Ok((Assembled { raw, nodes, stiffness, mass, row_to_internal, damping }, found))
+    let rows = layout.rows;
+    Ok((
+        Assembled { raw, nodes, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness },
+        found,
+    ))
 }
 
 /// The checks of a body: its mass, its connections, its rigid motion.
 pub(super) fn finish(
-    body: Assembled,
+    mut body: Assembled,
     number: Option<BodyNumber>,
     mut found: Vec<Diagnostic>,
 ) -> Result<CheckedModel> {
-    let label = |row: usize| body.label(row);
-    let raw = &body.raw;
-    let scalar = match scalar_mass(&body.mass, body.dimension(), block_tolerance(raw.mass.digits), label) {
-        Ok(scalar) => Some(scalar),
+    let digits = body.raw.mass.digits;
+    let form = match mass_form(&body.mass, &body.rows, block_tolerance(digits)) {
+        Ok(form) => Some(form),
         Err(diagnostic) => {
-            found.push(diagnostic.in_file(&raw.mass.path));
+            found.push(diagnostic.in_file(&body.raw.mass.path));
             None
         }
     };
     check_connections(&body, &mut found);
-    let rigid_residual = check_rigid_motion(&body.stiffness, &body.nodes, raw, label, &mut found);
+    if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        stop_on_error(&mut found)?;
+    }
+    let label = |row: usize| body.rows.label(&body.nodes, row);
+    if let Some(diagnostic) = misplaced(&body.rows) {
+        found.push(diagnostic.in_file(&body.raw.nodes_path));
+    }
+    if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+    }
+    let limit = rounding(body.raw.stiffness.digits, 3).max(1e-6);
+    let rigid_residual = check_rigid_motion(&body, limit, &mut found);
     check_rigid_damping(&body, &mut found);
+    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     stop_on_error(&mut found)?;
-    let scalar = scalar.expect("a missing mass comes with an error");
-    let scalar_mass = &scalar.matrix;
-    let diagonal_mass = (0..scalar_mass.n()).all(|i| scalar_mass.row(i).0.iter().all(|&j| j as usize == i));
-    if diagonal_mass {
+    let mut form = form.expect("a missing mass comes with an error");
+    // Vectors that rigid motion moves have no x of their own in the formulas for Ms.
+    form.commutes &= body.rows.are_still();
+    if !form.commutes {
+        check_inertia(&body, rounding(digits, 3).max(1e-9), &mut found);
+        stop_on_error(&mut found)?;
+    }
+    note_structure(&body, &form, &mut found);
+    check_plausibility(&form.scalar, &body.nodes, &body.raw, &mut found);
+    let diagonal_mass = is_diagonal(&body.mass);
+    let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
+    Ok(CheckedModel { model, diagnostics: found })
+}
+
+fn is_diagonal(m: &SymmetricMatrix) -> bool {
+    (0..m.n()).all(|i| m.row(i).0.iter().all(|&j| j as usize == i))
+}
+
+/// What kind of mass and of rows the body has, where it is not the plain one.
+fn note_structure(body: &Assembled, form: &MassForm, found: &mut Vec<Diagnostic>) {
+    let (raw, rows) = (&body.raw, &body.rows);
+    if is_diagonal(&body.mass) {
         let message = "mass matrix is diagonal: it was lumped before it came here";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }
-    check_plausibility(scalar_mass, &body.nodes, raw, &mut found);
-    let model = FeModel::new(body, scalar, rigid_residual, diagonal_mass, number);
-    Ok(CheckedModel { model, diagnostics: found })
+    let [vectors, others] = rows.without_place();
+    if !(vectors.is_empty() && others.is_empty()) {
+        let labels: Vec<DofLabel> =
+            vectors.clone().chain(others.clone()).map(|row| rows.label(&body.nodes, row)).collect();
+        let message = format!(
+            "{} rows have no coordinates: {} in {} vectors with mass, {} massless and condensed: {}",
+            labels.len(),
+            vectors.len(),
+            rows.vectors(),
+            others.len(),
+            name_some(&labels)
+        );
+        found.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&raw.nodes_path));
+    }
+    if !form.commutes {
+        let (a, b) = form.worst;
+        let label = |row| rows.label(&body.nodes, row);
+        let why = if form.deviation > block_tolerance(raw.mass.digits) {
+            let place = match a == b {
+                true => format!("at {}", label(a)),
+                false => format!("between {} and {}", label(a), label(b)),
+            };
+            let deviation = form.deviation;
+            format!("its blocks deviate by {deviation:.1e} from multiples of the identity, most {place}")
+        } else {
+            "rows that are no displacements of nodes carry mass".to_owned()
+        };
+        let message = format!("mass matrix does not commute with rotations: {why}");
+        found.push(Diagnostic::new(Code::MassBlockStructure, message).in_file(&raw.mass.path));
+    }
 }
 
 fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
@@ -263,8 +331,8 @@ fn symmetric(
             let i = i as usize;
             let other = ordered.get(j, i);
             one_sided += usize::from(other == 0.0);
-            let scale =
-                (size[i] * size[j]).max(if size[i] * size[j] > 0.0 { 0.0 } else { v.abs().max(other.abs()) });
+            // Beyond the diagonal, as only indefinite matrices go, an entry is compared with itself.
+            let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
             let difference = (v - other).abs() / scale;
             if difference > worst {
                 (worst, at) = (difference, (i, j));
@@ -329,19 +397,19 @@ fn check_diagonal(
 
 /// K and M together make one body, and K alone holds it together.
 fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
-    let Assembled { raw, nodes, stiffness, mass, .. } = body;
-    let component = connected_components(&[stiffness], body.dimension());
+    let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
+    let component = rows.components(&[stiffness]);
     if component.iter().all(|&c| c == 0) {
         return;
     }
-    let bodies = groups(&connected_components(&[stiffness, mass], body.dimension()), nodes);
+    let bodies = groups(&rows.components(&[stiffness, mass]), rows, nodes);
     if bodies.len() > 1 {
         let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
         found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
         return;
     }
     // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
-    let parts = groups(&component, nodes);
+    let parts = groups(&component, rows, nodes);
     let message = format!(
         "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
         parts.len(),
@@ -351,10 +419,10 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
 }
 
 /// Node numbers of every component, in the order of their first nodes.
-pub(super) fn groups(component: &[usize], nodes: &Nodes) -> Vec<Vec<i64>> {
+pub(super) fn groups(component: &[usize], rows: &Rows, nodes: &Nodes) -> Vec<Vec<i64>> {
     let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
-    for (&c, &id) in component.iter().zip(&nodes.ids) {
-        groups[c].push(id);
+    for (vertex, &c) in component.iter().enumerate() {
+        groups[c].push(rows.number(nodes, vertex));
     }
     groups
 }
@@ -368,51 +436,14 @@ pub(super) fn in_words(groups: &[Vec<i64>]) -> String {
     name_some(&groups.iter().map(group).collect::<Vec<_>>())
 }
 
-/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body.
-fn check_rigid_motion(
-    stiffness: &SymmetricMatrix,
-    nodes: &Nodes,
-    raw: &RawModel,
-    label: impl Fn(usize) -> DofLabel,
-    found: &mut Vec<Diagnostic>,
-) -> f64 {
-    let (centre, length) = centre_and_length(&nodes.positions);
-    let fields = rigid_fields(&nodes.positions, usize::from(raw.dimension), centre, length);
-    let residuals = rigid_residuals(stiffness, &fields);
-    let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
-    // Node tables written with few digits leave 1e-6 without harm; supports leave 0.01 to 1.
-    let limit = rounding(raw.stiffness.digits, 3).max(1e-6);
-    if worst > limit {
-        let mut rows: Vec<usize> = (0..residuals.len()).filter(|&i| residuals[i] > limit).collect();
-        rows.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]).then(a.cmp(&b)));
-        let named: Vec<String> =
-            rows.iter().map(|&i| format!("{} ({:.1e})", label(i), residuals[i])).collect();
-        let message = format!(
-            "K R is not zero for {} of {} rows: |K R| reaches {worst:.1e} of the row sum of |K| (allowed {limit:.0e}); worst: {}",
-            rows.len(),
-            residuals.len(),
-            name_some(&named)
-        );
-        let help = if rows.len() * 2 < residuals.len() {
-            "these degrees of freedom are supported or tied to ground: export the free body"
-        } else {
-            "nearly all rows fail: coordinates in other units or another node order than the matrices, or rotations labelled as displacements"
-        };
-        found.push(
-            Diagnostic::new(Code::RigidMotionStrained, message).in_file(&raw.stiffness.path).with_help(help),
-        );
-    }
-    worst
-}
-
 /// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     /// As much as node tables written with few digits leave.
     const LIMIT: f64 = 1e-6;
     let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
     let (centre, length) = centre_and_length(&body.nodes.positions);
-    let residuals =
-        rigid_residuals(damping, &rigid_fields(&body.nodes.positions, body.dimension(), centre, length));
+    let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
+    let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
     let damped = residuals.iter().filter(|r| **r > LIMIT).count();
     if damped > 0 {
         let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));

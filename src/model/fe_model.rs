@@ -1,24 +1,35 @@
-//! The checked model: every used node has d displacements (d: the dimension), DOF d i + k is direction k of node i.
+//! The checked model: every used node has d displacements (d: the dimension), row d i + k is direction k of node i; other
+//! rows follow as [`Rows`] has them.
 
 use super::checks::Assembled;
-use super::mass_structure::ScalarMass;
-use super::{BodyNumber, CheckedModel, Damping, DofLabel, NodeSet, Nodes, RawModel, check, check_bodies};
+use super::mass_structure::MassForm;
+use super::{
+    BodyNumber, CheckedModel, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, check,
+    check_bodies,
+};
 use crate::error::Result;
 use crate::linalg::{Pencil, SymmetricMatrix};
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
+use std::borrow::Cow;
 
-/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the order of `nodes`.
+/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the order of `nodes`, then
+/// what else [`rows`](FeModel::rows) says.
 #[derive(Debug, Clone)]
 pub struct FeModel {
     name: String,
-    dimension: usize,
     units: UnitSystem,
     nodes: Nodes,
+    rows: Rows,
     stiffness: SymmetricMatrix,
-    scalar_mass: SymmetricMatrix,
+    /// Ms, or what comes closest to it.
+    mean_mass: SymmetricMatrix,
+    /// M, where it is not Ms kron I_d.
+    whole_mass: Option<SymmetricMatrix>,
+    commutes: bool,
     damping: Option<Damping<SymmetricMatrix>>,
+    geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
     sources: Vec<SourceFile>,
     digits: u8,
@@ -49,25 +60,29 @@ impl FeModel {
 
     pub(super) fn new(
         body: Assembled,
-        mass: ScalarMass,
+        form: MassForm,
         rigid_residual: f64,
         diagonal_mass: bool,
         number: Option<BodyNumber>,
     ) -> Self {
-        let Assembled { raw, nodes, stiffness, damping, .. } = body;
+        let Assembled { raw, nodes, rows, stiffness, mass, damping, geometric_stiffness, .. } = body;
+        let scalar = form.commutes && rows.len() == rows.displacements();
         Self {
             digits: raw.stiffness.digits,
             name: raw.name,
-            dimension: usize::from(raw.dimension),
             units: raw.units,
             nodes,
+            rows,
             stiffness,
-            scalar_mass: mass.matrix,
+            mean_mass: form.scalar,
+            whole_mass: (!scalar).then_some(mass),
+            commutes: form.commutes,
             damping,
+            geometric_stiffness,
             interfaces: raw.interfaces,
             sources: raw.sources,
             rigid_residual,
-            mass_deviation: mass.deviation,
+            mass_deviation: form.deviation,
             diagonal_mass,
             row_to_internal: body.row_to_internal,
             number,
@@ -81,7 +96,7 @@ impl FeModel {
 
     /// 3, or 2 for a body in the plane: displacements per node.
     pub fn dimension(&self) -> usize {
-        self.dimension
+        self.rows.dimension
     }
 
     /// Units of all numbers.
@@ -94,24 +109,53 @@ impl FeModel {
         &self.nodes
     }
 
-    /// K (d n x d n), row d i + k.
+    /// K, row d i + k for direction k of node i, then the other rows.
     pub fn stiffness(&self) -> &SymmetricMatrix {
         &self.stiffness
     }
 
-    /// Ms (n x n): M = Ms kron I_d.
-    pub fn scalar_mass(&self) -> &SymmetricMatrix {
-        &self.scalar_mass
+    /// What the rows of the matrices are.
+    pub fn rows(&self) -> &Rows {
+        &self.rows
     }
 
-    /// Damping, where it was given; a matrix D is 3n x 3n, row 3 i + k.
+    /// Ms: M = Ms kron I_d for the displacements, of nodes and then of vectors without a place, and no other row carries
+    /// mass. `None` when M has no such form.
+    pub fn scalar_mass(&self) -> Option<&SymmetricMatrix> {
+        self.commutes.then_some(&self.mean_mass)
+    }
+
+    /// The mean over the directions of the mass between displacements of nodes (n x n): what lumping starts from.
+    pub fn nodal_mass(&self) -> Cow<'_, SymmetricMatrix> {
+        let n = self.nodes.len();
+        match self.rows.vectors() {
+            0 => Cow::Borrowed(&self.mean_mass),
+            _ => Cow::Owned(self.mean_mass.principal(&(0..n).collect::<Vec<_>>())),
+        }
+    }
+
+    /// Damping, where it was given; a matrix D has the rows of K.
     pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
         self.damping.as_ref()
     }
 
+    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows of K.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
+        &self.geometric_stiffness
+    }
+
     /// K and M.
     pub fn pencil(&self) -> Pencil<'_> {
-        Pencil::new(&self.stiffness, &self.scalar_mass, self.dimension)
+        match &self.whole_mass {
+            None => Pencil::new(&self.stiffness, &self.mean_mass, self.dimension()),
+            Some(mass) => Pencil::new(&self.stiffness, mass, 1),
+        }
+    }
+
+    /// The rigid fields (one row per row of K) about `centre`: translations, then rotations divided by `length`.
+    /// [`Rows::rigid_fields`].
+    pub fn rigid_fields(&self, centre: [f64; 3], length: f64) -> Mat<f64> {
+        self.rows.rigid_fields(&self.nodes.positions, centre, length)
     }
 
     /// Named node sets.
@@ -167,6 +211,6 @@ impl FeModel {
 
     /// Label of an internal row.
     pub fn label(&self, row: usize) -> DofLabel {
-        DofLabel { node: self.nodes.ids[row / self.dimension], direction: (row % self.dimension) as u8 + 1 }
+        self.rows.label(&self.nodes, row)
     }
 }

@@ -1,6 +1,6 @@
-//! The test M = Ms kron I_d, block by block (d: the dimension), and Ms itself.
+//! The test M = Ms kron I_d of the displacements, block by block (d: the dimension), and Ms itself.
 
-use super::DofLabel;
+use super::rows::Rows;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::linalg::{CscMatrix, SymmetricMatrix};
 use rayon::prelude::*;
@@ -10,25 +10,30 @@ use std::ops::Range;
 const NODES: usize = 2048;
 
 /// What the mass matrix turned out to be.
-pub(super) struct ScalarMass {
-    /// Ms: the mean of the directions.
-    pub matrix: SymmetricMatrix,
-    /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj).
+pub(super) struct MassForm {
+    /// Ms (nodes, then vectors without a place): the mean of the directions of their displacements.
+    pub scalar: SymmetricMatrix,
+    /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj), and where it is.
     pub deviation: f64,
+    pub worst: (usize, usize),
+    /// M = Ms kron I_d to rounding, and no other row carries mass.
+    pub commutes: bool,
 }
 
-/// Reduces M (d n x d n, internal order, symmetric, d = `dimension`) to Ms; `label` names a row for messages. Deviations up to `tolerance` are
-/// rounding.
-pub(super) fn scalar_mass(
-    m: &SymmetricMatrix,
-    dimension: usize,
-    tolerance: f64,
-    label: impl Fn(usize) -> DofLabel,
-) -> Result<ScalarMass, Diagnostic> {
-    let n = m.n() / dimension;
-    let chunks: Vec<Range<usize>> = (0..n).step_by(NODES).map(|i| i..(i + NODES).min(n)).collect();
-    let parts: Vec<([f64; 3], f64)> =
-        chunks.par_iter().map(|nodes| directional_mass(m, dimension, nodes.clone())).collect();
+/// Reduces the displacements of M (internal order, symmetric) to Ms. Deviations up to `tolerance` are rounding.
+///
+/// # Errors
+/// [`MassNotPositive`](Code::MassNotPositive), [`MassDirectional`](Code::MassDirectional).
+pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Result<MassForm, Diagnostic> {
+    let dimension = rows.dimension;
+    let displacements = rows.displacements();
+    let n = displacements / dimension;
+    let chunks =
+        |n: usize| -> Vec<Range<usize>> { (0..n).step_by(NODES).map(|i| i..(i + NODES).min(n)).collect() };
+    let parts: Vec<([f64; 3], f64)> = chunks(rows.nodes)
+        .into_par_iter()
+        .map(|nodes| directional_mass(m, dimension, dimension * rows.nodes, nodes))
+        .collect();
     let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
     for (part, part_magnitude) in parts {
         for (total, part) in totals.iter_mut().zip(part) {
@@ -51,11 +56,12 @@ pub(super) fn scalar_mass(
     }
     let diagonal = m.diagonal();
     let size = |d: &[f64]| d.iter().fold(0.0f64, |s, d| s.max(d.abs())).sqrt();
-    let sizes: Vec<f64> = diagonal.chunks_exact(dimension).map(size).collect();
+    let sizes: Vec<f64> = diagonal[..displacements].chunks_exact(dimension).map(size).collect();
     // Massless nodes have no scale of their own: compare with the mean nodal mass.
     let smallest = f64::EPSILON * mean / n as f64;
     let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
-    let parts: Vec<Part> = chunks.into_par_iter().map(|nodes| reduce(m, dimension, nodes, scale)).collect();
+    let parts: Vec<Part> =
+        chunks(n).into_par_iter().map(|nodes| reduce(m, dimension, displacements, nodes, scale)).collect();
     let entries = parts.iter().map(|part| part.row_idx.len()).sum();
     let (mut worst, mut worst_at) = (0.0f64, (0, 0));
     let mut col_ptr = Vec::with_capacity(n + 1);
@@ -70,28 +76,25 @@ pub(super) fn scalar_mass(
             (worst, worst_at) = (part.worst, part.worst_at);
         }
     }
-    if worst > tolerance {
-        let (a, b) = worst_at;
-        let message = format!(
-            "mass blocks deviate by {worst:.3e} from multiples of the identity (allowed {tolerance:.0e}), most between {} and {}",
-            label(a),
-            label(b)
-        );
-        return Err(Diagnostic::new(Code::MassBlockStructure, message));
-    }
     let csc = CscMatrix::from_parts(n, n, col_ptr, row_idx, values);
-    let matrix = SymmetricMatrix::new(csc)
+    let scalar = SymmetricMatrix::new(csc)
         .expect("the mean of entries is symmetric because each of them is, to the bit");
-    Ok(ScalarMass { matrix, deviation: worst })
+    let commutes = worst <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
+    Ok(MassForm { scalar, deviation: worst, worst: worst_at, commutes })
 }
 
-/// Sum of M along each direction over the rows of some nodes, and the mean of the sums of the absolute values.
-fn directional_mass(m: &SymmetricMatrix, dimension: usize, nodes: Range<usize>) -> ([f64; 3], f64) {
+/// Sum of M along each direction over the rows of some nodes and the columns up to `end`, and the mean of the sums of the absolute values.
+fn directional_mass(
+    m: &SymmetricMatrix,
+    dimension: usize,
+    end: usize,
+    nodes: Range<usize>,
+) -> ([f64; 3], f64) {
     let (mut totals, mut magnitude) = ([0.0f64; 3], 0.0f64);
     for node in nodes {
         for (k, total) in totals[..dimension].iter_mut().enumerate() {
             let (columns, values) = m.row(dimension * node + k);
-            for (&j, &v) in columns.iter().zip(values) {
+            for (&j, &v) in columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < end) {
                 if j as usize % dimension == k {
                     *total += v;
                     magnitude += v.abs() / dimension as f64;
@@ -112,17 +115,23 @@ struct Part {
     worst_at: (usize, usize),
 }
 
-/// Reduces the rows of some nodes; deviations are relative to `scale` of the two nodes.
+/// Reduces the rows of some nodes, the columns up to `end`; deviations are relative to `scale` of the two nodes.
 fn reduce(
     m: &SymmetricMatrix,
     dimension: usize,
+    end: usize,
     nodes: Range<usize>,
     scale: impl Fn(usize, usize) -> f64,
 ) -> Part {
     let d = dimension as u32;
     let mut part = Part::default();
     for node in nodes {
-        let rows: Vec<_> = (0..dimension).map(|k| m.row(dimension * node + k)).collect();
+        let row = |k: usize| {
+            let (columns, values) = m.row(dimension * node + k);
+            let count = columns.partition_point(|&j| (j as usize) < end);
+            (&columns[..count], &values[..count])
+        };
+        let rows: Vec<_> = (0..dimension).map(row).collect();
         let mut at = [0usize; 3];
         // The rows are merged: blocks come in the order of the other node.
         while let Some(other) = (0..dimension).filter_map(|k| rows[k].0.get(at[k])).min().map(|j| j / d) {

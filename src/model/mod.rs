@@ -3,19 +3,25 @@
 mod checks;
 mod damping;
 mod fe_model;
+mod geometric_stiffness;
 mod interface;
 mod layout;
 mod mass_structure;
 mod nodes;
+mod placeless;
 mod raw;
 mod rigid;
+mod rigid_motion;
+mod rows;
 mod several;
 
 pub use checks::{CheckedModel, check};
 pub use damping::{Damping, DampingBand};
 pub use fe_model::FeModel;
+pub use geometric_stiffness::{GeometricStiffness, LoadKind, UnitLoad};
 pub use interface::{Coupling, InterfaceMotion, NodeSet, Reference};
 pub use nodes::{DofLabel, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
 pub use rigid::{centre_and_length, rigid_count, rigid_fields};
+pub use rows::Rows;
 pub use several::{BodyNumber, check_bodies};

@@ -1,6 +1,6 @@
 //! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
 
-use super::{Damping, DofLabel, NodeSet, Nodes};
+use super::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes};
 use crate::diagnostic::Diagnostic;
 use crate::linalg::CscMatrix;
 use crate::provenance::SourceFile;
@@ -58,7 +58,9 @@ pub struct RawModel {
     pub interfaces: Vec<NodeSet>,
     /// Damping, where it is given; a matrix has the rows of K and M.
     pub damping: Option<Damping<RawMatrix>>,
-    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `manifest`), file name and SHA-256 (hex) of every file read.
+    /// Geometric stiffness of unit loads, with the rows of K and M.
+    pub geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>,
+    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Vec<SourceFile>,
     /// Warnings and notes of the readers; never an error.
     pub diagnostics: Vec<Diagnostic>,
@@ -82,6 +84,7 @@ impl RawModel {
             dofs_path: PathBuf::new(),
             interfaces: Vec::new(),
             damping: None,
+            geometric_stiffness: Vec::new(),
             sources: Vec::new(),
             diagnostics: Vec::new(),
         }

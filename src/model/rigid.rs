@@ -56,14 +56,20 @@ pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
     (centre, if length > 0.0 { length } else { 1.0 })
 }
 
-/// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij|, zero for empty rows. The fields have
-/// components of at most one, so that values near one mean a support and values near roundoff a free body.
-pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>) -> Vec<f64> {
+/// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows, with r_j the size that a field has
+/// at row j in general: values near one mean a support and values near roundoff a free body.
+pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {
     // Row by row: what a matrix entry needs lies in one or two cache lines.
-    let rows: Vec<[f64; 6]> = (0..k.n())
+    let rows: Vec<[f64; 7]> = (0..k.n())
         .into_par_iter()
         .with_min_len(1024)
-        .map(|i| std::array::from_fn(|c| if c < fields.ncols() { fields[(i, c)] } else { 0.0 }))
+        .map(|i| {
+            std::array::from_fn(|c| match c {
+                6 => sizes[i],
+                _ if c < fields.ncols() => fields[(i, c)],
+                _ => 0.0,
+            })
+        })
         .collect();
     (0..k.n())
         .into_par_iter()
@@ -73,8 +79,9 @@ pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>) -> Vec<f64
             let mut sums = [0.0; 6];
             let mut scale = 0.0;
             for (&j, &v) in columns.iter().zip(values) {
-                scale += v.abs();
-                for (sum, field) in sums.iter_mut().zip(&rows[j as usize]) {
+                let row = &rows[j as usize];
+                scale += v.abs() * row[6];
+                for (sum, field) in sums.iter_mut().zip(row) {
                     *sum += v * field;
                 }
             }

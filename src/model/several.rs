@@ -1,10 +1,10 @@
 //! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
 
 use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
-use super::{Damping, NodeSet, Nodes, RawModel};
+use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{Error, Result};
-use crate::linalg::{CscMatrix, SymmetricMatrix, connected_components};
+use crate::linalg::SymmetricMatrix;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
@@ -30,9 +30,9 @@ impl std::fmt::Display for BodyNumber {
 ///
 /// # Errors
 /// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
-/// [`ModelTooSmall`](Code::ModelTooSmall) for bodies of one or two nodes;
+/// [`ModelTooSmall`](Code::ModelTooSmall) for bodies with no more rows than rigid motions;
 /// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies;
-/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping matrix that couples bodies.
+/// [`BodiesCoupled`](Code::BodiesCoupled) for a damping or geometric stiffness matrix that couples bodies.
 pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     let (whole, shared) = assemble(raw)?;
     let bodies = match separate(whole) {
@@ -61,12 +61,14 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 
 /// The bodies, in the order of their first nodes.
 fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
-    let dimension = whole.dimension();
-    let Assembled { raw, nodes, stiffness, mass, damping, .. } = whole;
-    let component = connected_components(&[&stiffness, &mass], dimension);
-    let bodies = groups(&component, &nodes);
+    let Assembled { raw, nodes, rows, stiffness, mass, damping, geometric_stiffness, .. } = whole;
+    let component = rows.components(&[&stiffness, &mass]);
+    let bodies = groups(&component, &rows, &nodes);
     let mut found = Vec::new();
-    let small: Vec<Vec<i64>> = bodies.iter().filter(|body| body.len() <= 2).cloned().collect();
+    let members = rows.separated(&component);
+    let rigid = rigid_count(rows.dimension);
+    let few = bodies.iter().zip(&members).filter(|(_, (own, _))| own.len() <= rigid);
+    let small: Vec<Vec<i64>> = few.map(|(numbers, _)| numbers.clone()).collect();
     if !small.is_empty() {
         let message = format!(
             "{} of {} bodies have no flexible degree of freedom: {}",
@@ -81,40 +83,60 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
         );
     }
     let interfaces = distribute(&raw.interfaces, &component, &nodes, &mut found);
-    if let Some(matrix) = damping.as_ref().and_then(Damping::matrix) {
-        found.extend(coupling(matrix, &component, &nodes));
+    let damping_matrix = damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
+    let geometric =
+        geometric_stiffness.iter().map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
+    for (matrix, name) in damping_matrix.into_iter().chain(geometric) {
+        found.extend(coupling(matrix, &name, &component, &rows, &nodes));
+    }
+    let of = |row: usize| component[rows.vertex(row)];
+    for GeometricStiffness { load, matrix } in &geometric_stiffness {
+        let at = load.kind.interface();
+        let own = interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
+        let elsewhere = |b| (0..matrix.n()).find(|&row| of(row) != b && !matrix.row(row).0.is_empty());
+        if let Some((body, row)) = own.and_then(|b| Some((b + 1, elsewhere(b)?))) {
+            let (node, other) = (rows.label(&nodes, row).node, of(row) + 1);
+            let message = format!(
+                "geometric stiffness for {load} has entries at node {node} of body {other}, the interface belongs to body {body}"
+            );
+            found.push(Diagnostic::new(Code::BodiesCoupled, message));
+        }
     }
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
     }
-    // Place of every node within its body.
-    let mut next = vec![0u32; bodies.len()];
-    let local: Vec<u32> = component
-        .iter()
-        .map(|&c| {
-            next[c] += 1;
-            next[c] - 1
-        })
-        .collect();
-    let mut members = vec![Vec::new(); bodies.len()];
-    component.iter().enumerate().for_each(|(i, &c)| members[c].push(i));
-    let one = |(i, (own, interfaces)): (usize, (&Vec<usize>, Vec<NodeSet>))| Assembled {
-        raw: RawModel { name: format!("{}-{}", raw.name, i + 1), interfaces, ..raw.clone() },
-        nodes: Nodes {
-            ids: own.iter().map(|&node| nodes.ids[node]).collect(),
-            positions: own.iter().map(|&node| nodes.positions[node]).collect(),
-        },
-        stiffness: restricted(&stiffness, dimension, own, &local),
-        mass: restricted(&mass, dimension, own, &local),
-        row_to_internal: None,
-        damping: damping.as_ref().map(|damping| {
-            let Ok(own) = damping
-                .borrowed()
-                .try_map(|matrix| Ok::<_, Infallible>(restricted(matrix, dimension, own, &local)));
+    let mut own = vec![Nodes::default(); bodies.len()];
+    for (node, &body) in component.iter().enumerate().take(nodes.len()) {
+        own[body].ids.push(nodes.ids[node]);
+        own[body].positions.push(nodes.positions[node]);
+    }
+    let mut all = Vec::with_capacity(bodies.len());
+    for (i, ((kept, rows), (nodes, interfaces))) in
+        members.into_iter().zip(own.into_iter().zip(interfaces)).enumerate()
+    {
+        let damping = damping.as_ref().map(|damping| {
+            let principal = |matrix: &SymmetricMatrix| Ok::<_, Infallible>(matrix.principal(&kept));
+            let Ok(own) = damping.borrowed().try_map(principal);
             own
-        }),
-    };
-    Ok(members.iter().zip(interfaces).enumerate().map(one).collect())
+        });
+        // What a load does to the other bodies is nothing: no rows of it are theirs.
+        let geometric_stiffness = geometric_stiffness
+            .iter()
+            .map(|one| GeometricStiffness { load: one.load.clone(), matrix: one.matrix.principal(&kept) })
+            .filter(|one| one.matrix.as_csc().nnz() > 0)
+            .collect();
+        all.push(Assembled {
+            raw: RawModel { name: format!("{}-{}", raw.name, i + 1), interfaces, ..raw.clone() },
+            nodes,
+            rows,
+            stiffness: stiffness.principal(&kept),
+            mass: mass.principal(&kept),
+            row_to_internal: None,
+            damping,
+            geometric_stiffness,
+        });
+    }
+    Ok(all)
 }
 
 /// The interfaces of every body; a complaint about each that belongs to several.
@@ -148,28 +170,20 @@ fn distribute(
     own
 }
 
-/// A complaint when an entry of D couples two bodies.
-fn coupling(damping: &SymmetricMatrix, component: &[usize], nodes: &Nodes) -> Option<Diagnostic> {
-    let (a, b) = (0..damping.n()).find_map(|row| {
-        let other = |&column: &u32| (component[row / 3] != component[column as usize / 3]).then_some(column);
-        damping.row(row).0.iter().find_map(other).map(|column| (row / 3, column as usize / 3))
+/// A complaint when an entry of the matrix called `name` couples two bodies.
+fn coupling(
+    matrix: &SymmetricMatrix,
+    name: &str,
+    component: &[usize],
+    rows: &Rows,
+    nodes: &Nodes,
+) -> Option<Diagnostic> {
+    let of = |row: usize| component[rows.vertex(row)];
+    let (a, b) = (0..matrix.n()).find_map(|row| {
+        let other = |&column: &u32| (of(row) != of(column as usize)).then_some(column);
+        matrix.row(row).0.iter().find_map(other).map(|column| (row, column as usize))
     })?;
-    let place = |i: usize| format!("node {} of body {}", nodes.ids[i], component[i] + 1);
-    let message = format!("damping couples {} with {}", place(a), place(b));
+    let place = |row: usize| format!("node {} of body {}", rows.label(nodes, row).node, of(row) + 1);
+    let message = format!("{name} couples {} with {}", place(a), place(b));
     Some(Diagnostic::new(Code::BodiesCoupled, message))
-}
-
-/// Rows and columns of some nodes, ascending, that no other node is coupled to; `local` is the place of each.
-fn restricted(matrix: &SymmetricMatrix, dimension: usize, nodes: &[usize], local: &[u32]) -> SymmetricMatrix {
-    let d = dimension as u32;
-    let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
-    for column in nodes.iter().flat_map(|node| dimension * node..dimension * (node + 1)) {
-        let (rows, entries) = matrix.row(column);
-        row_idx.extend(rows.iter().map(|&row| d * local[(row / d) as usize] + row % d));
-        values.extend_from_slice(entries);
-        col_ptr.push(row_idx.len());
-    }
-    let n = dimension * nodes.len();
-    SymmetricMatrix::new(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
-        .expect("all entries of some rows and columns of a symmetric matrix")
 }

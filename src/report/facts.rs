@@ -1,6 +1,7 @@
 //! The facts of a body and of the run that made it, computed once; every format renders these.
 
 use super::completeness::Completeness;
+use super::geometric_stiffness::{GeometricStiffnessFacts, softening_hz};
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
@@ -8,6 +9,7 @@ use super::numbers::{counted, percent, significant};
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, Interface, MassStructure, Truncation};
+use crate::invariants::GENERAL_REMARK;
 use crate::provenance::{self, SourceFile};
 use serde::{Serialize, Serializer};
 
@@ -47,6 +49,8 @@ pub(super) struct ModelFacts {
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
+    /// What is not exact of a mass that does not commute with rotations.
+    pub approximation: Option<&'static str>,
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
@@ -121,6 +125,10 @@ pub(super) struct ModeFacts {
     pub worst_residual: f64,
     /// Where damping was given.
     pub damping: Option<DampingFacts>,
+    /// For each unit load.
+    pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
+    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where there is no geometric stiffness for spin.
+    pub softening_hz: Option<[Option<f64>; 3]>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -212,6 +220,8 @@ impl Facts {
                 truncation: body.modes().truncation.clone(),
                 damping_ratio: body.modes().damping_ratio.clone(),
                 damping: DampingFacts::of(body),
+                geometric_stiffness: GeometricStiffnessFacts::of(body),
+                softening_hz: softening_hz(body),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
             completeness: Completeness::of(body),
@@ -238,6 +248,7 @@ impl ModelFacts {
                 MassStructure::Diagonal => "diagonal",
                 MassStructure::General => "general",
             },
+            approximation: (source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK),
             units: UnitFacts {
                 length: units.length.name().to_owned(),
                 mass: units.mass.name().to_owned(),
@@ -259,7 +270,7 @@ impl ModelFacts {
         match self.mass_structure {
             "rotation-invariant" => "consistent mass",
             "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",
-            _ => "general mass matrix",
+            _ => "mass that does not commute with rotations",
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Facts;
 use super::bar_chart::bar_chart;
+use super::geometric_stiffness::{GeometricStiffnessFacts, softening_in_words};
 use super::guarantee::cut;
 use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
@@ -144,6 +145,12 @@ fn body(html: &mut String, facts: &Facts) {
             ("Units", escape(&units.in_words())),
         ],
     );
+    if let Some(remark) = model.approximation {
+        html.push_str(&format!(
+            "<p>The mass matrix does not commute with rotations: {}.</p>\n",
+            escape(remark)
+        ));
+    }
     if !model.interfaces.is_empty() {
         let rows: Vec<_> =
             model.interfaces.iter().map(|i| vec![escape(&i.name), escape(&i.in_words())]).collect();
@@ -184,6 +191,9 @@ fn modes(html: &mut String, facts: &Facts) {
     if let Some(damping) = &modes.damping {
         items.push(("Damping", escape(&sentence(&damping.in_words()))));
     }
+    if let Some(hertz) = &modes.softening_hz {
+        items.push(("Spin", escape(&sentence(&softening_in_words(hertz)))));
+    }
     terms(html, items);
     section(html, "Frequencies");
     // Without damping a column of zeros would say nothing.
@@ -223,6 +233,12 @@ fn modes(html: &mut String, facts: &Facts) {
         let rows: Vec<_> = modes.truncation.iter().map(row).collect();
         let caption = "Static responses: what the modes lack, in the norm of K";
         table(html, caption, &texts(["Load", "Free modes alone", "With residual vectors"]), &[0], &rows);
+    }
+    if !modes.geometric_stiffness.is_empty() {
+        let row = |g: &GeometricStiffnessFacts| vec![escape(&g.load), significant(g.relative_norm, 3)];
+        let rows: Vec<_> = modes.geometric_stiffness.iter().map(row).collect();
+        let caption = "Geometric stiffness: largest part by which one unit of the load changes the stiffness of a motion";
+        table(html, caption, &texts(["Load (body axes)", "Part"]), &[0], &rows);
     }
     if let Some(guarantee) = guarantee {
         let row = |(name, digits): &(&str, f64)| vec![escape(name), cut(*digits)];

@@ -5,6 +5,7 @@ mod clusters;
 mod comparison;
 mod completeness;
 mod facts;
+mod geometric_stiffness;
 mod guarantee;
 mod html;
 mod identities;

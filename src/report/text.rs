@@ -2,6 +2,7 @@
 
 use super::Facts;
 use super::facts::RunFacts;
+use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::diagnostic::Severity;
@@ -109,6 +110,9 @@ fn heading(page: &mut Page, facts: &Facts) {
         "model",
         &format!("{} nodes, {} degrees of freedom, {}", model.n_nodes, model.n_dofs, model.mass_in_words()),
     );
+    if let Some(remark) = model.approximation {
+        page.entry("", remark);
+    }
     if let Some(body) = &model.body {
         page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
     }
@@ -147,6 +151,10 @@ fn modes(page: &mut Page, facts: &Facts) {
     });
     if let Some(damping) = &modes.damping {
         page.entry("damping", &damping.in_words());
+    }
+    page.list("geometric", &modes.geometric_stiffness, |one| plain(&one.in_words()));
+    if let Some(hertz) = &modes.softening_hz {
+        page.entry("spin", &softening_in_words(hertz));
     }
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);

@@ -4,9 +4,10 @@ use super::scan::Scan;
 use super::schema::MASS_STRUCTURES;
 use super::value::Value;
 use crate::flex_body::{
-    Certificate, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source,
+    Certificate, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
+    LumpedBody, Modes, Parts, Source, UnitLoad,
 };
-use crate::invariants::{DIGITS, Invariants};
+use crate::invariants::{DIGITS, GeneralTerms, Invariants};
 use crate::model::{BodyNumber, Coupling, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -31,6 +32,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let modes = take.modes(nodes.len());
     let nf = modes.eigenvalue.len();
     let invariants = take.invariants("/invariants", nf);
+    let geometric_stiffness = take.geometric_stiffness(nf);
     let lumped = take.lumped(nf);
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
@@ -44,6 +46,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         nodes,
         modes,
         invariants,
+        geometric_stiffness,
         lumped,
         certificate,
         interfaces,
@@ -165,22 +168,51 @@ impl Take<'_> {
         let truncation = self.optional_json("/modes@truncation", "a JSON array of loads");
         let damping = "/invariants/modal_damping";
         let damped = self.scan.values.contains_key(damping);
+        let nf = eigenvalue.len();
+        let by_node = |shape: &[f64]| Mat::from_fn(3 * n, nf, |row, j| shape[j * 3 * n + row]);
+        let turned = self.scan.values.contains_key("/modes/rotation");
+        let rotation = turned.then(|| by_node(&self.floats("/modes/rotation")));
+        let internal = self.internal(nf);
         Modes {
             residual: self.floats("/modes/residual"),
             provenance,
             truncation,
             damping_ratio: self.floats("/modes/damping_ratio"),
-            modal_damping: damped.then(|| self.matrix(damping, eigenvalue.len())),
-            shape: Mat::from_fn(3 * n, eigenvalue.len(), |row, j| shape[j * 3 * n + row]),
+            modal_damping: damped.then(|| self.matrix(damping, nf)),
+            shape: by_node(&shape),
+            rotation,
+            internal,
             eigenvalue,
         }
+    }
+
+    /// Labels and values of the rows without a place, or neither.
+    fn internal(&mut self, nf: usize) -> Option<InternalRows> {
+        let [labels, values] = ["/modes/internal_dof", "/modes/internal"];
+        let there = [labels, values].map(|path| self.scan.values.contains_key(path));
+        if there != [true; 2] {
+            if there[0] != there[1] {
+                self.scan.add(format!("{labels} and {values}: expected both or none, found one"));
+            }
+            return None;
+        }
+        let dofs = self.ints(labels).as_chunks::<2>().0.to_vec();
+        Some(InternalRows { dofs, shape: self.matrix(values, nf) })
     }
 
     fn invariants(&mut self, place: &str, nf: usize) -> Invariants {
         let ibar = self.floats(&format!("{place}/Ibar"));
         let s = self.floats(&format!("{place}/S"));
         let block = |k: usize, l: usize| 3 * k + l;
+        // Elsewhere W3 and m_ff follow from S, and are compared with it.
+        let w0 = format!("{place}/W0");
+        let general = self.scan.values.contains_key(&w0).then(|| GeneralTerms {
+            w0: self.matrix(&w0, 3 * nf),
+            w3: self.matrix(&format!("{place}/W3"), nf),
+            modal_mass: self.matrix(&format!("{place}/modal_mass"), nf),
+        });
         Invariants {
+            general,
             mass: self.floats(&format!("{place}/mass"))[0],
             first_moment: Vector3::from_column_slice(&self.floats(&format!("{place}/first_moment"))),
             second_moment: Matrix3::from_row_slice(&self.floats(&format!("{place}/second_moment"))),
@@ -190,6 +222,19 @@ impl Take<'_> {
                 .map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| s[(block(k, l) * nf + i) * nf + j]))),
             modal_stiffness: self.matrix(&format!("{place}/modal_stiffness"), nf),
         }
+    }
+
+    fn geometric_stiffness(&mut self, nf: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
+        let mut out = Vec::new();
+        for (label, link) in self.scan.instances("/geometric_stiffness") {
+            let place = format!("/geometric_stiffness/{link}");
+            let matrix = self.matrix(&format!("{place}/stiffness"), nf);
+            match UnitLoad::from_label(&label) {
+                Some(load) => out.push(GeometricStiffness { load, matrix }),
+                None => self.scan.add(format!("{place}: expected a kind of load with its axis or name")),
+            }
+        }
+        out
     }
 
     fn lumped(&mut self, nf: usize) -> Vec<LumpedBody> {

@@ -1,8 +1,8 @@
 //! The checkpoint of a search for modes: a small HDF5 file of its own format, described in `docs/checkpoint.md`.
 
 use super::hdf5_value::{self, Sizes, Stored};
+use super::item::Extent;
 use super::read::open_sound;
-use super::schema::Extent;
 use super::write::{create, put_text, system_error};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::Snapshot;

@@ -1,8 +1,9 @@
 //! Entries that follow from others: what the file says against what the body gives.
 
 use super::hdf5_value::index;
+use super::item::{DERIVED_TOLERANCE, Group, Origin, Per};
 use super::scan::{Scan, key, place};
-use super::schema::{DERIVED_TOLERANCE, Group, Origin, Per, TABLE};
+use super::schema::TABLE;
 use super::value::{Value, View};
 use crate::diagnostic::Code;
 use crate::flex_body::Parts;
@@ -42,6 +43,9 @@ fn check_group(scan: &mut Scan, group: &Group, path: &str, view: &View<'_>) {
                 }
             }
             (Value::Int(a), Value::Int(b)) if a != b => scan.add(format!("{name}: expected {b}, found {a}")),
+            (Value::Text(a), Value::Text(b)) if a != b => {
+                scan.add(format!("{name}: expected `{b}`, found {a:?}"));
+            }
             _ => {}
         }
     }

@@ -1,6 +1,7 @@
 //! The table as documentation: `docs/format.md` and `schemas/flexbody-file.schema.json` are generated here.
 
-use super::schema::{DERIVED_TOLERANCE, Extent, FORMAT, Group, Item, Kind, MAJOR, MINOR, Origin, TABLE};
+use super::item::{DERIVED_TOLERANCE, Extent, Group, Item, Kind, Origin};
+use super::schema::{FORMAT, MAJOR, MINOR, TABLE};
 use super::value::Units;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -36,7 +37,7 @@ psi = h5read('body.flex.h5', '/modes/shape', [1 1 1], [3 Inf 1])';  % first mode
 
 const RULES: &str = "\
 A reader refuses a newer `format_major` and names the `generator`; a newer `format_minor` only adds entries, which older
-readers ignore. Names that are data (lumping schemes, interfaces) are percent-encoded where they hold `/`, `%`, control
+readers ignore. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
 characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
@@ -108,6 +109,7 @@ fn symbol(extent: Extent) -> String {
         Extent::ThreeModes => "3nf".to_owned(),
         Extent::InterfaceNodes => "k".to_owned(),
         Extent::Coordinates => "nc".to_owned(),
+        Extent::InternalRows => "m".to_owned(),
     }
 }
 
@@ -122,7 +124,7 @@ pub fn format_schema() -> String {
         let mut target = &mut root;
         for name in group.path.split('/').filter(|name| !name.is_empty()) {
             let key = if name.starts_with('<') { "additionalProperties" } else { name };
-            target = descend(target, key, !group.is_optional());
+            target = descend(target, key, group.since() == 0);
         }
         fill(target, group);
     }
@@ -137,7 +139,8 @@ pub fn format_schema() -> String {
     text
 }
 
-/// Schema of the member group `key`, made when it is not there yet.
+/// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those that are not
+/// required.
 fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));

@@ -2,7 +2,7 @@
 //!
 //! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
 
-use super::schema::Extent;
+use super::item::Extent;
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
@@ -24,6 +24,7 @@ pub(super) struct Sizes {
     modes: Option<usize>,
     pub interface_nodes: Option<usize>,
     coordinates: Option<usize>,
+    pub internal_rows: Option<usize>,
 }
 
 /// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
@@ -39,22 +40,19 @@ impl Stored {
     }
 }
 
+/// What [`open_group`] finds where no group is.
+pub(super) const NOTHING: &str = "nothing";
+
 /// Opens a group by its absolute path through hard links only: a file must not lead out of itself.
 pub(super) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> {
     let mut group = file.as_group().map_err(|e| e.to_string())?;
     for name in path.split('/').filter(|name| !name.is_empty()) {
         if !has(&group, name)? {
-            return Err("nothing".to_owned());
+            return Err(NOTHING.to_owned());
         }
         group = group.group(name).map_err(|_| "another object".to_owned())?;
     }
     Ok(group)
-}
-
-/// Whether a group lies in the root group.
-pub(super) fn has_group(file: &hdf5::File, path: &str) -> Result<bool, String> {
-    let root = file.as_group().map_err(|e| e.to_string())?;
-    has(&root, path.trim_start_matches('/'))
 }
 
 /// Names of the members of a group, in creation order where the file tracks it.
@@ -166,6 +164,7 @@ impl Sizes {
             Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
             Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
+            Extent::InternalRows => size == *self.internal_rows.get_or_insert(size),
         }
     }
 
@@ -181,6 +180,7 @@ impl Sizes {
             Extent::ThreeModes => known("3 nf", self.modes.map(|nf| 3 * nf)),
             Extent::InterfaceNodes => known("k", self.interface_nodes),
             Extent::Coordinates => known("nc", self.coordinates),
+            Extent::InternalRows => known("m", self.internal_rows),
         }
     }
 }

@@ -7,6 +7,7 @@ mod derived;
 mod document;
 mod hdf5_value;
 mod heap;
+mod item;
 mod names;
 mod read;
 mod scan;

@@ -1,10 +1,19 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
 
-use super::value::{Units, Value, View, count, matrix, rows, small, text};
-use crate::flex_body::{Guarantee, Interface, LumpedBody, MassStructure, Parts};
+use super::item::Extent::{Fixed, InternalRows, Modes, Nodes, ThreeModes};
+use super::item::Kind::{Floats, Int, Ints, Named, Text};
+use super::item::Origin::{ConstantInt, ConstantText, Primary};
+use super::item::{Get, Group, Item, Kind, Origin, Per};
+use super::value::{Units, Value, count, matrix, rows, shape_rows, small, text};
+use crate::flex_body::MassStructure;
+use crate::invariants::GENERAL_REMARK;
 use crate::provenance;
+use certificate::{CERTIFICATE, INVARIANT_DIGITS, guarantee};
+use geometric_stiffness::GEOMETRIC_STIFFNESS;
 use interfaces::{COORDINATES, INTERFACES};
 
+mod certificate;
+mod geometric_stiffness;
 mod interfaces;
 
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
@@ -14,92 +23,6 @@ pub(super) const MINOR: i64 = 2;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
-/// One extent of a dataset's shape.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Extent {
-    Fixed(usize),
-    /// n, the nodes of the body.
-    Nodes,
-    /// nf, the modes.
-    Modes,
-    /// 3 nf.
-    ThreeModes,
-    /// Nodes of the group's interface.
-    InterfaceNodes,
-    /// nc, the interface coordinates.
-    Coordinates,
-}
-use Extent::{Coordinates, Fixed, InterfaceNodes, Modes, Nodes, ThreeModes};
-
-/// How an entry is stored.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Kind {
-    /// Dataset of 64-bit floats.
-    Floats(&'static [Extent]),
-    /// Dataset of 64-bit signed integers.
-    Ints(&'static [Extent]),
-    /// Attribute: UTF-8 text of variable length.
-    Text,
-    /// Attribute: 64-bit signed integer.
-    Int,
-    /// Attribute: 64-bit float.
-    Float,
-    /// Attributes, 64-bit floats, whose names are data.
-    Named,
-}
-use Kind::{Float, Floats, Int, Ints, Named, Text};
-
-/// Takes the value of an entry from a body; `None` only for entries that are not required.
-pub(super) type Get = fn(&View<'_>) -> Option<Value>;
-
-/// Where the value of an entry comes from.
-#[derive(Clone, Copy)]
-pub(super) enum Origin {
-    /// The same text in every file; a reader refuses others.
-    ConstantText(&'static str),
-    /// The same integer in every file; a reader refuses others.
-    ConstantInt(i64),
-    /// Information of its own.
-    Primary(Get),
-    /// Follows from the primary entries; the reader recomputes it. Floats agree to [`DERIVED_TOLERANCE`] of the
-    /// largest magnitude in the named dataset of the same group, everything else exactly.
-    Derived(Get, &'static str),
-}
-use Origin::{ConstantInt, ConstantText, Derived, Primary};
-
-/// This program's files agree to the last bit; other writers may evaluate W1, W2, W3 by themselves, and 1e-12 is what
-/// independent evaluations of the invariants reach.
-pub(super) const DERIVED_TOLERANCE: f64 = 1e-12;
-
-/// How often a group occurs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Per {
-    Body,
-    LumpingScheme,
-    Interface,
-}
-
-/// A dataset or attribute.
-pub(super) struct Item {
-    pub name: &'static str,
-    pub kind: Kind,
-    pub units: Units,
-    pub symbol: &'static str,
-    pub description: &'static str,
-    pub required: bool,
-    /// Minor version of the format that brought it.
-    pub since: i64,
-    pub origin: Origin,
-}
-
-/// A group with its entries. `<scheme>` and `<name>` stand for names that are data.
-pub(super) struct Group {
-    pub path: &'static str,
-    pub per: Per,
-    pub description: &'static str,
-    pub items: &'static [&'static [Item]],
-}
-
 const ONE: Units = Units::One;
 const MASS: Units = Units::Of { mass_halves: 2, length: 0, time: 0 };
 const LENGTH: Units = Units::Of { mass_halves: 0, length: 1, time: 0 };
@@ -108,6 +31,7 @@ const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
 const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
 const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
 const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
+const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
 const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
 const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 
@@ -137,90 +61,6 @@ const fn attribute(
 /// A required attribute of version 1.0 with one value for every file.
 const fn constant(name: &'static str, kind: Kind, origin: Origin, description: &'static str) -> Item {
     Item { name, kind, units: ONE, symbol: "", description, required: true, since: 0, origin }
-}
-
-impl Item {
-    const fn derived(mut self, from: &'static str) -> Self {
-        if let Primary(get) = self.origin {
-            self.origin = Derived(get, from);
-        }
-        self
-    }
-
-    const fn optional(mut self) -> Self {
-        self.required = false;
-        self
-    }
-
-    /// Optional, and an addition of a minor version.
-    const fn added(mut self, minor: i64) -> Self {
-        self.since = minor;
-        self.optional()
-    }
-
-    /// The entry's value for a body.
-    pub fn value(&self, view: &View<'_>) -> Option<Value> {
-        match self.origin {
-            ConstantText(value) => text(value),
-            ConstantInt(value) => Some(Value::Int(value)),
-            Primary(get) | Derived(get, _) => get(view),
-        }
-    }
-
-    /// Shape of a dataset; `None` for attributes.
-    pub fn shape(&self) -> Option<&'static [Extent]> {
-        match self.kind {
-            Floats(shape) | Ints(shape) => Some(shape),
-            Text | Int | Float | Named => None,
-        }
-    }
-
-    /// Extents of a dataset for a body.
-    pub fn dims(&self, view: &View<'_>) -> Vec<usize> {
-        let nf = view.body.modes.eigenvalue.len();
-        let size = |extent: &Extent| match *extent {
-            Fixed(size) => size,
-            Nodes => view.body.nodes.len(),
-            Modes => nf,
-            ThreeModes => 3 * nf,
-            InterfaceNodes => view.interface_nodes().len(),
-            Coordinates => view.body.coordinates.as_ref().map_or(0, |c| c.names.len()),
-        };
-        self.shape().unwrap_or(&[]).iter().map(size).collect()
-    }
-}
-
-impl Group {
-    /// All entries, in the order of the table.
-    pub fn entries(&self) -> impl Iterator<Item = &'static Item> + use<> {
-        self.items.iter().flat_map(|part| part.iter())
-    }
-
-    /// Whether a file may do without it: it brings nothing that is required, and is no list of others.
-    pub fn is_optional(&self) -> bool {
-        self.per == Per::Body && self.entries().all(|item| !item.required)
-    }
-
-    /// Path without the last name.
-    pub fn parent(&self) -> &'static str {
-        self.path.rfind('/').map_or(self.path, |i| &self.path[..i])
-    }
-
-    /// The groups of a body that this one stands for, with their names where these are data.
-    pub fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<&'a str>, View<'a>)> {
-        let view = View { body, lumped: None, interface: None };
-        match self.per {
-            Per::Body => vec![(None, view)],
-            Per::LumpingScheme => {
-                let one = |l: &'a LumpedBody| (Some(l.scheme.as_str()), View { lumped: Some(l), ..view });
-                body.lumped.iter().map(one).collect()
-            }
-            Per::Interface => {
-                let one = |i: &'a Interface| (Some(i.name.as_str()), View { interface: Some(i), ..view });
-                body.interfaces.iter().map(one).collect()
-            }
-        }
-    }
 }
 
 const ROOT: &[Item] = &[
@@ -292,9 +132,18 @@ const SOURCE: &[Item] = &[
         "mass_structure",
         Text,
         ONE,
-        "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither",
+        "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither, and `/invariants/W0` is there",
         |v| text(mass_structure_name(v.body.source.mass_structure)),
     ),
+    attribute(
+        "approximation",
+        Text,
+        ONE,
+        "what stays approximate for the mass structure `general`; absent: nothing, the invariants are those of the matrices",
+        |v| text((v.body.source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK)?),
+    )
+    .derived("")
+    .added(2),
     attribute("settings", Text, ONE, "settings of the run that can change the result, as JSON", |v| {
         text(v.body.source.settings.to_string())
     }),
@@ -428,8 +277,35 @@ const MODES: &[Item] = &[
         PER_ROOT_MASS,
         "Psi",
         "mass-normalised mode shapes: displacement of every node in body axes; the largest component of each mode is positive",
-        |v| Some(v.shape_rows(0..v.body.nodes.len())),
+        |v| Some(shape_rows(&v.body.modes.shape, 0..v.body.nodes.len())),
     ),
+    dataset(
+        "rotation",
+        Floats(&[Modes, Nodes, Fixed(3)]),
+        PER_ROOT_MASS_LENGTH,
+        "theta",
+        "rotation of every node in body axes, zero where the model has none; absent: a model of displacements",
+        |v| Some(shape_rows(v.body.modes.rotation.as_ref()?, 0..v.body.nodes.len())),
+    )
+    .added(2),
+    dataset(
+        "internal_dof",
+        Ints(&[InternalRows, Fixed(2)]),
+        ONE,
+        "",
+        "number and direction (1 to 6) that label each row of the FE model without coordinates",
+        |v| Some(Value::Ints(v.body.modes.internal.as_ref()?.dofs.as_flattened().to_vec())),
+    )
+    .added(2),
+    dataset(
+        "internal",
+        Floats(&[InternalRows, Modes]),
+        ONE,
+        "",
+        "the modes at these rows, as the FE model scales them; vectors (three rows) in body axes",
+        |v| matrix(v.body.modes.internal.as_ref()?.shape.as_ref()),
+    )
+    .added(2),
 ];
 
 const INVARIANTS: &[Item] = &[
@@ -456,6 +332,10 @@ const INVARIANTS: &[Item] = &[
         small(v.invariants().inertia())
     })
     .derived("second_moment"),
+    dataset("W0", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS, "W0", "mass structure `general` only: Phi_t' M B_j, column b nf + j; else block b is (-C1~) e_b", |v| {
+        matrix(v.invariants().general.as_ref()?.w0.as_ref())
+    })
+    .added(2),
     dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
         matrix(v.invariants().w1().as_ref())
     })
@@ -464,7 +344,7 @@ const INVARIANTS: &[Item] = &[
         matrix(v.invariants().w2().as_ref())
     })
     .derived("S"),
-    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j", |v| {
+    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general`: B_j' M Psi, information of its own", |v| {
         matrix(v.invariants().w3().as_ref())
     })
     .derived("S"),
@@ -472,7 +352,7 @@ const INVARIANTS: &[Item] = &[
         matrix(v.invariants().c2().as_ref())
     })
     .derived("Ibar"),
-    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33", |v| matrix(v.invariants().modal_mass().as_ref()))
+    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33 = Psi' M Psi; mass structure `general`: information of its own", |v| matrix(v.invariants().modal_mass().as_ref()))
         .derived("S"),
 ];
 
@@ -495,111 +375,6 @@ const COMPARISON: &[Item] =
     &[attribute("<norm>", Named, ONE, "one attribute per error norm, in creation order", |v| {
         Some(Value::Named(v.lumped?.comparison.clone()))
     })];
-
-const CERTIFICATE: &[Item] = &[
-    attribute(
-        "proved",
-        Int,
-        ONE,
-        "1: the inertia count proves that no mode is missing; 0: not proved",
-        |v| Some(Value::Int(v.body.certificate.proved_modes.is_some().into())),
-    )
-    .derived(""),
-    attribute(
-        "proved_modes",
-        Int,
-        ONE,
-        "flexible modes below `shift` that the count proves; absent: not proved",
-        |v| v.body.certificate.proved_modes.and_then(count),
-    )
-    .optional(),
-    attribute("shift", Float, PER_TIME2, "shift sigma of the count", |v| {
-        Some(Value::Float(v.body.certificate.shift))
-    }),
-    attribute(
-        "negative_pivots",
-        Int,
-        ONE,
-        "negative pivots of K - sigma M: rigid and flexible modes below sigma; absent: not counted",
-        |v| v.body.certificate.negative_pivots.and_then(count),
-    )
-    .optional(),
-    attribute("rigid_modes", Int, ONE, "number of rigid modes", |v| count(v.body.certificate.rigid_modes)),
-    attribute(
-        "remark",
-        Text,
-        ONE,
-        "why the proof is missing or what limits it; empty when nothing does",
-        |v| text(v.body.certificate.remark.as_str()),
-    ),
-    attribute(
-        "rigid_noise",
-        Float,
-        ONE,
-        "largest |lambda| of the exact rigid modes over the first flexible lambda: the input's noise floor",
-        |v| Some(Value::Float(v.body.certificate.rigid_noise)),
-    ),
-    attribute(
-        "rigid_residual",
-        Float,
-        ONE,
-        "max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix",
-        |v| Some(Value::Float(v.body.certificate.rigid_residual)),
-    ),
-    attribute(
-        "shift_below",
-        Float,
-        PER_TIME2,
-        "shift sigma of a second count, between the rigid modes and the first flexible one; accuracy `certified` only",
-        |v| Some(Value::Float(guarantee(v)?.shift_below)),
-    )
-    .added(1),
-    attribute(
-        "negative_pivots_below",
-        Int,
-        ONE,
-        "negative pivots of K - shift_below M: the number of rigid modes; accuracy `certified` only",
-        |v| count(guarantee(v)?.pivots_below),
-    )
-    .added(1),
-];
-
-fn guarantee<'a>(view: &View<'a>) -> Option<&'a Guarantee> {
-    view.body.certificate.guarantee.as_ref()
-}
-
-/// One attribute per invariant, in the order of [`crate::invariants::DIGITS`].
-macro_rules! digits {
-    ($($index:literal $name:literal,)*) => {
-        &[$(attribute(
-            concat!("digits_", $name),
-            Float,
-            ONE,
-            concat!(
-                "guaranteed digits of `/invariants/", $name,
-                "`: -log10 of the rounding of its worst entry, relative to the Cauchy-Schwarz bound; accuracy `certified` only"
-            ),
-            |v| Some(Value::Float(guarantee(v)?.digits[$index])),
-        )
-        .added(1),)*]
-    };
-}
-
-const INVARIANT_DIGITS: &[Item] = digits![
-    0 "mass",
-    1 "first_moment",
-    2 "second_moment",
-    3 "C1",
-    4 "Ibar",
-    5 "S",
-    6 "modal_stiffness",
-    7 "I0",
-    8 "W1",
-    9 "W2",
-    10 "W3",
-    11 "C2",
-    12 "modal_mass",
-];
 
 const TERMS: &[Item] = &[
     constant("W1", Text, ConstantText("kept"), "kinetic-energy group W1 in this version"),
@@ -662,6 +437,12 @@ pub(super) const TABLE: &[Group] = &[
         description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",
         items: &[COORDINATES],
     },
+    Group {
+        path: "/geometric_stiffness/<load>",
+        per: Per::UnitLoad,
+        description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
+        items: &[GEOMETRIC_STIFFNESS],
+    },
 ];
 
 /// Names of the mass structures in the file.
@@ -673,17 +454,4 @@ pub(super) const MASS_STRUCTURES: [(&str, MassStructure); 3] = [
 
 fn mass_structure_name(structure: MassStructure) -> &'static str {
     MASS_STRUCTURES.iter().find(|(_, s)| *s == structure).map_or("general", |(name, _)| name)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::invariants::DIGITS;
-
-    #[test]
-    fn digits_are_named_as_their_invariants() {
-        let names: Vec<_> = INVARIANT_DIGITS.iter().map(|i| i.name.trim_start_matches("digits_")).collect();
-        assert_eq!(names, DIGITS);
-        assert!(DIGITS.iter().all(|name| INVARIANTS.iter().any(|item| item.name == *name)));
-    }
 }

@@ -1,9 +1,9 @@
 //! What an entry of the table holds, and where the writer takes it from.
 
-use crate::flex_body::{Interface, InterfaceRows, LumpedBody, Parts};
+use crate::flex_body::{GeometricStiffness, Interface, InterfaceRows, LumpedBody, Parts};
 use crate::invariants::Invariants;
 use crate::units::{Unit, UnitSystem};
-use faer::MatRef;
+use faer::{Mat, MatRef};
 
 /// Content of one entry; arrays are row-major in the shape that the table states.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +23,7 @@ pub(super) struct View<'a> {
     pub body: &'a Parts,
     pub lumped: Option<&'a LumpedBody>,
     pub interface: Option<&'a Interface>,
+    pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
 }
 
 impl<'a> View<'a> {
@@ -40,16 +41,15 @@ impl<'a> View<'a> {
     pub fn interface_nodes(&self) -> &'a [usize] {
         self.interface.map_or(&[], |i| &i.nodes)
     }
+}
 
-    /// Components of the modes at `nodes`, (nf x nodes x 3).
-    pub fn shape_rows(&self, nodes: impl Iterator<Item = usize> + Clone) -> Value {
-        let shape = &self.body.modes.shape;
-        let mut out = Vec::new();
-        for j in 0..shape.ncols() {
-            out.extend(nodes.clone().flat_map(|i| [0, 1, 2].map(|k| shape[(3 * i + k, j)])));
-        }
-        Value::Floats(out)
+/// Components of shapes (3n x nf) at `nodes`, (nf x nodes x 3).
+pub(super) fn shape_rows(shape: &Mat<f64>, nodes: impl Iterator<Item = usize> + Clone) -> Value {
+    let mut out = Vec::new();
+    for j in 0..shape.ncols() {
+        out.extend(nodes.clone().flat_map(|i| [0, 1, 2].map(|k| shape[(3 * i + k, j)])));
     }
+    Value::Floats(out)
 }
 
 /// A matrix, row by row.

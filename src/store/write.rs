@@ -1,8 +1,9 @@
 //! Writes a body as the table says.
 
+use super::item::{Extent, Item, Kind, Per};
 use super::names;
 use super::scan::place;
-use super::schema::{Extent, Item, Kind, Per, TABLE};
+use super::schema::TABLE;
 use super::value::{Value, View};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -82,10 +83,13 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             make(&file, group.parent())?;
         }
         for (name, view) in group.instances(body.parts()) {
-            if group.is_optional() && group.entries().all(|item| item.value(&view).is_none()) {
+            if group.per == Per::Body
+                && group.since() > 0
+                && group.entries().all(|item| item.value(&view).is_none())
+            {
                 continue;
             }
-            let path = place(group, name.map(names::encode).as_deref());
+            let path = place(group, name.as_deref().map(names::encode).as_deref());
             let target = if path == "/" { file.as_group()? } else { make(&file, &path)? };
             for item in group.entries() {
                 if let Some(value) = item.value(&view) {

@@ -42,7 +42,7 @@ fn eigenvalues_of_a_cuboid_of_tetrahedra_lie_between_their_bounds() {
     let conversion =
         convert(&model, &settings(Accuracy::Certified, 18, BodyFrame::Principal), SILENT).expect("sound");
     let guarantee = conversion.body.certificate().guarantee.as_ref().expect("certified");
-    let (k, m) = (dense(model.stiffness(), 1), dense(model.scalar_mass(), 3));
+    let (k, m) = (dense(model.stiffness(), 1), dense(model.scalar_mass().expect("a solid"), 3));
     assert_eq!(count_below(&k, &m, guarantee.shift_below), 6);
     for j in [0, 1, 8, 17] {
         let (lower, upper) = (guarantee.eigenvalue_lower[j], guarantee.eigenvalue_upper[j]);

@@ -116,6 +116,7 @@ fn units_scale_every_invariant_by_its_dimension() {
         }),
         s: a.s.each_ref().map(|row| row.each_ref().map(|s| times(s, mass * shape * shape))),
         modal_stiffness: a.modal_stiffness.clone(),
+        general: None,
     };
     assert_agree("units", &expected, &b, 1e-14);
 }

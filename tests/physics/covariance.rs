@@ -54,7 +54,7 @@ fn differences(
     shapes_a: &Mat<f64>,
     shapes_b: &Mat<f64>,
 ) -> Vec<(String, f64)> {
-    let mass = body.model.scalar_mass();
+    let mass = body.model.scalar_mass().expect("a solid");
     let weighted = Mat::from_fn(shapes_b.nrows(), shapes_b.ncols(), |row, j| {
         let (columns, values) = mass.row(row / 3);
         columns.iter().zip(values).map(|(&c, v)| v * shapes_b[(3 * c as usize + row % 3, j)]).sum::<f64>()

@@ -9,8 +9,8 @@ use crate::support::random::Random;
 use flexbody::basis::{ModeSettings, free_surface};
 use flexbody::eigen::{Accuracy, Method, Wanted};
 use flexbody::input::{ModelFiles, read_manifest, read_model};
-use flexbody::invariants::BodyFrame;
-use flexbody::model::RawModel;
+use flexbody::invariants::{BodyFrame, Frame, LumpedMasses, condense_lumped};
+use flexbody::model::{RawModel, check};
 use flexbody::progress::SILENT;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
@@ -66,10 +66,15 @@ fn own() -> Vec<Case> {
     ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8"].map(case).into()
 }
 
+/// Where larger bodies lie beside the project on some machines.
+fn shared_folder() -> PathBuf {
+    std::env::var_os("FLEXBODY_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from)
+        .join("models")
+}
+
 /// Larger solid bodies that lie beside the project on some machines; none elsewhere.
 fn shared() -> Vec<Case> {
-    let root = std::env::var_os("FLEXBODY_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
     let case = |folder: PathBuf| {
         let reference = json(&folder.join("ref.json"));
         let (rigid, modes) = (&reference["consistent"], &reference["modes"]);
@@ -93,7 +98,7 @@ fn shared() -> Vec<Case> {
     };
     ["a_beam_c3d20", "b_conrod_30k", "e_bracket_near", "f_cube_c3d8", "g_two_1e6", "k_c3d8r_singularM"]
         .iter()
-        .map(|name| root.join("models").join(name))
+        .map(|name| shared_folder().join(name))
         .filter(|folder| folder.is_dir())
         .map(case)
         .collect()
@@ -188,6 +193,35 @@ fn own_bodies_obey_the_nodal_equations() {
 #[test]
 fn shared_bodies_obey_the_nodal_equations() {
     shared().iter().for_each(obeys_the_nodal_equations);
+}
+
+/// Row sums of the mass matrix, and the number of finite eigenvalues of a mass matrix without full rank.
+#[test]
+fn shared_bodies_agree_with_the_row_sums_and_the_rank_of_their_references() {
+    for case in shared() {
+        let reference = json(&shared_folder().join(&case.name).join("ref.json"));
+        let lumped = &reference["rowsum_lumped"];
+        let model = check(case.raw.clone()).expect("a sound body").model;
+        let masses = LumpedMasses::row_sum(model.scalar_mass().expect("a solid"));
+        let negative = reference["rowsum_negative_rows"].as_u64().expect("a count") / 3;
+        assert_eq!(masses.negative() as u64, negative, "{}", case.name);
+        let com = Vector3::from_iterator(numbers(&lumped["com"]));
+        let frame = Frame { origin: com, ..Frame::model() };
+        let none = faer::Mat::zeros(3 * model.nodes().len(), 0);
+        let positions = frame.to_body(&model.nodes().positions);
+        let invariants = condense_lumped(&masses, &positions, none.as_ref(), faer::Mat::zeros(0, 0));
+        let expected = rows(&lumped["inertia_com"]);
+        let found = invariants.inertia();
+        assert!((found - expected).norm() < 1e-12 * expected.norm(), "{}: {found}", case.name);
+        let size = (expected.trace() / invariants.mass).sqrt();
+        assert!(invariants.first_moment.norm() < 1e-12 * invariants.mass * size, "{}", case.name);
+        if let Some(missing) = reference["M_rank_deficit_1e-12"].as_u64().filter(|missing| *missing > 0) {
+            let settings = ModeSettings { wanted: Wanted::Lowest(usize::MAX), ..ModeSettings::default() };
+            let found = free_surface(&model, &settings, SILENT).expect("a sound body").solution;
+            let finite = model.stiffness().n() - missing as usize - 6;
+            assert_eq!(found.eigenvalues.len(), finite, "{}", case.name);
+        }
+    }
 }
 
 #[test]

@@ -40,6 +40,7 @@ pub fn engine_mount() -> FlexBody {
             })
         }),
         modal_stiffness: Mat::from_fn(nf, nf, |p, q| if p == q { eigenvalue(hz[p]) } else { 0.0 }),
+        general: None,
     };
     let lumped = |scheme: &str, negative_masses: usize, factor: f64| LumpedBody {
         scheme: scheme.to_owned(),
@@ -94,11 +95,14 @@ pub fn engine_mount() -> FlexBody {
             residual: (0..nf).map(|j| (1.0 + j as f64) * 1e-13).collect(),
             provenance: vec![],
             truncation: vec![],
+            rotation: None,
+            internal: None,
             damping_ratio: vec![0.0; nf],
             modal_damping: None,
             shape: Mat::from_fn(24, nf, |i, j| if i == j { 1.0 } else { 0.0 }),
         },
         invariants: invariants(1.25, 1.0),
+        geometric_stiffness: vec![],
         lumped: vec![lumped("row-sum", 312, 1.0), lumped("diagonal-scaling", 0, 0.125)],
         certificate: Certificate {
             proved_modes: Some(8),
@@ -236,11 +240,14 @@ pub fn condensed(
             residual: vec![1e-14; 6],
             provenance: vec![],
             truncation: vec![],
+            rotation: None,
+            internal: None,
             damping_ratio: vec![0.0; 6],
             modal_damping: None,
             shape,
         },
         invariants,
+        geometric_stiffness: vec![],
         lumped: vec![],
         certificate: Certificate {
             proved_modes: None,

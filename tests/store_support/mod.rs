@@ -3,10 +3,10 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FlexBody, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
-    Modes, Parts, Source, Truncation,
+    Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
+    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Truncation, UnitLoad,
 };
-use flexbody::invariants::{DIGITS, Invariants};
+use flexbody::invariants::{DIGITS, GeneralTerms, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
@@ -77,7 +77,22 @@ impl Random {
             ibar: [(); 3].map(|()| [(); 3].map(|()| (0..nf).map(|_| self.value()).collect())),
             s: [(); 3].map(|()| [(); 3].map(|()| self.matrix(nf, nf))),
             modal_stiffness: self.matrix(nf, nf),
+            general: None,
         }
+    }
+
+    fn general(&mut self, nf: usize) -> GeneralTerms {
+        GeneralTerms {
+            w0: self.matrix(3, 3 * nf),
+            w3: self.matrix(3 * nf, nf),
+            modal_mass: self.matrix(nf, nf),
+        }
+    }
+
+    fn internal(&mut self, nf: usize) -> Option<InternalRows> {
+        let rows = self.below(4);
+        let dofs = (0..rows).map(|i| [1000 + i as i64, 1 + self.below(6) as i64]).collect();
+        (rows > 0).then(|| InternalRows { dofs, shape: self.matrix(rows, nf) })
     }
 }
 
@@ -105,6 +120,23 @@ fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
     }
 }
 
+/// One of every kind, as many as there are interfaces.
+fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let kinds = [
+        LoadKind::Force(r.name()),
+        LoadKind::Spin,
+        LoadKind::Named(r.name()),
+        LoadKind::Acceleration,
+        LoadKind::Moment(r.name()),
+        LoadKind::AngularAcceleration,
+    ];
+    let load = |kind: LoadKind, r: &mut Random| {
+        let component = r.below(kind.components().len());
+        GeometricStiffness { load: UnitLoad { kind, component }, matrix: r.matrix(nf, nf) }
+    };
+    kinds.into_iter().take(count).map(|kind| load(kind, r)).collect()
+}
+
 /// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
@@ -126,6 +158,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         })
         .collect();
     let bounded = eigenvalue.clone();
+    let mass_structure = structures[r.below(3)];
+    let general = (mass_structure == MassStructure::General).then(|| r.general(nf));
     Parts {
         source: Source {
             name: r.name(),
@@ -138,7 +172,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 .collect(),
             number: (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) }),
             n_dofs: 3 * n,
-            mass_structure: structures[r.below(3)],
+            mass_structure,
             settings: serde_json::json!({
                 "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
             }),
@@ -158,11 +192,14 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 .filter(|_| n * nf % 2 == 1)
                 .map(|_| Truncation { load: r.name(), before: r.value(), after: r.value() })
                 .collect(),
+            rotation: (r.below(2) == 1).then(|| r.matrix(3 * n, nf)),
+            internal: r.internal(nf),
             damping_ratio: (0..nf).map(|_| r.value().abs()).collect(),
             modal_damping: (r.below(2) == 1).then(|| Mat::from_fn(nf, nf, |_, _| r.value())),
             shape: r.matrix(3 * n, nf),
         },
-        invariants: r.invariants(nf),
+        invariants: Invariants { general, ..r.invariants(nf) },
+        geometric_stiffness: geometric_stiffness(&mut r, nf, interfaces),
         lumped,
         certificate: Certificate {
             proved_modes: (r.below(2) == 0).then(|| r.below(100)),
@@ -221,6 +258,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         matrix(&mut bits, &i.modal_stiffness);
     }
     matrix(&mut bits, &p.modes.shape);
+    p.geometric_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
     let m = &p.modes;
     let c = &p.certificate;
     bits.extend(m.eigenvalue.iter().chain(&m.residual).chain(&m.damping_ratio).map(|v| v.to_bits()));
@@ -237,11 +275,12 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     }
     bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
     let texts = format!(
-        "{:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
         p.source,
         p.units,
         p.nodes.ids,
         p.interfaces,
+        p.geometric_stiffness.iter().map(|g| &g.load).collect::<Vec<_>>(),
         (c.proved_modes, c.negative_pivots, c.rigid_modes, &c.remark),
         p.lumped.iter().map(|l| (&l.scheme, l.negative_masses, &l.comparison)).collect::<Vec<_>>(),
         p.coordinates.as_ref().map(|c| &c.names),

@@ -161,6 +161,40 @@ impl Kind {
     }
 }
 
+impl Kind {
+    /// Scalar geometric stiffness (m x m, row-major): sum over the points of grad N_a' sigma grad N_b, with the stress that the
+    /// displacements `moved` of the nodes cause. The element's K_geo is that kron I3.
+    pub fn geometric_stiffness(
+        self,
+        nodes: &[[f64; 3]],
+        moved: &[[f64; 3]],
+        material: &Material,
+    ) -> Vec<f64> {
+        let m = nodes.len();
+        let (lambda, mu) = material.lame();
+        let mut stiffness = vec![0.0; m * m];
+        for (xi, weight) in self.stiffness_rule() {
+            let (gradient, det) = physical_gradients(nodes, &self.shape(xi).1);
+            let slope: nalgebra::Matrix3<f64> = moved
+                .iter()
+                .zip(&gradient)
+                .map(|(u, g)| nalgebra::Vector3::from(*u) * nalgebra::RowVector3::from(*g))
+                .sum();
+            let strain = 0.5 * (slope + slope.transpose());
+            let stress = nalgebra::Matrix3::identity() * (lambda * strain.trace()) + strain * (2.0 * mu);
+            for a in 0..m {
+                let traction = stress * nalgebra::Vector3::from(gradient[a]);
+                for b in a..m {
+                    stiffness[a * m + b] +=
+                        weight * det * traction.dot(&nalgebra::Vector3::from(gradient[b]));
+                }
+            }
+        }
+        mirror(&mut stiffness, m);
+        stiffness
+    }
+}
+
 /// Copies the upper triangle to the lower one.
 fn mirror(matrix: &mut [f64], n: usize) {
     for i in 0..n {

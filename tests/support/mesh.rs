@@ -139,6 +139,25 @@ impl Mesh {
     }
 }
 
+impl Mesh {
+    /// K_geo (3n x 3n) of the stress that the displacements `moved` (3n) cause.
+    pub fn geometric_stiffness(&self, material: &Material, moved: &[f64]) -> CscMatrix {
+        let mut all = Vec::new();
+        for (kind, nodes) in &self.elements {
+            let positions: Vec<_> = nodes.iter().map(|&i| self.nodes[i]).collect();
+            let own: Vec<_> = nodes.iter().map(|&i| [0, 1, 2].map(|k| moved[3 * i + k])).collect();
+            let ke = kind.geometric_stiffness(&positions, &own, material);
+            for (a, &na) in nodes.iter().enumerate() {
+                for (b, &nb) in nodes.iter().enumerate() {
+                    let value = ke[a * nodes.len() + b];
+                    all.extend((0..3).map(|k| ((3 * na + k) as u32, (3 * nb + k) as u32, value)));
+                }
+            }
+        }
+        CscMatrix::from_triplets(3 * self.nodes.len(), 3 * self.nodes.len(), &all)
+    }
+}
+
 impl Assembly {
     /// The sum of two bodies on the same nodes: parts of different material.
     pub fn plus(&self, other: &Self) -> Self {

@@ -81,6 +81,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
             std::array::from_fn(|l| Mat::from_fn(nf, nf, |p, q| w(&psi(k, p, l), &mode(q))))
         }),
         modal_stiffness: Mat::zeros(nf, nf),
+        general: None,
     }
 }
 

@@ -40,7 +40,7 @@ impl Body {
 
     /// Exact invariants about the chosen frame.
     pub fn condensed(&self, choice: BodyFrame) -> Condensed {
-        let mass = self.model.scalar_mass();
+        let mass = self.model.scalar_mass().expect("a solid");
         let (frame, _) = choose_frame(mass, &self.model.nodes().positions, choice).expect("a body with mass");
         let positions = frame.to_body(&self.model.nodes().positions);
         let mut shapes = self.shapes().clone();

@@ -19,14 +19,17 @@ pub struct DenseModes {
     pub shapes: Mat<f64>,
 }
 
+/// All modes of an assembly of solid elements.
+pub fn dense_modes(assembly: &Assembly) -> DenseModes {
+    modes_of(&dense(&assembly.stiffness), &dense(&assembly.mass()))
+}
+
 /// Solves K psi = lambda M psi in full, through theta = 1 / (lambda - sigma) with sigma near -lambda_7, so that low
 /// eigenvalues keep all their digits and a singular M needs no care.
-pub fn dense_modes(assembly: &Assembly) -> DenseModes {
-    let k = dense(&assembly.stiffness);
-    let m = dense(&assembly.mass());
+pub fn modes_of(k: &Mat<f64>, m: &Mat<f64>) -> DenseModes {
     let n = k.nrows();
     let trace = |a: &Mat<f64>| (0..n).map(|i| a[(i, i)]).sum::<f64>();
-    let mut sigma = -1e-3 * trace(&k) / trace(&m);
+    let mut sigma = -1e-3 * trace(k) / trace(m);
     for _ in 0..2 {
         let (theta, _) = shifted(k.as_ref(), m.as_ref(), sigma);
         let lambda: Vec<f64> = theta.iter().rev().map(|t| 1.0 / t + sigma).collect();

@@ -1,9 +1,10 @@
 //! Entries of interfaces.
 
-use super::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
-use super::Kind::{Floats, Ints, Text};
-use super::{Item, LENGTH, ONE, PER_ROOT_MASS, attribute, dataset};
-use crate::store::value::{Units, Value, matrix, text};
+use super::{LENGTH, ONE, PER_ROOT_MASS, attribute, dataset};
+use crate::store::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
+use crate::store::item::Item;
+use crate::store::item::Kind::{Floats, Ints, Text};
+use crate::store::value::{Units, Value, matrix, shape_rows, text};
 
 const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
 
@@ -28,7 +29,7 @@ pub(super) const INTERFACES: &[Item] = &[
         PER_ROOT_MASS,
         "Psi",
         "their rows of /modes/shape",
-        |v| Some(v.shape_rows(v.interface_nodes().iter().copied())),
+        |v| Some(shape_rows(&v.body.modes.shape, v.interface_nodes().iter().copied())),
     )
     .derived("shape"),
     attribute(

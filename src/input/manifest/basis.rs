@@ -1,0 +1,58 @@
+//! The table `[basis]`: what the command line may say about the basis, kept with the model. What the command line says
+//! replaces it.
+
+use super::{MatrixLocation, Table, Walk};
+use crate::diagnostic::Code;
+use crate::input::LoadSource;
+use std::path::Path;
+use toml::de::DeValue;
+
+pub(super) const BASIS: &[&str] = &["residual_vectors", "loads"];
+
+impl Walk<'_> {
+    /// The loads of residual vectors; empty without the table, and with something in `found` when it is wrong.
+    pub(super) fn residual_vectors(&mut self, top: &Table) -> Vec<LoadSource> {
+        let Some((table, _)) = self.table(top, "basis") else { return Vec::new() };
+        self.known_keys(table, "[basis]", BASIS);
+        let mut loads = self.load_sets(table);
+        if let Some(file) = self.string(table, "loads") {
+            let folder = self.path.parent().unwrap_or(Path::new(""));
+            loads.push(LoadSource::File(MatrixLocation::parse(file).relative_to(folder)));
+        }
+        loads
+    }
+
+    fn load_sets(&mut self, table: &Table) -> Vec<LoadSource> {
+        const EXPECTED: &str = "a list of \"centrifugal\" and \"interfaces\"";
+        let Some(value) = table.get("residual_vectors") else { return Vec::new() };
+        let DeValue::Array(list) = value.get_ref() else {
+            self.mistyped("residual_vectors", value, EXPECTED);
+            return Vec::new();
+        };
+        let mut sets = Vec::new();
+        for item in list.iter() {
+            let set = match item.get_ref() {
+                DeValue::String(name) if name == "centrifugal" => LoadSource::Centrifugal,
+                DeValue::String(name) if name == "interfaces" => LoadSource::Interfaces,
+                DeValue::String(name) => {
+                    let message =
+                        format!("`{name}` is no set of loads for residual vectors, expected {EXPECTED}");
+                    let complaint = self.at(Code::ManifestSyntax, item.span(), message);
+                    self.found.push(complaint.with_help("nodal forces of your own go into `loads`, a file"));
+                    continue;
+                }
+                _ => {
+                    self.mistyped("residual_vectors", item, EXPECTED);
+                    continue;
+                }
+            };
+            if sets.contains(&set) {
+                let message = "`residual_vectors` names loads twice".to_owned();
+                self.complain(Code::ManifestSyntax, item.span(), message);
+            } else {
+                sets.push(set);
+            }
+        }
+        sets
+    }
+}

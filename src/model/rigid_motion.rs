@@ -1,0 +1,134 @@
+//! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly where it does not.
+
+use super::checks::Assembled;
+use super::layout::name_some;
+use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::linalg::{Pencil, gram};
+use faer::Mat;
+
+/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body. Node tables written with few digits leave
+/// 1e-6 without harm; supports leave 0.01 to 1.
+pub(super) fn check_rigid_motion(body: &Assembled, limit: f64, found: &mut Vec<Diagnostic>) -> f64 {
+    let Assembled { raw, nodes, rows, stiffness, .. } = body;
+    let (centre, length) = centre_and_length(&nodes.positions);
+    let fields = rows.rigid_fields(&nodes.positions, centre, length);
+    let residuals = rigid_residuals(stiffness, &fields, &rows.field_sizes(length));
+    let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
+    if worst > limit {
+        let mut strained: Vec<usize> = (0..residuals.len()).filter(|&i| residuals[i] > limit).collect();
+        strained.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]).then(a.cmp(&b)));
+        let named: Vec<String> =
+            strained.iter().map(|&i| format!("{} ({:.1e})", rows.label(nodes, i), residuals[i])).collect();
+        let message = format!(
+            "K R is not zero for {} of {} rows: |K R| reaches {worst:.1e} of the row sum of |K| (allowed {limit:.0e}); worst: {}",
+            strained.len(),
+            residuals.len(),
+            name_some(&named)
+        );
+        let help = match mislabelled(body, limit) {
+            Some(help) => help,
+            None if strained.len() * 2 < residuals.len() => {
+                "these degrees of freedom are supported or tied to ground: export the free body"
+            }
+            None => {
+                "nearly all rows fail: coordinates in other units or another node order than the matrices, or rotations labelled as displacements"
+            }
+        };
+        let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
+        found.push(diagnostic.in_file(&raw.stiffness.path).with_help(help));
+    }
+    worst
+}
+
+/// Other readings of the labels, each with what to do when K leaves its rigid motions free.
+fn mislabelled(body: &Assembled, limit: f64) -> Option<&'static str> {
+    let Assembled { nodes, rows, stiffness, .. } = body;
+    let (centre, length) = centre_and_length(&nodes.positions);
+    let (n, d) = (nodes.len(), rows.dimension);
+    let free = |fields: &Mat<f64>, rotation: &dyn Fn(usize) -> bool| {
+        let sizes: Vec<f64> =
+            (0..fields.nrows()).map(|row| if rotation(row) { 1.0 / length } else { 1.0 }).collect();
+        rigid_residuals(stiffness, fields, &sizes).iter().all(|&r| r <= limit)
+    };
+    let space = rigid_fields(&nodes.positions, 3, centre, length);
+    // Motion of a node: translations, then rotations.
+    let motion = |node: usize, direction: usize, field: usize| match (direction < 3, field >= 3) {
+        (true, _) => space[(3 * node + direction, field)],
+        (false, true) => f64::from(u8::from(direction == field)) / length,
+        (false, false) => 0.0,
+    };
+    if d == 3 && rows.are_plain() {
+        // Motions that such rows cannot show vanish.
+        let readings = [
+            (
+                [0, 1, 5],
+                "rows are ux, uy, rz of a plane frame: set `dimension = 2` and label the rotations with direction 6",
+            ),
+            (
+                [0, 2, 4],
+                "rows are ux, uz, ry of a plane frame: label them 1, 3, 5 in space, or turn its plane to x, y and set `dimension = 2`",
+            ),
+            (
+                [2, 3, 4],
+                "rows are uz, rx, ry of a plate in bending: label them 3, 4, 5 and give the displacements in its plane as well",
+            ),
+        ];
+        for (directions, help) in readings {
+            let fields = Mat::from_fn(3 * n, 6, |row, c| motion(row / 3, directions[row % 3], c));
+            if free(&fields, &|row| directions[row % 3] >= 3) {
+                return Some(help);
+            }
+        }
+        let blocked = Mat::from_fn(3 * n, 6, |row, c| space[(3 * (row % n) + row / n, c)]);
+        if free(&blocked, &|_| false) {
+            return Some("rows are those of x for all nodes, then y, then z: give a dofs table that says so");
+        }
+    }
+    let rotations = rows.rotations();
+    if d == 3 && rotations.len() == 3 * n {
+        let swapped = Mat::from_fn(rows.len(), 6, |row, c| match row.checked_sub(3 * n) {
+            _ if rows.vertex(row) >= n => 0.0,
+            None => motion(row / 3, 3 + row % 3, c),
+            Some(turn) => motion(turn / 3, turn % 3, c),
+        });
+        if free(&swapped, &|row| row < 3 * n) {
+            return Some(
+                "rotations are labelled as displacements and displacements as rotations: 1, 2, 3 are ux, uy, uz and 4, 5, 6 are rx, ry, rz",
+            );
+        }
+    }
+    None
+}
+
+/// A mass that does not commute with rotations must still give rigid motion the inertia of a rigid body: R'MR = \[m I, -c~; c~, I0\].
+pub(super) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Diagnostic>) {
+    let Assembled { raw, nodes, rows, mass, stiffness, .. } = body;
+    let (centre, length) = centre_and_length(&nodes.positions);
+    let rigid = rows.rigid_fields(&nodes.positions, centre, length);
+    let d = rows.dimension;
+    let g = gram(rigid.as_ref(), Pencil::new(stiffness, mass, 1).apply_mass(rigid.as_ref()).as_ref());
+    let m = (0..d).map(|k| g[(k, k)]).sum::<f64>() / d as f64;
+    let mut refuse = |message: String| {
+        found.push(Diagnostic::new(Code::MassDirectional, message).in_file(&raw.mass.path));
+    };
+    let directional = (0..d).flat_map(|k| (0..d).map(move |l| (k, l)));
+    let spread =
+        directional.fold(0.0f64, |s, (k, l)| s.max((g[(k, l)] - if k == l { m } else { 0.0 }).abs()));
+    if spread > tolerance * m {
+        let along: Vec<String> =
+            (0..d).map(|k| format!("{} along {}", g[(k, k)], ["x", "y", "z"][k])).collect();
+        return refuse(format!("total mass is {}, coupled by up to {:.1e}", along.join(", "), spread));
+    }
+    if d == 3 {
+        // T_k' M (e_l x r) = -T_l' M (e_k x r), zero for k = l.
+        let skew = (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+        let spread = skew.fold(0.0f64, |s, (k, l)| s.max((g[(k, 3 + l)] + g[(l, 3 + k)]).abs()));
+        if spread > tolerance * m {
+            refuse(format!(
+                "centres of mass along x, y and z differ by {:.1e}: the mass matrix is not that of a body",
+                0.5 * spread / m * length
+            ));
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! Geometric stiffness of a body, or what is without it.
+
+use super::numbers::significant;
+use crate::flex_body::{FlexBody, LoadKind};
+use crate::invariants::relative_norm;
+use serde::Serialize;
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct GeometricStiffnessFacts {
+    /// `spin xx`, along body axes.
+    pub load: String,
+    /// By which part of its own a unit of the load changes the stiffness of any motion at the most.
+    pub relative_norm: f64,
+}
+
+impl GeometricStiffnessFacts {
+    pub fn of(body: &FlexBody) -> Vec<Self> {
+        let stiffness = body.invariants().modal_stiffness.as_ref();
+        body.geometric_stiffness()
+            .iter()
+            .map(|one| Self {
+                load: one.load.to_string(),
+                relative_norm: relative_norm(one.matrix.as_ref(), stiffness).unwrap_or(f64::NAN),
+            })
+            .collect()
+    }
+
+    /// `spin xx: up to 1.2e-3 of the stiffness of a motion per unit`.
+    pub fn in_words(&self) -> String {
+        format!(
+            "{}: up to {} of the stiffness of a motion per unit",
+            self.load,
+            significant(self.relative_norm, 3)
+        )
+    }
+}
+
+/// Spin about each body axis, in hertz, at which the centrifugal term takes 1 % of the stiffness of the motion that it softens
+/// most. Nothing for a body with geometric stiffness for spin; no number where nothing moves across the axis, nor
+/// about axes that a plane body does not spin about.
+pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
+    let given = body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    (!given).then(|| {
+        [0, 1, 2].map(|axis| {
+            let spins = body.dimension() == 3 || axis == 2;
+            let rate = spins.then(|| body.invariants().softening_rate(axis)).flatten();
+            rate.map(|rate| body.units().frequency_of(rate * rate))
+        })
+    })
+}
+
+/// `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z)`.
+pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
+    let axes = ["x", "y", "z"].into_iter().zip(hertz);
+    let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
+    if known.is_empty() {
+        return "the centrifugal term softens nothing".to_owned();
+    }
+    let rates: Vec<String> = known.iter().map(|(_, hz)| significant(*hz, 3)).collect();
+    let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
+    format!("no geometric stiffness: 1 % softer at {} Hz ({})", rates.join(", "), axes.join(", "))
+}

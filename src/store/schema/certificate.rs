@@ -1,0 +1,125 @@
+//! What was proved about a body: the rows of `/certificate`.
+
+use super::super::item::Item;
+use super::super::item::Kind::{Float, Int, Text};
+use super::super::value::{Value, View, count, text};
+use super::{ONE, PER_TIME2, attribute};
+use crate::flex_body::Guarantee;
+
+pub(super) const CERTIFICATE: &[Item] = &[
+    attribute(
+        "proved",
+        Int,
+        ONE,
+        "1: the inertia count proves that no mode is missing; 0: not proved",
+        |v| Some(Value::Int(v.body.certificate.proved_modes.is_some().into())),
+    )
+    .derived(""),
+    attribute(
+        "proved_modes",
+        Int,
+        ONE,
+        "flexible modes below `shift` that the count proves; absent: not proved",
+        |v| v.body.certificate.proved_modes.and_then(count),
+    )
+    .optional(),
+    attribute("shift", Float, PER_TIME2, "shift sigma of the count", |v| {
+        Some(Value::Float(v.body.certificate.shift))
+    }),
+    attribute(
+        "negative_pivots",
+        Int,
+        ONE,
+        "negative pivots of K - sigma M: rigid and flexible modes below sigma; absent: not counted",
+        |v| v.body.certificate.negative_pivots.and_then(count),
+    )
+    .optional(),
+    attribute("rigid_modes", Int, ONE, "number of rigid modes", |v| count(v.body.certificate.rigid_modes)),
+    attribute(
+        "remark",
+        Text,
+        ONE,
+        "why the proof is missing or what limits it; empty when nothing does",
+        |v| text(v.body.certificate.remark.as_str()),
+    ),
+    attribute(
+        "rigid_noise",
+        Float,
+        ONE,
+        "largest |lambda| of the exact rigid modes over the first flexible lambda: the input's noise floor",
+        |v| Some(Value::Float(v.body.certificate.rigid_noise)),
+    ),
+    attribute(
+        "rigid_residual",
+        Float,
+        ONE,
+        "max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix",
+        |v| Some(Value::Float(v.body.certificate.rigid_residual)),
+    ),
+    attribute(
+        "shift_below",
+        Float,
+        PER_TIME2,
+        "shift sigma of a second count, between the rigid modes and the first flexible one; accuracy `certified` only",
+        |v| Some(Value::Float(guarantee(v)?.shift_below)),
+    )
+    .added(1),
+    attribute(
+        "negative_pivots_below",
+        Int,
+        ONE,
+        "negative pivots of K - shift_below M: the number of rigid modes; accuracy `certified` only",
+        |v| count(guarantee(v)?.pivots_below),
+    )
+    .added(1),
+];
+
+pub(super) fn guarantee<'a>(view: &View<'a>) -> Option<&'a Guarantee> {
+    view.body.certificate.guarantee.as_ref()
+}
+
+/// One attribute per invariant, in the order of [`crate::invariants::DIGITS`].
+macro_rules! digits {
+    ($($index:literal $name:literal,)*) => {
+        &[$(attribute(
+            concat!("digits_", $name),
+            Float,
+            ONE,
+            concat!(
+                "guaranteed digits of `/invariants/", $name,
+                "`: -log10 of the rounding of its worst entry, relative to the Cauchy-Schwarz bound; accuracy `certified` only"
+            ),
+            |v| Some(Value::Float(guarantee(v)?.digits[$index])),
+        )
+        .added(1),)*]
+    };
+}
+
+pub(super) const INVARIANT_DIGITS: &[Item] = digits![
+    0 "mass",
+    1 "first_moment",
+    2 "second_moment",
+    3 "C1",
+    4 "Ibar",
+    5 "S",
+    6 "modal_stiffness",
+    7 "I0",
+    8 "W1",
+    9 "W2",
+    10 "W3",
+    11 "C2",
+    12 "modal_mass",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::invariants::DIGITS;
+
+    #[test]
+    fn digits_are_named_as_their_invariants() {
+        let names: Vec<_> = INVARIANT_DIGITS.iter().map(|i| i.name.trim_start_matches("digits_")).collect();
+        assert_eq!(names, DIGITS);
+        assert!(DIGITS.iter().all(|name| super::super::INVARIANTS.iter().any(|item| item.name == *name)));
+    }
+}
