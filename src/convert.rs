@@ -193,7 +193,7 @@ pub fn convert_resumed(
     let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
     let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
     let interfaces = interfaces(model, &frame, coupled);
-    let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, modes.of_nodes(), model.dimension()));
+    let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, &modes, model.dimension()));
     diagnostics.extend(fits);
     let solution = found.solution;
     let coordinates = found.coordinates.map(|own| {
@@ -397,16 +397,12 @@ fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
 const RIGID_FIT: f64 = 1e-8;
 
 /// A warning about an interface that was declared rigid, but is not in these modes.
-fn poor_fit(
-    interface: &Interface,
-    nodes: &Nodes,
-    shapes: MatRef<'_, f64>,
-    dimension: usize,
-) -> Option<Diagnostic> {
+fn poor_fit(interface: &Interface, nodes: &Nodes, modes: &BodyModes, dimension: usize) -> Option<Diagnostic> {
     if interface.coupling != Some(Coupling::Rigid) {
         return None;
     }
-    let rows = interface.rows(nodes, shapes, dimension)?;
+    let rotations = modes.rotations.as_ref().map(Mat::as_ref);
+    let rows = interface.rows(nodes, modes.of_nodes(), rotations, dimension)?;
     let (mode, part) = rows.deformation();
     (part > RIGID_FIT).then(|| {
         let message = format!(

@@ -342,7 +342,7 @@ fn rows_of_the_interfaces_are_the_motion_of_the_reference_points() {
         let mut first = 0;
         for (interface, coupling) in body.interfaces().iter().zip(couplings) {
             assert_eq!(interface.coupling, Some(coupling));
-            let Some(rows) = interface.rows(body.nodes(), shape.as_ref(), d) else {
+            let Some(rows) = interface.rows(body.nodes(), shape.as_ref(), None, d) else {
                 assert_eq!(coupling, Coupling::Free);
                 first += d * interface.nodes.len();
                 continue;
@@ -631,7 +631,8 @@ fn plane_bodies_have_three_coordinates_for_each_interface() {
     let body = body(&model(strip([Coupling::Rigid, Coupling::Averaging])), 4);
     let names = &body.coordinates().expect("coordinates").names;
     assert_eq!(names[..6], ["first ux", "first uy", "first rz", "second ux", "second uy", "second rz"]);
-    let rows = body.interfaces()[0].rows(body.nodes(), body.modes().shape.as_ref(), 2).expect("a point");
+    let rows =
+        body.interfaces()[0].rows(body.nodes(), body.modes().shape.as_ref(), None, 2).expect("a point");
     let rotation = rows.rotation.expect("nodes on no point");
     assert!((0..body.n_modes()).all(|j| rotation[(0, j)] == 0.0 && rows.translation[(2, j)] == 0.0));
     assert!(rotation.norm_max() > 0.0);

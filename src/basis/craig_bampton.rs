@@ -307,8 +307,10 @@ impl<'a> Parts<'a> {
     /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in space.
     fn vectors(&self, d: usize) -> Vec<usize> {
         let of = |(joint, first): (&Joint, usize)| {
-            let count = joint.coordinates.len() / d;
-            (0..count).map(move |i| first + d * i)
+            let (moving, all) = (joint.displacements, joint.coordinates.len());
+            // In the plane a rotation is a number.
+            let turning = if d == 3 { (all - moving) / 3 } else { 0 };
+            (0..moving / d + turning).map(move |i| first + d * i)
         };
         starts(self.joints).flat_map(of).collect()
     }

@@ -4,7 +4,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::EigenFailure;
 use crate::error::{Error, Result};
 use crate::linalg::{Dependents, Elimination};
-use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference};
+use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference, rigid_count};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
 
@@ -29,8 +29,12 @@ pub(super) struct Joint {
     measure: Mat<f64>,
     /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference point costs no digits.
     centred: Mat<f64>,
-    /// Whether the nodes determine every coordinate.
+    /// Number of coordinates that are displacements; rotations follow.
+    pub displacements: usize,
+    /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its rotations or none has one.
     determined: bool,
+    /// Whether it holds the body by itself, not only together with others.
+    holds: bool,
 }
 
 impl Joint {
@@ -40,49 +44,77 @@ impl Joint {
         let mut nodes: Vec<usize> = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
-        let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
-        let coupling = set.coupling();
-        let joint = |coordinates: Vec<String>, loads, motion, measure, centred, determined| Self {
-            name: set.name.clone(),
-            coupling,
-            nodes: nodes.clone(),
-            rows: rows.clone(),
-            coordinates,
-            loads,
-            motion,
-            measure,
-            centred,
-            determined,
-        };
+        let displaced: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
+        let rotations = (model.rows().displacements()..).zip(model.rows().rotations());
+        let turned: Vec<usize> = rotations
+            .filter(|(_, (node, _))| nodes.binary_search(&(*node as usize)).is_ok())
+            .map(|(row, _)| row)
+            .collect();
+        let turns = rigid_count(d) - d;
+        let all_turn = turned.len() == turns * nodes.len();
+        let (name, coupling) = (set.name.clone(), set.coupling());
         if coupling == Coupling::Free {
-            let named = |kind: &dyn Fn(&str) -> String| {
-                let of = |&i: &usize| AXES[..d].iter().map(move |axis| (table.ids[i], axis));
-                nodes.iter().flat_map(of).map(|(id, axis)| format!("node {id} {}", kind(axis))).collect()
+            let rows = [displaced.as_slice(), &turned].concat();
+            let unit = Mat::identity(rows.len(), rows.len());
+            let load = |&row: &usize| {
+                let label = model.label(row);
+                let kind = if row < model.rows().displacements() { "force" } else { "torque" };
+                format!("node {} {kind} {}", label.node, AXES[(usize::from(label.direction) - 1) % 3])
             };
-            let unit = || Mat::identity(rows.len(), rows.len());
-            let (coordinates, loads) =
-                (named(&|axis| format!("u{axis}")), named(&|axis| format!("force {axis}")));
-            return joint(coordinates, loads, unit(), unit(), unit(), true);
+            return Self {
+                name,
+                coupling,
+                coordinates: rows.iter().map(|&row| model.label(row).to_string()).collect(),
+                loads: rows.iter().map(load).collect(),
+                displacements: displaced.len(),
+                motion: unit.clone(),
+                measure: unit.clone(),
+                centred: unit,
+                // Axes turn only whole vectors.
+                determined: turned.is_empty() || all_turn,
+                holds: all_turn,
+                nodes,
+                rows,
+            };
         }
         let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| table.positions[i]).collect();
         let reference = match set.reference {
             Reference::Point(x) => Some(x),
             _ => None,
         };
-        let motion = InterfaceMotion::new(&positions, d, reference);
+        let by_place = InterfaceMotion::new(&positions, false, d, reference);
+        // The mean motion leaves the rotations of the nodes alone, unless nothing else tells its own.
+        let rows = match coupling {
+            Coupling::Averaging if by_place.is_determined() || !all_turn => displaced,
+            _ => [displaced.as_slice(), &turned].concat(),
+        };
+        let with_rotations = all_turn && rows.len() > d * nodes.len();
+        let motion = InterfaceMotion::new(&positions, with_rotations, d, reference);
+        let centred = InterfaceMotion::new(&positions, with_rotations, d, None);
+        let padded = |a: MatRef<'_, f64>| {
+            Mat::from_fn(rows.len(), a.ncols(), |i, j| if i < a.nrows() { a[(i, j)] } else { 0.0 })
+        };
         let named = |along: &str, about: &str| {
             let turning = if d == 2 { &AXES[2..] } else { &AXES[..] };
             let along = AXES[..d].iter().map(|axis| format!("{along}{axis}"));
             along.chain(turning.iter().map(|axis| format!("{about}{axis}"))).collect()
         };
-        joint(
-            named("u", "r"),
-            named("force ", "torque "),
-            motion.rigid().to_owned(),
-            motion.average().to_owned(),
-            InterfaceMotion::new(&positions, d, None).average().to_owned(),
-            motion.is_determined(),
-        )
+        // Of all rows, also where some nodes have a part of the rotations only.
+        let fields = model.rigid_fields(motion.reference(), 1.0);
+        Self {
+            name,
+            coupling,
+            coordinates: named("u", "r"),
+            loads: named("force ", "torque "),
+            displacements: d,
+            motion: Mat::from_fn(rows.len(), fields.ncols(), |i, j| fields[(rows[i], j)]),
+            measure: padded(motion.average()),
+            centred: padded(centred.average()),
+            determined: motion.is_determined(),
+            holds: true,
+            nodes,
+            rows,
+        }
     }
 
     /// R (rows x r): displacements of the nodes for unit coordinates, nothing deformed at the interface.
@@ -139,6 +171,13 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()
         ("one line", "three nodes that do not lie on one line")
     };
     for joint in joints.iter().filter(|joint| !joint.determined) {
+        if joint.coupling == Coupling::Free {
+            let message =
+                format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
+            let help = "give it nodes with all rotations, nodes with none, or another coupling";
+            found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+            continue;
+        }
         let message = format!(
             "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
             joint.name,
@@ -165,7 +204,8 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()
     }
     let held: Vec<[f64; 3]> =
         joints.iter().flat_map(|joint| &joint.nodes).map(|&i| table.positions[i]).collect();
-    if found.is_empty() && !InterfaceMotion::new(&held, d, None).is_determined() {
+    let together = || InterfaceMotion::new(&held, false, d, None).is_determined();
+    if found.is_empty() && !joints.iter().any(|joint| joint.holds) && !together() {
         let message =
             format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
         let help = format!("the interfaces together need {least}");

@@ -126,7 +126,8 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
 }
 
 /// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations along the axes, in the
-/// plane (d = 2) r = 3.
+/// plane (d = 2) r = 3. Rows: the displacements of the nodes (d each), then their rotations, where they have them (three each, in the
+/// plane one).
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceMotion {
     reference: [f64; 3],
@@ -136,8 +137,15 @@ pub struct InterfaceMotion {
 }
 
 impl InterfaceMotion {
-    /// For nodes at `positions` (at least one) and a reference point, the mean of the positions where none is given.
-    pub fn new(positions: &[[f64; 3]], dimension: usize, reference: Option<[f64; 3]>) -> Self {
+    /// For nodes at `positions` (at least one), all with or all without `rotations`, and a reference point, the mean of the positions
+    /// where none is given. The displacements tell the rotation of the reference point; where the nodes lie on one line, the mean of
+    /// their rotations does.
+    pub fn new(
+        positions: &[[f64; 3]],
+        rotations: bool,
+        dimension: usize,
+        reference: Option<[f64; 3]>,
+    ) -> Self {
         let (centre, length) = centre_and_length(positions);
         let reference = reference.unwrap_or(centre);
         let (d, count) = (dimension, positions.len() as f64);
@@ -158,13 +166,20 @@ impl InterfaceMotion {
         // About the centre; the translation of the reference point adds the rotation times its distance.
         let offset = Vector3::from(reference) - centre;
         let turn = |axis: usize, r: &Vector3<f64>| (inverse * Vector3::ith(axis, 1.0)).cross(r);
-        let mut average = Mat::zeros(d * positions.len(), rigid_count(d));
+        let (count_rows, turns) = (d * positions.len(), rigid_count(d) - d);
+        let all_rows = count_rows + if rotations { turns * positions.len() } else { 0 };
+        let by_rotations = rotations && turning <= threshold;
+        let mut average = Mat::zeros(all_rows, rigid_count(d));
+        let mut rigid = rigid_fields(positions, d, reference, 1.0);
+        rigid.resize_with(all_rows, rigid_count(d), |row, column| {
+            f64::from(row >= count_rows && column == d + (row - count_rows) % turns)
+        });
         for (i, r) in arms.iter().enumerate() {
             for k in 0..d {
                 average[(d * i + k, k)] = 1.0 / count;
             }
             for (column, axis) in axes.clone().enumerate() {
-                let weight = turn(axis, r);
+                let weight = if by_rotations { Vector3::zeros() } else { turn(axis, r) };
                 let lever = Vector3::ith(axis, 1.0).cross(&offset);
                 for k in 0..d {
                     average[(d * i + k, d + column)] = weight[k];
@@ -172,14 +187,14 @@ impl InterfaceMotion {
                         average[(d * i + k, along)] += lever[along] * weight[k];
                     }
                 }
+                if by_rotations {
+                    let row = count_rows + turns * i + column;
+                    average[(row, d + column)] = 1.0 / count;
+                    (0..d).for_each(|along| average[(row, along)] = lever[along] / count);
+                }
             }
         }
-        Self {
-            reference,
-            rigid: rigid_fields(positions, d, reference, 1.0),
-            average,
-            determined: turning > threshold,
-        }
+        Self { reference, rigid, average, determined: by_rotations || turning > threshold }
     }
 
     /// The reference point.
@@ -187,23 +202,24 @@ impl InterfaceMotion {
         self.reference
     }
 
-    /// R (d k x r): displacements of the nodes for unit motions of the reference point.
+    /// R (rows x r): displacements and rotations of the nodes for unit motions of the reference point.
     pub fn rigid(&self) -> MatRef<'_, f64> {
         self.rigid.as_ref()
     }
 
-    /// A (d k x r) with A'R = I: the loads at the nodes that a unit force or torque at the reference point stands for. A' u is the
-    /// rigid motion that fits u best (least squares, all nodes with the same weight), A = R (R'R)^-1.
+    /// A (rows x r) with A'R = I: the loads at the nodes that a unit force or torque at the reference point stands for. A' u is the
+    /// rigid motion that fits the displacements u best (least squares, all nodes with the same weight), A = R (R'R)^-1; nodal
+    /// rotations count only where these do not tell the rotation.
     pub fn average(&self) -> MatRef<'_, f64> {
         self.average.as_ref()
     }
 
-    /// Whether the nodes determine the rotation: they do not lie on one line, in the plane not on one point.
+    /// Whether the nodes determine the rotation: they do not lie on one line (in the plane not on one point), or have rotations.
     pub fn is_determined(&self) -> bool {
         self.determined
     }
 
-    /// The motion A' u (r x m) that fits the displacements u (d k x m) of the nodes best.
+    /// The motion A' u (r x m) that fits the rows u (rows x m) of the nodes best.
     pub fn fit(&self, u: MatRef<'_, f64>) -> Mat<f64> {
         gram(self.average.as_ref(), u)
     }
@@ -223,7 +239,7 @@ mod tests {
     #[test]
     fn the_average_of_a_rigid_motion_is_that_motion_about_any_point() {
         for reference in [None, Some([0.0; 3]), Some([1e3, -2e3, 5e2])] {
-            let motion = InterfaceMotion::new(&NODES, 3, reference);
+            let motion = InterfaceMotion::new(&NODES, false, 3, reference);
             assert!(motion.is_determined());
             let scale = motion.reference().iter().fold(1.0f64, |m, x| m.max(x.abs()));
             assert!(off_identity(&motion.fit(motion.rigid())) < 1e-15 * scale * scale, "{reference:?}");
@@ -233,7 +249,7 @@ mod tests {
             assert!(gram(motion.rigid(), left.as_ref()).norm_max() < 1e-12 * scale, "{reference:?}");
         }
         let flat: Vec<[f64; 3]> = NODES.iter().map(|x| [x[0], x[1], 0.0]).collect();
-        let motion = InterfaceMotion::new(&flat, 2, Some([3.0, 4.0, 0.0]));
+        let motion = InterfaceMotion::new(&flat, false, 2, Some([3.0, 4.0, 0.0]));
         assert_eq!(motion.rigid().ncols(), 3);
         assert!(off_identity(&motion.fit(motion.rigid())) < 1e-14);
     }
@@ -241,13 +257,21 @@ mod tests {
     #[test]
     fn nodes_on_a_line_determine_no_rotation() {
         let line = [[0.0; 3], [1.0, 2.0, 3.0], [2.0, 4.0, 6.0 + 1e-9]];
-        assert!(!InterfaceMotion::new(&line, 3, None).is_determined());
-        assert!(!InterfaceMotion::new(&line[..1], 3, None).is_determined());
+        assert!(!InterfaceMotion::new(&line, false, 3, None).is_determined());
+        assert!(!InterfaceMotion::new(&line[..1], false, 3, None).is_determined());
         let flat = [[0.0; 3], [1.0, 2.0, 0.0]];
-        assert!(InterfaceMotion::new(&flat, 2, None).is_determined());
-        assert!(!InterfaceMotion::new(&flat[..1], 2, None).is_determined());
+        assert!(InterfaceMotion::new(&flat, false, 2, None).is_determined());
+        assert!(!InterfaceMotion::new(&flat[..1], false, 2, None).is_determined());
+        // Nodal rotations do, about any point; nodes in space are determined without them.
+        for nodes in [&line[..], &line[..1], &NODES[..]] {
+            let motion = InterfaceMotion::new(nodes, true, 3, Some([3.0, -1.0, 2.0]));
+            assert!(motion.is_determined());
+            assert_eq!(motion.rigid().nrows(), 6 * nodes.len());
+            assert!(off_identity(&motion.fit(motion.rigid())) < 1e-13);
+        }
+        assert!(InterfaceMotion::new(&flat[..1], true, 2, None).is_determined());
         // A single node still passes on forces.
-        let one = InterfaceMotion::new(&line[..1], 3, None);
+        let one = InterfaceMotion::new(&line[..1], false, 3, None);
         assert_eq!((one.average()[(1, 1)], one.average()[(1, 4)]), (1.0, 0.0));
     }
 }

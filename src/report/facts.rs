@@ -85,7 +85,8 @@ pub(super) struct InterfaceFacts {
 
 impl InterfaceFacts {
     fn of(interface: &Interface, body: &FlexBody) -> Self {
-        let rows = interface.rows(body.nodes(), body.modes().shape.as_ref(), body.dimension());
+        let rotation = body.modes().rotation.as_ref().map(|rotation| rotation.as_ref());
+        let rows = interface.rows(body.nodes(), body.modes().shape.as_ref(), rotation, body.dimension());
         Self {
             name: interface.name.clone(),
             n_nodes: interface.nodes.len(),

@@ -34,7 +34,9 @@ impl<'a> View<'a> {
 
     /// The modes at the reference point of the group's interface.
     pub fn interface_rows(&self) -> Option<InterfaceRows> {
-        self.interface?.rows(&self.body.nodes, self.body.modes.shape.as_ref(), self.body.dimension)
+        let Parts { nodes, modes, dimension, .. } = self.body;
+        let rotation = modes.rotation.as_ref().map(Mat::as_ref);
+        self.interface?.rows(nodes, modes.shape.as_ref(), rotation, *dimension)
     }
 
     /// Node indices of the group's interface.

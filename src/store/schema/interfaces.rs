@@ -59,7 +59,7 @@ pub(super) const INTERFACES: &[Item] = &[
         Floats(&[Fixed(3), Modes]),
         PER_ROOT_MASS_LENGTH,
         "Phi_r",
-        "rotation vector of the reference point in each mode, body axes; absent: the nodes lie on one line",
+        "rotation vector of the reference point in each mode, body axes; absent: the nodes lie on one line and have no rotations",
         |v| matrix(v.interface_rows()?.rotation?.as_ref()),
     )
     .added(2)
