@@ -33,7 +33,7 @@ pub fn write_truss(path: &Path) -> Result<FlexBody> {
     let (stiffness, mass) = matrices(&positions);
     let nodes = Nodes { ids: (1..=positions.len() as i64).collect(), positions };
     let foot = nodes.ids.iter().zip(&nodes.positions).filter(|(_, x)| x[2] == 0.0).map(|(&id, _)| id);
-    let foot = NodeSet { name: "foot".to_owned(), nodes: foot.collect() };
+    let foot = NodeSet::new("foot", foot.collect());
     let raw = RawModel {
         units: UnitSystem::parse("m", "kg", "s").expect("known units"),
         interfaces: vec![foot],

@@ -1,20 +1,21 @@
 //! The main job: from a checked model to a flexible body, with what lumped masses would have given.
 
 use crate::basis::{
-    BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
+    self, BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
 };
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Guarantee, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+    Certificate, FlexBody, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes,
+    Parts, Source, Truncation,
 };
 use crate::invariants::{
-    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
+    BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
     choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, error_norms,
 };
 use crate::linalg::{SymmetricMatrix, gram, multiply};
-use crate::model::{Damping, FeModel, Nodes, rigid_count};
+use crate::model::{Coupling, Damping, FeModel, Nodes, Reference, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
@@ -189,7 +190,17 @@ pub fn convert_resumed(
         Vec::new()
     };
     let certificate = certificate(model, &found, guarantee);
+    let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
+    let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+    let interfaces = interfaces(model, &frame, coupled);
+    let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, modes.of_nodes(), model.dimension()));
+    diagnostics.extend(fits);
     let solution = found.solution;
+    let coordinates = found.coordinates.map(|own| {
+        let turned = own.in_axes(&frame.axes, model.dimension(), &modes.signs);
+        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
+        InterfaceCoordinates { names, stiffness, mass, of_modes }
+    });
     let (damping_ratio, modal_damping) = match damping {
         Some(damping) => (damping.ratio, Some(damping.matrix)),
         None => (vec![0.0; solution.eigenvalues.len()], None),
@@ -210,8 +221,9 @@ pub fn convert_resumed(
         dimension: model.dimension(),
         units: model.units().clone(),
         frame,
-        interfaces: interfaces(model),
-        nodes: Nodes { ids: model.nodes().ids.clone(), positions: place.positions },
+        interfaces,
+        coordinates,
+        nodes,
         modes: Modes {
             damping_ratio,
             modal_damping,
@@ -356,16 +368,52 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
     }
 }
 
-fn interfaces(model: &FeModel) -> Vec<Interface> {
+/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.
+fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     model
         .interfaces()
         .iter()
-        .map(|set| Interface {
-            name: set.name.clone(),
-            nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
+        .map(|set| {
+            let nodes: Vec<usize> = set.nodes.iter().filter_map(|id| index.get(id)).copied().collect();
+            let reference = match set.reference {
+                Reference::Point(x) => Some(x),
+                _ => None,
+            };
+            Interface {
+                name: set.name.clone(),
+                nodes,
+                coupling: if coupled { Some(set.coupling()) } else { set.coupling },
+                reference: reference.map(|x| frame.to_body(&[x])[0]),
+            }
         })
         .collect()
+}
+
+/// Part of the motion of an interface that is rounding.
+const RIGID_FIT: f64 = 1e-8;
+
+/// A warning about an interface that was declared rigid, but is not in these modes.
+fn poor_fit(
+    interface: &Interface,
+    nodes: &Nodes,
+    shapes: MatRef<'_, f64>,
+    dimension: usize,
+) -> Option<Diagnostic> {
+    if interface.coupling != Some(Coupling::Rigid) {
+        return None;
+    }
+    let rows = interface.rows(nodes, shapes, dimension)?;
+    let (mode, part) = rows.deformation();
+    (part > RIGID_FIT).then(|| {
+        let message = format!(
+            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
+            interface.name,
+            100.0 * part,
+            mode + 1
+        );
+        Diagnostic::new(Code::InterfaceFit, message)
+    })
 }
 
 /// The settings that can change the result, for the file.
@@ -383,10 +431,7 @@ fn describe(settings: &ConvertSettings, model: &FeModel) -> serde_json::Value {
             Lumping::User(_) => LumpedScheme::User.name(),
         })
         .collect();
-    let loads: Vec<&str> = match &settings.basis {
-        BasisChoice::Free(free) => free.residual_vectors.iter().map(Loads::name).collect(),
-        BasisChoice::Imported(_) => Vec::new(),
-    };
+    let loads: Vec<&str> = settings.basis.residual_vectors().iter().map(Loads::name).collect();
     let mut described = serde_json::json!({
         "accuracy": settings.modes.accuracy.name(),
         "basis": settings.basis.basis().name(),

@@ -125,6 +125,9 @@ codes! {
     BodiesCoupled = "FB421", Error, BadInput, "damping or geometric stiffness couples bodies that K and M leave separate", "leave the entries between bodies out";
     RowsUnheld = "FB422", Error, BadInput, "stiffness leaves rows without coordinates free", "add the nodes to the node table, or remove these degrees of freedom";
     RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
+    InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
+    InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
+    InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

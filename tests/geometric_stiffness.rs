@@ -83,7 +83,7 @@ impl Case {
     }
 
     fn raw(&self, geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>) -> RawModel {
-        let interfaces = vec![NodeSet { name: "tip".to_owned(), nodes: vec![1, 2] }];
+        let interfaces = vec![NodeSet::new("tip", vec![1, 2])];
         RawModel { geometric_stiffness, interfaces, ..self.body.raw_model() }
     }
 }

@@ -269,7 +269,12 @@ fn a_whole_model_is_read_with_its_fingerprints() {
         None,
     )
     .unwrap();
-    let interface = |name: &str, nodes| flexbody::input::InterfaceSource { name: name.into(), nodes };
+    let interface = |name: &str, nodes| flexbody::input::InterfaceSource {
+        name: name.into(),
+        nodes,
+        coupling: None,
+        reference: flexbody::model::Reference::Mean,
+    };
     files.interfaces = vec![
         interface("tip", InterfaceNodes::Listed(vec![40])),
         interface("base", InterfaceNodes::File(list)),

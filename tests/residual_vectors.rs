@@ -36,8 +36,7 @@ fn model(plate: &Assembly) -> FeModel {
     };
     let left = edge(&|i| i % 9 == 0);
     let corner = edge(&|i| i == 8);
-    let set = |name: &str, nodes| NodeSet { name: name.to_owned(), nodes };
-    raw.interfaces = vec![set("edge", left), set("corner", corner)];
+    raw.interfaces = vec![NodeSet::new("edge", left), NodeSet::new("corner", corner)];
     FeModel::from_raw(raw).expect("a sound model").model
 }
 

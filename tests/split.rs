@@ -61,7 +61,7 @@ fn interleaved(bodies: &[RawModel]) -> RawModel {
     }
     let interfaces = bodies.iter().enumerate().flat_map(|(b, body)| {
         let nodes = move |set: &NodeSet| set.nodes.iter().map(|&node| id(b, node)).collect();
-        body.interfaces.iter().map(move |set| NodeSet { name: format!("{}{b}", set.name), nodes: nodes(set) })
+        body.interfaces.iter().map(move |set| NodeSet::new(format!("{}{b}", set.name), nodes(set)))
     });
     RawModel {
         stiffness: merged(&|body| &body.stiffness),
@@ -175,7 +175,7 @@ fn block(cells: i32) -> RawModel {
     let mesh = Mesh::block(Kind::Hex8, [cells, 2, 1], [0.1 * f64::from(cells), 0.15, 0.07]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     raw.name = "pair".to_owned();
-    raw.interfaces = vec![NodeSet { name: "root".to_owned(), nodes: raw.nodes.ids[..3].to_vec() }];
+    raw.interfaces = vec![NodeSet::new("root", raw.nodes.ids[..3].to_vec())];
     raw
 }
 

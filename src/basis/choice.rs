@@ -1,6 +1,6 @@
 //! The bases there are.
 
-use super::{Basis, FreeSurface, ImportedShapes, Loads};
+use super::{Basis, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
 use crate::provenance::SourceFile;
 
 /// Which basis a body gets: every implementation of [`Basis`] has a variant here.
@@ -10,6 +10,10 @@ pub enum BasisChoice {
     Free(FreeSurface),
     /// Shapes that were computed elsewhere.
     Imported(ImportedShapes),
+    /// Modes with the interfaces held, and constraint modes.
+    CraigBampton(CraigBampton),
+    /// Free-surface modes, and attachment modes of the interfaces.
+    CraigChang(CraigChang),
 }
 
 impl Default for BasisChoice {
@@ -23,8 +27,8 @@ impl BasisChoice {
     /// Files that were read for it.
     pub fn sources(&self) -> Vec<&SourceFile> {
         match self {
-            Self::Free(free) => free.residual_vectors.iter().filter_map(Loads::source).collect(),
             Self::Imported(shapes) => shapes.source().into_iter().collect(),
+            _ => self.residual_vectors().iter().filter_map(Loads::source).collect(),
         }
     }
 
@@ -33,6 +37,17 @@ impl BasisChoice {
         match self {
             Self::Free(free) => free,
             Self::Imported(shapes) => shapes,
+            Self::CraigBampton(fixed) => fixed,
+            Self::CraigChang(free) => free,
+        }
+    }
+
+    /// Loads, named by the user, whose static responses join the modes.
+    pub fn residual_vectors(&self) -> &[Loads] {
+        match self {
+            Self::Free(FreeSurface { residual_vectors })
+            | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
+            Self::Imported(_) | Self::CraigBampton(_) => &[],
         }
     }
 }

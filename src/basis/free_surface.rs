@@ -33,16 +33,22 @@ impl Basis for FreeSurface {
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
-        let Task { model, settings, resume, watch } = *task;
-        let modes = || free_surface_resumed(model, settings, resume, watch);
         if self.residual_vectors.is_empty() {
-            return modes();
+            let Task { model, settings, resume, watch } = *task;
+            return free_surface_resumed(model, settings, resume, watch);
         }
-        let rigid = rigid_modes(model, &model.pencil())?;
-        let problem = problem_of_span(model, rigid.as_ref(), resume);
-        let loads = NamedLoads::new(&problem, model, &self.residual_vectors, settings)?;
-        with_residual_vectors(model, &problem, modes()?, &loads, settings, watch)
+        free_modes_with(&self.residual_vectors, "residual vector", task)
     }
+}
+
+/// Free-surface modes and the static responses to `loads`, each called `what` where modes are named after it.
+pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> Result<ModalBasis> {
+    let Task { model, settings, resume, watch } = *task;
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let problem = problem_of_span(model, rigid.as_ref(), resume);
+    let loads = NamedLoads::new(&problem, model, loads, what, settings)?;
+    let free = free_surface_resumed(model, settings, resume, watch)?;
+    with_residual_vectors(model, &problem, free, &loads, settings, watch)
 }
 
 /// Computes the free-surface modes of `model`.
@@ -118,7 +124,7 @@ fn compute(
 }
 
 /// What the user should know about the precision of the factor.
-fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
+pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
     let plan = solution.plan.filter(|_| settings.factor == FactorChoice::Auto)?;
     let message = match plan.precision {
         Precision::Single => "the factor is in single precision; the modes are corrected in double precision",
@@ -192,7 +198,7 @@ fn describe(
 /// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper
 /// bound of the first flexible eigenvalue, within a factor of two for a uniform body. Nodal rotations are half the curl of
 /// the field, rows without a place stay zero.
-fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
+pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
     let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
     let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];

@@ -2,16 +2,23 @@
 
 mod choice;
 mod columns;
+mod craig_bampton;
+mod craig_chang;
 mod failure;
 mod free_surface;
 mod imported;
+mod interface_coordinates;
+mod joints;
 mod modal_basis;
 mod pseudo_free_surface;
 mod residual_vectors;
 mod rigid_modes;
 
 pub use choice::BasisChoice;
+pub use craig_bampton::CraigBampton;
+pub use craig_chang::CraigChang;
 pub use free_surface::{FreeSurface, ModeSettings, free_surface, free_surface_of, free_surface_resumed};
 pub use imported::ImportedShapes;
+pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
 pub use residual_vectors::{Loads, UserLoads};

@@ -1,6 +1,6 @@
 //! What every basis gives, and what is checked of it whichever it is.
 
-use super::ModeSettings;
+use super::{InterfaceCoordinates, ModeSettings};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{EigenProblem, EigenSolution, Resume, Wanted, energy_noise};
 use crate::error::Result;
@@ -62,6 +62,8 @@ pub struct ModalBasis {
     pub provenance: Vec<String>,
     /// For each load of the residual vectors, what the basis lacks.
     pub truncation: Vec<Truncation>,
+    /// K and M in interface coordinates, of a basis that has them.
+    pub coordinates: Option<InterfaceCoordinates>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -146,6 +148,14 @@ impl ModalBasis {
             });
         }
         let provenance = vec![provenance.to_owned(); solution.eigenvalues.len()];
-        Ok(Self { solution, rigid_noise, input_noise, provenance, truncation: Vec::new(), diagnostics })
+        Ok(Self {
+            solution,
+            rigid_noise,
+            input_noise,
+            provenance,
+            truncation: Vec::new(),
+            coordinates: None,
+            diagnostics,
+        })
     }
 }

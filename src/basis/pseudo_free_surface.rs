@@ -12,6 +12,10 @@ const RIGID: f64 = 1e-5;
 /// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which it moves no mass: rounding leaves 1e-15.
 const MASSLESS: f64 = 1e-12;
 
+/// The same for what is left of a shape beside others: a singular M sees almost nothing of some combinations of shapes that it sees.
+/// Below, such a shape would be so large, and its eigenvalue so high, that the others lose their digits beside it.
+const NEARLY_MASSLESS: f64 = 1e-4;
+
 /// The part of a set of shapes that spans deformations, and what became of the rest (indices from 0).
 #[derive(Debug, Clone)]
 pub(super) struct Independent {
@@ -37,6 +41,10 @@ pub(super) fn independent(
     dependent: f64,
 ) -> Option<Independent> {
     let (n, k) = (shapes.nrows(), shapes.ncols());
+    let diagonal = pencil.mass_diagonal();
+    let diagonal_square = |a: &Mat<f64>, j: usize| -> f64 {
+        diagonal.iter().zip(a.col(j).iter()).map(|(m, s)| m * s * s).sum()
+    };
     let mut out = Independent {
         vectors: Mat::zeros(0, 0),
         kept: Vec::new(),
@@ -54,8 +62,7 @@ pub(super) fn independent(
     let mut products = pencil.apply_mass(shapes.as_ref());
     let mut moving = vec![true; k];
     for (j, square) in column_products(shapes.as_ref(), products.as_ref()).into_iter().enumerate() {
-        let bound: f64 =
-            pencil.mass_diagonal().iter().zip(shapes.col(j).iter()).map(|(m, s)| m * s * s).sum();
+        let bound = diagonal_square(&shapes, j);
         if square < -MASSLESS.sqrt() * bound {
             return None;
         }
@@ -102,7 +109,13 @@ pub(super) fn independent(
         }
         // Afresh: the product was the difference of larger ones.
         product = pencil.apply_mass(vector.as_ref());
-        let norm = column_products(vector.as_ref(), product.as_ref())[0].max(0.0).sqrt();
+        let square = column_products(vector.as_ref(), product.as_ref())[0];
+        // A singular M: what is left of shapes with mass may have none.
+        if square <= NEARLY_MASSLESS * diagonal_square(&vector, 0) {
+            out.massless.push(j);
+            continue;
+        }
+        let norm = square.sqrt();
         for i in 0..n {
             shapes[(i, found)] = vector[(i, 0)] / norm;
             products[(i, found)] = product[(i, 0)] / norm;
@@ -117,10 +130,6 @@ impl Independent {
     /// What the user should know of the shapes that were left out; `what` names them, as in `imported shapes`, and `name` each.
     pub fn notes(&self, what: &str, criterion: f64, name: impl Fn(usize) -> String) -> Vec<Diagnostic> {
         let all = self.kept.len() + self.rigid.len() + self.massless.len() + self.dependent.len();
-        let named = |columns: Vec<String>| match columns.len() {
-            0..=6 => columns.join(", "),
-            count => format!("{} and {} more", columns[..5].join(", "), count - 5),
-        };
         let mut notes = Vec::new();
         if !self.rigid.is_empty() {
             let which = named(self.rigid.iter().map(|&j| name(j)).collect());
@@ -147,6 +156,22 @@ impl Independent {
     }
 }
 
+/// `a, b, c`, or `a, b, c, d, e and 7 more`.
+pub(super) fn named(columns: Vec<String>) -> String {
+    match columns.len() {
+        0..=6 => columns.join(", "),
+        count => format!("{} and {} more", columns[..5].join(", "), count - 5),
+    }
+}
+
 fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
     a.as_mut().col_mut(j).iter_mut().for_each(|value| *value *= factor);
+}
+
+/// For each mode, the shape with the largest share in it, and that share: the square of its amplitude in `parts` (shapes x modes) for
+/// M-orthonormal shapes and modes.
+pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {
+    let shares = |p: usize| parts.col(p).iter().map(|a| a * a).enumerate();
+    let largest = |p: usize| shares(p).fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most });
+    (0..parts.ncols()).map(largest).collect()
 }

@@ -2,6 +2,7 @@
 
 use super::columns::columns;
 use super::failure::explain;
+use super::joints::{AXES, Joint, joints};
 use super::modal_basis::ModalBasis;
 use super::pseudo_free_surface::independent;
 use super::{ModeSettings, Truncation};
@@ -15,8 +16,6 @@ use crate::model::{FeModel, RawShapes};
 use crate::progress::{Event, Watch};
 use crate::provenance::SourceFile;
 use faer::Mat;
-use nalgebra::{Matrix3, Vector3};
-use std::collections::HashSet;
 
 /// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
 const LEFT: f64 = 1e-8;
@@ -30,8 +29,9 @@ pub enum Loads {
     /// The six centrifugal loads f = M (e_k e_l' + e_l e_k' - 2 delta_kl I) x / (1 + delta_kl), up to their sign, that any
     /// constant angular velocity is made of: f(w) = sum_kl w_k w_l f_kl.
     Centrifugal,
-    /// Unit force and unit torque along every model axis at every interface, distributed over its nodes as a rigid
-    /// motion of these would be (averaging coupling).
+    /// Unit force and unit torque along every model axis at the reference point of every interface, distributed over its nodes as
+    /// a rigid motion of these would be (averaging coupling, also where another joins the nodes rigidly); unit forces at the
+    /// nodes of a free interface.
     Interfaces,
     /// Nodal forces.
     User(UserLoads),
@@ -74,18 +74,16 @@ impl Loads {
     }
 
     /// Names and nodal forces.
-    fn forces(&self, problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
+    fn forces(&self, problem: &EigenProblem<'_>, model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
         match self {
-            Self::Centrifugal => centrifugal(problem, model),
+            Self::Centrifugal => Ok(centrifugal(problem, model)),
             Self::Interfaces => interfaces(model),
-            Self::User(UserLoads { loads, .. }) => (0..loads.ncols())
+            Self::User(UserLoads { loads, .. }) => Ok((0..loads.ncols())
                 .map(|j| (format!("load {}", j + 1), loads.as_ref().subcols(j, 1).to_owned()))
-                .collect(),
+                .collect()),
         }
     }
 }
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
     let (mut loads, d) = (Vec::new(), model.dimension());
@@ -110,41 +108,21 @@ fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<
     loads
 }
 
-fn interfaces(model: &FeModel) -> Vec<(String, Mat<f64>)> {
-    let (nodes, d) = (model.nodes(), model.dimension());
-    let mut loads = Vec::new();
-    for set in model.interfaces() {
-        let members: HashSet<i64> = set.nodes.iter().copied().collect();
-        let places: Vec<usize> = (0..nodes.len()).filter(|&i| members.contains(&nodes.ids[i])).collect();
-        let count = places.len() as f64;
-        let at = |i: usize| Vector3::from(nodes.positions[i]);
-        let centre = places.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / count;
-        let arms: Vec<Vector3<f64>> = places.iter().map(|&i| at(i) - centre).collect();
-        let inertia: Matrix3<f64> =
-            arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
-        // Nodes on one line transmit no torque about it, a single node none at all.
-        let inverse = inertia.pseudo_inverse(1e-12 * inertia.trace()).unwrap_or_else(|_| Matrix3::zeros());
-        let mut push = |kind: &str, axis: usize, force: &dyn Fn(usize) -> Vector3<f64>| {
-            let mut load = Mat::zeros(d * nodes.len(), 1);
-            for (place, &i) in places.iter().enumerate() {
-                let force = force(place);
-                (0..d).for_each(|k| load[(d * i + k, 0)] = force[k]);
-            }
-            loads.push((format!("{} {kind} {}", set.name, AXES[axis]), load));
-        };
-        for axis in 0..d {
-            push("force", axis, &|_| Vector3::ith(axis, 1.0 / count));
-        }
-        for axis in if d == 2 { 2..3 } else { 0..3 } {
-            let turn = inverse * Vector3::ith(axis, 1.0);
-            push("torque", axis, &|place| turn.cross(&arms[place]));
-        }
-    }
-    loads
+/// The load on each coordinate of every interface.
+fn interfaces(model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
+    let joints = joints(model, "interface loads")?;
+    let one = |joint: &Joint, j: usize| {
+        let mut load = Mat::zeros(model.pencil().n(), 1);
+        joint.scatter(joint.measure().subcols(j, 1), &mut load, 0);
+        (format!("{} {}", joint.name, joint.loads[j]), load)
+    };
+    Ok(joints.iter().flat_map(|joint| (0..joint.loads.len()).map(move |j| one(joint, j))).collect())
 }
 
 /// All loads side by side.
 pub(super) struct NamedLoads {
+    /// What a static response is called.
+    what: String,
     names: Vec<String>,
     /// N x m.
     forces: Mat<f64>,
@@ -160,22 +138,17 @@ impl NamedLoads {
         problem: &EigenProblem<'_>,
         model: &FeModel,
         loads: &[Loads],
+        what: &str,
         settings: &ModeSettings,
     ) -> Result<Self> {
         if settings.accuracy == Accuracy::Certified {
-            let message = "residual vectors are no eigenvectors and cannot be certified";
+            let message = format!("{what}s are no eigenvectors and cannot be certified");
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
         }
-        if loads.contains(&Loads::Interfaces) && model.interfaces().is_empty() {
-            let message = "the model has no interfaces, so there are no interface loads";
-            return Err(Diagnostic::new(Code::InterfaceNode, message)
-                .with_help("name node sets as [[interface]] in the manifest")
-                .into());
-        }
-        let (names, forces): (Vec<String>, Vec<Mat<f64>>) =
-            loads.iter().flat_map(|loads| loads.forces(problem, model)).unzip();
+        let named = loads.iter().map(|loads| loads.forces(problem, model)).collect::<Result<Vec<_>>>()?;
+        let (names, forces): (Vec<String>, Vec<Mat<f64>>) = named.into_iter().flatten().unzip();
         let forces: Vec<_> = forces.iter().map(Mat::as_ref).collect();
-        Ok(Self { names, forces: side_by_side(&forces) })
+        Ok(Self { what: what.to_owned(), names, forces: side_by_side(&forces) })
     }
 }
 
@@ -189,8 +162,8 @@ pub(super) fn with_residual_vectors(
     settings: &ModeSettings,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    let NamedLoads { names, forces } = loads;
-    watch(Event::Phase("residual vectors"));
+    let NamedLoads { what, names, forces } = loads;
+    watch(Event::Phase(&format!("{what}s")));
     let failed = |failure: EigenFailure| explain(model, failure);
     let pencil = &problem.pencil;
     let modes = &free.solution.vectors;
@@ -251,7 +224,7 @@ pub(super) fn with_residual_vectors(
             let largest = (count..span.ncols()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
             let largest = largest.expect("the span is more than the free modes");
             let name = &names[used[found.kept[largest - count]]];
-            format!("residual vector: {:.0} % {name}", 100.0 * share(largest))
+            format!("{what}: {:.0} % {name}", 100.0 * share(largest))
         })
         .collect();
 
@@ -270,7 +243,7 @@ pub(super) fn with_residual_vectors(
     let mut notes = free.diagnostics;
     if !dropped.is_empty() {
         let message = format!(
-            "{} of {} residual vectors are left out, they add less than {LEFT:.0e} of their M-norm: {}",
+            "{} of {} {what}s are left out, they add less than {LEFT:.0e} of their M-norm: {}",
             dropped.len(),
             names.len(),
             dropped.join(", ")

@@ -60,7 +60,7 @@ pub struct ConvertArguments {
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
-    /// Number of flexible modes, up to all of them [default: 20; imported shapes: all]
+    /// Number of flexible modes, up to all of them; static shapes of the basis come on top [default: 20; imported shapes: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
     pub modes: Option<u32>,
     /// All flexible modes up to this frequency instead
@@ -72,7 +72,7 @@ pub struct ConvertArguments {
     /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array
     #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
     pub shapes: Option<PathBuf>,
-    /// Static responses to add to free modes: centrifugal, interfaces, loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. Replaces [basis] of the manifest
+    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces, loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. Replaces [basis] of the manifest
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,
     /// Promise about the modes
@@ -183,6 +183,10 @@ pub struct Printing {
 pub enum BasisName {
     /// Free-surface modes, computed here
     Free,
+    /// Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit motions of the interfaces
+    CraigBampton,
+    /// Free-surface modes (--modes counts them), and static responses to unit loads at the interfaces
+    CraigChang,
     /// Shapes that were computed elsewhere: eigenvectors, static shapes, any mixture of them
     Imported,
 }

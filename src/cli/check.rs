@@ -48,5 +48,7 @@ fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
         eigenvalues: Some(&body.modes().eigenvalue),
         eigenvalue_noise: body.certificate().rigid_noise,
     };
-    identities(body.invariants(), &expected)
+    let mut checks = identities(body.invariants(), &expected);
+    checks.extend(body.parts().interface_identities());
+    checks
 }

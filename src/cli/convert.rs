@@ -6,7 +6,9 @@ use super::output::{Outcome, tell};
 use super::places::{Places, Reserved};
 use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
-use crate::basis::{BasisChoice, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads};
+use crate::basis::{
+    BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
+};
 use crate::convert::{Conversion, ConvertSettings, Lumping, convert_resumed};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
@@ -209,14 +211,18 @@ fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 
 /// Options that say nothing together; `loads` are those of residual vectors.
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
-    let free = arguments.basis == BasisName::Free;
+    let basis = arguments.basis;
     let residual = !loads.is_empty();
+    let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang);
+    let coupled = matches!(basis, BasisName::CraigBampton | BasisName::CraigChang);
     let message = match arguments {
-        ConvertArguments { shapes: Some(_), .. } if free => "--shapes needs --basis imported",
-        ConvertArguments { checkpoint: Some(_), .. } if !free => {
-            "--checkpoint keeps a search for modes, imported shapes need none"
+        ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
+            "--shapes needs --basis imported"
         }
-        _ if residual && !free => "residual vectors need --basis free",
+        ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
+            "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
+        }
+        _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
         ConvertArguments { split: true, .. }
             if loads.iter().any(|set| matches!(set, LoadSource::File(_))) =>
         {
@@ -228,8 +234,11 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
         ConvertArguments { accuracy: AccuracyName::Certified, .. } if residual => {
             "residual vectors are no eigenvectors and cannot be certified"
         }
-        ConvertArguments { lumped_modes: true, .. } if !free => {
-            "--lumped-modes compares free-surface modes, not imported shapes"
+        ConvertArguments { accuracy: AccuracyName::Certified, .. } if coupled => {
+            "the modes of this basis are no eigenvectors and cannot be certified"
+        }
+        ConvertArguments { lumped_modes: true, .. } if basis != BasisName::Free => {
+            "--lumped-modes compares free-surface modes: it needs --basis free"
         }
         _ => return Ok(()),
     };
@@ -243,7 +252,8 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
             let raw = read_shapes(&MatrixLocation::parse(shapes), model.stiffness().n(), "shapes")?;
             ImportedShapes::new(model, raw).map(BasisChoice::Imported)
         }
-        _ => {
+        (BasisName::CraigBampton, _) => Ok(BasisChoice::CraigBampton(CraigBampton)),
+        (name, _) => {
             let read = |set: &LoadSource| match set {
                 LoadSource::Centrifugal => Ok(Loads::Centrifugal),
                 LoadSource::Interfaces => Ok(Loads::Interfaces),
@@ -253,7 +263,10 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
                 }
             };
             let residual_vectors = loads.iter().map(read).collect::<Result<_>>()?;
-            Ok(BasisChoice::Free(FreeSurface { residual_vectors }))
+            Ok(match name {
+                BasisName::CraigChang => BasisChoice::CraigChang(CraigChang { residual_vectors }),
+                _ => BasisChoice::Free(FreeSurface { residual_vectors }),
+            })
         }
     }
 }
@@ -378,8 +391,8 @@ fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
         Some(hertz) => Wanted::Below(units.eigenvalue_of(hertz)),
         None => Wanted::Lowest(match (arguments.modes, arguments.basis) {
             (Some(modes), _) => modes as usize,
-            (None, BasisName::Free) => ModeSettings::DEFAULT_COUNT,
             (None, BasisName::Imported) => usize::MAX,
+            (None, _) => ModeSettings::DEFAULT_COUNT,
         }),
     }
 }

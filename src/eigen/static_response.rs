@@ -25,7 +25,7 @@ const ACCEPTED: f64 = 1e-9;
 /// For each load (column of `loads`, N x m) the part of K^+ f that `modes` do not have: with P = \[R, Psi\] of rigid modes and
 /// eigenvectors (`modes` M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are thereby self-equilibrated (inertia relief).
 ///
-/// `first` is the first flexible eigenvalue, the scale of the shift.
+/// `first` is the first flexible eigenvalue, the scale of the shift. Without rigid modes and `modes` (a body that is held) x = K^-1 f.
 ///
 /// # Errors
 /// Failures of the factorisation; [`EigenFailure::Inaccurate`] with the residual of a response.
@@ -39,7 +39,8 @@ pub fn static_responses(
 ) -> Result<Mat<f64>, EigenFailure> {
     let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
     let known = side_by_side(&[problem.rigid, modes]);
-    let tau = 0.5 * first;
+    // Without known modes K itself is definite, and its factor the solution but for rounding.
+    let tau = if known.ncols() == 0 { 0.0 } else { 0.5 * first };
     match precision {
         Precision::Double => {
             let factor: Cholesky<'_, f64> = factorise(problem, &analysis, tau, counters)?;

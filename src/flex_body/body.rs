@@ -1,7 +1,7 @@
 //! The validated body.
 
 use super::validate::problems;
-use super::{Certificate, Interface, LumpedBody, Modes, Parts, Source};
+use super::{Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source};
 use crate::error::{Error, Result};
 use crate::invariants::{Frame, Invariants};
 use crate::model::{GeometricStiffness, Nodes};
@@ -21,7 +21,8 @@ impl FlexBody {
     /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
     /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
     /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty;
-    /// loads of geometric stiffness are those of the dimension, each once; interfaces name existing nodes;
+    /// loads of geometric stiffness are those of the dimension, each once; interfaces name existing nodes, those declared free have no reference point;
+    /// matrices in interface coordinates are symmetric;
     /// no text contains a NUL character (no file could hold it).
     ///
     /// # Errors
@@ -110,5 +111,10 @@ impl FlexBody {
     /// Interfaces.
     pub fn interfaces(&self) -> &[Interface] {
         &self.parts.interfaces
+    }
+
+    /// K and M in interface coordinates, of a basis that has them.
+    pub fn coordinates(&self) -> Option<&InterfaceCoordinates> {
+        self.parts.coordinates.as_ref()
     }
 }

@@ -1,5 +1,6 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
+use super::{Interface, InterfaceCoordinates};
 use crate::invariants::{DIGITS, Frame, Invariants};
 use crate::model::{BodyNumber, GeometricStiffness, Nodes};
 use crate::provenance::SourceFile;
@@ -129,15 +130,6 @@ pub struct LumpedBody {
     pub comparison: Vec<(String, f64)>,
 }
 
-/// A named interface of the body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Interface {
-    /// Name.
-    pub name: String,
-    /// Indices into the body's nodes.
-    pub nodes: Vec<usize>,
-}
-
 /// The parts of a [`FlexBody`](super::FlexBody), public so that makers (pipeline, reader) can fill them.
 ///
 /// [`FlexBody::new`](super::FlexBody::new) says what must hold.
@@ -166,4 +158,6 @@ pub struct Parts {
     pub certificate: Certificate,
     /// Interfaces.
     pub interfaces: Vec<Interface>,
+    /// K and M in interface coordinates, of a basis that has them (Craig-Bampton).
+    pub coordinates: Option<InterfaceCoordinates>,
 }

@@ -3,7 +3,7 @@
 use super::{MassStructure, Modes, Parts};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::invariants::{DIGITS, Invariants};
-use crate::model::UnitLoad;
+use crate::model::{Coupling, UnitLoad};
 use faer::{Mat, MatRef};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
@@ -43,6 +43,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
     check.guarantee(parts, nf);
     check.interfaces(parts, n);
+    check.coordinates(parts, nf);
     check.text("source.name", &parts.source.name);
     if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
         check.add(format!("`source.number` is {number}"));
@@ -322,6 +323,25 @@ impl Check {
             }
             if let Some(node) = interface.nodes.iter().find(|&&node| node >= n) {
                 self.add(format!("interface `{name}` names node index {node}, expected indices below {n}"));
+            }
+            self.finite(&format!("interface `{name}` reference"), interface.reference.into_iter().flatten());
+            if interface.coupling == Some(Coupling::Free) && interface.reference.is_some() {
+                self.add(format!("interface `{name}` is free, but has a reference point"));
+            }
+        }
+    }
+
+    fn coordinates(&mut self, parts: &Parts, nf: usize) {
+        let Some(coordinates) = &parts.coordinates else { return };
+        let size = coordinates.names.len();
+        coordinates.names.iter().for_each(|name| self.text("coordinates.names", name));
+        self.matrix("coordinates.of_modes", &coordinates.of_modes, size, nf);
+        for (name, matrix) in
+            [("coordinates.stiffness", &coordinates.stiffness), ("coordinates.mass", &coordinates.mass)]
+        {
+            self.matrix(name, matrix, size, size);
+            if (matrix.nrows(), matrix.ncols()) == (size, size) && *matrix != matrix.transpose() {
+                self.add(format!("`{name}` is not symmetric"));
             }
         }
     }

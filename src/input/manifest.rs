@@ -1,25 +1,24 @@
 //! The manifest `model.toml`. Its machine-readable contract is `schemas/manifest.schema.json`.
 
 use super::bytes::InputFile;
-use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, stem};
+use super::model_files::{MatrixLocation, ModelFiles, stem};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::units::UnitSystem;
-use std::collections::HashSet;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 mod basis;
 mod damping;
 mod geometric_stiffness;
+mod interface;
 
 const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs"];
-const INTERFACE: &[&str] = &["name", "nodes", "nodes_file"];
 
 /// Reads a manifest. Relative paths in it are taken from its folder. The files themselves are not touched.
 ///
@@ -89,7 +88,7 @@ impl Walk<'_> {
             Some((table, span)) => self.units(table, span)?,
             None => UnitSystem::default(),
         };
-        let interfaces = self.interfaces(top);
+        let interfaces = self.interfaces(top, usize::from(dimension));
         let damping = self.damping(top);
         let geometric_stiffness = self.geometric_stiffness(top);
         let residual_vectors = self.residual_vectors(top);
@@ -236,93 +235,19 @@ impl Walk<'_> {
         }
         Some(name)
     }
-
-    /// `None` when anything is wrong with the list.
-    fn interfaces(&mut self, top: &Table) -> Option<Vec<InterfaceSource>> {
-        let Some(value) = top.get("interface") else {
-            return Some(Vec::new());
-        };
-        let DeValue::Array(list) = value.get_ref() else {
-            self.mistyped("interface", value, "a list of tables: write [[interface]]");
-            return None;
-        };
-        let mut names = HashSet::new();
-        let mut interfaces = Vec::new();
-        for item in list.iter() {
-            let DeValue::Table(table) = item.get_ref() else {
-                self.mistyped("interface", item, "a list of tables: write [[interface]]");
-                continue;
-            };
-            if let Some(interface) = self.interface(table, item.span()) {
-                if !names.insert(interface.name.clone()) {
-                    let message = format!("interface `{}` is given twice", interface.name);
-                    self.complain(Code::ManifestSyntax, item.span(), message);
-                }
-                interfaces.push(interface);
-            }
-        }
-        Some(interfaces)
-    }
-
-    fn interface(&mut self, table: &Table, span: Range<usize>) -> Option<InterfaceSource> {
-        self.known_keys(table, "[[interface]]", INTERFACE);
-        if !table.contains_key("name") {
-            self.complain(Code::ManifestSyntax, span.clone(), "interface has no name".into());
-        }
-        let name = self.string(table, "name")?;
-        // The name becomes a group of the flex-body file.
-        if name.contains('/') || name.chars().all(|c| c == '.') || name.chars().any(char::is_control) {
-            let message =
-                format!("interface name `{}` cannot be the name of an HDF5 group", name.escape_debug());
-            self.complain(Code::ManifestSyntax, span, message);
-            return None;
-        }
-        let nodes = match (table.get("nodes"), table.contains_key("nodes_file")) {
-            (Some(list), false) => InterfaceNodes::Listed(self.node_list(&name, list)?),
-            (None, true) => {
-                let folder = self.path.parent().unwrap_or(Path::new(""));
-                InterfaceNodes::File(folder.join(PathBuf::from(self.string(table, "nodes_file")?)))
-            }
-            (None, false) => {
-                let message = format!("interface `{name}` has neither `nodes` nor `nodes_file`");
-                self.complain(Code::ManifestSyntax, span, message);
-                return None;
-            }
-            (Some(_), true) => {
-                let message = format!("interface `{name}` has both `nodes` and `nodes_file`");
-                self.complain(Code::ManifestSyntax, span, message);
-                return None;
-            }
-        };
-        Some(InterfaceSource { name, nodes })
-    }
-
-    fn node_list(&mut self, name: &str, value: &Value) -> Option<Vec<i64>> {
-        let DeValue::Array(list) = value.get_ref() else {
-            self.mistyped("nodes", value, "a list of node numbers");
-            return None;
-        };
-        if list.is_empty() {
-            self.complain(Code::ManifestSyntax, value.span(), format!("interface `{name}` has no nodes"));
-        }
-        let (mut nodes, mut seen) = (Vec::new(), HashSet::new());
-        for item in list.iter() {
-            match integer(item) {
-                Some(node) if seen.insert(node) => nodes.push(node),
-                Some(node) => {
-                    let message = format!("interface `{name}` lists node {node} twice");
-                    self.complain(Code::NodeDuplicate, item.span(), message);
-                }
-                None => self.mistyped("nodes", item, "a list of node numbers"),
-            }
-        }
-        Some(nodes)
-    }
 }
 
 fn integer(value: &Value) -> Option<i64> {
     let number = value.get_ref().as_integer()?;
     i64::from_str_radix(number.as_str(), number.radix()).ok()
+}
+
+fn real(value: &Value) -> Option<f64> {
+    match value.get_ref() {
+        DeValue::Float(number) => number.as_str().parse().ok(),
+        DeValue::Integer(_) => integer(value).map(|number| number as f64),
+        _ => None,
+    }
 }
 
 fn with_article(kind: &str) -> String {
@@ -335,6 +260,7 @@ mod tests {
     use super::basis::BASIS;
     use super::damping::{BAND, DAMPING, RAYLEIGH};
     use super::geometric_stiffness::GEOMETRIC_STIFFNESS;
+    use super::interface::INTERFACE;
     use super::*;
 
     /// The schema and the reader name the same keys.

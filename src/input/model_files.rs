@@ -2,7 +2,7 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
-use crate::model::{Damping, GeometricStiffness};
+use crate::model::{Coupling, Damping, GeometricStiffness, Reference};
 use crate::units::UnitSystem;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -37,12 +37,16 @@ pub struct ModelFiles {
 }
 
 /// An interface and where its nodes are listed.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceSource {
     /// Name, unique within the model.
     pub name: String,
     /// Its nodes.
     pub nodes: InterfaceNodes,
+    /// How it is coupled to its reference point, where that is said.
+    pub coupling: Option<Coupling>,
+    /// Its reference point.
+    pub reference: Reference,
 }
 
 /// Nodes of an interface.

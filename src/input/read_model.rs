@@ -114,7 +114,8 @@ fn parse(files: &ModelFiles, opened: &OpenFiles) -> Parsed {
             InterfaceNodes::Listed(nodes) => nodes.clone(),
             InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
         };
-        Ok(NodeSet { name: interface.name.clone(), nodes })
+        let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
+        Ok(NodeSet { name, nodes, coupling, reference })
     });
     let interfaces = interfaces.collect();
     let damping = files.damping.as_ref();

@@ -1,6 +1,7 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
 use super::geometric_stiffness::{check_loads, missing_components};
+use super::interface::resolve_references;
 use super::layout::{Layout, layout, name_some};
 use super::mass_structure::{MassForm, mass_form};
 use super::placeless::{check_massless, misplaced, recover};
@@ -102,6 +103,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
     }
     check_names(&raw, &mut found);
+    resolve_references(&mut raw, &mut found);
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     for set in &raw.interfaces {
         let unknown: Vec<i64> = set.nodes.iter().filter(|id| !known.contains(id)).copied().collect();

@@ -1,4 +1,4 @@
-//! Nodes, labels of degrees of freedom, and named node sets.
+//! Nodes and labels of degrees of freedom.
 
 /// Node numbers and undeformed positions, in the order of the node table.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -44,13 +44,4 @@ impl std::fmt::Display for DofLabel {
         };
         write!(f, "node {} {name}", self.node)
     }
-}
-
-/// A named set of nodes: an interface of the manifest.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NodeSet {
-    /// Name, unique within the model.
-    pub name: String,
-    /// Node numbers.
-    pub nodes: Vec<i64>,
 }

@@ -5,10 +5,10 @@ use super::geometric_stiffness::{GeometricStiffnessFacts, softening_hz};
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
-use super::numbers::{percent, significant};
+use super::numbers::{counted, percent, significant};
 use super::run_data::{Phase, RunData};
 use crate::diagnostic::Diagnostic;
-use crate::flex_body::{FlexBody, MassStructure, Truncation};
+use crate::flex_body::{FlexBody, Interface, MassStructure, Truncation};
 use crate::invariants::GENERAL_REMARK;
 use crate::provenance::{self, SourceFile};
 use serde::{Serialize, Serializer};
@@ -75,7 +75,40 @@ pub(super) struct UnitFacts {
 pub(super) struct InterfaceFacts {
     pub name: String,
     pub n_nodes: usize,
+    /// `None`: not stated.
+    pub coupling: Option<&'static str>,
+    /// Body frame; `None`: no reference point.
+    pub reference: Option<[f64; 3]>,
+    /// Largest deformation of the interface in a mode, relative to its largest motion in any; `None`: no reference point.
+    pub deformation: Option<f64>,
 }
+
+impl InterfaceFacts {
+    fn of(interface: &Interface, body: &FlexBody) -> Self {
+        let rows = interface.rows(body.nodes(), body.modes().shape.as_ref(), body.dimension());
+        Self {
+            name: interface.name.clone(),
+            n_nodes: interface.nodes.len(),
+            coupling: interface.coupling.map(|coupling| coupling.name()),
+            reference: interface.reference,
+            deformation: rows.map(|rows| rows.deformation().1),
+        }
+    }
+
+    /// `80 nodes, rigid`, `3 nodes, averaging, deforms by up to 12 %`.
+    pub fn in_words(&self) -> String {
+        let coupling = self.coupling.map_or(String::new(), |name| format!(", {name}"));
+        let deforms = match self.deformation {
+            Some(part) if part > RIGID => format!(", deforms by up to {} of its motion", percent(part)),
+            Some(_) => ", moves as a rigid body".to_owned(),
+            None => String::new(),
+        };
+        format!("{}{coupling}{deforms}", counted(self.n_nodes, "node"))
+    }
+}
+
+/// Deformation of an interface up to this is rounding.
+const RIGID: f64 = 1e-8;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ModeFacts {
@@ -226,7 +259,7 @@ impl ModelFacts {
             interfaces: body
                 .interfaces()
                 .iter()
-                .map(|i| InterfaceFacts { name: i.name.clone(), n_nodes: i.nodes.len() })
+                .map(|interface| InterfaceFacts::of(interface, body))
                 .collect(),
             settings: source.settings.clone(),
         }
@@ -243,11 +276,12 @@ impl ModelFacts {
 }
 
 impl ModeFacts {
-    /// How many modes come from where, in the order of their first ones; empty where all are free modes.
+    /// How many modes come from which kind of shape, in the order of their first ones; empty where all are free modes.
     pub fn origins(&self) -> Vec<(&str, usize)> {
         let mut origins: Vec<(&str, usize)> = Vec::new();
         for origin in &self.provenance {
-            match origins.iter_mut().find(|(known, _)| known == origin) {
+            let origin = origin.split_once(": ").map_or(origin.as_str(), |(kind, _)| kind);
+            match origins.iter_mut().find(|(known, _)| *known == origin) {
                 Some((_, count)) => *count += 1,
                 None => origins.push((origin, 1)),
             }

@@ -153,8 +153,8 @@ fn body(html: &mut String, facts: &Facts) {
     }
     if !model.interfaces.is_empty() {
         let rows: Vec<_> =
-            model.interfaces.iter().map(|i| vec![escape(&i.name), i.n_nodes.to_string()]).collect();
-        table(html, "Interfaces", &texts(["Name", "Nodes"]), &[0], &rows);
+            model.interfaces.iter().map(|i| vec![escape(&i.name), escape(&i.in_words())]).collect();
+        table(html, "Interfaces", &texts(["Name", "Nodes and coupling"]), &[0, 1], &rows);
     }
 }
 

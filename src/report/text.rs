@@ -123,6 +123,7 @@ fn heading(page: &mut Page, facts: &Facts) {
     page.entry("inertia", &format!("{} (principal)", triple(&body.principal_inertia, &units.inertia())));
     page.entry("gyration", &format!("{} (radii)", triple(&body.radii_of_gyration, &units.length())));
     page.entry("frame", &body.frame);
+    page.list("interface", &model.interfaces, |i| format!("{}: {}", plain(&i.name), i.in_words()));
 }
 
 fn modes(page: &mut Page, facts: &Facts) {
@@ -137,6 +138,9 @@ fn modes(page: &mut Page, facts: &Facts) {
     let residual = significant(modes.worst_residual, 2);
     page.entry("modes", &format!("{} flexible, worst residual {residual}{accuracy}", modes.count));
     page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
+    if let Some(basis) = facts.model.settings["basis"].as_str().filter(|basis| *basis != "free") {
+        page.entry("basis", &plain(basis));
+    }
     let origins = modes.origins();
     page.list("origin", &origins, |(origin, count)| {
         format!("{}: {}", counted(*count, "mode"), plain(origin))

@@ -4,11 +4,11 @@ use super::scan::Scan;
 use super::schema::MASS_STRUCTURES;
 use super::value::Value;
 use crate::flex_body::{
-    Certificate, Frame, GeometricStiffness, Guarantee, Interface, InternalRows, LumpedBody, Modes, Parts,
-    Source, UnitLoad,
+    Certificate, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
+    LumpedBody, Modes, Parts, Source, UnitLoad,
 };
 use crate::invariants::{DIGITS, GeneralTerms, Invariants};
-use crate::model::{BodyNumber, Nodes};
+use crate::model::{BodyNumber, Coupling, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -36,6 +36,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let lumped = take.lumped(nf);
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
+    let coordinates = take.coordinates(nf);
     let source = source.filter(|_| scan.problems.is_empty())?;
     Some(Parts {
         source,
@@ -49,6 +50,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         lumped,
         certificate,
         interfaces,
+        coordinates,
     })
 }
 
@@ -63,6 +65,10 @@ impl Take<'_> {
             Some(Value::Floats(values)) => values,
             other => unreachable!("scan without problems has {other:?} as {path}"),
         }
+    }
+
+    fn optional_floats(&mut self, path: &str) -> Option<Vec<f64>> {
+        self.scan.values.contains_key(path).then(|| self.floats(path))
     }
 
     fn ints(&mut self, path: &str) -> Vec<i64> {
@@ -294,8 +300,55 @@ impl Take<'_> {
             if let Some(id) = ids.iter().find(|id| !index.contains_key(id)) {
                 self.scan.add(format!("{path}: expected nodes of /nodes/id, found {id}"));
             }
-            out.push(Interface { name, nodes: ids.iter().filter_map(|id| index.get(id).copied()).collect() });
+            let nodes = ids.iter().filter_map(|id| index.get(id).copied()).collect();
+            let coupling = self.coupling(&format!("/interfaces/{link}@coupling"));
+            let reference = self.optional_floats(&format!("/interfaces/{link}/reference"));
+            let reference = reference.and_then(|x| x.try_into().ok());
+            out.push(Interface { name, nodes, coupling, reference });
         }
         out
+    }
+
+    fn coupling(&mut self, path: &str) -> Option<Coupling> {
+        let Some(Value::Text(name)) = self.scan.values.remove(path) else { return None };
+        let coupling = Coupling::ALL.into_iter().find(|coupling| coupling.name() == name);
+        if coupling.is_none() {
+            let known = Coupling::ALL.map(|coupling| format!("`{}`", coupling.name())).join(", ");
+            self.scan.add(format!("{path}: expected one of {known}, found {name:?}"));
+        }
+        coupling
+    }
+
+    /// All of the interface coordinates, or nothing of them.
+    fn coordinates(&mut self, nf: usize) -> Option<InterfaceCoordinates> {
+        let names = "/interface_coordinates@names";
+        let matrices = ["stiffness", "mass", "of_modes"].map(|name| format!("/interface_coordinates/{name}"));
+        let there = |path: &str| self.scan.values.contains_key(path);
+        let count = matrices.iter().filter(|path| there(path)).count() + usize::from(there(names));
+        if count < 1 + matrices.len() {
+            if count > 0 {
+                let expected = "/interface_coordinates: expected `names`, `stiffness`, `mass` and `of_modes`";
+                self.scan.add(format!("{expected}, found {count} of them"));
+            }
+            return None;
+        }
+        let names: Vec<String> = self.json(names, "a JSON array of texts")?;
+        let [stiffness, mass, of_modes] = matrices.map(|path| self.floats(&path));
+        if stiffness.len() != names.len().pow(2) {
+            let found = format!("found {} for {} numbers in `stiffness`", names.len(), stiffness.len());
+            self.scan
+                .add(format!("/interface_coordinates@names: expected a name for each coordinate, {found}"));
+            return None;
+        }
+        let matrix = |values: Vec<f64>, columns: usize| {
+            Mat::from_fn(values.len() / columns, columns, |i, j| values[i * columns + j])
+        };
+        let size = names.len();
+        Some(InterfaceCoordinates {
+            names,
+            stiffness: matrix(stiffness, size),
+            mass: matrix(mass, size),
+            of_modes: matrix(of_modes, nf),
+        })
     }
 }

@@ -14,7 +14,7 @@ const INTRODUCTION: &str = "\
 A flex-body file is an HDF5 file (readable by HDF5 1.8 and later). All arrays are row-major in the shapes given here
 (MATLAB and Fortran show the extents in reverse order); numbers are 64-bit little-endian; texts are UTF-8 of variable
 length. Every dataset has the text attributes `units`, `symbol` and `description`. Numbers are in the units of the root
-group. n is the number of nodes, nf the number of modes, k the number of nodes of an interface.
+group. n is the number of nodes, nf the number of modes, k the number of nodes of an interface, nc the number of interface coordinates.
 
 W1, W2, W3 are component-blocked: the column (or row) of component b = 0, 1, 2 and mode j is b nf + j.
 
@@ -109,6 +109,7 @@ fn symbol(extent: Extent) -> String {
         Extent::ThreeModes => "3nf".to_owned(),
         Extent::InterfaceNodes => "k".to_owned(),
         Extent::InternalRows => "m".to_owned(),
+        Extent::Coordinates => "nc".to_owned(),
     }
 }
 
@@ -123,7 +124,7 @@ pub fn format_schema() -> String {
         let mut target = &mut root;
         for name in group.path.split('/').filter(|name| !name.is_empty()) {
             let key = if name.starts_with('<') { "additionalProperties" } else { name };
-            target = descend(target, key, group.since() == 0);
+            target = descend(target, key, group.since() == 0 && !group.is_optional());
         }
         fill(target, group);
     }

@@ -24,6 +24,7 @@ pub(super) struct Sizes {
     modes: Option<usize>,
     pub interface_nodes: Option<usize>,
     pub internal_rows: Option<usize>,
+    coordinates: Option<usize>,
 }
 
 /// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
@@ -52,6 +53,12 @@ pub(super) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, S
         group = group.group(name).map_err(|_| "another object".to_owned())?;
     }
     Ok(group)
+}
+
+/// Whether a group lies in the root group.
+pub(super) fn has_group(file: &hdf5::File, path: &str) -> Result<bool, String> {
+    let root = file.as_group().map_err(|e| e.to_string())?;
+    has(&root, path.trim_start_matches('/'))
 }
 
 /// Names of the members of a group, in creation order where the file tracks it.
@@ -163,6 +170,7 @@ impl Sizes {
             Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
             Extent::InternalRows => size == *self.internal_rows.get_or_insert(size),
+            Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
         }
     }
 
@@ -178,6 +186,7 @@ impl Sizes {
             Extent::ThreeModes => known("3 nf", self.modes.map(|nf| 3 * nf)),
             Extent::InterfaceNodes => known("k", self.interface_nodes),
             Extent::InternalRows => known("m", self.internal_rows),
+            Extent::Coordinates => known("nc", self.coordinates),
         }
     }
 }

@@ -17,8 +17,10 @@ pub(super) enum Extent {
     InterfaceNodes,
     /// Rows of the modes without a place.
     InternalRows,
+    /// nc, the interface coordinates.
+    Coordinates,
 }
-use Extent::{Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes};
+use Extent::{Coordinates, Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes};
 
 /// How an entry is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,6 +143,7 @@ impl Item {
             Modes => nf,
             ThreeModes => 3 * nf,
             InterfaceNodes => view.interface_nodes().len(),
+            Coordinates => view.body.coordinates.as_ref().map_or(0, |c| c.names.len()),
             InternalRows => view.body.modes.internal.as_ref().map_or(0, |internal| internal.dofs.len()),
         };
         self.shape().unwrap_or(&[]).iter().map(size).collect()
@@ -151,6 +154,11 @@ impl Group {
     /// All entries, in the order of the table.
     pub fn entries(&self) -> impl Iterator<Item = &'static Item> + use<> {
         self.items.iter().flat_map(|part| part.iter())
+    }
+
+    /// Whether a file may do without it: it brings nothing that is required, and is no list of others.
+    pub fn is_optional(&self) -> bool {
+        self.per == Per::Body && self.entries().all(|item| !item.required)
     }
 
     /// The minor version that brought the group with all its entries.

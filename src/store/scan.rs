@@ -130,6 +130,9 @@ impl Scan {
 
     fn group(&mut self, file: &hdf5::File, group: &Group, link: Option<&str>) {
         let path = place(group, link);
+        if group.is_optional() && hdf5_value::has_group(file, &path) == Ok(false) {
+            return;
+        }
         let opened = match hdf5_value::open_group(file, &path) {
             Ok(opened) => opened,
             Err(found) => return self.add(format!("{path}: expected a group, found {found}")),

@@ -1,6 +1,6 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
 
-use super::item::Extent::{Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes};
+use super::item::Extent::{Fixed, InternalRows, Modes, Nodes, ThreeModes};
 use super::item::Kind::{Floats, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
 use super::item::{Get, Group, Item, Kind, Origin, Per};
@@ -10,9 +10,11 @@ use crate::invariants::GENERAL_REMARK;
 use crate::provenance;
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, guarantee};
 use geometric_stiffness::GEOMETRIC_STIFFNESS;
+use interfaces::{COORDINATES, INTERFACES};
 
 mod certificate;
 mod geometric_stiffness;
+mod interfaces;
 
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
@@ -381,32 +383,6 @@ const TERMS: &[Item] = &[
     attribute("reason", Text, ONE, "why", |_| text("no scene was given: every term is kept")),
 ];
 
-const INTERFACES: &[Item] = &[
-    dataset("node_id", Ints(&[InterfaceNodes]), ONE, "id", "node numbers of the interface", |v| {
-        Some(Value::Ints(v.interface_nodes().iter().map(|&i| v.body.nodes.ids[i]).collect()))
-    }),
-    dataset(
-        "position",
-        Floats(&[InterfaceNodes, Fixed(3)]),
-        LENGTH,
-        "x",
-        "their positions in the body frame",
-        |v| {
-            Some(Value::Floats(v.interface_nodes().iter().flat_map(|&i| v.body.nodes.positions[i]).collect()))
-        },
-    )
-    .derived("position"),
-    dataset(
-        "shape",
-        Floats(&[Modes, InterfaceNodes, Fixed(3)]),
-        PER_ROOT_MASS,
-        "Psi",
-        "their rows of /modes/shape",
-        |v| Some(shape_rows(&v.body.modes.shape, v.interface_nodes().iter().copied())),
-    )
-    .derived("shape"),
-];
-
 /// The groups, in the order in which they are written.
 pub(super) const TABLE: &[Group] = &[
     Group { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
@@ -452,7 +428,7 @@ pub(super) const TABLE: &[Group] = &[
     Group {
         path: "/interfaces/<name>",
         per: Per::Interface,
-        description: "Named node sets.",
+        description: "Named node sets, what they are coupled to, and the modes there.",
         items: &[INTERFACES],
     },
     Group {
@@ -460,6 +436,12 @@ pub(super) const TABLE: &[Group] = &[
         per: Per::UnitLoad,
         description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
         items: &[GEOMETRIC_STIFFNESS],
+    },
+    Group {
+        path: "/interface_coordinates",
+        per: Per::Body,
+        description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",
+        items: &[COORDINATES],
     },
 ];
 

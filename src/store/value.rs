@@ -1,6 +1,6 @@
 //! What an entry of the table holds, and where the writer takes it from.
 
-use crate::flex_body::{GeometricStiffness, Interface, LumpedBody, Parts};
+use crate::flex_body::{GeometricStiffness, Interface, InterfaceRows, LumpedBody, Parts};
 use crate::invariants::Invariants;
 use crate::units::{Unit, UnitSystem};
 use faer::{Mat, MatRef};
@@ -30,6 +30,11 @@ impl<'a> View<'a> {
     /// The invariants of the group: exact, or those of its lumping scheme.
     pub fn invariants(&self) -> &'a Invariants {
         self.lumped.map_or(&self.body.invariants, |l| &l.invariants)
+    }
+
+    /// The modes at the reference point of the group's interface.
+    pub fn interface_rows(&self) -> Option<InterfaceRows> {
+        self.interface?.rows(&self.body.nodes, self.body.modes.shape.as_ref(), self.body.dimension)
     }
 
     /// Node indices of the group's interface.
@@ -77,6 +82,8 @@ pub(super) enum Units {
     One,
     /// Hertz, whatever the unit of time.
     Hertz,
+    /// They differ between the rows, as the description says.
+    Mixed,
     /// mass^(halves/2) length^b time^c: mass-normalised modes carry mass^(-1/2).
     Of { mass_halves: i8, length: i8, time: i8 },
 }
@@ -101,6 +108,7 @@ impl Units {
         let (m, l, t) = match self {
             Units::One => return "1".to_owned(),
             Units::Hertz => return "Hz".to_owned(),
+            Units::Mixed => return "mixed".to_owned(),
             Units::Of { mass_halves, length, time } => (mass_halves, length, time),
         };
         let mut factors = Vec::new();

@@ -83,6 +83,9 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             make(&file, group.parent())?;
         }
         for (name, view) in group.instances(body.parts()) {
+            if group.is_optional() && group.entries().all(|item| item.value(&view).is_none()) {
+                continue;
+            }
             let path = place(group, name.as_deref().map(names::encode).as_deref());
             let target = if path == "/" { file.as_group()? } else { make(&file, &path)? };
             for item in group.entries() {

@@ -13,7 +13,7 @@ use flexbody::flex_body::{
 };
 use flexbody::invariants::{BodyFrame, ERROR_NORMS, Frame, Invariants, choose_frame, condense};
 use flexbody::linalg::SymmetricMatrix;
-use flexbody::model::Nodes;
+use flexbody::model::{Coupling, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::report::{Phase, RunData};
 use flexbody::units::UnitSystem;
@@ -114,7 +114,13 @@ pub fn engine_mount() -> FlexBody {
             rigid_residual: 1.1e-15,
             guarantee: None,
         },
-        interfaces: vec![Interface { name: "base".to_owned(), nodes: vec![0, 1, 2, 3] }],
+        interfaces: vec![Interface {
+            name: "base".to_owned(),
+            nodes: vec![0, 1, 2, 3],
+            coupling: Some(Coupling::Averaging),
+            reference: Some([0.0, 0.0, 0.0]),
+        }],
+        coordinates: None,
     })
     .unwrap_or_else(|e| panic!("{e}"))
 }
@@ -254,6 +260,7 @@ pub fn condensed(
             guarantee: None,
         },
         interfaces: vec![],
+        coordinates: None,
     })
     .unwrap_or_else(|e| panic!("{e}"))
 }

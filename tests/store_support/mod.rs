@@ -3,11 +3,11 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InternalRows, LoadKind,
-    LumpedBody, MassStructure, Modes, Parts, Source, Truncation, UnitLoad,
+    Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
+    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Truncation, UnitLoad,
 };
 use flexbody::invariants::{DIGITS, GeneralTerms, Invariants};
-use flexbody::model::{BodyNumber, Nodes};
+use flexbody::model::{BodyNumber, Coupling, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -124,6 +124,19 @@ fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<Geometric
     kinds.into_iter().take(count).map(|kind| load(kind, r)).collect()
 }
 
+fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
+    let symmetric = |r: &mut Random| {
+        let a = r.matrix(size, size);
+        Mat::from_fn(size, size, |i, j| a[(i.min(j), i.max(j))])
+    };
+    InterfaceCoordinates {
+        names: (0..size).map(|_| r.name()).collect(),
+        stiffness: symmetric(r),
+        mass: symmetric(r),
+        of_modes: r.matrix(size, nf),
+    }
+}
+
 /// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
@@ -202,8 +215,15 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             .map(|i| Interface {
                 name: format!("{}{i}", r.name()),
                 nodes: (0..1 + r.below(2 * n)).map(|_| r.below(n)).collect(),
+                coupling: [None, Some(Coupling::Rigid), Some(Coupling::Averaging)][r.below(3)],
+                reference: (n * nf % 2 == 1 || r.below(4) > 0).then(|| [(); 3].map(|()| r.value())),
+            })
+            .map(|i| Interface {
+                coupling: if i.reference.is_none() { Some(Coupling::Free) } else { i.coupling },
+                ..i
             })
             .collect(),
+        coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
     }
 }
 
@@ -250,9 +270,12 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         bits.extend(columns.into_iter().flatten().chain(&g.digits).map(|v| v.to_bits()));
         bits.extend([g.shift_below.to_bits(), g.pivots_below as u64]);
     }
+    if let Some(c) = &p.coordinates {
+        [&c.stiffness, &c.mass, &c.of_modes].into_iter().for_each(|m| matrix(&mut bits, m));
+    }
     bits.extend(p.lumped.iter().flat_map(|l| &l.comparison).map(|(_, v)| v.to_bits()));
     let texts = format!(
-        "{:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
         p.source,
         p.units,
         p.nodes.ids,
@@ -260,6 +283,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         p.geometric_stiffness.iter().map(|g| &g.load).collect::<Vec<_>>(),
         (c.proved_modes, c.negative_pivots, c.rigid_modes, &c.remark),
         p.lumped.iter().map(|l| (&l.scheme, l.negative_masses, &l.comparison)).collect::<Vec<_>>(),
+        p.coordinates.as_ref().map(|c| &c.names),
     );
     (bits, texts)
 }

@@ -10,5 +10,6 @@ pub mod integrate;
 pub mod mesh;
 pub mod nodal;
 pub mod pipeline;
+pub mod plane;
 pub mod random;
 pub mod reference;

@@ -1,6 +1,6 @@
 //! The table `[damping]`.
 
-use super::{MatrixLocation, Table, Value, Walk, integer};
+use super::{MatrixLocation, Table, Value, Walk, real};
 use crate::diagnostic::Code;
 use crate::model::{Damping, DampingBand};
 use std::ops::Range;
@@ -70,11 +70,7 @@ impl Walk<'_> {
             self.complain(Code::ManifestSyntax, span.clone(), format!("key `{key}` is missing"));
             return None;
         };
-        let number = match value.get_ref() {
-            DeValue::Float(number) => number.as_str().parse().ok(),
-            DeValue::Integer(_) => integer(value).map(|number| number as f64),
-            _ => None,
-        };
+        let number = real(value);
         if number.is_none() {
             self.mistyped(key, value, "a number");
         }

@@ -1,0 +1,230 @@
+//! Interfaces as rows of the matrices: the coordinates of a joint, what they do to the nodes, and what they measure of them.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::eigen::EigenFailure;
+use crate::error::{Error, Result};
+use crate::linalg::{Dependents, Elimination};
+use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference};
+use faer::{Mat, MatRef};
+use std::collections::HashMap;
+
+/// Axes in names.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// An interface with r coordinates: the motion of its reference point, or, without one, all displacements of its nodes.
+pub(super) struct Joint {
+    pub name: String,
+    pub coupling: Coupling,
+    /// Indices of its nodes.
+    pub nodes: Vec<usize>,
+    /// Their rows in the matrices.
+    pub rows: Vec<usize>,
+    /// What each coordinate is, as in `ux` or `node 7 ux`.
+    pub coordinates: Vec<String>,
+    /// The load that works on each coordinate, as in `force x` or `torque z`.
+    pub loads: Vec<String>,
+    /// Displacements of the rows for unit coordinates that deform nothing at the interface, and weights of the rows with
+    /// measure' motion = I, which are also the loads that work on unit coordinates (both rows x r).
+    motion: Mat<f64>,
+    measure: Mat<f64>,
+    /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference point costs no digits.
+    centred: Mat<f64>,
+    /// Whether the nodes determine every coordinate.
+    determined: bool,
+}
+
+impl Joint {
+    fn new(model: &FeModel, set: &NodeSet, places: &HashMap<i64, usize>) -> Self {
+        let (table, d) = (model.nodes(), model.dimension());
+        // In the order of the node table: equal sets give equal results.
+        let mut nodes: Vec<usize> = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
+        let coupling = set.coupling();
+        let joint = |coordinates: Vec<String>, loads, motion, measure, centred, determined| Self {
+            name: set.name.clone(),
+            coupling,
+            nodes: nodes.clone(),
+            rows: rows.clone(),
+            coordinates,
+            loads,
+            motion,
+            measure,
+            centred,
+            determined,
+        };
+        if coupling == Coupling::Free {
+            let named = |kind: &dyn Fn(&str) -> String| {
+                let of = |&i: &usize| AXES[..d].iter().map(move |axis| (table.ids[i], axis));
+                nodes.iter().flat_map(of).map(|(id, axis)| format!("node {id} {}", kind(axis))).collect()
+            };
+            let unit = || Mat::identity(rows.len(), rows.len());
+            let (coordinates, loads) =
+                (named(&|axis| format!("u{axis}")), named(&|axis| format!("force {axis}")));
+            return joint(coordinates, loads, unit(), unit(), unit(), true);
+        }
+        let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| table.positions[i]).collect();
+        let reference = match set.reference {
+            Reference::Point(x) => Some(x),
+            _ => None,
+        };
+        let motion = InterfaceMotion::new(&positions, d, reference);
+        let named = |along: &str, about: &str| {
+            let turning = if d == 2 { &AXES[2..] } else { &AXES[..] };
+            let along = AXES[..d].iter().map(|axis| format!("{along}{axis}"));
+            along.chain(turning.iter().map(|axis| format!("{about}{axis}"))).collect()
+        };
+        joint(
+            named("u", "r"),
+            named("force ", "torque "),
+            motion.rigid().to_owned(),
+            motion.average().to_owned(),
+            InterfaceMotion::new(&positions, d, None).average().to_owned(),
+            motion.is_determined(),
+        )
+    }
+
+    /// R (rows x r): displacements of the nodes for unit coordinates, nothing deformed at the interface.
+    pub fn motion(&self) -> MatRef<'_, f64> {
+        self.motion.as_ref()
+    }
+
+    /// A (rows x r), A'R = I: weights that take the coordinates from the displacements, and nodal forces of unit loads on the
+    /// coordinates.
+    pub fn measure(&self) -> MatRef<'_, f64> {
+        self.measure.as_ref()
+    }
+
+    /// Adds the columns of `part` (rows x r) to `whole` (N x c) from column `first` on.
+    pub fn scatter(&self, part: MatRef<'_, f64>, whole: &mut Mat<f64>, first: usize) {
+        for (i, &row) in self.rows.iter().enumerate() {
+            for j in 0..part.ncols() {
+                whole[(row, first + j)] += part[(i, j)];
+            }
+        }
+    }
+
+    /// The rows of the nodes.
+    pub fn gather(&self, whole: MatRef<'_, f64>) -> Mat<f64> {
+        Mat::from_fn(self.rows.len(), whole.ncols(), |i, j| whole[(self.rows[i], j)])
+    }
+}
+
+/// All interfaces of a model.
+///
+/// # Errors
+/// [`InterfaceNode`](Code::InterfaceNode) when there is none; `what` needs one, as in `interface loads`.
+pub(super) fn joints(model: &FeModel, what: &str) -> Result<Vec<Joint>> {
+    if model.interfaces().is_empty() {
+        let message = format!("the model has no interfaces, so there are no {what}");
+        return Err(Diagnostic::new(Code::InterfaceNode, message)
+            .with_help("name node sets as [[interface]] in the manifest")
+            .into());
+    }
+    let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+    Ok(model.interfaces().iter().map(|set| Joint::new(model, set, &places)).collect())
+}
+
+/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are zero.
+///
+/// # Errors
+/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that are found.
+pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()> {
+    let (table, d) = (model.nodes(), model.dimension());
+    let mut found = Vec::new();
+    let (place, least) = if d == 2 {
+        ("one point", "two nodes")
+    } else {
+        ("one line", "three nodes that do not lie on one line")
+    };
+    for joint in joints.iter().filter(|joint| !joint.determined) {
+        let message = format!(
+            "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
+            joint.name,
+            joint.nodes.len()
+        );
+        let help = format!("give the interface {least}, or coupling = \"free\"");
+        found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+    }
+    let mut owner: HashMap<usize, &str> = HashMap::new();
+    for joint in joints {
+        let shared: Vec<(i64, &str)> = joint
+            .nodes
+            .iter()
+            .filter_map(|&i| owner.insert(i, &joint.name).map(|other| (table.ids[i], other)))
+            .collect();
+        if let Some((node, other)) = shared.first() {
+            let message = format!(
+                "interface `{}` shares {} nodes with others, node {node} with `{other}`: their motions are not independent",
+                joint.name,
+                shared.len()
+            );
+            found.push(Diagnostic::new(Code::InterfaceShared, message));
+        }
+    }
+    let held: Vec<[f64; 3]> =
+        joints.iter().flat_map(|joint| &joint.nodes).map(|&i| table.positions[i]).collect();
+    if found.is_empty() && !InterfaceMotion::new(&held, d, None).is_determined() {
+        let message =
+            format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
+        let help = format!("the interfaces together need {least}");
+        found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+    }
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of averaging ones have no
+/// mean.
+///
+/// # Errors
+/// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not fit.
+pub(super) fn hold(
+    n: usize,
+    joints: &[Joint],
+    memory: Option<u64>,
+) -> std::result::Result<Elimination, EigenFailure> {
+    let averaging = |joint: &&Joint| joint.coupling == Coupling::Averaging;
+    // In K and in M. Bytes of an entry: in both matrices, one of them twice while it is made symmetric.
+    let entries: u64 = joints.iter().filter(averaging).map(|joint| (joint.rows.len() as u64).pow(2)).sum();
+    let bytes = 48 * entries;
+    if let Some(available) = memory.filter(|&available| bytes > available) {
+        return Err(EigenFailure::Memory { bytes, available });
+    }
+    let dependents = joints.iter().filter(averaging).map(without_mean).collect();
+    let zero = joints.iter().filter(|joint| !averaging(joint)).flat_map(|joint| joint.rows.iter().copied());
+    Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
+}
+
+/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of the size of one.
+fn without_mean(joint: &Joint) -> Dependents {
+    let measure = joint.centred.as_ref();
+    let (rows, r) = (measure.nrows(), measure.ncols());
+    // Rows of one size: rotations are in other units than displacements.
+    let mut a = Mat::from_fn(r, rows, |i, j| measure[(j, i)] / measure.col(i).norm_l2());
+    let mut pivots: Vec<usize> = Vec::new();
+    for step in 0..r {
+        let places = (step..r).flat_map(|i| (0..rows).map(move |j| (i, j)));
+        let (i, j) = places
+            .filter(|(_, j)| !pivots.contains(j))
+            .max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs()))
+            .expect("an averaging interface has more rows than coordinates");
+        for column in 0..rows {
+            let (upper, lower) = (a[(step, column)], a[(i, column)]);
+            (a[(step, column)], a[(i, column)]) = (lower, upper);
+        }
+        let pivot = a[(step, j)];
+        (0..rows).for_each(|column| a[(step, column)] /= pivot);
+        for other in (0..r).filter(|&other| other != step) {
+            let factor = a[(other, j)];
+            (0..rows).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
+        }
+        pivots.push(j);
+    }
+    let others: Vec<usize> = (0..rows).filter(|j| !pivots.contains(j)).collect();
+    Dependents {
+        rows: pivots.iter().map(|&j| joint.rows[j]).collect(),
+        on: others.iter().map(|&j| joint.rows[j]).collect(),
+        weights: Mat::from_fn(r, others.len(), |i, j| -a[(i, others[j])]),
+    }
+}

@@ -1,0 +1,294 @@
+//! Rows of a pencil that others determine, eliminated: u = T y, K -> T' K T, M -> T' M T.
+
+use super::{CscMatrix, Pencil, SymmetricMatrix, combine, gram};
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+
+/// Columns per parallel task.
+const COLUMNS: usize = 2048;
+
+/// T (N x m): the free rows of u are y, dependent rows are sums of free ones, all others are zero.
+#[derive(Debug, Clone)]
+pub struct Elimination {
+    n: usize,
+    free: Vec<u32>,
+    dependents: Vec<Dependents>,
+    /// Of each row: its place in y, or where it stands among the dependent ones.
+    kinds: Vec<Kind>,
+}
+
+/// Rows that depend on the same others: u\[rows\] = W u\[on\].
+#[derive(Debug, Clone)]
+pub struct Dependents {
+    /// Which rows.
+    pub rows: Vec<usize>,
+    /// On which free rows they depend.
+    pub on: Vec<usize>,
+    /// W (rows x on).
+    pub weights: Mat<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Zero,
+    Free(u32),
+    Dependent(u32, u32),
+}
+
+/// The pencil (T' K T, T' M T), owned.
+#[derive(Debug, Clone)]
+pub struct ReducedPencil {
+    stiffness: SymmetricMatrix,
+    mass: SymmetricMatrix,
+    block: usize,
+}
+
+impl ReducedPencil {
+    /// Bytes of both matrices.
+    pub fn bytes(&self) -> u64 {
+        12 * (self.stiffness.as_csc().nnz() + self.mass.as_csc().nnz()) as u64
+    }
+
+    /// As a pencil.
+    pub fn pencil(&self) -> Pencil<'_> {
+        Pencil::new(&self.stiffness, &self.mass, self.block)
+    }
+}
+
+impl Elimination {
+    /// T for `n` rows: `zero` ones, `dependents`, and all others free.
+    ///
+    /// # Panics
+    /// When a row is given twice, or a row depends on one that is not free.
+    pub fn new(n: usize, zero: &[usize], dependents: Vec<Dependents>) -> Self {
+        let mut kinds = vec![Kind::Free(0); n];
+        let mut set = |row: usize, kind: Kind| {
+            assert_eq!(kinds[row], Kind::Free(0), "row {row} is eliminated twice");
+            kinds[row] = kind;
+        };
+        zero.iter().for_each(|&row| set(row, Kind::Zero));
+        for (group, dependent) in dependents.iter().enumerate() {
+            let rows = dependent.rows.iter().enumerate();
+            rows.for_each(|(place, &row)| set(row, Kind::Dependent(group as u32, place as u32)));
+        }
+        let mut free = Vec::new();
+        for (row, kind) in kinds.iter_mut().enumerate() {
+            if let Kind::Free(place) = kind {
+                *place = free.len() as u32;
+                free.push(row as u32);
+            }
+        }
+        let on_free = dependents.iter().flat_map(|d| &d.on).all(|&row| matches!(kinds[row], Kind::Free(_)));
+        assert!(on_free, "a row depends on one that is not free");
+        Self { n, free, dependents, kinds }
+    }
+
+    /// Number m of free rows.
+    pub fn len(&self) -> usize {
+        self.free.len()
+    }
+
+    /// Whether no row is free.
+    pub fn is_empty(&self) -> bool {
+        self.free.is_empty()
+    }
+
+    /// y: the free rows of u (N x k).
+    pub fn free_rows(&self, u: MatRef<'_, f64>) -> Mat<f64> {
+        Mat::from_fn(self.len(), u.ncols(), |i, j| u[(self.free[i] as usize, j)])
+    }
+
+    /// T y (N x k).
+    pub fn expand(&self, y: MatRef<'_, f64>) -> Mat<f64> {
+        let mut u = Mat::zeros(self.n, y.ncols());
+        for j in 0..y.ncols() {
+            for (i, &row) in self.free.iter().enumerate() {
+                u[(row as usize, j)] = y[(i, j)];
+            }
+        }
+        for Dependents { rows, on, weights } in &self.dependents {
+            let given = Mat::from_fn(on.len(), y.ncols(), |i, j| u[(on[i], j)]);
+            let sums = combine(weights.as_ref(), given.as_ref());
+            for j in 0..y.ncols() {
+                rows.iter().enumerate().for_each(|(i, &row)| u[(row, j)] = sums[(i, j)]);
+            }
+        }
+        u
+    }
+
+    /// T' f (m x k).
+    pub fn restrict(&self, f: MatRef<'_, f64>) -> Mat<f64> {
+        let mut out = self.free_rows(f);
+        for Dependents { rows, on, weights } in &self.dependents {
+            let given = Mat::from_fn(rows.len(), f.ncols(), |i, j| f[(rows[i], j)]);
+            let sums = gram(weights.as_ref(), given.as_ref());
+            for j in 0..f.ncols() {
+                for (i, &row) in on.iter().enumerate() {
+                    out[(self.place(row), j)] += sums[(i, j)];
+                }
+            }
+        }
+        out
+    }
+
+    /// The reduced pencil. It keeps the blocks of `pencil` where whole nodes are left.
+    ///
+    /// # Panics
+    /// When the pencil has not N rows.
+    pub fn reduced(&self, pencil: &Pencil<'_>) -> ReducedPencil {
+        assert_eq!(pencil.n(), self.n, "rows of the pencil");
+        let block = pencil.block();
+        let whole = self.kinds.chunks(block).all(|node| {
+            node.iter().all(|kind| matches!(kind, Kind::Free(_)))
+                || node.iter().all(|kind| *kind == Kind::Zero)
+        });
+        let stiffness = self.congruence(pencil.stiffness(), 1);
+        if whole {
+            let zero: Vec<usize> =
+                (0..self.n / block).filter(|node| self.kinds[node * block] == Kind::Zero).collect();
+            let nodes = Self::new(self.n / block, &zero, Vec::new());
+            ReducedPencil { stiffness, mass: nodes.congruence(pencil.mass(), 1), block }
+        } else {
+            ReducedPencil { stiffness, mass: self.congruence(pencil.mass(), block), block: 1 }
+        }
+    }
+
+    /// T' (A kron I_block) T.
+    fn congruence(&self, a: &SymmetricMatrix, block: usize) -> SymmetricMatrix {
+        let m = self.len();
+        // Of each free row: the dependent ones that take part of it.
+        let mut taken: Vec<Vec<(usize, f64)>> = vec![Vec::new(); m];
+        for Dependents { rows, on, weights } in &self.dependents {
+            for (i, &row) in rows.iter().enumerate() {
+                for (j, &free) in on.iter().enumerate() {
+                    taken[self.place(free)].push((row, weights[(i, j)]));
+                }
+            }
+        }
+        let chunk = |first: usize| {
+            let mut column = Column { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
+            let (mut lengths, mut row_idx, mut values) = (Vec::new(), Vec::new(), Vec::new());
+            let last = (first + COLUMNS).min(m);
+            for (&own, others) in self.free[first..last].iter().zip(&taken[first..last]) {
+                for (row, weight) in std::iter::once((own as usize, 1.0)).chain(others.iter().copied()) {
+                    let (nodes, entries) = a.row(row / block);
+                    for (&node, &value) in nodes.iter().zip(entries) {
+                        self.add(&mut column, node as usize * block + row % block, weight * value);
+                    }
+                }
+                column.rows.sort_unstable();
+                lengths.push(column.rows.len());
+                for &row in &column.rows {
+                    row_idx.push(row);
+                    values.push(std::mem::take(&mut column.sums[row as usize]));
+                    column.met[row as usize] = false;
+                }
+                column.rows.clear();
+            }
+            (lengths, row_idx, values)
+        };
+        let chunks: Vec<_> = (0..m).into_par_iter().step_by(COLUMNS).map(chunk).collect();
+        let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
+        for (lengths, rows, entries) in chunks {
+            for length in lengths {
+                col_ptr.push(col_ptr[col_ptr.len() - 1] + length);
+            }
+            row_idx.extend(rows);
+            values.extend(entries);
+        }
+        let matrix = CscMatrix::from_parts(m, m, col_ptr, row_idx, values);
+        // Without dependent rows entries are only left out; sums may round differently on both sides of the diagonal.
+        SymmetricMatrix::try_from(matrix).unwrap_or_else(|matrix| SymmetricMatrix::symmetrised(&matrix))
+    }
+
+    /// Adds T' of `value` in one row.
+    fn add(&self, column: &mut Column, row: usize, value: f64) {
+        match self.kinds[row] {
+            Kind::Zero => {}
+            Kind::Free(place) => column.add(place, value),
+            Kind::Dependent(group, i) => {
+                let Dependents { on, weights, .. } = &self.dependents[group as usize];
+                for (j, &free) in on.iter().enumerate() {
+                    column.add(self.place(free) as u32, weights[(i as usize, j)] * value);
+                }
+            }
+        }
+    }
+
+    fn place(&self, row: usize) -> usize {
+        match self.kinds[row] {
+            Kind::Free(place) => place as usize,
+            _ => unreachable!("checked at construction: row {row} is free"),
+        }
+    }
+}
+
+/// Sums of one column in the making.
+struct Column {
+    sums: Vec<f64>,
+    met: Vec<bool>,
+    rows: Vec<u32>,
+}
+
+impl Column {
+    fn add(&mut self, row: u32, value: f64) {
+        let i = row as usize;
+        if !self.met[i] {
+            self.met[i] = true;
+            self.rows.push(row);
+        }
+        self.sums[i] += value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A symmetric band matrix.
+    fn band(n: usize, seed: usize) -> SymmetricMatrix {
+        let value = |i: usize, j: usize| ((i.min(j) * 7 + i.max(j) * 3 + seed) as f64).sin() + 1.5;
+        let entries: Vec<(u32, u32, f64)> = (0..n)
+            .flat_map(|j| [j, j + 1, j + 4].map(|i| (i, j)))
+            .filter(|&(i, _)| i < n)
+            .flat_map(|(i, j)| [(i as u32, j as u32, value(i, j)), (j as u32, i as u32, value(i, j))])
+            .filter(|&(i, j, _)| i != j)
+            .chain((0..n).map(|i| (i as u32, i as u32, 9.0)))
+            .collect();
+        SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric")
+    }
+
+    #[test]
+    fn the_reduced_pencil_is_that_of_the_explicit_transformation() {
+        let nodes = 40;
+        for block in 1..=3 {
+            let n = nodes * block;
+            let (k, m) = (band(n, 1), band(nodes, 2));
+            let pencil = Pencil::new(&k, &m, block);
+            let zero: Vec<usize> = (block..3 * block).collect();
+            let on: Vec<usize> = (10..30).collect();
+            let weights = Mat::from_fn(2, on.len(), |i, j| ((3 * i + j) as f64).cos());
+            let group = Dependents { rows: vec![31, 8], on, weights };
+            for dependents in [Vec::new(), vec![group]] {
+                let kept = dependents.is_empty();
+                let elimination = Elimination::new(n, &zero, dependents);
+                let t =
+                    elimination.expand(Mat::<f64>::identity(elimination.len(), elimination.len()).as_ref());
+                let reduced = elimination.reduced(&pencil);
+                let reduced = reduced.pencil();
+                assert_eq!(reduced.block(), if kept { block } else { 1 });
+                let whole = Mat::<f64>::identity(elimination.len(), elimination.len());
+                for (found, full) in [
+                    (reduced.apply_stiffness(whole.as_ref()), pencil.apply_stiffness(t.as_ref())),
+                    (reduced.apply_mass(whole.as_ref()), pencil.apply_mass(t.as_ref())),
+                ] {
+                    let expected = gram(t.as_ref(), full.as_ref());
+                    assert!((&found - &expected).norm_max() < 1e-13 * expected.norm_max(), "block {block}");
+                }
+                let f = Mat::from_fn(n, 3, |i, j| ((i + 5 * j) as f64).sin());
+                let difference = elimination.restrict(f.as_ref()) - gram(t.as_ref(), f.as_ref());
+                assert!(difference.norm_max() < 1e-13, "block {block}");
+            }
+        }
+    }
+}

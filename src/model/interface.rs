@@ -1,0 +1,239 @@
+//! Interfaces: named node sets, the reference point that a joint sees of them, and the motion that both share.
+
+use super::{RawModel, centre_and_length, rigid_count, rigid_fields};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::linalg::gram;
+use faer::{Mat, MatRef};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+
+/// Width of a node set across the line that fits it best, relative to its length, below which it determines no rotation
+/// about that line.
+const COLLINEAR: f64 = 1e-6;
+
+/// How the nodes of an interface and its reference point follow each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coupling {
+    /// The nodes move as one rigid body with the reference point (RBE2).
+    Rigid,
+    /// The reference point follows the mean rigid motion of the nodes, all with the same weight (RBE3).
+    Averaging,
+    /// No reference point: every degree of freedom of the nodes is one of the interface.
+    Free,
+}
+
+impl Coupling {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Rigid, Self::Averaging, Self::Free];
+
+    /// Name in manifests and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Averaging => "averaging",
+            Self::Free => "free",
+        }
+    }
+}
+
+/// Where the reference point of an interface lies.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Reference {
+    /// At the mean of its nodes.
+    #[default]
+    Mean,
+    /// Here, in model axes.
+    Point([f64; 3]),
+    /// At a node of the node table, with degrees of freedom or without.
+    Node(i64),
+}
+
+/// A named set of nodes: an interface of the manifest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeSet {
+    /// Name, unique within the model.
+    pub name: String,
+    /// Node numbers.
+    pub nodes: Vec<i64>,
+    /// How it is coupled to its reference point, where that was said.
+    pub coupling: Option<Coupling>,
+    /// Its reference point; in a checked model a point, but of a free interface.
+    pub reference: Reference,
+}
+
+impl NodeSet {
+    /// A set without a stated coupling, its reference point at the mean of the nodes.
+    pub fn new(name: impl Into<String>, nodes: Vec<i64>) -> Self {
+        Self { name: name.into(), nodes, coupling: None, reference: Reference::default() }
+    }
+
+    /// The coupling where one is needed: averaging unless another was stated.
+    pub fn coupling(&self) -> Coupling {
+        self.coupling.unwrap_or(Coupling::Averaging)
+    }
+}
+
+/// Puts the places of reference points in place of what says where they are, and complains about those that cannot be.
+pub(super) fn resolve_references(raw: &mut RawModel, found: &mut Vec<Diagnostic>) {
+    let places: HashMap<i64, [f64; 3]> =
+        raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
+    for set in &mut raw.interfaces {
+        let name = &set.name;
+        if set.coupling == Some(Coupling::Free) && set.reference != Reference::Mean {
+            let message = format!("interface `{name}` is free, but has a reference point");
+            found.push(Diagnostic::new(Code::ManifestSyntax, message));
+        }
+        match set.reference {
+            Reference::Node(id) => match places.get(&id) {
+                Some(&place) => set.reference = Reference::Point(place),
+                None => {
+                    let message = format!("reference node {id} of interface `{name}` is unknown");
+                    found.push(Diagnostic::new(Code::InterfaceNode, message));
+                }
+            },
+            Reference::Mean if set.coupling != Some(Coupling::Free) => {
+                let of_nodes: Vec<[f64; 3]> =
+                    set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
+                set.reference = Reference::Point(centre_and_length(&of_nodes).0);
+            }
+            Reference::Mean | Reference::Point(_) => {}
+        }
+        if let Reference::Point(x) = set.reference {
+            if x.iter().any(|x| !x.is_finite()) {
+                let message = format!("reference point of interface `{name}` is not finite");
+                found.push(Diagnostic::new(Code::CoordinateNotFinite, message));
+            } else if raw.dimension == 2 && x[2] != 0.0 {
+                let message =
+                    format!("reference point of interface `{name}` in a plane model has z = {}", x[2]);
+                found.push(Diagnostic::new(Code::DirectionOutOfPlane, message));
+            }
+        }
+    }
+}
+
+/// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations along the axes, in the
+/// plane (d = 2) r = 3.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterfaceMotion {
+    reference: [f64; 3],
+    rigid: Mat<f64>,
+    average: Mat<f64>,
+    determined: bool,
+}
+
+impl InterfaceMotion {
+    /// For nodes at `positions` (at least one) and a reference point, the mean of the positions where none is given.
+    pub fn new(positions: &[[f64; 3]], dimension: usize, reference: Option<[f64; 3]>) -> Self {
+        let (centre, length) = centre_and_length(positions);
+        let reference = reference.unwrap_or(centre);
+        let (d, count) = (dimension, positions.len() as f64);
+        let centre = Vector3::from(centre);
+        // Of unit size: squares of coordinates in any unit stay in range.
+        let arms: Vec<Vector3<f64>> =
+            positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
+        let inertia: Matrix3<f64> =
+            arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
+        let threshold = COLLINEAR * COLLINEAR * inertia.trace();
+        let (mut inverse, mut turning) = (Matrix3::zeros(), 0.0);
+        if threshold.is_finite() {
+            // Nodes on one line follow no rotation about it, a single node none at all.
+            inverse = inertia.pseudo_inverse(threshold).unwrap_or_else(|_| Matrix3::zeros()) / length;
+            turning = if d == 2 { inertia[(2, 2)] } else { inertia.symmetric_eigenvalues().min() };
+        }
+        let axes = if d == 2 { 2..3 } else { 0..3 };
+        // About the centre; the translation of the reference point adds the rotation times its distance.
+        let offset = Vector3::from(reference) - centre;
+        let turn = |axis: usize, r: &Vector3<f64>| (inverse * Vector3::ith(axis, 1.0)).cross(r);
+        let mut average = Mat::zeros(d * positions.len(), rigid_count(d));
+        for (i, r) in arms.iter().enumerate() {
+            for k in 0..d {
+                average[(d * i + k, k)] = 1.0 / count;
+            }
+            for (column, axis) in axes.clone().enumerate() {
+                let weight = turn(axis, r);
+                let lever = Vector3::ith(axis, 1.0).cross(&offset);
+                for k in 0..d {
+                    average[(d * i + k, d + column)] = weight[k];
+                    for along in 0..d {
+                        average[(d * i + k, along)] += lever[along] * weight[k];
+                    }
+                }
+            }
+        }
+        Self {
+            reference,
+            rigid: rigid_fields(positions, d, reference, 1.0),
+            average,
+            determined: turning > threshold,
+        }
+    }
+
+    /// The reference point.
+    pub fn reference(&self) -> [f64; 3] {
+        self.reference
+    }
+
+    /// R (d k x r): displacements of the nodes for unit motions of the reference point.
+    pub fn rigid(&self) -> MatRef<'_, f64> {
+        self.rigid.as_ref()
+    }
+
+    /// A (d k x r) with A'R = I: the loads at the nodes that a unit force or torque at the reference point stands for. A' u is the
+    /// rigid motion that fits u best (least squares, all nodes with the same weight), A = R (R'R)^-1.
+    pub fn average(&self) -> MatRef<'_, f64> {
+        self.average.as_ref()
+    }
+
+    /// Whether the nodes determine the rotation: they do not lie on one line, in the plane not on one point.
+    pub fn is_determined(&self) -> bool {
+        self.determined
+    }
+
+    /// The motion A' u (r x m) that fits the displacements u (d k x m) of the nodes best.
+    pub fn fit(&self, u: MatRef<'_, f64>) -> Mat<f64> {
+        gram(self.average.as_ref(), u)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NODES: [[f64; 3]; 5] =
+        [[0.0, 0.0, 0.1], [1.0, 0.0, 0.0], [0.3, 2.0, 0.0], [0.5, 0.5, 3.0], [7.0, -1.0, 0.2]];
+
+    fn off_identity(a: &Mat<f64>) -> f64 {
+        (a - Mat::<f64>::identity(a.nrows(), a.ncols())).norm_max()
+    }
+
+    #[test]
+    fn the_average_of_a_rigid_motion_is_that_motion_about_any_point() {
+        for reference in [None, Some([0.0; 3]), Some([1e3, -2e3, 5e2])] {
+            let motion = InterfaceMotion::new(&NODES, 3, reference);
+            assert!(motion.is_determined());
+            let scale = motion.reference().iter().fold(1.0f64, |m, x| m.max(x.abs()));
+            assert!(off_identity(&motion.fit(motion.rigid())) < 1e-15 * scale * scale, "{reference:?}");
+            // Least squares: what is left has no part along any rigid motion.
+            let u = Mat::from_fn(15, 2, |i, j| ((7 * i + 3 * j) as f64).sin());
+            let left = &u - motion.rigid() * motion.fit(u.as_ref());
+            assert!(gram(motion.rigid(), left.as_ref()).norm_max() < 1e-12 * scale, "{reference:?}");
+        }
+        let flat: Vec<[f64; 3]> = NODES.iter().map(|x| [x[0], x[1], 0.0]).collect();
+        let motion = InterfaceMotion::new(&flat, 2, Some([3.0, 4.0, 0.0]));
+        assert_eq!(motion.rigid().ncols(), 3);
+        assert!(off_identity(&motion.fit(motion.rigid())) < 1e-14);
+    }
+
+    #[test]
+    fn nodes_on_a_line_determine_no_rotation() {
+        let line = [[0.0; 3], [1.0, 2.0, 3.0], [2.0, 4.0, 6.0 + 1e-9]];
+        assert!(!InterfaceMotion::new(&line, 3, None).is_determined());
+        assert!(!InterfaceMotion::new(&line[..1], 3, None).is_determined());
+        let flat = [[0.0; 3], [1.0, 2.0, 0.0]];
+        assert!(InterfaceMotion::new(&flat, 2, None).is_determined());
+        assert!(!InterfaceMotion::new(&flat[..1], 2, None).is_determined());
+        // A single node still passes on forces.
+        let one = InterfaceMotion::new(&line[..1], 3, None);
+        assert_eq!((one.average()[(1, 1)], one.average()[(1, 4)]), (1.0, 0.0));
+    }
+}
