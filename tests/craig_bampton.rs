@@ -11,11 +11,13 @@ use flexbody::diagnostic::Code;
 use flexbody::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
 use flexbody::error::Result;
 use flexbody::flex_body::FlexBody;
+use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, Expected, identities};
-use flexbody::linalg::gram;
+use flexbody::linalg::{CscMatrix, gram};
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody::progress::SILENT;
 use flexbody::verification::verify;
+use std::path::Path;
 use support::elements::{Kind, MassRule, Material};
 use support::mesh::Mesh;
 use support::plane::rectangle;
@@ -418,6 +420,69 @@ fn interface_coordinates_hold_the_modes_and_as_many_rigid_motions() {
     }
 }
 
+/// Checks of the interface coordinates that do not hold.
+fn broken(body: &FlexBody) -> Vec<String> {
+    let checks = body.parts().interface_identities();
+    assert_eq!(checks.len(), 4);
+    let wrong = checks.iter().filter(|check| !check.passed);
+    wrong.map(|check| format!("{}: {:e} > {:e}", check.name, check.value, check.limit)).collect()
+}
+
+/// K of few digits annihilates rigid motion badly, and a slender body magnifies that: its rigid mass is exact all the same.
+#[test]
+fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
+    let mesh = Mesh::block(Kind::Hex8, [30, 1, 1], [3.0, 0.05, 0.04]);
+    let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let digits = 11;
+    let rounded = |v: f64| format!("{v:.*e}", digits - 1).parse::<f64>().expect("a number");
+    let entries: Vec<_> =
+        support::mesh::entries(&raw.stiffness.matrix).map(|(r, c, v)| (r, c, rounded(v))).collect();
+    let n = raw.stiffness.matrix.n_cols();
+    raw.stiffness.matrix = CscMatrix::from_triplets(n, n, &entries);
+    raw.stiffness.digits = digits as u8;
+    let x = &raw.nodes.positions;
+    let end = |at: f64| (0..x.len()).filter(|&i| (x[i][0] - at).abs() < 1e-9).map(|i| i as i64 + 1).collect();
+    let ends: [Vec<i64>; 2] = [end(0.0), end(3.0)];
+    for coupling in [Coupling::Rigid, Coupling::Averaging, Coupling::Free] {
+        raw.interfaces = ["first", "second"]
+            .into_iter()
+            .zip(&ends)
+            .map(|(name, nodes)| NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes.clone()) })
+            .collect();
+        let body = body(&model(raw.clone()), 6);
+        assert!(body.certificate().rigid_noise > 1e-9, "{:e}", body.certificate().rigid_noise);
+        assert_eq!(broken(&body), [""; 0], "{coupling:?}");
+        let coordinates = body.coordinates().expect("coordinates");
+        assert_eq!(coordinates.names.len(), body.n_modes() + 6);
+    }
+}
+
+/// Reduced integration leaves patterns without mass, also among the motions of single nodes: they are left out and told, and what
+/// stays keeps its digits.
+#[test]
+fn motions_without_mass_are_left_out_and_told() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/bar_c3d8r");
+    let files = read_manifest(folder.join("model.toml")).expect("a fixture");
+    let mut raw = read_model(&files).expect("a fixture");
+    let along = |axis: usize| {
+        let x = raw.nodes.positions.iter().map(|x| x[axis]);
+        (x.clone().fold(f64::INFINITY, f64::min), x.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let axis = (0..3).max_by(|&a, &b| (along(a).1 - along(a).0).total_cmp(&(along(b).1 - along(b).0)));
+    let axis = axis.expect("three axes");
+    let (low, high) = along(axis);
+    let end = |at: f64| {
+        let near = |i: &usize| (raw.nodes.positions[*i][axis] - at).abs() < 1e-6 * (high - low);
+        (0..raw.nodes.len()).filter(near).map(|i| raw.nodes.ids[i]).collect::<Vec<_>>()
+    };
+    let free = |name: &str, nodes| NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new(name, nodes) };
+    raw.interfaces = vec![free("low", end(low)), free("high", end(high))];
+    let done = converted(&model(raw), BasisChoice::CraigBampton(CraigBampton), 8, BodyFrame::Principal);
+    let told = done.diagnostics.iter().find(|d| d.code() == Code::ShapesDependent).expect("told");
+    assert!(told.message().contains("move no mass"), "{}", told.message());
+    assert_eq!(broken(&done.body), [""; 0]);
+}
+
 #[test]
 fn the_same_bits_at_any_number_of_threads() {
     let model = model(bracket([Coupling::Rigid, Coupling::Averaging]));
@@ -537,6 +602,27 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
     raw.interfaces.pop();
     let below = ModeSettings { wanted: Wanted::Below(1.0), ..ModeSettings::default() };
     assert!(refused(raw, &below).has(Code::ShapesNone), "nothing but rigid motion");
+}
+
+/// Two blocks that share an edge: a mechanism when one is held, and also when both are, since the interfaces move.
+#[test]
+fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
+    let mesh = Mesh::hinge(Kind::Hex8, 2);
+    let face = |at: f64| -> Vec<i64> {
+        let kept = mesh.nodes.iter().enumerate().filter(|(_, x)| (x[0] - at).abs() < 1e-9);
+        kept.map(|(i, _)| i as i64 + 1).collect()
+    };
+    for method in [Method::Dense, Method::Lanczos] {
+        for ends in [vec![face(0.0)], vec![face(0.0), face(4.0)]] {
+            let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+            let sets = ends.into_iter().enumerate();
+            raw.interfaces = sets.map(|(i, nodes)| NodeSet::new(format!("end {i}"), nodes)).collect();
+            let settings = ModeSettings { method, ..lowest(3) };
+            let error = modes_of(&model(raw), &CraigBampton, &settings).expect_err("a mechanism");
+            assert!(error.has(Code::Mechanism), "{error}");
+            assert!(error.to_string().contains("7 zero-energy modes: 6 rigid ones and 1 more"), "{error}");
+        }
+    }
 }
 
 /// A plane body's coordinates are two translations and a rotation for each interface.

@@ -4,6 +4,7 @@ mod store_support;
 
 use flexbody::diagnostic::Code;
 use flexbody::flex_body::{FlexBody, Parts};
+use flexbody::model::Coupling;
 use flexbody::units::UnitSystem;
 use store_support::{Random, body, parts};
 
@@ -112,6 +113,13 @@ fn names_are_unique_and_can_be_stored() {
     assert_refused(|p| p.interfaces[0].name.clear(), &["empty name of an interface"]);
     assert_refused(|p| p.interfaces[0].nodes.clear(), &["has no nodes"]);
     assert_refused(|p| p.interfaces[1].nodes.push(4), &["names node index 4, expected indices below 4"]);
+    assert_refused(
+        |p| {
+            p.interfaces[0].coupling = Some(Coupling::Free);
+            p.interfaces[0].reference = Some([0.0; 3]);
+        },
+        &["is free, but has a reference point"],
+    );
     assert_refused(|p| p.lumped[1].scheme = p.lumped[0].scheme.clone(), &["is given twice"]);
     assert_refused(|p| p.lumped[1].scheme = "x".repeat(1001), &["has 1001 bytes"]);
     assert_refused(|p| p.source.name.push('\0'), &["`source.name` contains a NUL character"]);

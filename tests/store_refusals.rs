@@ -352,6 +352,57 @@ fn derived_entries_must_follow_from_the_primary_ones() {
 }
 
 #[test]
+fn entries_of_interfaces_are_checked() {
+    // Odd sizes: with reference points and interface coordinates.
+    let odd = || stored(&body(5, 3, 3, 0, 1));
+    let link = |f: &hdf5::File| f.group("interfaces").unwrap().member_names().unwrap().remove(0);
+    let error = refused(odd(), |f| {
+        let interface = f.group(&format!("interfaces/{}", link(f))).unwrap();
+        if interface.attr_names().unwrap().iter().any(|name| name == "coupling") {
+            interface.delete_attr("coupling").unwrap();
+        }
+        set_text(&interface, "coupling", "glued");
+        f.unlink("interface_coordinates/mass").unwrap();
+    });
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &[
+            "@coupling: expected one of `rigid`, `averaging`, `free`, found \"glued\"",
+            "/interface_coordinates: expected `names`, `stiffness`, `mass` and `of_modes`, found 3 of them",
+        ],
+    );
+    let error = refused(odd(), |f| {
+        let group = f.group("interface_coordinates").unwrap();
+        group.delete_attr("names").unwrap();
+        set_text(&group, "names", "[\"one\"]");
+    });
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &["/interface_coordinates@names: expected a name for each coordinate, found 1 for 4 numbers"],
+    );
+    let error = refused(odd(), |f| {
+        let path = "interface_coordinates/stiffness";
+        f.dataset(path).unwrap().write_raw(&[1.0, 2.0, 3.0, 4.0]).unwrap();
+    });
+    assert_says(&error, Code::BodySchema, &["`coordinates.stiffness` is not symmetric"]);
+    let error = refused(odd(), |f| {
+        let path = format!("interfaces/{}/misfit", link(f));
+        let mut values = f.dataset(&path).unwrap().read_raw::<f64>().unwrap();
+        values[1] += 1.0;
+        f.dataset(&path).unwrap().write_raw(&values).unwrap();
+    });
+    assert_says(&error, Code::BodyIdentity, &["/misfit: found "]);
+    let error = refused(odd(), |f| replace(f, "interface_coordinates/of_modes", &[3, 3], &[1.0; 9]));
+    assert_says(
+        &error,
+        Code::BodySchema,
+        &["/interface_coordinates/of_modes: expected shape [nc = 2, nf = 3]"],
+    );
+}
+
+#[test]
 fn a_file_cannot_lead_out_of_itself() {
     let case = valid();
     let other = case.path.with_file_name("other.h5");

@@ -105,6 +105,7 @@ struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     fn new(model: &FeModel, joints: &'a [Joint], settings: &ModeSettings, watch: Watch<'_>) -> Result<Self> {
+        watch(Event::Phase("interfaces"));
         let pencil = model.pencil();
         let failed = |failure| explain(model, failure);
         let elimination = hold(pencil.n(), joints, settings.memory).map_err(failed)?;

@@ -103,7 +103,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
     }
     check_names(&raw, &mut found);
-    resolve_references(&mut raw, &mut found);
+    resolve_references(&mut raw, &nodes, &mut found);
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     for set in &raw.interfaces {
         let unknown: Vec<i64> = set.nodes.iter().filter(|id| !known.contains(id)).copied().collect();

@@ -1,6 +1,6 @@
 //! Interfaces: named node sets, the reference point that a joint sees of them, and the motion that both share.
 
-use super::{RawModel, centre_and_length, rigid_count, rigid_fields};
+use super::{Nodes, RawModel, centre_and_length, rigid_count, rigid_fields};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::linalg::gram;
 use faer::{Mat, MatRef};
@@ -10,6 +10,10 @@ use std::collections::HashMap;
 /// Width of a node set across the line that fits it best, relative to its length, below which it determines no rotation
 /// about that line.
 const COLLINEAR: f64 = 1e-6;
+
+/// Distance of a reference point from the middle of the nodes, relative to their largest, beyond which it is a mistake, of units as
+/// a rule. Rotations about a point so far away lose four digits.
+const FARTHEST: f64 = 100.0;
 
 /// How the nodes of an interface and its reference point follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +78,8 @@ impl NodeSet {
 }
 
 /// Puts the places of reference points in place of what says where they are, and complains about those that cannot be.
-pub(super) fn resolve_references(raw: &mut RawModel, found: &mut Vec<Diagnostic>) {
+pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut Vec<Diagnostic>) {
+    let (centre, size) = centre_and_length(&used.positions);
     let places: HashMap<i64, [f64; 3]> =
         raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
     for set in &mut raw.interfaces {
@@ -106,6 +111,15 @@ pub(super) fn resolve_references(raw: &mut RawModel, found: &mut Vec<Diagnostic>
                 let message =
                     format!("reference point of interface `{name}` in a plane model has z = {}", x[2]);
                 found.push(Diagnostic::new(Code::DirectionOutOfPlane, message));
+            } else {
+                let away = (Vector3::from(x) - Vector3::from(centre)).norm() / size;
+                if away.is_nan() || away > FARTHEST {
+                    let message = format!(
+                        "reference point of interface `{name}` is {away:.1e} times the size of the body away from its middle"
+                    );
+                    let help = "it is in model axes and in the unit of length of the nodes";
+                    found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+                }
             }
         }
     }

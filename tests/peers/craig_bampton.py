@@ -37,9 +37,9 @@ MODES = 12
 LIMITS = {
     "angle": 1e-6,
     "eigenvalues": 1e-8,
-    "grounding": 1e-9,
+    "grounding": 1e-12,
     "geometry": 1e-8,
-    "mass": 1e-9,
+    "mass": 1e-12,
     "fixed": 1e-8,
 }
 
