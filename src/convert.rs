@@ -7,11 +7,11 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Frame, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
-    Modes, Parts, Source, Truncation,
+    Certificate, FlexBody, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes,
+    Parts, Source, Truncation,
 };
 use crate::invariants::{
-    BodyFrame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
+    BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
     choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, error_norms,
 };
 use crate::linalg::{SymmetricMatrix, gram, multiply};
@@ -197,10 +197,7 @@ pub fn convert_resumed(
     diagnostics.extend(fits);
     let solution = found.solution;
     let coordinates = found.coordinates.map(|own| {
-        let same = |j: usize| modes.vectors.col(j) == solution.vectors.col(j);
-        let signs: Vec<f64> =
-            (0..solution.eigenvalues.len()).map(|j| if same(j) { 1.0 } else { -1.0 }).collect();
-        let turned = own.in_axes(&frame.axes, model.dimension(), &signs);
+        let turned = own.in_axes(&frame.axes, model.dimension(), &modes.signs);
         let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
         InterfaceCoordinates { names, stiffness, mass, of_modes }
     });

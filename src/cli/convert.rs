@@ -212,9 +212,9 @@ fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 /// Options that say nothing together; `loads` are those of residual vectors.
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
+    let residual = !loads.is_empty();
     let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang);
     let coupled = matches!(basis, BasisName::CraigBampton | BasisName::CraigChang);
-    let residual = !loads.is_empty();
     let message = match arguments {
         ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
             "--shapes needs --basis imported"

@@ -36,6 +36,8 @@ pub(crate) struct BodyModes {
     pub rotations: Option<Mat<f64>>,
     /// Rows without a place: vectors in body axes, then massless rows.
     pub internal: Option<InternalRows>,
+    /// What the modes of the search were multiplied by.
+    pub signs: Vec<f64>,
     nodes: usize,
 }
 
@@ -78,7 +80,7 @@ impl BodyModes {
         flip(&mut displacements);
         rotations.iter_mut().for_each(flip);
         let internal = internal(model, &vectors, &displacements);
-        Self { vectors, displacements, rotations, internal, nodes }
+        Self { vectors, displacements, rotations, internal, signs, nodes }
     }
 
     /// The modes of a body that was made of `model`; `None` when it lacks rows of the model, or has others.
@@ -118,6 +120,7 @@ impl BodyModes {
             displacements,
             rotations: modes.rotation.clone(),
             internal: modes.internal.clone(),
+            signs: vec![1.0; nf],
             nodes,
         })
     }

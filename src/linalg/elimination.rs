@@ -268,7 +268,7 @@ mod tests {
             let zero: Vec<usize> = (block..3 * block).collect();
             let on: Vec<usize> = (10..30).collect();
             let weights = Mat::from_fn(2, on.len(), |i, j| ((3 * i + j) as f64).cos());
-            let group = Dependents { rows: vec![31, 8], on, weights };
+            let group = Dependents { rows: vec![31, 9], on, weights };
             for dependents in [Vec::new(), vec![group]] {
                 let kept = dependents.is_empty();
                 let elimination = Elimination::new(n, &zero, dependents);

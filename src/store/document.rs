@@ -108,8 +108,8 @@ fn symbol(extent: Extent) -> String {
         Extent::Modes => "nf".to_owned(),
         Extent::ThreeModes => "3nf".to_owned(),
         Extent::InterfaceNodes => "k".to_owned(),
-        Extent::Coordinates => "nc".to_owned(),
         Extent::InternalRows => "m".to_owned(),
+        Extent::Coordinates => "nc".to_owned(),
     }
 }
 

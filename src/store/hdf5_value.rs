@@ -23,8 +23,8 @@ pub(super) struct Sizes {
     nodes: Option<usize>,
     modes: Option<usize>,
     pub interface_nodes: Option<usize>,
-    coordinates: Option<usize>,
     pub internal_rows: Option<usize>,
+    coordinates: Option<usize>,
 }
 
 /// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
@@ -163,8 +163,8 @@ impl Sizes {
             Extent::Modes => size == *self.modes.get_or_insert(size),
             Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
-            Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
             Extent::InternalRows => size == *self.internal_rows.get_or_insert(size),
+            Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
         }
     }
 
@@ -179,8 +179,8 @@ impl Sizes {
             Extent::Modes => known("nf", self.modes),
             Extent::ThreeModes => known("3 nf", self.modes.map(|nf| 3 * nf)),
             Extent::InterfaceNodes => known("k", self.interface_nodes),
-            Extent::Coordinates => known("nc", self.coordinates),
             Extent::InternalRows => known("m", self.internal_rows),
+            Extent::Coordinates => known("nc", self.coordinates),
         }
     }
 }

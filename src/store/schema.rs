@@ -432,16 +432,16 @@ pub(super) const TABLE: &[Group] = &[
         items: &[INTERFACES],
     },
     Group {
-        path: "/interface_coordinates",
-        per: Per::Body,
-        description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",
-        items: &[COORDINATES],
-    },
-    Group {
         path: "/geometric_stiffness/<load>",
         per: Per::UnitLoad,
         description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
         items: &[GEOMETRIC_STIFFNESS],
+    },
+    Group {
+        path: "/interface_coordinates",
+        per: Per::Body,
+        description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",
+        items: &[COORDINATES],
     },
 ];
 

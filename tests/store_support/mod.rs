@@ -107,19 +107,6 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
     }
 }
 
-fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
-    let symmetric = |r: &mut Random| {
-        let a = r.matrix(size, size);
-        Mat::from_fn(size, size, |i, j| a[(i.min(j), i.max(j))])
-    };
-    InterfaceCoordinates {
-        names: (0..size).map(|_| r.name()).collect(),
-        stiffness: symmetric(r),
-        mass: symmetric(r),
-        of_modes: r.matrix(size, nf),
-    }
-}
-
 /// One of every kind, as many as there are interfaces.
 fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
     let kinds = [
@@ -135,6 +122,19 @@ fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<Geometric
         GeometricStiffness { load: UnitLoad { kind, component }, matrix: r.matrix(nf, nf) }
     };
     kinds.into_iter().take(count).map(|kind| load(kind, r)).collect()
+}
+
+fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
+    let symmetric = |r: &mut Random| {
+        let a = r.matrix(size, size);
+        Mat::from_fn(size, size, |i, j| a[(i.min(j), i.max(j))])
+    };
+    InterfaceCoordinates {
+        names: (0..size).map(|_| r.name()).collect(),
+        stiffness: symmetric(r),
+        mass: symmetric(r),
+        of_modes: r.matrix(size, nf),
+    }
 }
 
 /// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.

@@ -1,12 +1,10 @@
 //! Entries of interfaces.
 
-use super::{LENGTH, ONE, PER_ROOT_MASS, attribute, dataset};
-use crate::store::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
-use crate::store::item::Item;
-use crate::store::item::Kind::{Floats, Ints, Text};
+use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
+use super::super::item::Item;
+use super::super::item::Kind::{Floats, Ints, Text};
+use super::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
 use crate::store::value::{Units, Value, matrix, shape_rows, text};
-
-const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
 
 pub(super) const INTERFACES: &[Item] = &[
     dataset("node_id", Ints(&[InterfaceNodes]), ONE, "id", "node numbers of the interface", |v| {
