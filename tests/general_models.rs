@@ -2,12 +2,12 @@
 
 mod support;
 
-use flexbody::basis::ModeSettings;
+use flexbody::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use flexbody::convert::{Conversion, ConvertSettings, convert};
 use flexbody::diagnostic::Code;
 use flexbody::eigen::{Method, Wanted};
 use flexbody::error::Error;
-use flexbody::flex_body::MassStructure;
+use flexbody::flex_body::{FlexBody, MassStructure};
 use flexbody::input::{ModelFiles, read_manifest, read_model};
 use flexbody::invariants::primary_differences;
 use flexbody::linalg::CscMatrix;
@@ -252,4 +252,36 @@ fn certified_says_what_it_does_not_cover() {
     let body = convert(&model, &settings, SILENT).expect("converts").body;
     let digits = body.certificate().guarantee.as_ref().expect("certified").digits;
     assert!(digits.iter().all(|d| *d > 13.0), "{digits:?}");
+}
+
+/// f'K^+ f of the load of a constant spin, from the invariants alone: sum_j (w' W1_j w / 2)^2 / lambda_j.
+fn spin_compliance(body: &FlexBody, spin: Vector3<f64>) -> f64 {
+    let (w1, nf) = (body.invariants().w1(), body.n_modes());
+    let load = |j: usize| {
+        let block = Matrix3::from_fn(|k, b| w1[(k, b * nf + j)]);
+        0.5 * spin.dot(&(block * spin))
+    };
+    body.modes().eigenvalue.iter().enumerate().map(|(j, lambda)| load(j).powi(2) / lambda).sum()
+}
+
+/// The centrifugal residual vectors of bodies with rotations: with them a few modes respond to spin as all modes do.
+#[test]
+fn centrifugal_vectors_carry_the_response_that_all_modes_have() {
+    for name in ["frame_beams", "shell_folded", "mpc_block", "hex8_edges", "plane_frame"] {
+        let all = converted(raw(name), usize::MAX, Method::Dense).body;
+        let few = converted(raw(name), 5, Method::Auto).body;
+        let mut settings = settings(5, Method::Auto);
+        let vectors = FreeSurface { residual_vectors: vec![Loads::Centrifugal] };
+        settings.basis = BasisChoice::Free(vectors);
+        let model = FeModel::from_raw(raw(name)).expect("a body").model;
+        let completed = convert(&model, &settings, SILENT).expect("converts").body;
+        let plane = all.dimension() == 2;
+        for spin in [Vector3::new(0.3, -1.0, 0.7), Vector3::new(1.0, 0.2, -0.4)] {
+            let spin = if plane { Vector3::z() } else { spin };
+            let exact = spin_compliance(&all, spin);
+            let error = (spin_compliance(&completed, spin) / exact - 1.0).abs();
+            assert!(error < 1e-9, "{name}: {error:e}");
+            assert!(1.0 - spin_compliance(&few, spin) / exact > 1e-4, "{name}: the modes alone do it");
+        }
+    }
 }

@@ -12,7 +12,7 @@ use crate::eigen::{
 };
 use crate::error::Result;
 use crate::linalg::{add_combination, column_products, gram, side_by_side};
-use crate::model::{FeModel, RawShapes};
+use crate::model::{FeModel, RawShapes, centre_and_length};
 use crate::progress::{Event, Watch};
 use crate::provenance::SourceFile;
 use faer::Mat;
@@ -26,8 +26,9 @@ const SELF_EQUILIBRATED: f64 = 1e-10;
 /// Loads whose static responses are to be in the basis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Loads {
-    /// The six centrifugal loads f = M (e_k e_l' + e_l e_k' - 2 delta_kl I) x / (1 + delta_kl), up to their sign, that any
-    /// constant angular velocity is made of: f(w) = sum_kl w_k w_l f_kl.
+    /// The six centrifugal loads that any constant angular velocity about the centre of mass is made of, f(w) = sum_kl w_k w_l f_kl:
+    /// f_kl = -e_k x (M B_x e_l) - e_l x (M B_x e_k), once for k = l, at displacements (theory sections 3 and 6). For M = Ms kron I3
+    /// f_kl = -Ms (e_k x (e_l x x) + e_l x (e_k x x)).
     Centrifugal,
     /// Unit force and unit torque along every model axis at the reference point of every interface, distributed over its nodes as
     /// a rigid motion of these would be (averaging coupling, also where another joins the nodes rigidly); unit forces at the
@@ -87,25 +88,44 @@ impl Loads {
 
 fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
     let (mut loads, d) = (Vec::new(), model.dimension());
+    let pencil = &problem.pencil;
+    let turning = model.rigid_fields(centre_of_mass(problem, model), 1.0);
+    let momenta = pencil.apply_mass(turning.as_ref().subcols(d, turning.ncols() - d));
     // A plane body spins about z alone.
     let spins: &[(usize, usize)] =
         if d == 2 { &[(2, 2)] } else { &[(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] };
+    let displacements = model.rows().displacements();
     for &(k, l) in spins {
-        // The acceleration w x (w x x) = (w w' - w'w I) x. Where its origin lies makes a rigid motion of difference.
-        let mut outward = Mat::zeros(problem.pencil.n(), 1);
-        for (i, x) in model.nodes().positions.iter().enumerate() {
-            let mut add = |component: usize, value: f64| outward[(d * i + component, 0)] += value;
-            if k == l {
-                (0..d).filter(|&c| c != k).for_each(|c| add(c, x[c]));
-            } else {
-                add(k, -x[l]);
-                add(l, -x[k]);
+        let mut load = Mat::zeros(pencil.n(), 1);
+        // -e_k x (M B_x e_l) at every displacement, where (a, b) follow k in cyclic order.
+        for (k, l) in if k == l { vec![(k, l)] } else { vec![(k, l), (l, k)] } {
+            let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+            let momentum = momenta.col(if d == 2 { 0 } else { l });
+            for first in (0..displacements).step_by(d) {
+                let along = |axis: usize| if axis < d { momentum[first + axis] } else { 0.0 };
+                for (axis, value) in [(a, along(b)), (b, -along(a))] {
+                    if axis < d {
+                        load[(first + axis, 0)] += value;
+                    }
+                }
             }
         }
-        let load = problem.pencil.apply_mass(outward.as_ref());
         loads.push((format!("centrifugal {}{}", AXES[k], AXES[l]), load));
     }
     loads
+}
+
+/// Centre of mass in model coordinates.
+fn centre_of_mass(problem: &EigenProblem<'_>, model: &FeModel) -> [f64; 3] {
+    let (centre, _) = centre_and_length(&model.nodes().positions);
+    let rigid = model.rigid_fields(centre, 1.0);
+    let g = gram(rigid.as_ref(), problem.pencil.apply_mass(rigid.as_ref()).as_ref());
+    // R'MR = [m I, -c~; c~, I0].
+    let offset = match model.dimension() {
+        2 => [g[(1, 2)], -g[(0, 2)], 0.0],
+        _ => [0, 1, 2].map(|k| 0.5 * (g[((k + 1) % 3, 3 + (k + 2) % 3)] - g[((k + 2) % 3, 3 + (k + 1) % 3)])),
+    };
+    [0, 1, 2].map(|k| centre[k] + offset[k] / g[(0, 0)])
 }
 
 /// The load on each coordinate of every interface.
