@@ -24,7 +24,7 @@ use crate::linalg::{
     Elimination, ReducedPencil, add_combination, combine, gram, side_by_side, subtract_combination,
     symmetric_eigen,
 };
-use crate::model::{FeModel, rigid_count};
+use crate::model::{Coupling, FeModel, rigid_count};
 use crate::progress::{Event, Watch};
 use faer::{Mat, MatRef};
 
@@ -48,6 +48,15 @@ impl Basis for CraigBampton {
         if settings.accuracy == Accuracy::Certified {
             let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+        }
+        // Before anything of that size is made.
+        let coordinates = model.interfaces().iter().map(|set| match set.coupling() {
+            Coupling::Free => model.dimension() * set.nodes.len(),
+            _ => rigid_count(model.dimension()),
+        });
+        let bytes = shape_bytes(model.pencil().n(), coordinates.sum());
+        if let Some(available) = settings.memory.filter(|&available| bytes > available) {
+            return Err(explain(model, EigenFailure::Memory { bytes, available }));
         }
         let joints = joints(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
@@ -116,10 +125,6 @@ impl<'a> Parts<'a> {
                 .into());
         }
         let count = joints.iter().map(|joint| joint.coordinates.len()).sum();
-        let bytes = shape_bytes(pencil.n(), count);
-        if let Some(available) = settings.memory.filter(|&available| bytes > available) {
-            return Err(failed(EigenFailure::Memory { bytes, available }));
-        }
         let names = joints.iter().flat_map(|joint| {
             joint.coordinates.iter().map(|coordinate| format!("{} {coordinate}", joint.name))
         });
