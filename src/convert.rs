@@ -27,7 +27,7 @@ mod geometric_stiffness;
 pub(crate) use damping::modal_damping;
 pub(crate) use geometric_stiffness::modal_geometric_stiffness;
 
-pub(crate) use body_modes::{BodyModes, Place};
+pub(crate) use body_modes::{BodyModes, Place, rigid_mass};
 
 /// A lumped comparator that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,9 +134,7 @@ pub fn convert_resumed(
     let (frame, mass_properties) = match (model.scalar_mass(), model.dimension()) {
         (Some(mass), 2) => choose_plane_frame(mass, positions, settings.frame)?,
         (Some(mass), _) => choose_frame(mass, positions, settings.frame)?,
-        (None, _) => {
-            choose_general_frame(|about| body_modes::rigid_mass(model, about), positions, settings.frame)?
-        }
+        (None, _) => choose_general_frame(|about| rigid_mass(model, about), positions, settings.frame)?,
     };
     let place = Place::new(model, frame);
     let modes = BodyModes::new(model, &place, &found.solution.vectors);

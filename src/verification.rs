@@ -1,6 +1,6 @@
 //! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
 
-use crate::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness};
+use crate::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness, rigid_mass};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{relative_residual, residual_scale, rounding_residual};
 use crate::error::Result;
@@ -87,6 +87,12 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
             "invariants_recomputed",
             "m, c, J, C1, Ibar, S from the matrices",
             worst_of(&|name| name != STIFFNESS),
+            RECOMPUTED,
+        ),
+        check(
+            "rigid_inertia_recomputed",
+            "R' M R = [m, -c~; c~, I0]",
+            rigid_inertia_error(body, &rigid_mass(model, frame.origin.into())),
             RECOMPUTED,
         ),
         check(
@@ -225,6 +231,30 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
         Difference::new((&stored - &own).norm_max(), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))
+}
+
+/// How far R'MR of unit translations and rotations about the origin of the body frame (model axes; in the plane 3 x 3) is from m, c
+/// and I0 of the body, relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
+fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
+    let (own, axes) = (body.invariants(), &body.frame().axes);
+    let lever = -(axes * own.first_moment).cross_matrix();
+    let inertia = axes * own.inertia() * axes.transpose();
+    // Rows of the six motions that are there: in the plane two translations and the rotation about z.
+    let motions: &[usize] = if body.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
+    let expected = |i: usize, j: usize| match (motions[i], motions[j]) {
+        (a, b) if a < 3 && b < 3 => own.mass * f64::from(u8::from(a == b)),
+        (a, b) if a < 3 => lever[(a, b - 3)],
+        (a, b) if b < 3 => lever[(b, a - 3)],
+        (a, b) => inertia[(a - 3, b - 3)],
+    };
+    let mut worst = 0.0f64;
+    for i in 0..motions.len() {
+        for j in 0..motions.len() {
+            let error = (found[(i, j)] - expected(i, j)).abs() / (expected(i, i) * expected(j, j)).sqrt();
+            worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
+        }
+    }
+    worst
 }
 
 /// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.

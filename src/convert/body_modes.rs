@@ -21,7 +21,7 @@ impl Place {
 }
 
 /// R'MR of the unit translations and rotations about a point in model coordinates.
-pub(super) fn rigid_mass(model: &FeModel, about: [f64; 3]) -> Mat<f64> {
+pub(crate) fn rigid_mass(model: &FeModel, about: [f64; 3]) -> Mat<f64> {
     let rigid = model.rigid_fields(about, 1.0);
     gram(rigid.as_ref(), model.pencil().apply_mass(rigid.as_ref()).as_ref())
 }
