@@ -9,7 +9,7 @@ use flexbody::eigen::{Method, Wanted};
 use flexbody::error::Error;
 use flexbody::flex_body::{FlexBody, MassStructure};
 use flexbody::input::{ModelFiles, read_manifest, read_model};
-use flexbody::invariants::primary_differences;
+use flexbody::invariants::{BodyFrame, Expected, identities, primary_differences};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::{DofLabel, FeModel, Nodes, RawModel};
 use flexbody::progress::SILENT;
@@ -284,4 +284,72 @@ fn centrifugal_vectors_carry_the_response_that_all_modes_have() {
             assert!(1.0 - spin_compliance(&few, spin) / exact > 1e-4, "{name}: the modes alone do it");
         }
     }
+}
+
+/// Straight beams: modes without any displacement of the nodes (torsion), or along one axis alone (stretch).
+#[test]
+fn straight_beams_fulfil_every_identity() {
+    // Along the axes and across them: what is zero is left with rounding of either sign.
+    let directions = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 2.0, 3.0], [-2.0, 0.3, 0.7], [0.1, -0.9, 0.4]];
+    for (parts, direction) in [1, 2, 10].into_iter().flat_map(|parts| directions.map(|d| (parts, d))) {
+        let direction = Vector3::from(direction).normalize();
+        let body = converted(straight_beam(parts, direction), usize::MAX, Method::Dense).body;
+        assert_eq!(body.n_modes(), 6 * parts, "all flexible modes");
+        let expected = Expected {
+            mass_normalised: true,
+            free_surface: true,
+            frame: BodyFrame::Principal,
+            origin: body.frame().origin,
+            eigenvalues: Some(&body.modes().eigenvalue),
+            eigenvalue_noise: body.certificate().rigid_noise,
+        };
+        for check in identities(body.invariants(), &expected) {
+            assert!(check.passed, "{parts} parts along {direction:?}: {check:?}");
+        }
+    }
+}
+
+/// A bar that stretches, twists and bends: unit lumped inertia at its nodes, springs between the neighbours' relative motions.
+fn straight_beam(parts: usize, direction: Vector3<f64>) -> RawModel {
+    let n = parts + 1;
+    let place = |i: usize| direction * (i as f64 / parts as f64);
+    let (mut k, mut m) = (Vec::new(), Vec::new());
+    for i in 0..n as u32 {
+        for axis in 0..3 {
+            m.push((6 * i + axis, 6 * i + axis, 1.0));
+            m.push((6 * i + 3 + axis, 6 * i + 3 + axis, 0.01));
+        }
+    }
+    for i in 0..parts {
+        // Relative displacement at the middle of the part, and relative rotation.
+        let half = 0.5 * (place(i + 1) - place(i));
+        let mut rows = vec![[0.0; 12]; 6];
+        for a in 0..3 {
+            let lever = Vector3::ith(a, 1.0).cross(&half);
+            rows[a][a] = -1.0;
+            rows[a][6 + a] = 1.0;
+            rows[3 + a][3 + a] = -1.0;
+            rows[3 + a][9 + a] = 1.0;
+            for (row, value) in lever.iter().enumerate() {
+                rows[row][3 + a] -= value;
+                rows[row][9 + a] -= value;
+            }
+        }
+        let stiffness = [3e4, 1e4, 2e4, 100.0, 50.0, 70.0];
+        for a in 0..12 {
+            for b in 0..12 {
+                let value: f64 = (0..6).map(|s| stiffness[s] * rows[s][a] * rows[s][b]).sum();
+                if value != 0.0 {
+                    k.push((6 * i as u32 + a as u32, 6 * i as u32 + b as u32, value));
+                }
+            }
+        }
+    }
+    let nodes = Nodes { ids: (1..=n as i64).collect(), positions: (0..n).map(|i| place(i).into()).collect() };
+    let matrix = |entries: &[(u32, u32, f64)]| CscMatrix::from_triplets(6 * n, 6 * n, entries);
+    let mut raw = RawModel::in_memory("straight", matrix(&k), matrix(&m), nodes);
+    raw.dofs = Some(
+        (1..=n as i64).flat_map(|node| (1..=6).map(move |direction| DofLabel { node, direction })).collect(),
+    );
+    raw
 }

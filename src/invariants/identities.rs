@@ -91,7 +91,7 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
         checks.push(check(
             "velocity_gram_psd",
             "[Phi_t B Psi]' M [Phi_t B Psi] positive semidefinite",
-            terms::velocity_gram_negative(body),
+            terms::velocity_gram_negative(body, &bound),
             ROUNDING,
         ));
     } else {

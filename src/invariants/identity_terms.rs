@@ -135,19 +135,16 @@ pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> 
     })
 }
 
-/// Gram matrix of [Phi_t, B, Psi], the columns of unit size: kinetic energy is never negative, whatever the modes do.
-pub(super) fn velocity_gram_negative(body: &Invariants) -> f64 {
+/// Gram matrix of [Phi_t, B, Psi], the columns in units of their modes: kinetic energy is never negative, whatever the modes do.
+pub(super) fn velocity_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let nf = body.n_modes();
     let (w0, w2, w3, modal_mass) = (body.w0(), body.w2(), body.w3(), body.modal_mass());
+    // Not of its own size: a rotation about the direction in which a mode moves all nodes has none.
     let size = |i: usize| match i {
         0..3 => body.mass.sqrt(),
-        _ if i < 3 + 3 * nf => w2[(i - 3, i - 3)].max(0.0).sqrt(),
-        _ => modal_mass[(i - 3 - 3 * nf, i - 3 - 3 * nf)].max(0.0).sqrt(),
+        _ => bound.mode((i - 3) % nf),
     };
-    // A direction that moves no mass: its products are rounding of those of the others.
-    let largest = (0..3 * nf).map(|i| w2[(i, i)]).fold(0.0, f64::max).sqrt();
-    let floor = |i: usize| size(i).max(f64::EPSILON.sqrt() * largest);
-    unit_gram_negative(3 + 4 * nf, floor, |i, j| match (i, j) {
+    unit_gram_negative(3 + 4 * nf, size, |i, j| match (i, j) {
         (0..3, 0..3) => body.mass * f64::from(u8::from(i == j)),
         (0..3, _) if j < 3 + 3 * nf => w0[(i, j - 3)],
         (0..3, _) => body.c1[(i, j - 3 - 3 * nf)],
