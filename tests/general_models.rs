@@ -159,6 +159,34 @@ fn bodies_come_back_from_their_files_to_the_last_bit() {
     }
 }
 
+/// The body about another origin and in other axes is what its invariants say of it there, in the plane as well.
+#[test]
+fn invariants_follow_the_frame() {
+    for name in FIXTURES {
+        let model = FeModel::from_raw(raw(name)).expect("a body").model;
+        let [own, other] = [BodyFrame::Principal, BodyFrame::Model].map(|frame| {
+            let settings = ConvertSettings { frame, ..settings(6, Method::Auto) };
+            convert(&model, &settings, SILENT).expect("converts").body
+        });
+        let frame = own.frame();
+        // x_model = r0 + A x: turned back, then to an origin at -r0.
+        let moved = own.invariants().rotated(&frame.axes.transpose()).shifted(-frame.origin);
+        let signs = faer::Mat::from_fn(6, 6, |i, j| {
+            let (a, b) = (own.modes(), other.modes());
+            // Turned shapes of one mode: the sign of their product.
+            let turned = |row: usize| -> f64 {
+                (0..3).map(|l| frame.axes[(row % 3, l)] * a.shape[(row / 3 * 3 + l, j)]).sum()
+            };
+            let product: f64 = (0..a.shape.nrows()).map(|row| turned(row) * b.shape[(row, j)]).sum();
+            if i == j { product.signum() } else { 0.0 }
+        });
+        let moved = moved.with_basis(signs.as_ref());
+        for (what, error) in primary_differences(other.invariants(), &moved) {
+            assert!(error < 1e-11, "{name} {what}: {error:e}");
+        }
+    }
+}
+
 fn relabelled(mut raw: RawModel, to: impl Fn(u8) -> u8) -> RawModel {
     for DofLabel { direction, .. } in raw.dofs.as_mut().expect("labels") {
         *direction = to(*direction);

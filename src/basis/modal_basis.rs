@@ -50,7 +50,7 @@ pub struct Truncation {
 /// Modes of a model, in model axes, whatever basis they come from.
 #[derive(Debug, Clone)]
 pub struct ModalBasis {
-    /// Eigenvalues, shapes (3n x nf, row 3 i + k), residuals, completeness, work. Ritz values and vectors of the basis'
+    /// Eigenvalues, shapes (N x nf, by internal rows), residuals, completeness, work. Ritz values and vectors of the basis'
     /// span where these are no eigenvectors, which the residuals tell.
     pub solution: EigenSolution,
     /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what digits and

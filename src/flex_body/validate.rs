@@ -238,6 +238,9 @@ impl Check {
                 "`invariants.W0` is there for the mass structure `general`, and only for that".to_owned(),
             );
         }
+        if parts.invariants.general.as_ref().is_some_and(|terms| terms.plane != (parts.dimension == 2)) {
+            self.add(format!("general terms of another dimension than {}", parts.dimension));
+        }
         if parts.lumped.iter().any(|lumped| lumped.invariants.general.is_some()) {
             self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
         }

@@ -193,6 +193,7 @@ impl Products {
                 w0: Mat::from_fn(3, 3 * nf, |k, column| w0[column % nf][(k, column / nf)]),
                 w3,
                 modal_mass: self.modal_mass(),
+                plane: false,
             }),
         }
     }
@@ -201,24 +202,18 @@ impl Products {
         let (g, nf) = (&self.gram, self.nf);
         let vector = |f: &dyn Fn(usize) -> f64| axes.transpose() * Vector3::new(f(0), f(1), 0.0);
         let (mass, first_moment, second_moment) = rigid_inertia(g.as_ref().submatrix(0, 0, 3, 3));
+        let second_moment = axes.transpose() * second_moment * axes;
         let c1: Vec<Vector3<f64>> = (0..nf).map(|j| vector(&|k| g[(k, self.mode(j))])).collect();
         let w0: Vec<Vector3<f64>> = (0..nf).map(|j| vector(&|k| g[(k, self.turned(0, j))])).collect();
-        let ibar: Vec<Matrix3<f64>> = (0..nf)
-            .map(|j| {
-                // W1_zz = 2 (Ibar_xx + Ibar_yy), C2_z = Ibar_xy - Ibar_yx.
-                let mut ibar = lamina(g[(2, self.turned(0, j))]);
-                let c2 = g[(2, self.mode(j))];
-                (ibar[(0, 1)], ibar[(1, 0)]) = (0.5 * c2, -0.5 * c2);
-                ibar
-            })
-            .collect();
+        let ibar: Vec<Matrix3<f64>> =
+            (0..nf).map(|j| plane_ibar(g[(2, self.turned(0, j))], g[(2, self.mode(j))])).collect();
         let w2 = |i: usize, j: usize| g[(self.turned(0, i), self.turned(0, j))];
         let half = || Mat::from_fn(nf, nf, |i, j| 0.5 * w2(i, j));
         let zero = || Mat::zeros(nf, nf);
         Invariants {
             mass,
             first_moment: axes.transpose() * first_moment,
-            second_moment,
+            second_moment: (second_moment + second_moment.transpose()) * 0.5,
             c1: Mat::from_fn(3, nf, |k, j| c1[j][k]),
             ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect())),
             s: [[half(), zero(), zero()], [zero(), half(), zero()], [zero(), zero(), zero()]],
@@ -230,6 +225,7 @@ impl Products {
                     None => 0.0,
                 }),
                 modal_mass: self.modal_mass(),
+                plane: true,
             }),
         }
     }
@@ -239,8 +235,8 @@ impl Products {
 /// and J that of a lamina.
 pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
     if g.ncols() == 3 {
-        let first_moment = Vector3::new(g[(1, 2)], -g[(0, 2)], 0.0);
-        return (0.5 * (g[(0, 0)] + g[(1, 1)]), first_moment, lamina(g[(2, 2)]));
+        let (mass, c) = (0.5 * (g[(0, 0)] + g[(1, 1)]), Vector3::new(g[(1, 2)], -g[(0, 2)], 0.0));
+        return (mass, c, plane_second_moment(g[(2, 2)], mass, &c));
     }
     let mass = (0..3).map(|k| g[(k, k)]).sum::<f64>() / 3.0;
     let moment = |k: usize| {
@@ -250,6 +246,19 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
     let inertia = Matrix3::from_fn(|k, l| 0.5 * (g[(3 + k, 3 + l)] + g[(3 + l, 3 + k)]));
     let second_moment = Matrix3::identity() * (0.5 * inertia.trace()) - inertia;
     (mass, Vector3::from_fn(|k, _| moment(k)), second_moment)
+}
+
+/// J of a plane body of which the moment about z is known alone: the same in all directions about its centre of mass, so that it
+/// changes with the origin as J does.
+fn plane_second_moment(about_z: f64, mass: f64, c: &Vector3<f64>) -> Matrix3<f64> {
+    lamina(about_z - c.norm_squared() / mass) + c * c.transpose() / mass
+}
+
+/// Ibar of a mode of a plane body from W1_zz = 2 (Ibar_xx + Ibar_yy), half of which is given, and C2_z = Ibar_xy - Ibar_yx.
+pub(super) fn plane_ibar(half_w1: f64, c2: f64) -> Matrix3<f64> {
+    let mut ibar = lamina(half_w1);
+    (ibar[(0, 1)], ibar[(1, 0)]) = (0.5 * c2, -0.5 * c2);
+    ibar
 }
 
 /// The tensor in the plane, the same in all directions there, with J_xx + J_yy = `about_z`.
@@ -263,7 +272,7 @@ impl Invariants {
     pub fn about_z(mut self) -> Self {
         let half = |a: f64, b: f64| 0.5 * (a + b);
         let j = &self.second_moment;
-        self.second_moment = lamina(j[(0, 0)] + j[(1, 1)]);
+        self.second_moment = plane_second_moment(j[(0, 0)] + j[(1, 1)], self.mass, &self.first_moment);
         for p in 0..self.n_modes() {
             let mean = half(self.ibar[0][0][p], self.ibar[1][1][p]);
             let skew = half(self.ibar[0][1][p], -self.ibar[1][0][p]);

@@ -40,4 +40,7 @@ pub struct GeneralTerms {
     pub w3: Mat<f64>,
     /// m_ff (nf x nf) = Psi' M Psi.
     pub modal_mass: Mat<f64>,
+    /// Of a plane body: nothing but its rotation about z is known, the entries of J, Ibar and S about the other axes are those of a
+    /// lamina that is the same in all directions about its centre of mass.
+    pub plane: bool,
 }

@@ -1,7 +1,7 @@
 //! How the primary data change with the frame and with the basis (theory section 5).
 
 use super::dense::{product, transpose_product};
-use super::general::{ibar_of, symmetrise};
+use super::general::{ibar_of, plane_ibar, symmetrise};
 use super::{GeneralTerms, Invariants};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -25,6 +25,9 @@ impl Invariants {
             let c1 = Vector3::from_fn(|k, _| self.c1[(k, p)]);
             let change = match self.general {
                 None => d * c1.transpose(),
+                Some(GeneralTerms { plane: true, .. }) => {
+                    plane_ibar((d.cross_matrix() * w0)[(2, 2)], d.cross(&c1)[2])
+                }
                 Some(_) => ibar_of(&(d.cross_matrix() * w0), &(d.cross(&c1))),
             };
             for (k, row) in shifted.ibar.iter_mut().enumerate() {
@@ -68,6 +71,7 @@ impl Invariants {
                     (0..3).map(|a| axes[(a, k)] * general.w3[(a * nf + p, q)]).sum()
                 }),
                 modal_mass: general.modal_mass.clone(),
+                plane: general.plane,
             }),
         };
         symmetrise(&mut rotated.s);
@@ -106,6 +110,7 @@ impl Invariants {
                     w0: Mat::from_fn(3, 3 * nt, |k, column| w0[column / nt][(k, column % nt)]),
                     w3: Mat::from_fn(3 * nt, nt, |row, q| w3[row / nt][(row % nt, q)]),
                     modal_mass: Mat::from_fn(nt, nt, |p, q| 0.5 * (mass[(p, q)] + mass[(q, p)])),
+                    plane: general.plane,
                 }
             }),
         };

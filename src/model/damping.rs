@@ -14,7 +14,7 @@ pub enum Damping<D> {
         /// Unit: time.
         beta: f64,
     },
-    /// D (3n x 3n), symmetric and positive semidefinite. Unit: mass/time.
+    /// D (N x N, rows as K), symmetric and positive semidefinite. Unit: mass/time.
     Matrix(D),
 }
 

@@ -31,9 +31,9 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     };
     let modes = take.modes(nodes.len());
     let nf = modes.eigenvalue.len();
-    let invariants = take.invariants("/invariants", nf);
+    let invariants = take.invariants("/invariants", nf, dimension == 2);
     let geometric_stiffness = take.geometric_stiffness(nf);
-    let lumped = take.lumped(nf);
+    let lumped = take.lumped(nf, dimension == 2);
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
     let coordinates = take.coordinates(nf);
@@ -200,7 +200,7 @@ impl Take<'_> {
         Some(InternalRows { dofs, shape: self.matrix(values, nf) })
     }
 
-    fn invariants(&mut self, place: &str, nf: usize) -> Invariants {
+    fn invariants(&mut self, place: &str, nf: usize, plane: bool) -> Invariants {
         let ibar = self.floats(&format!("{place}/Ibar"));
         let s = self.floats(&format!("{place}/S"));
         let block = |k: usize, l: usize| 3 * k + l;
@@ -210,6 +210,7 @@ impl Take<'_> {
             w0: self.matrix(&w0, 3 * nf),
             w3: self.matrix(&format!("{place}/W3"), nf),
             modal_mass: self.matrix(&format!("{place}/modal_mass"), nf),
+            plane,
         });
         Invariants {
             general,
@@ -237,7 +238,7 @@ impl Take<'_> {
         out
     }
 
-    fn lumped(&mut self, nf: usize) -> Vec<LumpedBody> {
+    fn lumped(&mut self, nf: usize, plane: bool) -> Vec<LumpedBody> {
         let mut out = Vec::new();
         for (scheme, link) in self.scan.instances("/lumped") {
             let place = format!("/lumped/{link}");
@@ -246,7 +247,7 @@ impl Take<'_> {
                 other => unreachable!("scan without problems has {other:?} as norms of {link}"),
             };
             let negative_masses = self.count(&format!("{place}@negative_masses"));
-            let invariants = self.invariants(&place, nf);
+            let invariants = self.invariants(&place, nf, plane);
             out.push(LumpedBody { scheme, invariants, negative_masses, comparison });
         }
         out

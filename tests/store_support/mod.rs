@@ -86,6 +86,7 @@ impl Random {
             w0: self.matrix(3, 3 * nf),
             w3: self.matrix(3 * nf, nf),
             modal_mass: self.matrix(nf, nf),
+            plane: false,
         }
     }
 
