@@ -12,7 +12,7 @@ use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::FeModel;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::Value;
 use std::path::Path;
 use support::equations::{Coriolis, State};

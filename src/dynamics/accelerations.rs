@@ -18,7 +18,7 @@ impl std::fmt::Display for NotPositiveDefinite {
 impl std::error::Error for NotPositiveDefinite {}
 
 impl Evaluation<'_> {
-    /// nu' from Mc(q) nu' = applied - h(q, nu) - (0, 0, K_ff q + D qd).
+    /// nu' from Mc(q) nu' = applied - h_nu - (0, 0, K_ff q + D qd).
     ///
     /// `applied` are the generalised forces (F, tau, Q) other than elastic and damping forces; V' is the rate of the components in
     /// body axes, so that R'' = A (V' + omega x V). Block elimination: with m_ff = L L' and Y = L^-1 \[C1' C(q)'\] the rigid

@@ -27,7 +27,7 @@ pub(super) const LINEAR: usize = 21;
 /// The equations of motion of one flexible body in constant invariants (theory section 6, which is section 3 for solids).
 ///
 /// ```text
-/// Mc(q) nu' + h(q, nu) + (0, 0, K_ff q + D qd) = (F, tau, Q),    nu = (V, omega, qd)
+/// Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd) = (F, tau, Q),    nu = (V, omega, qd)
 /// ```
 ///
 /// V is the velocity of the origin of the body frame, omega the angular velocity of the frame, both in body axes; F, tau (about the
@@ -187,5 +187,35 @@ impl EquationsOfMotion {
     /// Row of `linear`.
     pub(super) fn row(&self, row: usize) -> &[f64] {
         &self.linear[row * self.nf..][..self.nf]
+    }
+
+    /// V, omega and the modes of a vector in the order of nu.
+    pub(super) fn split<'v>(&self, nu: &'v [f64]) -> (Vector3<f64>, Vector3<f64>, &'v [f64]) {
+        assert_eq!(nu.len(), self.n_velocities(), "one entry per rigid motion and mode");
+        let (rigid, modal) = nu.split_at(self.rigid.len());
+        let mut both = [Vector3::zeros(); 2];
+        for (&axis, &value) in self.rigid.iter().zip(rigid) {
+            both[axis / 3][axis % 3] = value;
+        }
+        let [velocity, omega] = both;
+        (velocity, omega, modal)
+    }
+
+    /// Row `axis` of [C1; C(q)], given C(q).
+    pub(super) fn coupling_row<'v>(&'v self, coupling: &'v [f64], axis: usize) -> &'v [f64] {
+        if axis < 3 { self.row(C1 + axis) } else { &coupling[(axis - 3) * self.nf..][..self.nf] }
+    }
+
+    /// y += factor (K_ff q + D qd).
+    #[inline(always)]
+    pub(super) fn add_internal(&self, factor: f64, q: &[f64], qd: &[f64], y: &mut [f64]) {
+        self.stiffness.add_product(factor, q, y);
+        self.damping.add_product(factor, qd, y);
+    }
+
+    /// Entries of a force and a torque that belong to rigid motions of the body.
+    pub(super) fn put_rigid(&self, force: Vector3<f64>, torque: Vector3<f64>, rigid: &mut [f64]) {
+        let at = |axis: usize| if axis < 3 { force[axis] } else { torque[axis - 3] };
+        rigid.iter_mut().zip(self.rigid).for_each(|(entry, &axis)| *entry = at(axis));
     }
 }

@@ -91,7 +91,7 @@ impl<'a> Evaluation<'a> {
     ///
     /// ```text
     /// (p, h, pi) = Mc(q) nu
-    /// h(q, nu) = dMc/dt nu + (omega x p, omega x h + V x p, -dT/dq)
+    /// h_nu = dMc/dt nu + (omega x p, omega x h + V x p, -dT/dq)
     /// ```
     ///
     /// # Panics
@@ -233,12 +233,12 @@ impl<'a> Evaluation<'a> {
         0.5 * self.equations.stiffness.quadratic(&self.q)
     }
 
-    /// h(q, nu): the forces that the inertia of the body takes without acceleration (6 + nf, or 3 + nf).
+    /// h_nu: the forces that the inertia of the body takes without acceleration (6 + nf, or 3 + nf).
     pub fn velocity_forces(&self) -> &[f64] {
         &self.velocity_forces
     }
 
-    /// The forces that have to be applied for the accelerations nu': Mc(q) nu' + h(q, nu) + (0, 0, K_ff q + D qd).
+    /// The forces that have to be applied for the accelerations nu': Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd).
     ///
     /// # Panics
     /// When a length is not 6 + nf (of a plane body 3 + nf).
@@ -313,38 +313,6 @@ impl<'a> Evaluation<'a> {
     /// What runs in the vector instructions of the machine.
     pub(super) fn arch(&self) -> Arch {
         self.arch
-    }
-}
-
-impl EquationsOfMotion {
-    /// V, omega and the modes of a vector in the order of nu.
-    pub(super) fn split<'v>(&self, nu: &'v [f64]) -> (Vector3<f64>, Vector3<f64>, &'v [f64]) {
-        assert_eq!(nu.len(), self.n_velocities(), "one entry per rigid motion and mode");
-        let (rigid, modal) = nu.split_at(self.rigid.len());
-        let mut both = [Vector3::zeros(); 2];
-        for (&axis, &value) in self.rigid.iter().zip(rigid) {
-            both[axis / 3][axis % 3] = value;
-        }
-        let [velocity, omega] = both;
-        (velocity, omega, modal)
-    }
-
-    /// Row `axis` of [C1; C(q)], given C(q).
-    pub(super) fn coupling_row<'v>(&'v self, coupling: &'v [f64], axis: usize) -> &'v [f64] {
-        if axis < 3 { self.row(C1 + axis) } else { &coupling[(axis - 3) * self.nf..][..self.nf] }
-    }
-
-    /// y += factor (K_ff q + D qd).
-    #[inline(always)]
-    pub(super) fn add_internal(&self, factor: f64, q: &[f64], qd: &[f64], y: &mut [f64]) {
-        self.stiffness.add_product(factor, q, y);
-        self.damping.add_product(factor, qd, y);
-    }
-
-    /// Entries of a force and a torque that belong to rigid motions of the body.
-    pub(super) fn put_rigid(&self, force: Vector3<f64>, torque: Vector3<f64>, rigid: &mut [f64]) {
-        let at = |axis: usize| if axis < 3 { force[axis] } else { torque[axis - 3] };
-        rigid.iter_mut().zip(self.rigid).for_each(|(entry, &axis)| *entry = at(axis));
     }
 }
 

@@ -6,9 +6,9 @@ use super::evaluation::{add_symmetric, spin_product};
 use nalgebra::{Matrix3, Vector3};
 
 impl Evaluation<'_> {
-    /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h(q, nu) + (0, 0, K_ff q + D qd), at constant accelerations nu'.
+    /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd), at constant accelerations nu'.
     ///
-    /// * `acceleration`: nu' (n = 6 + nf, of a plane body 3 + nf); zero for the derivatives of h and the elastic forces alone.
+    /// * `acceleration`: nu' (n = 6 + nf, of a plane body 3 + nf); zero for the derivatives of h_nu and the elastic forces alone.
     /// * `by_q`: df/dq (n x nf), row-major.
     /// * `by_nu`: df/dnu (n x n), row-major.
     ///
@@ -152,21 +152,26 @@ impl Evaluation<'_> {
         let (n, nf, r, w) = (body.n_velocities(), body.nf, body.rigid.len(), &self.omega);
         for i in 0..nf {
             for j in 0..nf {
-                let (mut q, mut rate) = (body.stiffness.get(i, j), body.damping.get(i, j));
-                if let Some(w2) = &body.w2 {
-                    for (at, &pair) in body.pairs.iter().enumerate() {
-                        q -= spin_product(w, pair) * w2.get(at * nf + i, j);
+                by_q[(r + i) * nf + j] = body.stiffness.get(i, j);
+                by_nu[(r + i) * n + r + j] = body.damping.get(i, j);
+            }
+        }
+        for i in 0..nf {
+            let of_q = &mut by_q[(r + i) * nf..][..nf];
+            if let Some(w2) = &body.w2 {
+                for (at, &pair) in body.pairs.iter().enumerate() {
+                    let factor = spin_product(w, pair);
+                    of_q.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
+                }
+            }
+            if let Some(w3) = &body.w3 {
+                for (at, &a) in body.axes.iter().enumerate() {
+                    for (j, transposed) in w3.row(at * nf + i).enumerate() {
+                        of_q[j] += angular[a] * transposed;
+                        by_nu[(r + i) * n + r + j] += w[a] * transposed;
+                        by_nu[(r + j) * n + r + i] -= w[a] * transposed;
                     }
                 }
-                if let Some(w3) = &body.w3 {
-                    for (at, &a) in body.axes.iter().enumerate() {
-                        let own = w3.get(at * nf + i, j);
-                        q += angular[a] * own;
-                        rate += w[a] * (own - w3.get(at * nf + j, i));
-                    }
-                }
-                by_q[(r + i) * nf + j] = q;
-                by_nu[(r + i) * n + r + j] = rate;
             }
         }
     }

@@ -39,8 +39,10 @@ impl Panels {
         if self.columns == 0 { 0 } else { self.panels.len() / self.columns * WIDTH }
     }
 
-    pub(super) fn get(&self, row: usize, column: usize) -> f64 {
-        self.panels[row / WIDTH * self.columns + column][row % WIDTH]
+    /// The entries of a row, column by column.
+    pub(super) fn row(&self, row: usize) -> impl Iterator<Item = f64> + '_ {
+        let columns = &self.panels[row / WIDTH * self.columns..][..self.columns];
+        columns.iter().map(move |column| column[row % WIDTH])
     }
 
     /// y = A x.

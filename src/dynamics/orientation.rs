@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 ///
 /// ```text
 /// nu = H x',    H = blkdiag(A', G, I)
-/// H'Mc H x'' + H'(Mc dH/dt x' + h) + (0, 0, K_ff q + D qd) = H'(F, tau, Q)
+/// H'Mc H x'' + H'(Mc dH/dt x' + h_nu) + (0, 0, K_ff q + D qd) = H'(F, tau, Q)
 /// ```
 ///
 /// which is the form of theory (3.2), and of (4.2) in the plane.
@@ -257,7 +257,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// H'(Mc dH/dt x' + h): the velocity forces that belong to [`Evaluation::mass_matrix_of`], without elastic and damping forces.
+    /// H'(Mc dH/dt x' + h_nu): the velocity forces that belong to [`Evaluation::mass_matrix_of`], without elastic and damping forces.
     ///
     /// * `rate`: theta', that of the state.
     /// * `forces`: 3 + R + nf, of a plane body 2 + R + nf.
