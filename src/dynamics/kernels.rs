@@ -10,7 +10,7 @@ pub(super) const WIDTH: usize = 32;
 /// Lanes of a dot product.
 const LANES: usize = 8;
 
-/// A matrix (rows x n) cut to panels of [`WIDTH`] rows, the last filled up with zeros. A product streams the memory once and
+/// A matrix (rows x n, n > 0) cut to panels of [`WIDTH`] rows, the last filled up with zeros. A product streams the memory once and
 /// keeps the sums of a panel in registers.
 #[derive(Debug, Clone)]
 pub(super) struct Panels {
@@ -28,15 +28,15 @@ impl Panels {
         Self { columns, panels: panels.map(|(first, j)| column(first, j)).collect() }
     }
 
-    /// Square matrices (n x n) on top of each other.
+    /// Square matrices (n x n) on top of each other, one at least.
     pub(super) fn stacked(blocks: &[Mat<f64>]) -> Self {
-        let n = blocks.first().map_or(0, Mat::nrows);
+        let n = blocks[0].nrows();
         Self::new(blocks.len() * n, n, |row, j| blocks[row / n][(row % n, j)])
     }
 
     /// Room that a product needs: the rows, filled up to whole panels.
     pub(super) fn padded_rows(&self) -> usize {
-        if self.columns == 0 { 0 } else { self.panels.len() / self.columns * WIDTH }
+        self.panels.len() / self.columns * WIDTH
     }
 
     /// The entries of a row, column by column.
@@ -48,9 +48,6 @@ impl Panels {
     /// y = A x.
     #[inline(always)] // compiled once per instruction set
     pub(super) fn times(&self, x: &[f64], y: &mut [f64]) {
-        if self.panels.is_empty() {
-            return;
-        }
         let targets = y.as_chunks_mut::<WIDTH>().0;
         for (panel, target) in self.panels.chunks_exact(self.columns).zip(targets) {
             let mut sum = [0.0; WIDTH];
