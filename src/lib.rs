@@ -11,6 +11,7 @@ pub mod basis;
 pub mod cli;
 pub mod convert;
 pub mod diagnostic;
+pub mod dynamics;
 pub mod eigen;
 pub mod error;
 pub mod flex_body;

@@ -12,64 +12,18 @@ use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::FeModel;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::Value;
 use std::path::Path;
 use support::equations::{Coriolis, State};
 use support::general::{
-    GeneralBody, NodalBody, Row, RowKind, dense, nodal_rates, pack, rates, reduced_rates, rigid_velocities,
-    rows, unpack,
+    GeneralBody, NodalBody, Row, RowKind, dense, nodal_rates, pack, random_body, random_matrix, rates,
+    reduced_rates, rigid_velocities, rows, to_faer, unpack,
 };
 use support::integrate;
 use support::nodal::{deviation, random_state};
 use support::random::Random;
 use support::reference;
-
-fn random_matrix(random: &mut Random, rows: usize, columns: usize) -> DMatrix<f64> {
-    DMatrix::from_fn(rows, columns, |_, _| random.signed())
-}
-
-fn to_faer(a: &DMatrix<f64>) -> Mat<f64> {
-    Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
-}
-
-/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M is any positive
-/// definite matrix with the given rigid mass matrix: T'M T with T R = R S, and S taking R'M R to what it has to be.
-fn random_body(seed: u64) -> NodalBody {
-    let mut random = Random(seed);
-    let positions: Vec<[f64; 3]> = (0..5).map(|_| random.vector::<3>()).collect();
-    let vectors = (0..5)
-        .map(|node| (RowKind::Displacement, node))
-        .chain((0..3).map(|node| (RowKind::Rotation, node)))
-        .chain((7..9).map(|node| (RowKind::Internal, node)));
-    let ordered: Vec<Row> =
-        vectors.flat_map(|(kind, node)| [0, 1, 2].map(|axis| Row { kind, node, axis })).collect();
-    let rows: Vec<Row> = random.permutation(ordered.len()).into_iter().map(|i| ordered[i]).collect();
-    let n = rows.len();
-    let square = |random: &mut Random, n: usize| {
-        let a = random_matrix(random, n, n);
-        &a * a.transpose() / n as f64
-    };
-    let (any, stiffness) = (square(&mut random, n), square(&mut random, n));
-
-    let rigid = rigid_velocities(&rows, &positions);
-    let (mass, first) = (2.0, Vector3::from(random.vector::<3>()) * 0.5);
-    let mixed = -support::equations::skew(&first);
-    let mut wanted = DMatrix::<f64>::identity(6, 6) * mass;
-    wanted.view_mut((0, 3), (3, 3)).copy_from(&mixed);
-    wanted.view_mut((3, 0), (3, 3)).copy_from(&mixed.transpose());
-    let inertia = square(&mut random, 3) + Matrix3::identity();
-    wanted.view_mut((3, 3), (3, 3)).copy_from(&inertia);
-    let lower = |a: DMatrix<f64>| a.cholesky().expect("positive definite").l();
-    let found = lower(rigid.transpose() * &any * &rigid);
-    let change = found.transpose().try_inverse().expect("regular") * lower(wanted).transpose();
-    let gram = (rigid.transpose() * &rigid).try_inverse().expect("regular");
-    let turn = DMatrix::identity(n, n)
-        + &rigid * (change - DMatrix::<f64>::identity(6, 6)) * gram * rigid.transpose();
-    let general = turn.transpose() * any * turn;
-    let shapes = random_matrix(&mut random, n, 4);
-    NodalBody::new(&to_faer(&stiffness), &to_faer(&general), &rows, &positions, &to_faer(&shapes))
-}
 
 #[test]
 fn invariants_give_the_accelerations_of_the_nodes() {

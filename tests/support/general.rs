@@ -2,6 +2,7 @@
 //! invariants. Dense, written as the theory prints it, nothing shared with the library.
 
 use super::equations::{ReducedBody, State, skew};
+use super::random::Random;
 use faer::Mat;
 use flexbody::model::RawModel;
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -414,4 +415,52 @@ pub fn nodal_rates(body: &NodalBody, y: &DVector<f64>) -> DVector<f64> {
 /// y' by the invariants.
 pub fn reduced_rates(body: &GeneralBody, y: &DVector<f64>) -> DVector<f64> {
     rates(y, |state| body.accelerations(state))
+}
+
+/// Random entries.
+pub fn random_matrix(random: &mut Random, rows: usize, columns: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(rows, columns, |_, _| random.signed())
+}
+
+/// An nalgebra matrix as one of faer.
+pub fn to_faer(a: &DMatrix<f64>) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
+}
+
+/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M is any positive
+/// definite matrix with the given rigid mass matrix: T'M T with T R = R S, and S taking R'M R to what it has to be.
+pub fn random_body(seed: u64) -> NodalBody {
+    let mut random = Random(seed);
+    let positions: Vec<[f64; 3]> = (0..5).map(|_| random.vector::<3>()).collect();
+    let vectors = (0..5)
+        .map(|node| (RowKind::Displacement, node))
+        .chain((0..3).map(|node| (RowKind::Rotation, node)))
+        .chain((7..9).map(|node| (RowKind::Internal, node)));
+    let ordered: Vec<Row> =
+        vectors.flat_map(|(kind, node)| [0, 1, 2].map(|axis| Row { kind, node, axis })).collect();
+    let rows: Vec<Row> = random.permutation(ordered.len()).into_iter().map(|i| ordered[i]).collect();
+    let n = rows.len();
+    let square = |random: &mut Random, n: usize| {
+        let a = random_matrix(random, n, n);
+        &a * a.transpose() / n as f64
+    };
+    let (any, stiffness) = (square(&mut random, n), square(&mut random, n));
+
+    let rigid = rigid_velocities(&rows, &positions);
+    let (mass, first) = (2.0, Vector3::from(random.vector::<3>()) * 0.5);
+    let mixed = -skew(&first);
+    let mut wanted = DMatrix::<f64>::identity(6, 6) * mass;
+    wanted.view_mut((0, 3), (3, 3)).copy_from(&mixed);
+    wanted.view_mut((3, 0), (3, 3)).copy_from(&mixed.transpose());
+    let inertia = square(&mut random, 3) + Matrix3::identity();
+    wanted.view_mut((3, 3), (3, 3)).copy_from(&inertia);
+    let lower = |a: DMatrix<f64>| a.cholesky().expect("positive definite").l();
+    let found = lower(rigid.transpose() * &any * &rigid);
+    let change = found.transpose().try_inverse().expect("regular") * lower(wanted).transpose();
+    let gram = (rigid.transpose() * &rigid).try_inverse().expect("regular");
+    let turn = DMatrix::identity(n, n)
+        + &rigid * (change - DMatrix::<f64>::identity(6, 6)) * gram * rigid.transpose();
+    let general = turn.transpose() * any * turn;
+    let shapes = random_matrix(&mut random, n, 4);
+    NodalBody::new(&to_faer(&stiffness), &to_faer(&general), &rows, &positions, &to_faer(&shapes))
 }

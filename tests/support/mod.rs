@@ -5,6 +5,7 @@
 pub mod elements;
 pub mod equations;
 pub mod files;
+pub mod flexible;
 pub mod general;
 pub mod integrate;
 pub mod mesh;

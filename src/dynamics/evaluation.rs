@@ -1,0 +1,330 @@
+//! The equations of motion at one state.
+
+use super::EquationsOfMotion;
+use super::equations::{C1, C2, LINEAR, PAIRS, W0, W1};
+use super::kernels::{WIDTH, add_scaled, dot};
+use nalgebra::{Matrix3, Matrix6, Vector3};
+use pulp::Arch;
+
+const _: () = assert!(LINEAR <= WIDTH, "what is linear in q is one panel");
+
+/// The equations of motion at one state, and the memory to evaluate them: nothing is allocated after [`Evaluation::new`].
+///
+/// [`Evaluation::set`] takes the state; everything else refers to the last one. Before the first it is rest, undeformed.
+/// Vectors with 6 + nf entries (of a plane body 3 + nf) are in the order of [`EquationsOfMotion`], in body axes about the origin of
+/// the body frame; matrices are row-major.
+#[derive(Debug, Clone)]
+pub struct Evaluation<'a> {
+    pub(super) equations: &'a EquationsOfMotion,
+    arch: Arch,
+    pub(super) q: Vec<f64>,
+    pub(super) qd: Vec<f64>,
+    pub(super) velocity: Vector3<f64>,
+    pub(super) omega: Vector3<f64>,
+    /// E_ab q for each pair.
+    pub(super) w2_q: Vec<f64>,
+    /// W3_a' q for each axis.
+    w3_q: Vec<f64>,
+    /// W3_a' qd.
+    pub(super) w3_qd: Vec<f64>,
+    /// (W3_a' - W3_a) qd.
+    pub(super) skew_qd: Vec<f64>,
+    /// C(q) (3 x nf).
+    pub(super) coupling: Vec<f64>,
+    first_moment: Vector3<f64>,
+    /// -c~ + W0 Q: momentum per angular velocity.
+    pub(super) lever: Matrix3<f64>,
+    pub(super) lever_rate: Matrix3<f64>,
+    inertia: Matrix3<f64>,
+    pub(super) inertia_rate: Matrix3<f64>,
+    pub(super) momentum: Vector3<f64>,
+    pub(super) angular_momentum: Vector3<f64>,
+    pub(super) velocity_forces: Vec<f64>,
+    /// For [`Evaluation::accelerations`]: L^-1 [C1' C(q)'] (6 x nf) and modal forces.
+    pub(super) whitened: Vec<f64>,
+    pub(super) modal: Vec<f64>,
+    /// For [`Evaluation::jacobian`]: products with rates and accelerations.
+    pub(super) w2_scratch: Vec<f64>,
+    pub(super) w3_scratch: [Vec<f64>; 2],
+}
+
+impl<'a> Evaluation<'a> {
+    /// Memory for evaluations of `equations`, set to rest without deformation.
+    pub fn new(equations: &'a EquationsOfMotion) -> Self {
+        let nf = equations.nf;
+        let zeros = |n: usize| vec![0.0; n];
+        let of_pairs = || zeros(equations.w2.as_ref().map_or(0, |w2| w2.padded_rows()));
+        let of_axes = || zeros(equations.w3.as_ref().map_or(0, |w3| w3.padded_rows()));
+        let mut evaluation = Self {
+            equations,
+            arch: Arch::new(),
+            q: zeros(nf),
+            qd: zeros(nf),
+            velocity: Vector3::zeros(),
+            omega: Vector3::zeros(),
+            w2_q: of_pairs(),
+            w3_q: of_axes(),
+            w3_qd: of_axes(),
+            skew_qd: of_axes(),
+            coupling: zeros(3 * nf),
+            first_moment: Vector3::zeros(),
+            lever: Matrix3::zeros(),
+            lever_rate: Matrix3::zeros(),
+            inertia: Matrix3::zeros(),
+            inertia_rate: Matrix3::zeros(),
+            momentum: Vector3::zeros(),
+            angular_momentum: Vector3::zeros(),
+            velocity_forces: zeros(equations.n_velocities()),
+            whitened: zeros(6 * nf),
+            modal: zeros(nf),
+            w2_scratch: of_pairs(),
+            w3_scratch: [of_axes(), of_axes()],
+        };
+        let (q, nu) = (zeros(nf), zeros(equations.n_velocities()));
+        evaluation.set(&q, &nu);
+        evaluation
+    }
+
+    /// Goes to the state with modal coordinates `q` (nf) and velocities `nu`.
+    ///
+    /// One pass over W2 and two over W3 (theory 6.2, 6.3):
+    ///
+    /// ```text
+    /// (p, h, pi) = Mc(q) nu
+    /// h_nu = dMc/dt nu + (omega x p, omega x h + V x p, -dT/dq)
+    /// ```
+    ///
+    /// # Panics
+    /// When the lengths are not those of the equations.
+    pub fn set(&mut self, q: &[f64], nu: &[f64]) {
+        let equations = self.equations;
+        assert_eq!(q.len(), equations.nf, "one coordinate per mode");
+        let (velocity, omega, qd) = equations.split(nu);
+        self.q.copy_from_slice(q);
+        self.qd.copy_from_slice(qd);
+        (self.velocity, self.omega) = (velocity, omega);
+        self.arch.dispatch(|| self.evaluate());
+    }
+
+    #[inline(always)] // compiled once per instruction set
+    fn evaluate(&mut self) {
+        let body = self.equations;
+        let (nf, v, w) = (body.nf, self.velocity, self.omega);
+        let (q, qd) = (&self.q[..], &self.qd[..]);
+        let (mut of_q, mut of_qd) = ([0.0; WIDTH], [0.0; WIDTH]);
+        body.linear_panels.times(q, &mut of_q);
+        body.linear_panels.times(qd, &mut of_qd);
+        let vector = |row: usize, of: &[f64; WIDTH]| Vector3::new(of[row], of[row + 1], of[row + 2]);
+        let matrix = |of: &[f64; WIDTH]| Matrix3::from_fn(|k, b| of[W0 + 3 * k + b]);
+        self.first_moment = body.first_moment + vector(C1, &of_q);
+        self.lever = matrix(&of_q) - body.first_moment.cross_matrix();
+        self.lever_rate = matrix(&of_qd);
+
+        // I(q) and its rate; w_a w_b summed over both orders of a pair.
+        (self.inertia, self.inertia_rate) = (body.inertia, Matrix3::zeros());
+        for (pair, &(a, b)) in PAIRS.iter().enumerate() {
+            add_symmetric(&mut self.inertia, (a, b), of_q[W1 + pair]);
+            add_symmetric(&mut self.inertia_rate, (a, b), of_qd[W1 + pair]);
+        }
+        if let Some(w2) = &body.w2 {
+            w2.times(q, &mut self.w2_q);
+            for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
+                add_symmetric(&mut self.inertia, pair, dot(q, product));
+                add_symmetric(&mut self.inertia_rate, pair, 2.0 * dot(qd, product));
+            }
+        }
+
+        // C(q), C(q) qd and dC/dt qd.
+        self.coupling.copy_from_slice(&body.linear[C2 * nf..]);
+        let mut coupling_qd = vector(C2, &of_qd);
+        let mut coupling_rate_qd = Vector3::zeros();
+        if let Some(w3) = &body.w3 {
+            w3.times(q, &mut self.w3_q);
+            w3.times(qd, &mut self.w3_qd);
+            match &body.w3_skew {
+                Some(skew) => skew.times(qd, &mut self.skew_qd),
+                None => self.skew_qd.iter_mut().zip(&self.w3_qd).for_each(|(skew, w3)| *skew = 2.0 * w3),
+            }
+            for (at, &a) in body.axes.iter().enumerate() {
+                let product = &self.w3_q[at * nf..][..nf];
+                add_scaled(1.0, product, &mut self.coupling[a * nf..][..nf]);
+                coupling_qd[a] += dot(product, qd);
+                if body.w3_skew.is_some() {
+                    coupling_rate_qd[a] = dot(&self.w3_qd[at * nf..][..nf], qd);
+                }
+            }
+        }
+
+        let p = body.mass * v + self.lever * w + vector(C1, &of_qd);
+        let h = self.lever.tr_mul(&v) + self.inertia * w + coupling_qd;
+        (self.momentum, self.angular_momentum) = (p, h);
+        let force = self.lever_rate * w + w.cross(&p);
+        let torque =
+            self.lever_rate.tr_mul(&v) + self.inertia_rate * w + coupling_rate_qd + w.cross(&h) + v.cross(&p);
+
+        let (rigid, modal) = self.velocity_forces.split_at_mut(body.rigid.len());
+        body.put_rigid(force, torque, rigid);
+        modal.fill(0.0);
+        for at in 0..9 {
+            let weight = v[at / 3] * w[at % 3];
+            add_scaled(-weight, body.row(W0 + at), modal);
+        }
+        for (pair, &(a, b)) in PAIRS.iter().enumerate() {
+            add_scaled(-0.5 * spin_product(&w, (a, b)), body.row(W1 + pair), modal);
+        }
+        if body.w2.is_some() {
+            for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
+                add_scaled(-spin_product(&w, pair), product, modal);
+            }
+        }
+        if body.w3.is_some() {
+            for (&a, product) in body.axes.iter().zip(self.skew_qd.chunks_exact(nf)) {
+                add_scaled(w[a], product, modal);
+            }
+        }
+    }
+
+    /// The equations.
+    pub fn equations(&self) -> &'a EquationsOfMotion {
+        self.equations
+    }
+
+    /// s(q) = c + C1 q, first moment of the deformed body. Unit: mass length.
+    pub fn first_moment(&self) -> Vector3<f64> {
+        self.first_moment
+    }
+
+    /// I(q) = I0 + W1 Q + Q'W2 Q, inertia of the deformed body about the origin. Unit: mass length^2.
+    pub fn inertia(&self) -> Matrix3<f64> {
+        self.inertia
+    }
+
+    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1 qd, body axes.
+    pub fn linear_momentum(&self) -> Vector3<f64> {
+        self.momentum
+    }
+
+    /// Angular momentum about the origin of the body frame, h = (-c~ + W0 Q)'V + I(q) omega + C(q) qd, body axes.
+    pub fn angular_momentum(&self) -> Vector3<f64> {
+        self.angular_momentum
+    }
+
+    /// pi = C1'V + C(q)'omega + m_ff qd (nf).
+    ///
+    /// # Panics
+    /// When `pi` has not nf entries.
+    pub fn modal_momentum(&self, pi: &mut [f64]) {
+        assert_eq!(pi.len(), self.equations.nf, "one entry per mode");
+        pi.fill(0.0);
+        self.add_modal_inertia(&self.velocity, &self.omega, &self.qd, pi);
+    }
+
+    /// T = nu' Mc(q) nu / 2.
+    pub fn kinetic_energy(&self) -> f64 {
+        // V'p + omega'h has the coupling to qd once.
+        let of_qd = |axis: usize| dot(self.equations.coupling_row(&self.coupling, axis), &self.qd);
+        let coupling: f64 = (0..3).map(|k| self.velocity[k] * of_qd(k) + self.omega[k] * of_qd(3 + k)).sum();
+        let rigid = self.velocity.dot(&self.momentum) + self.omega.dot(&self.angular_momentum);
+        0.5 * (rigid + coupling + self.equations.modal_mass.quadratic(&self.qd))
+    }
+
+    /// U = q' K_ff q / 2.
+    pub fn elastic_energy(&self) -> f64 {
+        0.5 * self.equations.stiffness.quadratic(&self.q)
+    }
+
+    /// h_nu: the forces that the inertia of the body takes without acceleration (6 + nf, or 3 + nf).
+    pub fn velocity_forces(&self) -> &[f64] {
+        &self.velocity_forces
+    }
+
+    /// The forces that have to be applied for the accelerations nu': Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd).
+    ///
+    /// # Panics
+    /// When a length is not 6 + nf (of a plane body 3 + nf).
+    pub fn balance(&self, acceleration: &[f64], forces: &mut [f64]) {
+        let body = self.equations;
+        let (linear, angular, modal) = body.split(acceleration);
+        assert_eq!(forces.len(), acceleration.len(), "as many forces as velocities");
+        forces.copy_from_slice(&self.velocity_forces);
+        let (mut force, mut torque) =
+            (body.mass * linear + self.lever * angular, self.lever.tr_mul(&linear) + self.inertia * angular);
+        for k in 0..3 {
+            force[k] += dot(body.coupling_row(&self.coupling, k), modal);
+            torque[k] += dot(body.coupling_row(&self.coupling, 3 + k), modal);
+        }
+        let (rigid, flexible) = forces.split_at_mut(body.rigid.len());
+        let at = |axis: usize| if axis < 3 { force[axis] } else { torque[axis - 3] };
+        rigid.iter_mut().zip(body.rigid).for_each(|(sum, &axis)| *sum += at(axis));
+        self.add_modal_inertia(&linear, &angular, modal, flexible);
+        body.add_internal(1.0, &self.q, &self.qd, flexible);
+    }
+
+    /// Mc(q), (6 + nf) x (6 + nf), of a plane body (3 + nf) x (3 + nf), row-major (theory 6.2).
+    ///
+    /// # Panics
+    /// When `matrix` has not that many entries.
+    pub fn mass_matrix(&self, matrix: &mut [f64]) {
+        let body = self.equations;
+        let (r, n) = (body.rigid.len(), body.n_velocities());
+        assert_eq!(matrix.len(), n * n, "a square matrix");
+        let rigid = self.rigid_mass();
+        for (i, &axis) in body.rigid.iter().enumerate() {
+            for (j, &other) in body.rigid.iter().enumerate() {
+                matrix[i * n + j] = rigid[(axis, other)];
+            }
+            for (j, &value) in body.coupling_row(&self.coupling, axis).iter().enumerate() {
+                matrix[i * n + r + j] = value;
+                matrix[(r + j) * n + i] = value;
+            }
+        }
+        for i in 0..body.nf {
+            for j in 0..body.nf {
+                matrix[(r + i) * n + r + j] = body.modal_mass.get(i, j);
+            }
+        }
+    }
+
+    /// The rows of Mc that belong to V and omega, without modes; zero where the body does not move.
+    pub(super) fn rigid_mass(&self) -> Matrix6<f64> {
+        let mut matrix = Matrix6::zeros();
+        for &i in self.equations.rigid {
+            for &j in self.equations.rigid {
+                matrix[(i, j)] = match (i < 3, j < 3) {
+                    (true, true) => self.equations.mass * f64::from(i == j),
+                    (true, false) => self.lever[(i, j - 3)],
+                    (false, true) => self.lever[(j, i - 3)],
+                    (false, false) => self.inertia[(i - 3, j - 3)],
+                };
+            }
+        }
+        matrix
+    }
+
+    /// y += C1' linear + C(q)' angular + m_ff modal.
+    fn add_modal_inertia(&self, linear: &Vector3<f64>, angular: &Vector3<f64>, modal: &[f64], y: &mut [f64]) {
+        for k in 0..3 {
+            add_scaled(linear[k], self.equations.coupling_row(&self.coupling, k), y);
+            add_scaled(angular[k], self.equations.coupling_row(&self.coupling, 3 + k), y);
+        }
+        self.equations.modal_mass.add_product(modal, y);
+    }
+
+    /// What runs in the vector instructions of the machine.
+    pub(super) fn arch(&self) -> Arch {
+        self.arch
+    }
+}
+
+/// Adds `value` at (a, b) and (b, a).
+pub(super) fn add_symmetric(matrix: &mut Matrix3<f64>, (a, b): (usize, usize), value: f64) {
+    matrix[(a, b)] += value;
+    if a != b {
+        matrix[(b, a)] += value;
+    }
+}
+
+/// w_a w_b, summed over both orders of a pair of different axes.
+pub(super) fn spin_product(w: &Vector3<f64>, (a, b): (usize, usize)) -> f64 {
+    if a == b { w[a] * w[a] } else { 2.0 * w[a] * w[b] }
+}

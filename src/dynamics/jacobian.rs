@@ -1,0 +1,178 @@
+//! Derivatives of the forces with respect to coordinates and velocities.
+
+use super::Evaluation;
+use super::equations::{PAIRS, W0, W1};
+use super::evaluation::{add_symmetric, spin_product};
+use nalgebra::{Matrix3, Vector3};
+
+impl Evaluation<'_> {
+    /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd), at constant accelerations nu'.
+    ///
+    /// * `acceleration`: nu' (n = 6 + nf, of a plane body 3 + nf); zero for the derivatives of h_nu and the elastic forces alone.
+    /// * `by_q`: df/dq (n x nf), row-major.
+    /// * `by_nu`: df/dnu (n x n), row-major.
+    ///
+    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = (W0)_j and I_j = dI/dq_j = (W1)_j + 2 (E q)_j, where E is
+    /// the part of W2 that the kinetic energy sees (theory 6.4), transposes as N^T and rates as dN, dI:
+    ///
+    /// ```text
+    /// dF/dq_j      = N_j alpha + omega x N_j omega
+    /// dtau/dq_j    = N_j^T V' + I_j alpha + (W3)_j qdd + 2 (E qd)_j omega + omega x (N_j^T V + I_j omega + (W3)_j qd) + V x N_j omega
+    /// dQ_i/dq_j    = alpha^T (W3)_ji - omega^T E_ij omega + (K_ff)_ij
+    /// dF/dV        = m omega~
+    /// dtau/dV      = dN^T - p~ + omega~ N^T + m V~
+    /// dQ_j/dV      = -N_j omega
+    /// dF/domega    = dN - p~ + omega~ N
+    /// dtau/domega  = dI - h~ + omega~ I + V~ N
+    /// dQ_j/domega  = (W3^T - W3)_j qd - N_j^T V - I_j omega
+    /// dF/dqd_j     = N_j omega + omega x C1_j
+    /// dtau/dqd_j   = N_j^T V + I_j omega + (W3 + W3^T)_j qd + omega x C(q)_j + V x C1_j
+    /// dQ/dqd       = sum_a omega_a (W3_a^T - W3_a) + D
+    /// ```
+    ///
+    /// # Panics
+    /// When a length is another.
+    pub fn jacobian(&mut self, acceleration: &[f64], by_q: &mut [f64], by_nu: &mut [f64]) {
+        let body = self.equations;
+        let (n, nf) = (body.n_velocities(), body.nf);
+        let (linear, angular, modal) = body.split(acceleration);
+        assert!(by_q.len() == n * nf && by_nu.len() == n * n, "n x nf and n x n entries");
+        self.arch().dispatch(|| self.multiply(modal));
+        self.rigid_columns(by_nu);
+        for j in 0..nf {
+            self.modal_columns(j, (&linear, &angular), by_q, by_nu);
+        }
+        self.modal_block(&angular, by_q, by_nu);
+    }
+
+    /// The products with W2 and W3 that an evaluation does not need.
+    #[inline(always)] // compiled once per instruction set
+    fn multiply(&mut self, modal: &[f64]) {
+        let body = self.equations;
+        if let Some(w2) = &body.w2 {
+            w2.times(&self.qd, &mut self.w2_scratch);
+        }
+        if let Some(w3) = &body.w3 {
+            let [transposed, skew] = &mut self.w3_scratch;
+            w3.times(modal, transposed);
+            match &body.w3_skew {
+                Some(w3_skew) => w3_skew.times(modal, skew),
+                None => skew.iter_mut().zip(&*transposed).for_each(|(s, t)| *s = 2.0 * t),
+            }
+        }
+    }
+
+    /// df/dV and df/domega of the rigid rows.
+    fn rigid_columns(&self, by_nu: &mut [f64]) {
+        let body = self.equations;
+        let (n, r) = (body.n_velocities(), body.rigid.len());
+        let (v, w) = (self.velocity.cross_matrix(), self.omega.cross_matrix());
+        let (p, h) = (self.momentum.cross_matrix(), self.angular_momentum.cross_matrix());
+        let force = [w * body.mass, self.lever_rate - p + w * self.lever];
+        let torque = [
+            self.lever_rate.transpose() - p + w * self.lever.transpose() + v * body.mass,
+            self.inertia_rate - h + w * self.inertia() + v * self.lever,
+        ];
+        for (j, &axis) in body.rigid.iter().enumerate() {
+            let column = |blocks: &[Matrix3<f64>; 2]| blocks[axis / 3].column(axis % 3).into_owned();
+            let mut values = [0.0; 6];
+            body.put_rigid(column(&force), column(&torque), &mut values[..r]);
+            (0..r).for_each(|i| by_nu[i * n + j] = values[i]);
+        }
+    }
+
+    /// Columns of q_j and qd_j in the rigid rows, and those of V and omega in row j of the modes.
+    fn modal_columns(
+        &self,
+        j: usize,
+        (linear, angular): (&Vector3<f64>, &Vector3<f64>),
+        by_q: &mut [f64],
+        by_nu: &mut [f64],
+    ) {
+        let body = self.equations;
+        let (n, nf, r) = (body.n_velocities(), body.nf, body.rigid.len());
+        let (v, w) = (&self.velocity, &self.omega);
+        let lever = Matrix3::from_fn(|k, b| body.row(W0 + 3 * k + b)[j]);
+        let (mut inertia, mut inertia_rate) = (Matrix3::zeros(), Matrix3::zeros());
+        for (pair, &axes) in PAIRS.iter().enumerate() {
+            add_symmetric(&mut inertia, axes, body.row(W1 + pair)[j]);
+        }
+        if body.w2.is_some() {
+            for (at, &pair) in body.pairs.iter().enumerate() {
+                add_symmetric(&mut inertia, pair, 2.0 * self.w2_q[at * nf + j]);
+                add_symmetric(&mut inertia_rate, pair, 2.0 * self.w2_scratch[at * nf + j]);
+            }
+        }
+        // (W3_a x)_j is that of the transpose less that of the difference.
+        let w3_times = |transposed: &[f64], skew: &[f64]| {
+            let mut product = Vector3::zeros();
+            if body.w3.is_some() {
+                for (at, &a) in body.axes.iter().enumerate() {
+                    product[a] = transposed[at * nf + j] - skew[at * nf + j];
+                }
+            }
+            product
+        };
+        let [transposed, skew] = &self.w3_scratch;
+        let (w3_modal, w3_qd) = (w3_times(transposed, skew), w3_times(&self.w3_qd, &self.skew_qd));
+        let mut skew_qd = Vector3::zeros();
+        if body.w3.is_some() {
+            body.axes.iter().enumerate().for_each(|(at, &a)| skew_qd[a] = self.skew_qd[at * nf + j]);
+        }
+        let row = |axis: usize| body.coupling_row(&self.coupling, axis)[j];
+        let c1 = Vector3::from_fn(|k, _| row(k));
+        let coupling = Vector3::from_fn(|k, _| row(3 + k));
+        let (p, rate) = (lever * w, lever.tr_mul(v) + inertia * w);
+
+        let by_qj = (
+            lever * angular + w.cross(&p),
+            lever.tr_mul(linear)
+                + inertia * angular
+                + w3_modal
+                + inertia_rate * w
+                + w.cross(&(rate + w3_qd))
+                + v.cross(&p),
+        );
+        let symmetric_qd = w3_qd + w3_qd + skew_qd;
+        let by_rate = (p + w.cross(&c1), rate + symmetric_qd + w.cross(&coupling) + v.cross(&c1));
+        let by_rigid = (-p, skew_qd - rate);
+        let entry = |(a, b): &(Vector3<f64>, Vector3<f64>), axis: usize| {
+            if axis < 3 { a[axis] } else { b[axis - 3] }
+        };
+        for (i, &axis) in body.rigid.iter().enumerate() {
+            by_q[i * nf + j] = entry(&by_qj, axis);
+            by_nu[i * n + r + j] = entry(&by_rate, axis);
+            by_nu[(r + j) * n + i] = entry(&by_rigid, axis);
+        }
+    }
+
+    /// Derivatives of the modal forces by q and qd.
+    fn modal_block(&self, angular: &Vector3<f64>, by_q: &mut [f64], by_nu: &mut [f64]) {
+        let body = self.equations;
+        let (n, nf, r, w) = (body.n_velocities(), body.nf, body.rigid.len(), &self.omega);
+        for i in 0..nf {
+            for j in 0..nf {
+                by_q[(r + i) * nf + j] = body.stiffness.get(i, j);
+                by_nu[(r + i) * n + r + j] = body.damping.get(i, j);
+            }
+        }
+        for i in 0..nf {
+            let of_q = &mut by_q[(r + i) * nf..][..nf];
+            if let Some(w2) = &body.w2 {
+                for (at, &pair) in body.pairs.iter().enumerate() {
+                    let factor = spin_product(w, pair);
+                    of_q.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
+                }
+            }
+            if let Some(w3) = &body.w3 {
+                for (at, &a) in body.axes.iter().enumerate() {
+                    for (j, transposed) in w3.row(at * nf + i).enumerate() {
+                        of_q[j] += angular[a] * transposed;
+                        by_nu[(r + i) * n + r + j] += w[a] * transposed;
+                        by_nu[(r + j) * n + r + i] -= w[a] * transposed;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! The reduced equations of motion of one flexible body from its invariants (theory sections 3, 4 and 6): forces, momenta,
+//! energies, accelerations and Jacobians, without an allocation per evaluation. No integrators.
+
+mod accelerations;
+mod equations;
+mod evaluation;
+mod jacobian;
+mod kernels;
+mod loads;
+mod modal_matrix;
+mod orientation;
+mod terms;
+
+pub use accelerations::NotPositiveDefinite;
+pub use equations::EquationsOfMotion;
+pub use evaluation::Evaluation;
+pub use loads::NodeShapes;
+pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
+pub use terms::Terms;

@@ -1,0 +1,141 @@
+//! A symmetric matrix of the modes, in the cheapest form that it has.
+
+use super::kernels::{add_scaled, dot};
+use faer::MatRef;
+use nalgebra::DMatrix;
+
+/// K_ff, D or m_ff (nf x nf).
+#[derive(Debug, Clone)]
+pub(super) enum ModalMatrix {
+    /// Its diagonal.
+    Diagonal(Vec<f64>),
+    /// Row-major.
+    Full { n: usize, entries: Vec<f64> },
+}
+
+impl ModalMatrix {
+    /// The symmetric part of `a`, as a diagonal where no other entry is larger than `rounding` times sqrt(|a_ii a_jj|).
+    pub(super) fn new(a: MatRef<'_, f64>, rounding: f64) -> Self {
+        let n = a.nrows();
+        let size: Vec<f64> = (0..n).map(|i| a[(i, i)].abs().sqrt()).collect();
+        let is_rounding = |i: usize, j: usize| i == j || a[(i, j)].abs() <= rounding * size[i] * size[j];
+        if (0..n).all(|i| (0..n).all(|j| is_rounding(i, j))) {
+            return Self::Diagonal((0..n).map(|i| a[(i, i)]).collect());
+        }
+        Self::Full {
+            n,
+            entries: (0..n * n).map(|at| 0.5 * (a[(at / n, at % n)] + a[(at % n, at / n)])).collect(),
+        }
+    }
+
+    pub(super) fn get(&self, i: usize, j: usize) -> f64 {
+        match self {
+            Self::Diagonal(diagonal) if i == j => diagonal[i],
+            Self::Diagonal(_) => 0.0,
+            Self::Full { n, entries } => entries[i * n + j],
+        }
+    }
+
+    /// y += factor A x.
+    #[inline(always)] // compiled once per instruction set
+    pub(super) fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+        match self {
+            Self::Diagonal(diagonal) => {
+                for ((y, a), x) in y.iter_mut().zip(diagonal).zip(x) {
+                    *y += factor * (a * x);
+                }
+            }
+            Self::Full { n, entries } => {
+                for (y, row) in y.iter_mut().zip(entries.chunks_exact(*n)) {
+                    *y += factor * dot(row, x);
+                }
+            }
+        }
+    }
+
+    /// x' A x.
+    pub(super) fn quadratic(&self, x: &[f64]) -> f64 {
+        match self {
+            Self::Diagonal(diagonal) => diagonal.iter().zip(x).map(|(a, x)| a * x * x).sum(),
+            Self::Full { n, entries } => {
+                entries.chunks_exact(*n).zip(x).map(|(row, xi)| xi * dot(row, x)).sum()
+            }
+        }
+    }
+}
+
+/// m_ff and what solves with it.
+#[derive(Debug, Clone)]
+pub(super) enum ModalMass {
+    /// Mass-normalised modes.
+    Identity,
+    /// Any other.
+    Full {
+        matrix: ModalMatrix,
+        /// L of m_ff = L L' (row-major, its lower triangle), where m_ff is positive definite.
+        factor: Option<Vec<f64>>,
+    },
+}
+
+impl ModalMass {
+    /// The identity where no entry differs from it by more than `rounding`.
+    pub(super) fn new(a: MatRef<'_, f64>, rounding: f64) -> Self {
+        let n = a.nrows();
+        let is_identity = |i: usize, j: usize| (a[(i, j)] - f64::from(i == j)).abs() <= rounding;
+        if (0..n).all(|i| (0..n).all(|j| is_identity(i, j))) {
+            return Self::Identity;
+        }
+        let lower = DMatrix::from_fn(n, n, |i, j| 0.5 * (a[(i, j)] + a[(j, i)])).cholesky();
+        // Column-major of L' is row-major of L.
+        let factor = lower.map(|cholesky| cholesky.l().transpose().as_slice().to_vec());
+        Self::Full { matrix: ModalMatrix::new(a, 0.0), factor }
+    }
+
+    pub(super) fn get(&self, i: usize, j: usize) -> f64 {
+        match self {
+            Self::Identity => f64::from(i == j),
+            Self::Full { matrix, .. } => matrix.get(i, j),
+        }
+    }
+
+    /// y += m_ff x.
+    #[inline(always)]
+    pub(super) fn add_product(&self, x: &[f64], y: &mut [f64]) {
+        match self {
+            Self::Identity => add_scaled(1.0, x, y),
+            Self::Full { matrix, .. } => matrix.add_product(1.0, x, y),
+        }
+    }
+
+    /// x' m_ff x.
+    pub(super) fn quadratic(&self, x: &[f64]) -> f64 {
+        match self {
+            Self::Identity => dot(x, x),
+            Self::Full { matrix, .. } => matrix.quadratic(x),
+        }
+    }
+
+    /// x <- L^-1 x; `None` when m_ff is not positive definite.
+    #[inline(always)]
+    pub(super) fn solve_lower(&self, x: &mut [f64]) -> Option<()> {
+        let Self::Full { factor, .. } = self else { return Some(()) };
+        let n = x.len();
+        for (i, row) in factor.as_ref()?.chunks_exact(n).enumerate() {
+            x[i] = (x[i] - dot(&row[..i], &x[..i])) / row[i];
+        }
+        Some(())
+    }
+
+    /// x <- L^-T x; `None` when m_ff is not positive definite.
+    #[inline(always)]
+    pub(super) fn solve_upper(&self, x: &mut [f64]) -> Option<()> {
+        let Self::Full { factor, .. } = self else { return Some(()) };
+        let n = x.len();
+        for (i, row) in factor.as_ref()?.chunks_exact(n).enumerate().rev() {
+            x[i] /= row[i];
+            let (before, from) = x.split_at_mut(i);
+            add_scaled(-from[0], &row[..i], before);
+        }
+        Some(())
+    }
+}

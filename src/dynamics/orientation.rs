@@ -1,0 +1,289 @@
+//! The same equations in rates of coordinates: velocities along world axes, and any parameters of the rotation.
+
+use super::kernels::add_scaled;
+use super::{EquationsOfMotion, Evaluation};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+/// Parameters theta (R of them) of the rotation A from body axes to world axes, with omega = G(theta) theta' in body axes.
+///
+/// With these, coordinates x = (R, theta, q) have velocities x' = (R', theta', qd), R' along world axes, and
+///
+/// ```text
+/// nu = H x',    H = blkdiag(A', G, I)
+/// H'Mc H x'' + H'(Mc dH/dt x' + h_nu) + (0, 0, K_ff q + D qd) = H'(F, tau, Q)
+/// ```
+///
+/// which is the form of theory (3.2), and of (4.2) in the plane.
+pub trait Orientation<const R: usize> {
+    /// A: body axes to world axes.
+    fn axes(&self) -> Matrix3<f64>;
+
+    /// G (3 x R).
+    fn map(&self) -> SMatrix<f64, 3, R>;
+
+    /// dG/dt theta': what omega' has besides G theta''.
+    fn drift(&self, rate: &SVector<f64, R>) -> Vector3<f64>;
+}
+
+/// The angular velocity itself: theta' = omega, theta no coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngularVelocity {
+    /// A: body axes to world axes.
+    pub axes: Matrix3<f64>,
+}
+
+impl Orientation<3> for AngularVelocity {
+    fn axes(&self) -> Matrix3<f64> {
+        self.axes
+    }
+
+    fn map(&self) -> Matrix3<f64> {
+        Matrix3::identity()
+    }
+
+    fn drift(&self, _: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+}
+
+/// Euler parameters p = (p0, p1, p2, p3) with p'p = 1, p0 the cosine of half the angle.
+///
+/// G = 2 \[-e, p0 I - e~\] with e = (p1, p2, p3); G G' = 4 I and G'I G has rank 3: p'p'' = -p''p' is part of the system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EulerParameters(pub [f64; 4]);
+
+impl EulerParameters {
+    /// p' = G'omega / 4.
+    pub fn rate(&self, omega: &Vector3<f64>) -> [f64; 4] {
+        (self.map().tr_mul(omega) * 0.25).into()
+    }
+}
+
+impl Orientation<4> for EulerParameters {
+    fn axes(&self) -> Matrix3<f64> {
+        let [p0, p1, p2, p3] = self.0;
+        let e = Vector3::new(p1, p2, p3);
+        Matrix3::identity() * (p0 * p0 - e.norm_squared())
+            + e * e.transpose() * 2.0
+            + e.cross_matrix() * (2.0 * p0)
+    }
+
+    fn map(&self) -> SMatrix<f64, 3, 4> {
+        let [p0, p1, p2, p3] = self.0;
+        SMatrix::<f64, 3, 4>::new(-p1, p0, p3, -p2, -p2, -p3, p0, p1, -p3, p2, -p1, p0) * 2.0
+    }
+
+    /// Zero: G is linear in p and G(p') p' = 0.
+    fn drift(&self, _: &SVector<f64, 4>) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+}
+
+/// The rotation vector v: turn by the angle |v| about v.
+///
+/// A = I + sin f / f v~ + (1 - cos f) / f^2 v~^2 and G = I - (1 - cos f) / f^2 v~ + (f - sin f) / f^3 v~^2 with f = |v|. G is singular at
+/// f = 2 pi.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotationVector(pub Vector3<f64>);
+
+/// Angles below which the series of [`RotationVector`] are summed: their first terms left out are below rounding.
+const SMALL: f64 = 1.0;
+
+/// Terms of these series: the next is below 1e-20 of the first.
+const TERMS: u32 = 10;
+
+impl RotationVector {
+    /// sin f / f, b = (1 - cos f) / f^2, c = (f - sin f) / f^3 and b'/f, c'/f with b' = db/df.
+    fn coefficients(&self) -> [f64; 5] {
+        let square = self.0.norm_squared();
+        let f = square.sqrt();
+        if f < SMALL {
+            // sum_k (-1)^k f^2k / (2k + shift)! and its derivative over f, sum_k (-1)^k 2k f^(2k-2) / (2k + shift)!.
+            let series = |shift: u32| {
+                let mut coefficient = f64::from((1..=shift).product::<u32>()).recip();
+                let (mut power, mut sum, mut slope) = (1.0, coefficient, 0.0);
+                for k in 1..=TERMS {
+                    coefficient /= -f64::from((2 * k + shift - 1) * (2 * k + shift));
+                    slope += f64::from(2 * k) * coefficient * power;
+                    power *= square;
+                    sum += coefficient * power;
+                }
+                (sum, slope)
+            };
+            let ((a, _), (b, b_slope), (c, c_slope)) = (series(1), series(2), series(3));
+            return [a, b, c, b_slope, c_slope];
+        }
+        let sin = f.sin();
+        // 1 - cos without cancellation.
+        let (b, c) = (2.0 * (0.5 * f).sin().powi(2) / square, (f - sin) / (square * f));
+        [sin / f, b, c, (sin / f - 2.0 * b) / square, (b - 3.0 * c) / square]
+    }
+}
+
+impl Orientation<3> for RotationVector {
+    fn axes(&self) -> Matrix3<f64> {
+        let [a, b, ..] = self.coefficients();
+        let v = self.0.cross_matrix();
+        Matrix3::identity() + v * a + v * v * b
+    }
+
+    fn map(&self) -> Matrix3<f64> {
+        let [_, b, c, ..] = self.coefficients();
+        let v = self.0.cross_matrix();
+        Matrix3::identity() - v * b + v * v * c
+    }
+
+    fn drift(&self, rate: &Vector3<f64>) -> Vector3<f64> {
+        let [_, _, c, b_slope, c_slope] = self.coefficients();
+        // f' f = v'v'; v~ v' changes by v'~ v' = 0.
+        let (v, stretch) = (&self.0, self.0.dot(rate));
+        let once = v.cross(rate);
+        let twice = v.cross(&once);
+        once * (-b_slope * stretch) + twice * (c_slope * stretch) + rate.cross(&once) * c
+    }
+}
+
+/// The angle of a plane body about z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaneAngle(pub f64);
+
+impl Orientation<1> for PlaneAngle {
+    fn axes(&self) -> Matrix3<f64> {
+        let (sin, cos) = self.0.sin_cos();
+        Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)
+    }
+
+    fn map(&self) -> SMatrix<f64, 3, 1> {
+        Vector3::z()
+    }
+
+    fn drift(&self, _: &SVector<f64, 1>) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+}
+
+impl EquationsOfMotion {
+    /// Translations, of a plane body 2.
+    fn translations(&self) -> usize {
+        if self.rigid.len() == 3 { 2 } else { 3 }
+    }
+
+    /// nu = H x'.
+    ///
+    /// * `rates`: x' = (R', theta', qd), 3 + R + nf; of a plane body 2 + R + nf.
+    /// * `nu`: 6 + nf, of a plane body 3 + nf.
+    ///
+    /// # Panics
+    /// When a length is another.
+    pub fn velocities<const R: usize>(
+        &self,
+        orientation: &impl Orientation<R>,
+        rates: &[f64],
+        nu: &mut [f64],
+    ) {
+        let (linear, theta, modal) = self.split_rates::<R>(rates);
+        assert_eq!(nu.len(), self.n_velocities(), "one entry per rigid motion and mode");
+        let (rigid, flexible) = nu.split_at_mut(self.rigid.len());
+        let omega = orientation.map() * theta;
+        self.put_rigid(orientation.axes().tr_mul(&linear), omega, rigid);
+        flexible.copy_from_slice(modal);
+    }
+
+    /// H'f: generalised forces of (R', theta', qd) from those of nu.
+    ///
+    /// # Panics
+    /// When a length is not that of [`EquationsOfMotion::velocities`].
+    pub fn forces<const R: usize>(
+        &self,
+        orientation: &impl Orientation<R>,
+        of_nu: &[f64],
+        forces: &mut [f64],
+    ) {
+        let d = self.translations();
+        assert_eq!(forces.len(), d + R + self.nf, "one entry per coordinate");
+        let (force, torque, modal) = self.split(of_nu);
+        let (force, torque) = (orientation.axes() * force, orientation.map().tr_mul(&torque));
+        forces[..d].copy_from_slice(&force.as_slice()[..d]);
+        forces[d..d + R].copy_from_slice(torque.as_slice());
+        forces[d + R..].copy_from_slice(modal);
+    }
+
+    fn split_rates<'v, const R: usize>(
+        &self,
+        rates: &'v [f64],
+    ) -> (Vector3<f64>, SVector<f64, R>, &'v [f64]) {
+        let d = self.translations();
+        assert_eq!(rates.len(), d + R + self.nf, "one entry per coordinate");
+        let mut linear = Vector3::zeros();
+        linear.as_mut_slice()[..d].copy_from_slice(&rates[..d]);
+        (linear, SVector::from_column_slice(&rates[d..d + R]), &rates[d + R..])
+    }
+}
+
+impl Evaluation<'_> {
+    /// H'Mc H of (R'', theta'', qdd), row-major: (3 + R + nf) squared, of a plane body (2 + R + nf) squared.
+    ///
+    /// # Panics
+    /// When `matrix` has another length.
+    pub fn mass_matrix_of<const R: usize>(&self, orientation: &impl Orientation<R>, matrix: &mut [f64]) {
+        let body = self.equations();
+        let (d, nf) = (body.translations(), body.nf);
+        let n = d + R + nf;
+        assert_eq!(matrix.len(), n * n, "a square matrix");
+        let (axes, map) = (orientation.axes(), orientation.map());
+        let turned = axes * self.lever * map;
+        let inertia = map.tr_mul(&(self.inertia() * map));
+        // Above the diagonal, so that the whole is exactly symmetric.
+        let upper = |i: usize, j: usize| match (i < d, j < d) {
+            (true, true) => body.mass * f64::from(i == j),
+            (true, false) => turned[(i, j - d)],
+            _ => inertia[(i - d, j - d)],
+        };
+        for i in 0..d + R {
+            (0..d + R).for_each(|j| matrix[i * n + j] = upper(i.min(j), i.max(j)));
+        }
+        for j in 0..nf {
+            let part =
+                |first: usize| Vector3::from_fn(|k, _| body.coupling_row(&self.coupling, first + k)[j]);
+            let (linear, angular) = (axes * part(0), map.tr_mul(&part(3)));
+            for i in 0..d + R {
+                let value = if i < d { linear[i] } else { angular[i - d] };
+                matrix[i * n + d + R + j] = value;
+                matrix[(d + R + j) * n + i] = value;
+            }
+            for i in 0..nf {
+                matrix[(d + R + i) * n + d + R + j] = body.modal_mass.get(i, j);
+            }
+        }
+    }
+
+    /// H'(Mc dH/dt x' + h_nu): the velocity forces that belong to [`Evaluation::mass_matrix_of`], without elastic and damping forces.
+    ///
+    /// * `rate`: theta', that of the state.
+    /// * `forces`: 3 + R + nf, of a plane body 2 + R + nf.
+    ///
+    /// # Panics
+    /// When `forces` has another length.
+    pub fn velocity_forces_of<const R: usize>(
+        &self,
+        orientation: &impl Orientation<R>,
+        rate: &SVector<f64, R>,
+        forces: &mut [f64],
+    ) {
+        let body = self.equations();
+        let d = body.translations();
+        body.forces(orientation, &self.velocity_forces, forces);
+        // V' = A'R'' - omega x V.
+        let (linear, angular) = (-self.omega.cross(&self.velocity), orientation.drift(rate));
+        let force = orientation.axes() * (body.mass * linear + self.lever * angular);
+        let torque = orientation.map().tr_mul(&(self.lever.tr_mul(&linear) + self.inertia() * angular));
+        for (sum, value) in forces.iter_mut().zip(force.iter().take(d).chain(torque.iter())) {
+            *sum += value;
+        }
+        let modal = &mut forces[d + R..];
+        for k in 0..3 {
+            add_scaled(linear[k], body.coupling_row(&self.coupling, k), modal);
+            add_scaled(angular[k], body.coupling_row(&self.coupling, 3 + k), modal);
+        }
+    }
+}

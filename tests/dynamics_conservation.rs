@@ -1,0 +1,162 @@
+//! What motion keeps: energy and momenta of all terms, of every truncation and of general masses; and what misprints lose.
+
+mod support;
+
+use flexbody::dynamics::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms};
+use flexbody::flex_body::FlexBody;
+use flexbody::invariants::BodyFrame;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use support::elements::{Kind, MassRule, Material};
+use support::flexible::{body_of, fixture, oracle};
+use support::integrate;
+use support::mesh::{Mesh, grid};
+
+/// A rubber-like block without any symmetry: W1, W2 and W3 all count.
+fn soft_block() -> FlexBody {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
+        [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
+    });
+    body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), 10, BodyFrame::Principal)
+}
+
+/// y = (R, Euler parameters, q, V, omega, qd); forces are added by `load`, which knows A.
+fn rate(
+    equations: &EquationsOfMotion,
+    y: &DVector<f64>,
+    load: &impl Fn(&Evaluation<'_>, &Matrix3<f64>, &DVector<f64>, &mut [f64]),
+) -> DVector<f64> {
+    let nf = equations.n_modes();
+    let euler = orientation(y);
+    let (q, nu) = (y.rows(7, nf).into_owned(), y.rows(7 + nf, 6 + nf).into_owned());
+    let mut evaluation = Evaluation::new(equations);
+    evaluation.set(q.as_slice(), nu.as_slice());
+    let (mut forces, mut found) = (vec![0.0; 6 + nf], DVector::zeros(6 + nf));
+    load(&evaluation, &euler.axes(), y, &mut forces);
+    evaluation.accelerations(&forces, found.as_mut_slice()).expect("a body");
+    let velocity = euler.axes() * nu.fixed_rows::<3>(0);
+    let turn = euler.rate(&nu.fixed_rows::<3>(3).into_owned());
+    let modal = nu.rows(6, nf).into_owned();
+    let parts = velocity.iter().chain(&turn).chain(&modal).chain(&found).copied();
+    DVector::from_iterator(y.len(), parts)
+}
+
+/// The Euler parameters, of unit length but for the error of the integration.
+fn orientation(y: &DVector<f64>) -> EulerParameters {
+    EulerParameters(y.fixed_rows::<4>(3).normalize().into())
+}
+
+/// Energy and world momenta (about the world origin).
+fn kept(equations: &EquationsOfMotion, y: &DVector<f64>) -> (f64, Vector3<f64>, Vector3<f64>) {
+    let nf = equations.n_modes();
+    let mut evaluation = Evaluation::new(equations);
+    evaluation.set(y.rows(7, nf).as_slice(), y.rows(7 + nf, 6 + nf).as_slice());
+    let (axes, origin) = (orientation(y).axes(), y.fixed_rows::<3>(0).into_owned());
+    let linear = axes * evaluation.linear_momentum();
+    let angular = axes * evaluation.angular_momentum() + origin.cross(&linear);
+    (evaluation.kinetic_energy() + evaluation.elastic_energy(), linear, angular)
+}
+
+#[derive(Debug)]
+struct Drift {
+    energy: f64,
+    linear: f64,
+    angular: f64,
+    deformation: f64,
+    turns: f64,
+}
+
+/// Spin about the middle axis with a fifth of the first circular frequency, bent and flying at the start.
+fn start(body: &FlexBody) -> DVector<f64> {
+    let nf = body.n_modes();
+    let omega: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
+    let radius = body.invariants().inertia()[(1, 1)].sqrt();
+    let spin = 0.2 * omega[0];
+    let mut y = DVector::zeros(13 + 2 * nf);
+    y.rows_mut(0, 7).copy_from_slice(&[0.3, -0.2, 0.5, 1.0, 0.0, 0.0, 0.0]);
+    let velocity = Vector3::new(0.2, 0.5, -0.4) * spin * radius / body.invariants().mass.sqrt();
+    y.rows_mut(7 + nf, 3).copy_from(&velocity);
+    y.rows_mut(10 + nf, 3).copy_from(&(Vector3::new(0.1, 1.0, 0.05) * spin));
+    (0..nf).for_each(|j| y[7 + j] = 0.05 * radius * omega[0] / omega[j]);
+    y
+}
+
+fn tumble(
+    body: &FlexBody,
+    terms: Terms,
+    load: impl Fn(&Evaluation<'_>, &Matrix3<f64>, &DVector<f64>, &mut [f64]),
+    potential: impl Fn(&DVector<f64>) -> f64,
+) -> Drift {
+    let equations = EquationsOfMotion::new(body, terms);
+    let nf = equations.n_modes();
+    let mut y = start(body);
+    let omega: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
+    let step = 0.6 / omega[nf - 1];
+    let steps = (15.0 * std::f64::consts::TAU / omega[0] / step).ceil() as usize;
+    let (energy, linear, angular) = kept(&equations, &y);
+    let height = potential(&y);
+    let mut found = Drift { energy: 0.0, linear: 0.0, angular: 0.0, deformation: 0.0, turns: 0.0 };
+    let radius = body.invariants().inertia()[(1, 1)].sqrt();
+    for _ in 0..steps {
+        y = integrate::step(&y, step, &|y| rate(&equations, y, &load));
+        let now = kept(&equations, &y);
+        found.energy = found.energy.max(((now.0 + potential(&y) - height) / energy - 1.0).abs());
+        found.linear = found.linear.max((now.1 - linear).norm() / linear.norm());
+        found.angular = found.angular.max((now.2 - angular).norm() / angular.norm());
+        found.deformation = found.deformation.max(y.rows(7, nf).norm() / radius);
+        found.turns += y.rows(10 + nf, 3).norm() * step / std::f64::consts::TAU;
+    }
+    found
+}
+
+fn nothing(_: &Evaluation<'_>, _: &Matrix3<f64>, _: &DVector<f64>, _: &mut [f64]) {}
+
+#[test]
+fn energy_and_momenta_are_kept_by_every_truncation() {
+    for body in [soft_block(), fixture("frame_beams", 6, BodyFrame::Principal)] {
+        for bits in 0..8 {
+            let terms = Terms { w1: bits & 1 == 0, w2: bits & 2 == 0, w3: bits & 4 == 0 };
+            let drift = tumble(&body, terms, nothing, |_| 0.0);
+            assert!(drift.deformation > 0.05 && drift.turns > 2.0, "{terms:?}: {drift:?}");
+            let worst = drift.energy.max(drift.linear).max(drift.angular);
+            assert!(worst < 1e-10, "{terms:?}: {drift:?}");
+        }
+    }
+}
+
+/// [WP19] (16) and guideline IV: Q'W2 Qd twice in place of Q'W2 Qd + Qd'W2 Q, and the W3 term.
+#[test]
+fn misprinted_coriolis_terms_lose_angular_momentum_and_hide_from_the_energy() {
+    let body = soft_block();
+    let (own, nf) = (oracle(&body).reduced, body.n_modes());
+    let misprint = |_: &Evaluation<'_>, _: &Matrix3<f64>, y: &DVector<f64>, forces: &mut [f64]| {
+        let kron = |at: usize| DMatrix::<f64>::identity(3, 3).kronecker(&y.rows(at, nf).into_owned());
+        let mixed = kron(7).transpose() * &own.w2 * kron(13 + nf);
+        let torque = (mixed.transpose() - mixed) * y.rows(10 + nf, 3);
+        (0..3).for_each(|k| forces[3 + k] += torque[k]);
+    };
+    let drift = tumble(&body, Terms::ALL, misprint, |_| 0.0);
+    assert!(drift.angular > 1e-4, "{drift:?}");
+    assert!(drift.energy < 1e-10 && drift.linear < 1e-10, "{drift:?}");
+}
+
+/// Gravity is the gradient of -g'(m R + A (c + C1 q)), for general masses too.
+#[test]
+fn gravity_keeps_the_energy() {
+    for name in ["frame_beams", "mpc_block"] {
+        let body = fixture(name, 6, BodyFrame::Model);
+        let (own, nf) = (oracle(&body).reduced, 6);
+        let omega = body.modes().eigenvalue[0].sqrt();
+        let size = body.invariants().inertia()[(1, 1)].sqrt() / own.mass.sqrt();
+        let gravity = Vector3::new(0.2, -0.5, 1.0) * (0.01 * omega * omega * size);
+        let load = |at: &Evaluation<'_>, axes: &Matrix3<f64>, _: &DVector<f64>, forces: &mut [f64]| {
+            at.add_gravity(&(axes.transpose() * gravity), forces);
+        };
+        let potential = |y: &DVector<f64>| {
+            let s = own.first_moment + Vector3::from_column_slice((&own.c1 * y.rows(7, nf)).as_slice());
+            -gravity.dot(&(own.mass * y.fixed_rows::<3>(0) + orientation(y).axes() * s))
+        };
+        let drift = tumble(&body, Terms::ALL, load, potential);
+        assert!(drift.energy < 1e-10 && drift.linear > 0.1, "{name}: {drift:?}");
+    }
+}
