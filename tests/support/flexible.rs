@@ -72,6 +72,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
             w0: faer(w0),
             w3: faer(w3),
             modal_mass: faer(&reduced.modal_mass),
+            plane: false,
         }),
     }
 }
