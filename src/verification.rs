@@ -236,21 +236,18 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
 /// How far R'MR of unit translations and rotations about the origin of the body frame (model axes; in the plane 3 x 3) is from m, c
 /// and I0 of the body, relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
 fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
-    let (own, axes) = (body.invariants(), &body.frame().axes);
-    let lever = -(axes * own.first_moment).cross_matrix();
-    let inertia = axes * own.inertia() * axes.transpose();
-    // Rows of the six motions that are there: in the plane two translations and the rotation about z.
-    let motions: &[usize] = if body.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
-    let expected = |i: usize, j: usize| match (motions[i], motions[j]) {
-        (a, b) if a < 3 && b < 3 => own.mass * f64::from(u8::from(a == b)),
-        (a, b) if a < 3 => lever[(a, b - 3)],
-        (a, b) if b < 3 => lever[(b, a - 3)],
-        (a, b) => inertia[(a - 3, b - 3)],
-    };
+    let (own, axes, d) = (body.parts().rigid_mass(), &body.frame().axes, body.dimension());
+    // Columns of body axes in model axes, for translations and, in space, rotations: one about z stays what it is.
+    let turn = Mat::from_fn(own.nrows(), own.ncols(), |i, j| match (i / d, j / d) {
+        (a, b) if a != b => 0.0,
+        (1, _) if d == 2 => 1.0,
+        _ => axes[(i % d, j % d)],
+    });
+    let found = turn.transpose() * found * &turn;
     let mut worst = 0.0f64;
-    for i in 0..motions.len() {
-        for j in 0..motions.len() {
-            let error = (found[(i, j)] - expected(i, j)).abs() / (expected(i, i) * expected(j, j)).sqrt();
+    for i in 0..own.nrows() {
+        for j in 0..own.ncols() {
+            let error = (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
             worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
         }
     }

@@ -8,7 +8,6 @@ use flexbody::basis::ModeSettings;
 use flexbody::convert::{Conversion, ConvertSettings, convert};
 use flexbody::eigen::Wanted;
 use flexbody::flex_body::FlexBody;
-use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::FeModel;
@@ -17,8 +16,8 @@ use serde_json::Value;
 use std::path::Path;
 use support::equations::{Coriolis, State};
 use support::general::{
-    GeneralBody, NodalBody, Row, RowKind, dense, nodal_rates, pack, random_body, random_matrix, rates,
-    reduced_rates, rigid_velocities, rows, to_faer, unpack,
+    FIXTURES, GeneralBody, NodalBody, Row, RowKind, dense, nodal_rates, pack, random_body, random_matrix,
+    rates, raw_fixture, reduced_rates, rigid_velocities, rows, to_faer, unpack,
 };
 use support::integrate;
 use support::nodal::{deviation, random_state};
@@ -90,20 +89,9 @@ struct Fixture {
     reference: Value,
 }
 
-const FIXTURES: [&str; 8] = [
-    "frame_beams",
-    "frame_lumped",
-    "hex8_bubbles",
-    "hex8_edges",
-    "mpc_block",
-    "plane_frame",
-    "shell_folded",
-    "spring_ends",
-];
-
 fn fixture(name: &str, modes: usize) -> Fixture {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
-    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    let raw = raw_fixture(name);
     let text = std::fs::read_to_string(folder.join("expected.json")).expect("reference");
     let reference: Value = serde_json::from_str(&text).expect("JSON");
     let rows = rows(&raw);
@@ -267,8 +255,7 @@ fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
 
 /// What flexbody makes of a fixture, about its centre of mass in model axes.
 fn converted(name: &str, modes: usize) -> Conversion {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
-    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    let raw = raw_fixture(name);
     let model = FeModel::from_raw(raw).expect("a body").model;
     let settings = ConvertSettings {
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
@@ -377,8 +364,7 @@ fn conversions_have_these_invariants_and_move_like_the_nodes() {
 
 /// The unreduced model of a fixture with the modes that its body has, rotations and rows without a place included.
 fn nodal_body(name: &str, body: &FlexBody) -> NodalBody {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
-    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    let raw = raw_fixture(name);
     let (modes, ids) = (body.modes(), &body.nodes().ids);
     let rows = rows(&raw);
     let place =
@@ -419,8 +405,7 @@ fn converted_bodies_keep_energy_and_momenta() {
 #[test]
 fn the_general_condensation_of_a_solid_is_that_of_its_scalar_mass() {
     for name in ["cube_hex8", "bracket_hex20"] {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
-        let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+        let raw = raw_fixture(name);
         let model = FeModel::from_raw(raw).expect("a body").model;
         let scalar = model.scalar_mass().expect("a solid");
         let n = 3 * scalar.n();

@@ -8,7 +8,7 @@ use flexbody::diagnostic::Code;
 use flexbody::eigen::{Method, Wanted};
 use flexbody::error::Error;
 use flexbody::flex_body::{FlexBody, MassStructure};
-use flexbody::input::{ModelFiles, read_manifest, read_model};
+use flexbody::input::{ModelFiles, read_model};
 use flexbody::invariants::{BodyFrame, Expected, identities, primary_differences};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::{DofLabel, FeModel, Nodes, RawModel};
@@ -17,23 +17,8 @@ use flexbody::store;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use support::general::{FIXTURES, raw_fixture as raw};
 use support::random::Random;
-
-const FIXTURES: [&str; 8] = [
-    "frame_beams",
-    "frame_lumped",
-    "hex8_bubbles",
-    "hex8_edges",
-    "mpc_block",
-    "plane_frame",
-    "shell_folded",
-    "spring_ends",
-];
-
-fn raw(name: &str) -> RawModel {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
-    read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable")
-}
 
 fn settings(modes: usize, method: Method) -> ConvertSettings {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), method, ..ModeSettings::default() };

@@ -126,17 +126,17 @@ pub fn choose_plane_frame(
 }
 
 /// The same for any mass, given the matrix R'MR of its unit translations and unit rotations about a point in model coordinates:
-/// 6x6, of a body in the plane 3x3.
+/// 6x6, of a body in the plane (`dimension` 2) 3x3.
 ///
 /// # Errors
 /// As [`choose_frame`].
 pub fn choose_general_frame(
     rigid_mass: impl Fn([f64; 3]) -> Mat<f64>,
     positions: &[[f64; 3]],
+    dimension: usize,
     choice: BodyFrame,
 ) -> Result<(Frame, MassProperties)> {
-    let plane = rigid_mass([0.0; 3]).ncols() == 3;
-    frame_of(positions, choice, plane, |middle, offset| {
+    frame_of(positions, choice, dimension == 2, |middle, offset| {
         rigid_inertia(rigid_mass((middle + offset).into()).as_ref())
     })
 }

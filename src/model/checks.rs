@@ -196,9 +196,9 @@ pub(super) fn finish(
         check_inertia(&body, rounding(digits, 3).max(1e-9), &mut found);
         stop_on_error(&mut found)?;
     }
-    note_structure(&body, &form, &mut found);
-    check_plausibility(&form.scalar, &body.nodes, &body.raw, &mut found);
     let diagonal_mass = is_diagonal(&body.mass);
+    note_structure(&body, &form, diagonal_mass, &mut found);
+    check_plausibility(&form.scalar, &body.nodes, &body.raw, &mut found);
     let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found })
 }
@@ -208,9 +208,9 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
 }
 
 /// What kind of mass and of rows the body has, where it is not the plain one.
-fn note_structure(body: &Assembled, form: &MassForm, found: &mut Vec<Diagnostic>) {
+fn note_structure(body: &Assembled, form: &MassForm, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
     let (raw, rows) = (&body.raw, &body.rows);
-    if is_diagonal(&body.mass) {
+    if diagonal_mass {
         let message = "mass matrix is diagonal: it was lumped before it came here";
         found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
     }

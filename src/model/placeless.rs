@@ -85,10 +85,10 @@ pub(super) fn check_massless(
     stiffness: &SymmetricMatrix,
     mass: &SymmetricMatrix,
     label: impl Fn(usize) -> DofLabel,
-) -> Result<usize, Diagnostic> {
+) -> Result<(), Diagnostic> {
     let massless: Vec<usize> = (0..mass.n()).filter(|&i| mass.row(i).0.is_empty()).collect();
     if massless.is_empty() {
-        return Ok(0);
+        return Ok(());
     }
     Restricted::new(stiffness, &massless).held().map_err(|free| {
         let labels: Vec<DofLabel> = free.iter().map(|&i| label(massless[i])).collect();
@@ -99,8 +99,7 @@ pub(super) fn check_massless(
             name_some(&labels)
         );
         Diagnostic::new(Code::PencilSingular, message)
-    })?;
-    Ok(massless.len())
+    })
 }
 
 /// The stiffness of some rows with all others held, scaled to a unit diagonal.

@@ -4,9 +4,29 @@
 use super::equations::{ReducedBody, State, skew};
 use super::random::Random;
 use faer::Mat;
+use flexbody::input::{read_manifest, read_model};
 use flexbody::model::RawModel;
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::collections::HashMap;
+use std::path::Path;
+
+/// Fixture models with rotations of nodes, rows without a place or masses that do not commute with rotations.
+pub const FIXTURES: [&str; 8] = [
+    "frame_beams",
+    "frame_lumped",
+    "hex8_bubbles",
+    "hex8_edges",
+    "mpc_block",
+    "plane_frame",
+    "shell_folded",
+    "spring_ends",
+];
+
+/// A model of `fixtures/models`, not yet checked.
+pub fn raw_fixture(name: &str) -> RawModel {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
+    read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable")
+}
 
 /// What a matrix row moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
