@@ -16,6 +16,7 @@ pub mod eigen;
 pub mod error;
 pub mod flex_body;
 pub mod input;
+pub mod integration;
 pub mod invariants;
 pub mod linalg;
 pub mod model;

@@ -1,0 +1,5 @@
+//! Time integration of ordinary differential equations; knows no bodies.
+
+mod system;
+
+pub use system::{Failure, System};

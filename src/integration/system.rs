@@ -1,0 +1,65 @@
+//! What is integrated, and why an integration ends early.
+
+/// A system of ordinary differential equations y' = f(t, y).
+pub trait System {
+    /// Number of entries of y.
+    fn dimension(&self) -> usize;
+
+    /// f(t, y).
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] where the equations have no solution at this state; an integrator with error control then tries a shorter
+    /// step.
+    fn rates(&mut self, time: f64, state: &[f64], rates: &mut [f64]) -> Result<(), Failure>;
+
+    /// What an error of each entry is measured against at this state: all positive, in the units of the entry. A tolerance is the largest
+    /// root mean square of error / scale that a step may add.
+    fn scales(&self, state: &[f64], scales: &mut [f64]);
+
+    /// Restores what holds exactly, as the length of Euler parameters; called after every step that is taken.
+    fn settle(&self, _state: &mut [f64]) {}
+}
+
+/// Why an integration cannot go on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Failure {
+    /// f(t, y) does not exist: `reason` as a lowercase fragment.
+    Rates {
+        /// What is wrong with the state.
+        reason: &'static str,
+    },
+    /// The state is no longer finite.
+    NotFinite {
+        /// End of the last good step.
+        time: f64,
+    },
+    /// No step that time can still resolve meets the tolerance.
+    StepTooSmall {
+        /// End of the last good step.
+        time: f64,
+    },
+    /// The equations of an implicit step were not solved.
+    NotConverged {
+        /// Start of the step.
+        time: f64,
+        /// Its length.
+        step: f64,
+    },
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Rates { reason } => f.write_str(reason),
+            Self::NotFinite { time } => write!(f, "the state is no longer finite after t = {time:e}"),
+            Self::StepTooSmall { time } => {
+                write!(f, "no step that time can resolve meets the tolerance at t = {time:e}")
+            }
+            Self::NotConverged { time, step } => {
+                write!(f, "the equations of the implicit step of {step:e} from t = {time:e} were not solved")
+            }
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
