@@ -85,43 +85,14 @@ impl BodyModes {
 
     /// The modes of a body that was made of `model`; `None` when it lacks rows of the model, or has others.
     pub fn of_body(model: &FeModel, body: &FlexBody) -> Option<Self> {
-        let (rows, modes) = (model.rows(), body.modes());
-        let (d, nodes, nf) = (model.dimension(), model.nodes().len(), body.n_modes());
-        let [vectors, massless] = rows.without_place();
-        let split = vectors.len() / d * 3;
-        let shape = modes.internal.as_ref().map(|internal| &internal.shape);
-        let internal_rows = shape.map_or(0, Mat::nrows);
-        if internal_rows != split + massless.len() || modes.rotation.is_some() == rows.rotations().is_empty()
-        {
-            return None;
-        }
-        let displacements =
-            Mat::from_fn(3 * nodes + split, nf, |row, j| match (row.checked_sub(3 * nodes), shape) {
-                (Some(row), Some(shape)) => shape[(row, j)],
-                _ => modes.shape[(row, j)],
-            });
-        let axes = &body.frame().axes;
-        let turned = |shapes: &Mat<f64>, vector: usize, k: usize, j: usize| -> f64 {
-            (0..3).map(|l| axes[(k, l)] * shapes[(3 * vector + l, j)]).sum()
-        };
-        let first = rows.displacements();
-        let vectors =
-            Mat::from_fn(rows.len(), nf, |row, j| match (row.checked_sub(first), &modes.rotation, shape) {
-                (None, ..) => turned(&displacements, row / d, row % d, j),
-                (Some(after), Some(rotation), _) if after < rows.rotations().len() => {
-                    let (node, axis) = rows.rotations()[after];
-                    turned(rotation, node as usize, axis.into(), j)
-                }
-                (Some(_), _, Some(shape)) => shape[(split + row - massless.start, j)],
-                (Some(_), _, None) => 0.0,
-            });
+        let modes = body.modes();
         Some(Self {
-            vectors,
-            displacements,
+            vectors: body.vectors_of(model)?,
+            displacements: body.displacements_of(model)?,
             rotations: modes.rotation.clone(),
             internal: modes.internal.clone(),
-            signs: vec![1.0; nf],
-            nodes,
+            signs: vec![1.0; body.n_modes()],
+            nodes: model.nodes().len(),
         })
     }
 

@@ -2,6 +2,7 @@
 
 mod body;
 mod interface;
+mod model_rows;
 mod parts;
 mod validate;
 

@@ -23,6 +23,32 @@ pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, y: MatMut
     sum_terms(a, block, x, y, |term| term);
 }
 
+/// y = (A kron I_block) x for one vector: by one thread, nothing allocated.
+///
+/// # Panics
+/// When the shapes disagree, or the block is not of 1, 2 or 3.
+pub fn multiply_vector(a: &SymmetricMatrix, block: usize, x: &[f64], y: &mut [f64]) {
+    assert!(x.len() == a.n() * block && y.len() == x.len(), "shapes of a product");
+    match block {
+        1 => vector_pass::<1>(a, x, y),
+        2 => vector_pass::<2>(a, x, y),
+        3 => vector_pass::<3>(a, x, y),
+        _ => panic!("blocks of 1, 2 or 3 components, not {block}"),
+    }
+}
+
+fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
+    let x = x.as_chunks::<B>().0;
+    for (i, y) in y.as_chunks_mut::<B>().0.iter_mut().enumerate() {
+        let (columns, values) = a.row(i);
+        let mut sum = [0.0; B];
+        for (&j, v) in columns.iter().zip(values) {
+            sum.iter_mut().zip(&x[j as usize]).for_each(|(sum, x)| *sum += v * x);
+        }
+        *y = sum;
+    }
+}
+
 /// y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] for other sums of the same terms.
 ///
 /// # Panics
