@@ -16,14 +16,17 @@ impl FlexBody {
             (0..3).map(|l| axes[(k, l)] * shape(3 * vector + l)).sum()
         };
         let first = rows.displacements();
-        Some(Mat::from_fn(rows.len(), self.n_modes(), |row, j| match (row.checked_sub(first), &modes.rotation) {
-            (None, _) => turned(&|at| self.displacement(at, j), row / d, row % d),
-            (Some(after), Some(rotation)) if after < rows.rotations().len() => {
-                let (node, axis) = rows.rotations()[after];
-                turned(&|at| rotation[(at, j)], node as usize, axis.into())
-            }
-            (Some(_), _) => {
-                modes.internal.as_ref().map_or(0.0, |internal| internal.shape[(split + row - massless, j)])
+        Some(Mat::from_fn(rows.len(), self.n_modes(), |row, j| {
+            match (row.checked_sub(first), &modes.rotation) {
+                (None, _) => turned(&|at| self.displacement(at, j), row / d, row % d),
+                (Some(after), Some(rotation)) if after < rows.rotations().len() => {
+                    let (node, axis) = rows.rotations()[after];
+                    turned(&|at| rotation[(at, j)], node as usize, axis.into())
+                }
+                (Some(_), _) => modes
+                    .internal
+                    .as_ref()
+                    .map_or(0.0, |internal| internal.shape[(split + row - massless, j)]),
             }
         }))
     }

@@ -168,9 +168,8 @@ mod tests {
     fn gram(n: usize, vectors: usize) -> SymmetricMatrix {
         let mut triplets = Vec::new();
         for v in 0..vectors {
-            let entries: Vec<(u32, f64)> = (0..4)
-                .map(|k| (((v * 7 + k * (3 + v % 5)) % n) as u32, 1.0 + number(v + 13 * k)))
-                .collect();
+            let entries: Vec<(u32, f64)> =
+                (0..4).map(|k| (((v * 7 + k * (3 + v % 5)) % n) as u32, 1.0 + number(v + 13 * k))).collect();
             for &(i, a) in &entries {
                 triplets.extend(entries.iter().map(|&(j, b)| (i, j, a * b)));
             }

@@ -1,0 +1,286 @@
+//! The nodal equations at one state.
+
+use super::equations::NodalEquations;
+use super::massless::Room;
+use super::state::{ANGULAR, LINEAR, normalised};
+use crate::dynamics::{EulerParameters, Orientation};
+use crate::integration::Failure;
+use crate::model::Damping;
+use nalgebra::{LU, Matrix3, Matrix6, U6, Vector3, Vector6};
+
+/// The deformation is beyond what the conditions can follow.
+const LOST: Failure = Failure::Rates {
+    reason: "the deformation is so large that the reference conditions do not determine the frame",
+};
+
+/// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after [`NodalEvaluation::new`].
+///
+/// [`NodalEvaluation::set`] takes the state and removes all loads; loads are added then; rates and accelerations are those under them.
+#[derive(Debug, Clone)]
+pub struct NodalEvaluation<'e> {
+    pub(super) equations: &'e NodalEquations<'e>,
+    pub(super) origin: Vector3<f64>,
+    /// As in the state, of unit length but for the error of the integration.
+    pub(super) orientation: EulerParameters,
+    /// Model axes to world axes.
+    pub(super) axes: Matrix3<f64>,
+    /// V, omega, p, h in model axes.
+    pub(super) velocity: Vector3<f64>,
+    pub(super) omega: Vector3<f64>,
+    pub(super) p: Vector3<f64>,
+    pub(super) h: Vector3<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) ud: Vec<f64>,
+    pub(super) vbar: Vec<f64>,
+    pub(super) w: Vec<f64>,
+    /// B'C' and its transpose.
+    conditions: LU<f64, U6, U6>,
+    conditions_transposed: LU<f64, U6, U6>,
+    /// Loads: force, torque about the origin, forces of rows; model axes.
+    pub(super) force: Vector3<f64>,
+    pub(super) torque: Vector3<f64>,
+    pub(super) row_forces: Vec<f64>,
+    w_rate: Vec<f64>,
+    multipliers: Vector6<f64>,
+    first: Vec<f64>,
+    second: Vec<f64>,
+    room: Room,
+}
+
+impl<'e> NodalEvaluation<'e> {
+    /// Memory for evaluations of `equations`, set to rest without deformation.
+    pub fn new(equations: &'e NodalEquations<'e>) -> Self {
+        let zeros = || vec![0.0; equations.n_rows()];
+        let zero = Vector3::zeros();
+        Self {
+            equations,
+            origin: zero,
+            orientation: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+            axes: equations.frame_axes.transpose(),
+            velocity: zero,
+            omega: zero,
+            p: zero,
+            h: zero,
+            u: zeros(),
+            ud: zeros(),
+            vbar: zeros(),
+            w: zeros(),
+            conditions: equations.conditions_rigid.lu(),
+            conditions_transposed: equations.conditions_rigid.transpose().lu(),
+            force: zero,
+            torque: zero,
+            row_forces: zeros(),
+            w_rate: zeros(),
+            multipliers: Vector6::zeros(),
+            first: zeros(),
+            second: zeros(),
+            room: equations.massless.room(),
+        }
+    }
+
+    /// The equations.
+    pub fn equations(&self) -> &'e NodalEquations<'e> {
+        self.equations
+    }
+
+    /// Goes to a state, without loads.
+    ///
+    /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a whole. Then M vbar = w,
+    /// C B (V, omega) = C vbar and u' = vbar - B (V, omega).
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] when the body is deformed so far that C B is singular.
+    ///
+    /// # Panics
+    /// When `state` has not [`NodalEquations::dimension`] entries.
+    pub fn set(&mut self, state: &[f64]) -> Result<(), Failure> {
+        let body = self.equations;
+        let (frame, u, w) = body.parts(state);
+        let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
+        self.origin = vector(0);
+        self.orientation = EulerParameters([frame[3], frame[4], frame[5], frame[6]]);
+        self.axes = normalised(&self.orientation).axes() * body.frame_axes.transpose();
+        self.u.copy_from_slice(u);
+        self.w.copy_from_slice(w);
+        (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
+        self.row_forces.fill(0.0);
+
+        let matrix: Matrix6<f64> = body.conditions_at(&self.u);
+        (self.conditions, self.conditions_transposed) = (matrix.lu(), matrix.transpose().lu());
+        let momenta = self.moving(&self.axes.tr_mul(&vector(LINEAR)), &self.axes.tr_mul(&vector(ANGULAR)));
+        (self.p, self.h) = halves(&momenta);
+        let missing = momenta - self.onto_frame(&self.w);
+        let mu = self.conditions.solve(&missing).ok_or(LOST)?;
+        NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
+
+        self.vbar.copy_from_slice(&self.w);
+        body.solve(&mut self.vbar, &mut self.first);
+        let nu = NodalEquations::sums(&body.conditions, &self.vbar);
+        let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
+        (self.velocity, self.omega) = halves(&nu);
+        self.ud.copy_from_slice(&self.vbar);
+        self.add_frame_velocity(-1.0);
+        if !body.massless.is_empty() {
+            body.massless.project(body.stiffness(), &mut self.ud, &mut self.room);
+            self.vbar.copy_from_slice(&self.ud);
+            std::mem::swap(&mut self.ud, &mut self.vbar);
+            self.add_frame_velocity(1.0);
+            std::mem::swap(&mut self.ud, &mut self.vbar);
+        }
+        Ok(())
+    }
+
+    /// u' += factor B (V, omega).
+    fn add_frame_velocity(&mut self, factor: f64) {
+        NodalEquations::add_motion(&self.equations.rigid, factor, &self.nu(), &mut self.ud);
+        self.equations.add_turned(factor, &self.omega, &self.u, &mut self.ud);
+    }
+
+    /// y' (see [`NodalEquations::dimension`]) under the loads.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `rates` has not the length of a state.
+    pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
+        assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
+        self.find_rates()?;
+        let origin = self.axes * self.velocity;
+        let linear = self.axes * self.force;
+        let angular = self.axes * self.torque - origin.cross(&(self.axes * self.p));
+        let turning = self.orientation.rate(&(self.equations.frame_axes.transpose() * self.omega));
+        let frame = origin.iter().chain(&turning).chain(&linear).chain(&angular);
+        let nodes = self.ud.iter().chain(&self.w_rate);
+        rates.iter_mut().zip(frame.chain(nodes)).for_each(|(rate, value)| *rate = *value);
+        Ok(())
+    }
+
+    /// w' and lambda.
+    ///
+    /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is known from the momenta.
+    fn find_rates(&mut self) -> Result<(), Failure> {
+        let body = self.equations;
+        let [forces, moved] = [&mut self.first, &mut self.second];
+        forces.copy_from_slice(&self.row_forces);
+        body.add_turned(-1.0, &self.omega, &self.w, forces);
+        moved.copy_from_slice(&self.u);
+        match body.model.damping() {
+            None => {}
+            Some(Damping::Rayleigh { alpha, beta }) => {
+                body.weigh(&self.ud, &mut self.w_rate);
+                add_scaled(-alpha, &self.w_rate, forces);
+                add_scaled(*beta, &self.ud, moved);
+            }
+            Some(Damping::Matrix(damping)) => {
+                crate::linalg::multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
+                add_scaled(-1.0, &self.w_rate, forces);
+            }
+            Some(Damping::Ratio(_) | Damping::Bands(_)) => unreachable!("refused at construction"),
+        }
+        body.massless.add_static(forces, moved, &mut self.room);
+        crate::linalg::multiply_vector(body.stiffness(), 1, moved, &mut self.w_rate);
+        for (rate, force) in self.w_rate.iter_mut().zip(&*forces) {
+            *rate = force - *rate;
+        }
+        let of_forces = self.torque
+            - self.omega.cross(&self.h)
+            - self.velocity.cross(&self.p)
+            - body.moment(&self.ud, &self.w);
+        let wanted = self.moving(&(self.force - self.omega.cross(&self.p)), &of_forces);
+        let missing = wanted - self.onto_frame(&self.w_rate);
+        self.multipliers = self.conditions.solve(&missing).ok_or(LOST)?;
+        NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
+        Ok(())
+    }
+
+    /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components in these axes.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `udd` has not N entries.
+    pub fn accelerations(&mut self, udd: &mut [f64]) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
+        assert_eq!(udd.len(), self.u.len(), "one entry per row");
+        self.find_rates()?;
+        let body = self.equations;
+        udd.copy_from_slice(&self.w_rate);
+        body.solve(udd, &mut self.first);
+        body.add_turned(-1.0, &self.omega, &self.ud, udd);
+        let nu = NodalEquations::sums(&body.conditions, udd);
+        let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
+        let (linear, angular) = halves(&nu);
+        NodalEquations::add_motion(&body.rigid, -1.0, &nu, udd);
+        body.add_turned(-1.0, &angular, &self.u, udd);
+        body.massless.project(body.stiffness(), udd, &mut self.room);
+        let to_frame = body.frame_axes.transpose();
+        Ok((to_frame * linear, to_frame * angular))
+    }
+
+    /// lambda of the last rates or accelerations: what holds C u = 0. Of a solid C'lambda has no force, and the moment
+    /// sum_i u_i x (K u)_i that linear elastic forces have about a deformed body.
+    pub fn multipliers(&self) -> &Vector6<f64> {
+        &self.multipliers
+    }
+
+    /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F and tau in the axes of the
+    /// frame, and f (N) in model axes, with lambda = 0.
+    ///
+    /// # Panics
+    /// When a length is not N.
+    pub fn balance(
+        &mut self,
+        linear: &Vector3<f64>,
+        angular: &Vector3<f64>,
+        udd: &[f64],
+        forces: &mut [f64],
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let body = self.equations;
+        assert!(udd.len() == self.u.len() && forces.len() == self.u.len(), "one entry per row");
+        let nu = body.in_model(linear, angular);
+        let change = &mut self.first;
+        change.copy_from_slice(udd);
+        NodalEquations::add_motion(&body.rigid, 1.0, &nu, change);
+        body.add_turned(1.0, &halves(&nu).1, &self.u, change);
+        body.add_turned(1.0, &self.omega, &self.ud, change);
+        body.weigh(change, forces);
+        let (force, torque) = halves(&self.onto_frame(forces));
+        let force = force + self.omega.cross(&self.p);
+        let torque = torque
+            + body.moment(&self.ud, &self.w)
+            + self.omega.cross(&self.h)
+            + self.velocity.cross(&self.p);
+        let (force, torque) = halves(&self.moving(&force, &torque));
+        body.add_turned(1.0, &self.omega, &self.w, forces);
+        crate::linalg::multiply_vector(body.stiffness(), 1, &self.u, &mut self.first);
+        add_scaled(1.0, &self.first, forces);
+        let to_frame = body.frame_axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+
+    /// B'x.
+    pub(super) fn onto_frame(&self, x: &[f64]) -> Vector6<f64> {
+        let (linear, angular) = halves(&NodalEquations::sums(&self.equations.rigid, x));
+        self.moving(&linear, &(angular + self.equations.moment(&self.u, x)))
+    }
+
+    /// Both vectors, without what a plane body does not have.
+    fn moving(&self, linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+        let mut both = Vector6::zeros();
+        for &k in self.equations.moving {
+            both[k] = if k < 3 { linear[k] } else { angular[k - 3] };
+        }
+        both
+    }
+}
+
+/// The linear and the angular part.
+fn halves(both: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (both.fixed_rows::<3>(0).into_owned(), both.fixed_rows::<3>(3).into_owned())
+}
+
+/// y += factor x.
+fn add_scaled(factor: f64, x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
+}

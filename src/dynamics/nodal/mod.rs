@@ -1,0 +1,20 @@
+//! The unreduced equations of motion of a body in its floating frame, all nodes kept (theory section 6, "The nodal equations"): what
+//! every reduced equation is measured against.
+
+mod conditions;
+mod equations;
+mod error;
+mod evaluation;
+mod loads;
+mod massless;
+mod modes;
+mod motion;
+mod state;
+
+pub use conditions::ReferenceConditions;
+pub use equations::NodalEquations;
+pub use error::NodalError;
+pub use evaluation::NodalEvaluation;
+pub use modes::NodalModes;
+pub use motion::NodalMotion;
+pub use state::FrameMotion;
