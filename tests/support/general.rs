@@ -363,7 +363,7 @@ pub fn quasi_velocities(state: &State) -> DVector<f64> {
 /// Mc nu' from pd + w x p = 0; hd + w x h + V x p = 0; d/dt pi - dT/dq + K q = 0, where `rate` is dMc/dt nu.
 fn solve(
     state: &State,
-    matrix: DMatrix<f64>,
+    mut matrix: DMatrix<f64>,
     momenta: &DVector<f64>,
     rate: &DVector<f64>,
     energy_slope: &DVector<f64>,
@@ -378,6 +378,8 @@ fn solve(
     rotation -= state.omega.cross(&h) + velocity.cross(&p);
     let mut modal = forces.rows_mut(6, elastic.len());
     modal += energy_slope - elastic;
+    // Motions that a plane body does not have: no force, unit mass.
+    (0..6).filter(|&k| matrix[(k, k)] == 0.0).collect::<Vec<_>>().iter().for_each(|&k| matrix[(k, k)] = 1.0);
     in_world(state, matrix.lu().solve(&forces).expect("the mass matrix is positive definite"))
 }
 

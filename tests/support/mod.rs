@@ -14,3 +14,4 @@ pub mod pipeline;
 pub mod plane;
 pub mod random;
 pub mod reference;
+pub mod unreduced;
