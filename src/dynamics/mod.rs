@@ -1,5 +1,5 @@
-//! The equations of motion of one flexible body: reduced, from its invariants (theory sections 3, 4 and 6), and of all nodes. Forces,
-//! momenta, energies, accelerations and Jacobians, without an allocation per evaluation. No integrators.
+//! The equations of motion of one flexible body: reduced, from its invariants (theory sections 3, 4 and 6), and of all its nodes.
+//! Forces, momenta, energies, accelerations and Jacobians, without an allocation per evaluation; and its motion as a system to integrate.
 
 mod accelerations;
 mod equations;
@@ -8,16 +8,19 @@ mod jacobian;
 mod kernels;
 mod loads;
 mod modal_matrix;
+mod motion;
 mod nodal;
 mod orientation;
 mod terms;
 
-pub use accelerations::NotPositiveDefinite;
+pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
 pub use loads::NodeShapes;
+pub use motion::{Balance, Configuration, EmptySpace, Motion, Place, Surroundings};
 pub use nodal::{
-    FrameMotion, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, ReferenceConditions,
+    NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
+    ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use terms::Terms;

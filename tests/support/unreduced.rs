@@ -8,7 +8,7 @@ use super::plane::rectangle;
 use super::random::Random;
 use super::reference;
 use faer::Mat;
-use flexbody::dynamics::{EulerParameters, FrameMotion};
+use flexbody::dynamics::{EulerParameters, NodalConfiguration};
 use flexbody::flex_body::Frame;
 use flexbody::linalg::SymmetricMatrix;
 use flexbody::model::{FeModel, RawModel};
@@ -116,14 +116,17 @@ impl Unreduced {
     }
 }
 
-/// Motion of the frame of a state.
-pub fn frame_motion(state: &State) -> FrameMotion {
+/// A state of the oracle with its displacements, u = `shapes` q.
+pub fn configuration(shapes: &Mat<f64>, state: &State) -> NodalConfiguration {
     let turn = UnitQuaternion::from_matrix(&state.axes);
-    FrameMotion {
+    let lifted = |q: &DVector<f64>| times(shapes, q).as_slice().to_vec();
+    NodalConfiguration {
         origin: state.origin,
-        orientation: EulerParameters([turn.w, turn.i, turn.j, turn.k]),
-        velocity: state.axes.transpose() * state.velocity,
+        attitude: EulerParameters([turn.w, turn.i, turn.j, turn.k]),
+        velocity: state.velocity,
         omega: state.omega,
+        u: lifted(&state.q),
+        ud: lifted(&state.qd),
     }
 }
 

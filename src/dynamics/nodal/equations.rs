@@ -6,7 +6,7 @@ use super::massless::{Massless, NULL_PIVOT};
 use crate::flex_body::Frame;
 use crate::linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use crate::model::{Damping, FeModel, centre_and_length};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Part of the largest that the smallest singular value of C R may be.
 const INDEPENDENT: f64 = 1e-8;
@@ -29,24 +29,24 @@ const INDEPENDENT: f64 = 1e-8;
 /// product with K, a solve with a factor of M made here, and a few dot products: some thousand rows are comfortable.
 ///
 /// ```
-/// # fn check(model: &flexbody::model::FeModel, body: &flexbody::flex_body::FlexBody) -> Result<(), Box<dyn std::error::Error>> {
-/// use flexbody::dynamics::{FrameMotion, NodalEquations, NodalEvaluation, ReferenceConditions};
+/// # fn check(model: &flexbody::model::FeModel, body: &flexbody::flex_body::FlexBody, start: &flexbody::dynamics::Configuration)
+/// # -> Result<(), Box<dyn std::error::Error>> {
+/// use flexbody::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
+/// use flexbody::integration::{Explicit, Failure, Method, integrate};
 /// let equations = NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes)?;
-/// let spin = FrameMotion { omega: [0.0, 0.0, 1.0].into(), ..FrameMotion::default() };
-/// let undeformed = vec![0.0; equations.n_rows()];
-/// let state = equations.state(&spin, &undeformed, &undeformed)?;
-/// let mut evaluation = NodalEvaluation::new(&equations);
-/// evaluation.set(&state)?;
-/// let mut rates = vec![0.0; equations.dimension()];
-/// evaluation.rates(&mut rates)?;
+/// let modes = NodalModes::new(&equations, body).ok_or("modes of another model")?;
+/// let mut state = equations.state(&modes.lift(start))?;
+/// let mut method = Method::Explicit(Explicit::new(state.len(), 1e-10, f64::INFINITY));
+/// let mut motion = NodalMotion::free(&equations);
+/// integrate(&mut method, &mut motion, &mut state, &[0.0, 1.0], &[], |_, _| Ok::<(), Failure>(()))?;
+/// let end = modes.project(&motion.evaluate(1.0, &state)?.configuration());
 /// # Ok(())
 /// # }
 /// ```
 #[derive(Debug, Clone)]
 pub struct NodalEquations<'m> {
     pub(super) model: &'m FeModel,
-    /// Columns are the axes of the frame in model axes.
-    pub(super) frame_axes: Matrix3<f64>,
+    pub(super) frame: Frame,
     /// Nodes about the origin of the frame, model axes.
     pub(super) positions: Vec<Vector3<f64>>,
     pub(super) length: f64,
@@ -115,7 +115,7 @@ impl<'m> NodalEquations<'m> {
         let positions = model.nodes().positions.iter().map(|x| Vector3::from(*x) - frame.origin).collect();
         Ok(Self {
             model,
-            frame_axes: frame.axes,
+            frame: *frame,
             positions,
             length,
             moving,
@@ -236,7 +236,7 @@ impl<'m> NodalEquations<'m> {
 
     /// (V, omega) in model axes, without what a plane body does not have.
     pub(super) fn in_model(&self, linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-        let (linear, angular) = (self.frame_axes * linear, self.frame_axes * angular);
+        let (linear, angular) = (self.frame.axes * linear, self.frame.axes * angular);
         let both = Vector6::from_iterator(linear.iter().chain(&angular).copied());
         Vector6::from_fn(|k, _| if self.moving.contains(&k) { both[k] } else { 0.0 })
     }

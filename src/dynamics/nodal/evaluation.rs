@@ -56,7 +56,7 @@ impl<'e> NodalEvaluation<'e> {
             equations,
             origin: zero,
             orientation: EulerParameters([1.0, 0.0, 0.0, 0.0]),
-            axes: equations.frame_axes.transpose(),
+            axes: equations.frame.axes.transpose(),
             velocity: zero,
             omega: zero,
             p: zero,
@@ -99,7 +99,7 @@ impl<'e> NodalEvaluation<'e> {
         let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
         self.origin = vector(0);
         self.orientation = EulerParameters([frame[3], frame[4], frame[5], frame[6]]);
-        self.axes = normalised(&self.orientation).axes() * body.frame_axes.transpose();
+        self.axes = normalised(&self.orientation).axes() * body.frame.axes.transpose();
         self.u.copy_from_slice(u);
         self.w.copy_from_slice(w);
         (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
@@ -149,7 +149,7 @@ impl<'e> NodalEvaluation<'e> {
         let origin = self.axes * self.velocity;
         let linear = self.axes * self.force;
         let angular = self.axes * self.torque - origin.cross(&(self.axes * self.p));
-        let turning = self.orientation.rate(&(self.equations.frame_axes.transpose() * self.omega));
+        let turning = self.orientation.rate(&(self.equations.frame.axes.transpose() * self.omega));
         let frame = origin.iter().chain(&turning).chain(&linear).chain(&angular);
         let nodes = self.ud.iter().chain(&self.w_rate);
         rates.iter_mut().zip(frame.chain(nodes)).for_each(|(rate, value)| *rate = *value);
@@ -214,7 +214,7 @@ impl<'e> NodalEvaluation<'e> {
         NodalEquations::add_motion(&body.rigid, -1.0, &nu, udd);
         body.add_turned(-1.0, &angular, &self.u, udd);
         body.massless.project(body.stiffness(), udd, &mut self.room);
-        let to_frame = body.frame_axes.transpose();
+        let to_frame = body.frame.axes.transpose();
         Ok((to_frame * linear, to_frame * angular))
     }
 
@@ -255,7 +255,7 @@ impl<'e> NodalEvaluation<'e> {
         body.add_turned(1.0, &self.omega, &self.w, forces);
         crate::linalg::multiply_vector(body.stiffness(), 1, &self.u, &mut self.first);
         add_scaled(1.0, &self.first, forces);
-        let to_frame = body.frame_axes.transpose();
+        let to_frame = body.frame.axes.transpose();
         (to_frame * force, to_frame * torque)
     }
 

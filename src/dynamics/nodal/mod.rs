@@ -17,4 +17,4 @@ pub use error::NodalError;
 pub use evaluation::NodalEvaluation;
 pub use modes::NodalModes;
 pub use motion::NodalMotion;
-pub use state::FrameMotion;
+pub use state::NodalConfiguration;

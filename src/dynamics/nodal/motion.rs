@@ -51,9 +51,14 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         }
     }
 
-    /// The evaluation of the last rates.
-    pub fn evaluation(&self) -> &NodalEvaluation<'e> {
-        &self.evaluation
+    /// The body at a state, under its loads.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    pub fn evaluate(&mut self, time: f64, state: &[f64]) -> Result<&mut NodalEvaluation<'e>, Failure> {
+        self.evaluation.set(state)?;
+        (self.loads)(time, &mut self.evaluation);
+        Ok(&mut self.evaluation)
     }
 
     /// E.
@@ -78,9 +83,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
     }
 
     fn rates(&mut self, time: f64, state: &[f64], rates: &mut [f64]) -> Result<(), Failure> {
-        self.evaluation.set(state)?;
-        (self.loads)(time, &mut self.evaluation);
-        self.evaluation.rates(rates)
+        self.evaluate(time, state)?.rates(rates)
     }
 
     fn scales(&self, state: &[f64], scales: &mut [f64]) {

@@ -13,26 +13,21 @@ pub(super) const LINEAR: usize = 7;
 pub(super) const ANGULAR: usize = 10;
 pub(super) const DISPLACEMENTS: usize = 13;
 
-/// Position and velocity of a body frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameMotion {
-    /// R, world axes. Unit: length.
+/// A state in the velocities that a reader thinks in: [`Configuration`](crate::dynamics::Configuration) with nodal displacements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalConfiguration {
+    /// Origin of the body frame, world axes.
     pub origin: Vector3<f64>,
-    /// Rotation from the axes of the frame to those of the world.
-    pub orientation: EulerParameters,
-    /// V, velocity of the origin in the axes of the frame. Unit: length/time.
+    /// Attitude of the frame, of unit length.
+    pub attitude: EulerParameters,
+    /// Velocity of the origin, world axes.
     pub velocity: Vector3<f64>,
-    /// Angular velocity in the axes of the frame. Unit: 1/time.
+    /// Angular velocity of the frame, in its axes.
     pub omega: Vector3<f64>,
-}
-
-impl Default for FrameMotion {
-    /// At rest at the origin of the world, along its axes.
-    fn default() -> Self {
-        let zero = Vector3::zeros();
-        let orientation = EulerParameters([1.0, 0.0, 0.0, 0.0]);
-        Self { origin: zero, orientation, velocity: zero, omega: zero }
-    }
+    /// Displacements relative to the frame (N), in the rows and axes of the model.
+    pub u: Vec<f64>,
+    /// Their rates (N).
+    pub ud: Vec<f64>,
 }
 
 impl NodalEquations<'_> {
@@ -43,45 +38,44 @@ impl NodalEquations<'_> {
         DISPLACEMENTS + 2 * self.n_rows()
     }
 
-    /// The state with given motion of the frame, displacements `u` and their rates `ud` (N each).
+    /// The state y of a configuration.
     ///
-    /// What carries no mass is set to where the rest takes it. Rigid motion in `ud` is taken as that of the body: the motion of the
-    /// frame that a state has is the one that leaves C u' = 0.
+    /// What carries no mass is set to where the rest takes it. Rigid motion in u' is taken as that of the body: the velocities that a
+    /// state has leave C u' = 0.
     ///
     /// # Errors
     /// [`NodalError::ConditionsViolated`] when C u is not zero to rounding.
     ///
     /// # Panics
     /// When a length is not N.
-    pub fn state(&self, motion: &FrameMotion, u: &[f64], ud: &[f64]) -> Result<Vec<f64>, NodalError> {
+    pub fn state(&self, configuration: &NodalConfiguration) -> Result<Vec<f64>, NodalError> {
+        let NodalConfiguration { origin, attitude, velocity, omega, u, ud } = configuration;
         let n = self.n_rows();
         assert!(u.len() == n && ud.len() == n, "one entry per row");
-        let [mut own, mut velocity] = [u.to_vec(), ud.to_vec()];
-        if !self.massless.is_empty() {
-            let mut room = self.massless.room();
-            self.massless.project(self.stiffness(), &mut own, &mut room);
-            self.massless.project(self.stiffness(), &mut velocity, &mut room);
-        }
-        let taken = self.take_rigid(&mut own);
-        let largest = own.iter().fold(0.0f64, |m, u| m.max(u.abs()));
+        let (mut u, mut vbar) = (u.clone(), ud.clone());
+        let mut room = self.massless.room();
+        self.massless.project(self.stiffness(), &mut u, &mut room);
+        self.massless.project(self.stiffness(), &mut vbar, &mut room);
+        let taken = self.take_rigid(&mut u);
+        let largest = u.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         let moved = taken.fixed_rows::<3>(0).amax().max(taken.fixed_rows::<3>(3).amax() * self.length);
         if moved > ROUNDING * largest {
             return Err(NodalError::ConditionsViolated { part: moved / largest });
         }
-        let nu = self.in_model(&motion.velocity, &motion.omega);
-        Self::add_motion(&self.rigid, 1.0, &nu, &mut velocity);
-        self.add_turned(1.0, &nu.fixed_rows::<3>(3).into_owned(), &own, &mut velocity);
+        let attitude = normalised(attitude);
+        let nu = self.in_model(&attitude.axes().tr_mul(velocity), omega);
+        Self::add_motion(&self.rigid, 1.0, &nu, &mut vbar);
+        self.add_turned(1.0, &nu.fixed_rows::<3>(3).into_owned(), &u, &mut vbar);
         let mut w = vec![0.0; n];
-        self.weigh(&velocity, &mut w);
+        self.weigh(&vbar, &mut w);
 
-        let orientation = normalised(&motion.orientation);
-        let to_world = orientation.axes() * self.frame_axes.transpose();
+        let to_world = attitude.axes() * self.frame.axes.transpose();
         let momenta = Self::sums(&self.rigid, &w);
         let linear = to_world * momenta.fixed_rows::<3>(0);
-        let angular = to_world * (momenta.fixed_rows::<3>(3) + self.moment(&own, &w));
+        let angular = to_world * (momenta.fixed_rows::<3>(3) + self.moment(&u, &w));
         let mut state = Vec::with_capacity(self.dimension());
-        state.extend(motion.origin.iter().chain(&orientation.0).chain(&linear).chain(&angular));
-        state.extend(own);
+        state.extend(origin.iter().chain(&attitude.0).chain(&linear).chain(&angular));
+        state.extend(u);
         state.extend(w);
         Ok(state)
     }
@@ -102,14 +96,15 @@ pub(super) fn normalised(EulerParameters(p): &EulerParameters) -> EulerParameter
 }
 
 impl NodalEvaluation<'_> {
-    /// Position and velocity of the frame.
-    pub fn frame_motion(&self) -> FrameMotion {
-        let to_frame = self.equations.frame_axes.transpose();
-        FrameMotion {
+    /// The state as positions and velocities.
+    pub fn configuration(&self) -> NodalConfiguration {
+        NodalConfiguration {
             origin: self.origin,
-            orientation: normalised(&self.orientation),
-            velocity: to_frame * self.velocity,
-            omega: to_frame * self.omega,
+            attitude: normalised(&self.orientation),
+            velocity: self.axes * self.velocity,
+            omega: self.equations.frame.axes.tr_mul(&self.omega),
+            u: self.u.clone(),
+            ud: self.ud.clone(),
         }
     }
 
