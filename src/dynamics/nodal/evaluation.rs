@@ -218,10 +218,13 @@ impl<'e> NodalEvaluation<'e> {
         Ok((to_frame * linear, to_frame * angular))
     }
 
-    /// lambda of the last rates or accelerations: what holds C u = 0. Of a solid C'lambda has no force, and the moment
-    /// sum_i u_i x (K u)_i that linear elastic forces have about a deformed body.
-    pub fn multipliers(&self) -> &Vector6<f64> {
-        &self.multipliers
+    /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame: what it takes to hold C u = 0.
+    /// Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the moment that linear elastic forces have about the deformed
+    /// body.
+    pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let (force, torque) = halves(&(self.equations.conditions_at(&self.u) * self.multipliers));
+        let to_frame = self.equations.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
     }
 
     /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F and tau in the axes of the
