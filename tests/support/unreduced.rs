@@ -11,7 +11,7 @@ use faer::Mat;
 use flexbody::dynamics::{EulerParameters, NodalConfiguration};
 use flexbody::flex_body::Frame;
 use flexbody::linalg::SymmetricMatrix;
-use flexbody::model::{FeModel, RawModel};
+use flexbody::model::{DofLabel, FeModel, RawModel};
 use nalgebra::{DVector, Matrix3, UnitQuaternion, Vector3};
 
 /// A checked model and all its flexible modes, by the dense oracle.
@@ -128,6 +128,37 @@ pub fn configuration(shapes: &Mat<f64>, state: &State) -> NodalConfiguration {
         u: lifted(&state.q),
         ud: lifted(&state.qd),
     }
+}
+
+/// Degrees of freedom that hold a body: three of one node, two of another and one of a third, all far apart.
+pub fn holding(model: &FeModel) -> Vec<DofLabel> {
+    let x: Vec<Vector3<f64>> = model.nodes().positions.iter().map(|x| Vector3::from(*x)).collect();
+    let farthest =
+        |f: &dyn Fn(usize) -> f64| (0..x.len()).max_by(|&i, &j| f(i).total_cmp(&f(j))).expect("nodes");
+    let first = farthest(&|i| x[i].norm());
+    let second = farthest(&|i| (x[i] - x[first]).norm());
+    let along = x[second] - x[first];
+    let third = farthest(&|i| along.cross(&(x[i] - x[first])).norm());
+    let directions = |v: Vector3<f64>| {
+        let mut order = [0u8, 1, 2];
+        order.sort_by(|&i, &j| v[i as usize].abs().total_cmp(&v[j as usize].abs()));
+        order
+    };
+    let label = |i: usize, k: u8| DofLabel { node: model.nodes().ids[i], direction: k + 1 };
+    if model.dimension() == 2 {
+        let across = u8::from(along.x.abs() > along.y.abs());
+        return vec![label(first, 0), label(first, 1), label(second, across)];
+    }
+    let [across, also, _] = directions(along);
+    let [.., normal] = directions(along.cross(&(x[third] - x[first])));
+    vec![
+        label(first, 0),
+        label(first, 1),
+        label(first, 2),
+        label(second, across),
+        label(second, also),
+        label(third, normal),
+    ]
 }
 
 /// A matrix times a vector.

@@ -2,7 +2,7 @@
 
 use super::equations::NodalEquations;
 use super::massless::Room;
-use super::state::{ANGULAR, LINEAR, normalised};
+use super::state::{ANGULAR, LINEAR, OFFSET, attitude, normalised};
 use crate::dynamics::{EulerParameters, Orientation};
 use crate::integration::Failure;
 use crate::model::Damping;
@@ -21,7 +21,9 @@ pub struct NodalEvaluation<'e> {
     pub(super) equations: &'e NodalEquations<'e>,
     pub(super) origin: Vector3<f64>,
     /// As in the state, of unit length but for the error of the integration.
-    pub(super) orientation: EulerParameters,
+    pub(super) attitude: EulerParameters,
+    /// D.
+    offset: Vector3<f64>,
     /// Model axes to world axes.
     pub(super) axes: Matrix3<f64>,
     /// V, omega, p, h in model axes.
@@ -55,7 +57,8 @@ impl<'e> NodalEvaluation<'e> {
         Self {
             equations,
             origin: zero,
-            orientation: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+            attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+            offset: zero,
             axes: equations.frame.axes.transpose(),
             velocity: zero,
             omega: zero,
@@ -97,9 +100,10 @@ impl<'e> NodalEvaluation<'e> {
         let body = self.equations;
         let (frame, u, w) = body.parts(state);
         let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
-        self.origin = vector(0);
-        self.orientation = EulerParameters([frame[3], frame[4], frame[5], frame[6]]);
-        self.axes = normalised(&self.orientation).axes() * body.frame.axes.transpose();
+        self.offset = vector(OFFSET);
+        self.origin = vector(0) + self.offset;
+        self.attitude = attitude(frame);
+        self.axes = normalised(&self.attitude).axes() * body.frame.axes.transpose();
         self.u.copy_from_slice(u);
         self.w.copy_from_slice(w);
         (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
@@ -107,7 +111,8 @@ impl<'e> NodalEvaluation<'e> {
 
         let matrix: Matrix6<f64> = body.conditions_at(&self.u);
         (self.conditions, self.conditions_transposed) = (matrix.lu(), matrix.transpose().lu());
-        let momenta = self.moving(&self.axes.tr_mul(&vector(LINEAR)), &self.axes.tr_mul(&vector(ANGULAR)));
+        let (linear, angular) = (vector(LINEAR), vector(ANGULAR) - self.offset.cross(&vector(LINEAR)));
+        let momenta = self.moving(&self.axes.tr_mul(&linear), &self.axes.tr_mul(&angular));
         (self.p, self.h) = halves(&momenta);
         let missing = momenta - self.onto_frame(&self.w);
         let mu = self.conditions.solve(&missing).ok_or(LOST)?;
@@ -146,11 +151,12 @@ impl<'e> NodalEvaluation<'e> {
     pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
         assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
         self.find_rates()?;
-        let origin = self.axes * self.velocity;
+        let flight = self.axes * self.p / self.equations.rigid_mass[(0, 0)];
+        let offset = self.axes * self.velocity - flight;
         let linear = self.axes * self.force;
-        let angular = self.axes * self.torque - origin.cross(&(self.axes * self.p));
-        let turning = self.orientation.rate(&(self.equations.frame.axes.transpose() * self.omega));
-        let frame = origin.iter().chain(&turning).chain(&linear).chain(&angular);
+        let angular = self.axes * self.torque + self.offset.cross(&linear);
+        let turning = self.attitude.rate(&self.equations.frame.axes.tr_mul(&self.omega));
+        let frame = flight.iter().chain(&offset).chain(&turning).chain(&linear).chain(&angular);
         let nodes = self.ud.iter().chain(&self.w_rate);
         rates.iter_mut().zip(frame.chain(nodes)).for_each(|(rate, value)| *rate = *value);
         Ok(())

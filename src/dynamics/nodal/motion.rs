@@ -2,8 +2,8 @@
 
 use super::NodalEvaluation;
 use super::equations::NodalEquations;
-use super::state::{ANGULAR, DISPLACEMENTS, LINEAR, normalised};
-use crate::dynamics::{EulerParameters, Orientation};
+use super::state::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, attitude, normalised};
+use crate::dynamics::Orientation;
 use crate::integration::{Failure, System};
 use nalgebra::{Vector3, Vector6};
 
@@ -16,7 +16,7 @@ const NOTHING: f64 = 1e-9;
 /// and the elastic energy, and n entries of y,
 ///
 /// ```text
-/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    R: length / sqrt(n)    Euler parameters: 1 / sqrt(n)
+/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    G, D: length / sqrt(n)    e: 1 / sqrt(n)
 /// ```
 ///
 /// so that the sum of the squares of all errors over their scales is the energy of the error, that of u bounded from above by the
@@ -65,9 +65,9 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     fn energy(&self, state: &[f64]) -> f64 {
         let body = self.evaluation.equations;
         let (frame, u, w) = body.parts(state);
-        let orientation = normalised(&EulerParameters([frame[3], frame[4], frame[5], frame[6]]));
+        let axes = normalised(&attitude(frame)).axes();
         let linear = Vector3::from_column_slice(&frame[LINEAR..LINEAR + 3]) / body.rigid_mass[(0, 0)];
-        let drift = body.in_model(&orientation.axes().tr_mul(&linear), &Vector3::zeros());
+        let drift = body.in_model(&axes.tr_mul(&linear), &Vector3::zeros());
         let about_centre = |((w, mass_rigid), mass): ((&f64, &[f64; 6]), &f64)| {
             (w - Vector6::from(*mass_rigid).dot(&drift)).powi(2) / mass
         };
@@ -92,8 +92,8 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
         let one = (scales.len() as f64).sqrt().recip();
         let (frame, nodes) = scales.split_at_mut(DISPLACEMENTS);
         let inertia = body.rigid_mass.diagonal().fixed_rows::<3>(3).amax();
-        frame[..3].fill(body.length * one);
-        frame[3..LINEAR].fill(one);
+        frame[..ATTITUDE].fill(body.length * one);
+        frame[ATTITUDE..LINEAR].fill(one);
         frame[LINEAR..ANGULAR].fill((share * body.rigid_mass[(0, 0)]).sqrt());
         frame[ANGULAR..].fill((share * inertia).sqrt());
         let (u, w) = nodes.split_at_mut(body.n_rows());
@@ -103,8 +103,8 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
 
     /// Euler parameters of unit length; C u = 0.
     fn settle(&self, state: &mut [f64]) {
-        let p = normalised(&EulerParameters([state[3], state[4], state[5], state[6]]));
-        state[3..LINEAR].copy_from_slice(&p.0);
+        let unit = normalised(&attitude(state));
+        state[ATTITUDE..LINEAR].copy_from_slice(&unit.0);
         let body = self.evaluation.equations;
         body.take_rigid(&mut state[DISPLACEMENTS..][..body.n_rows()]);
     }

@@ -8,10 +8,12 @@ use nalgebra::{Vector3, Vector6};
 /// Largest rigid motion in displacements that is rounding, relative to the largest of them.
 const ROUNDING: f64 = 1e-8;
 
-/// Where in a state y = (R, Euler parameters, P, L, u, w) each part begins.
-pub(super) const LINEAR: usize = 7;
-pub(super) const ANGULAR: usize = 10;
-pub(super) const DISPLACEMENTS: usize = 13;
+/// Where in a state y = (G, D, e, P, L, u, w) each part but the first begins.
+pub(super) const OFFSET: usize = 3;
+pub(super) const ATTITUDE: usize = 6;
+pub(super) const LINEAR: usize = 10;
+pub(super) const ANGULAR: usize = 13;
+pub(super) const DISPLACEMENTS: usize = 16;
 
 /// A state in the velocities that a reader thinks in: [`Configuration`](crate::dynamics::Configuration) with nodal displacements.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,9 +33,9 @@ pub struct NodalConfiguration {
 }
 
 impl NodalEquations<'_> {
-    /// Number of entries of a state y = (R, Euler parameters, P, L, u, w): 13 + 2 N. P and L are the linear momentum and the angular
-    /// momentum about the origin of the frame, in world axes; what is linear in y any Runge-Kutta method keeps, so that P and L + R x P
-    /// of a free body stay what they are.
+    /// Number of entries of a state y = (G, D, e, P, L, u, w): 16 + 2 N. The frame has its origin at R = G + D and the Euler parameters e;
+    /// P is the linear momentum, L the angular momentum about G, which starts at R and flies with P / m; all in world axes. P and L
+    /// of a free body are constant entries, which every method keeps to rounding.
     pub fn dimension(&self) -> usize {
         DISPLACEMENTS + 2 * self.n_rows()
     }
@@ -74,19 +76,24 @@ impl NodalEquations<'_> {
         let linear = to_world * momenta.fixed_rows::<3>(0);
         let angular = to_world * (momenta.fixed_rows::<3>(3) + self.moment(&u, &w));
         let mut state = Vec::with_capacity(self.dimension());
-        state.extend(origin.iter().chain(&attitude.0).chain(&linear).chain(&angular));
+        state.extend(origin.iter().chain(&[0.0; 3]).chain(&attitude.0).chain(&linear).chain(&angular));
         state.extend(u);
         state.extend(w);
         Ok(state)
     }
 
-    /// Parts of a state: the first 13 numbers, u and w.
+    /// Parts of a state: that of the frame, u and w.
     pub(super) fn parts<'s>(&self, state: &'s [f64]) -> (&'s [f64], &'s [f64], &'s [f64]) {
         assert_eq!(state.len(), self.dimension(), "a state of these equations");
         let (frame, nodes) = state.split_at(DISPLACEMENTS);
         let (u, w) = nodes.split_at(self.n_rows());
         (frame, u, w)
     }
+}
+
+/// The Euler parameters of a state.
+pub(super) fn attitude(frame: &[f64]) -> EulerParameters {
+    EulerParameters([frame[ATTITUDE], frame[ATTITUDE + 1], frame[ATTITUDE + 2], frame[ATTITUDE + 3]])
 }
 
 /// Euler parameters of unit length: a state has them but for the error of its integration.
@@ -100,7 +107,7 @@ impl NodalEvaluation<'_> {
     pub fn configuration(&self) -> NodalConfiguration {
         NodalConfiguration {
             origin: self.origin,
-            attitude: normalised(&self.orientation),
+            attitude: normalised(&self.attitude),
             velocity: self.axes * self.velocity,
             omega: self.equations.frame.axes.tr_mul(&self.omega),
             u: self.u.clone(),
