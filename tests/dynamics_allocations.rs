@@ -3,13 +3,18 @@
 mod support;
 
 use flexbody::dynamics::{
-    EquationsOfMotion, EulerParameters, Evaluation, NodeShapes, Orientation, RotationVector, Terms,
+    EquationsOfMotion, EulerParameters, Evaluation, NodalConfiguration, NodalEquations, NodalEvaluation,
+    NodalMotion, NodeShapes, Orientation, ReferenceConditions, RotationVector, Terms,
 };
+use flexbody::flex_body::Frame;
+use flexbody::integration::System as _;
 use flexbody::invariants::BodyFrame;
+use flexbody::model::{Damping, FeModel, RawModel};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use support::flexible::fixture;
+use support::general::raw_fixture;
 
 /// The system's allocator, counting per thread: other threads of the test harness do not matter.
 struct Counting;
@@ -73,5 +78,50 @@ fn evaluations_allocate_nothing() {
             assert_eq!(COUNT.get(), before + 1);
             drop(one);
         }
+    }
+}
+
+/// The nodal equations of a solid, of massless rows and of other null vectors of the mass.
+#[test]
+fn nodal_evaluations_allocate_nothing() {
+    for name in ["bracket_hex20", "frame_lumped", "shell_folded", "plane_frame"] {
+        let raw =
+            RawModel { damping: Some(Damping::Rayleigh { alpha: 0.1, beta: 1e-3 }), ..raw_fixture(name) };
+        let model = FeModel::from_raw(raw).expect("a body").model;
+        let frame = Frame::model();
+        let equations =
+            NodalEquations::new(&model, &frame, &ReferenceConditions::MeanAxes).expect("equations");
+        let n = equations.n_rows();
+        let start = NodalConfiguration {
+            origin: Vector3::zeros(),
+            attitude: EulerParameters([0.6, 0.0, 0.0, 0.8]),
+            velocity: Vector3::x(),
+            omega: Vector3::z(),
+            u: vec![0.0; n],
+            ud: vec![0.0; n],
+        };
+        let mut state = equations.state(&start).expect("a state");
+        let (mut rates, mut scales, mut nodal) = (state.clone(), state.clone(), vec![0.0; n]);
+        let loads = |_: f64, at: &mut NodalEvaluation<'_>| {
+            at.add_gravity(&Vector3::y());
+            at.add_force(1, &Vector3::x());
+        };
+        let mut motion = NodalMotion::new(&equations, loads);
+        let row_forces = vec![1e-3; n];
+
+        let before = COUNT.get();
+        motion.rates(0.0, &state, &mut rates).expect("rates");
+        motion.scales(&state, &mut scales);
+        motion.settle(&mut state);
+        let at = motion.evaluate(0.0, &state).expect("a state");
+        at.add_row_forces(&row_forces);
+        let (linear, angular) = at.accelerations(&mut nodal).expect("accelerations");
+        at.balance(&linear, &angular, &row_forces, &mut nodal);
+        let energy =
+            at.kinetic_energy() + at.elastic_energy() + at.reaction().1.norm() + at.momenta().0.norm();
+        let (place, velocity) = (at.place(2), at.node_velocity(2));
+        assert_eq!(COUNT.get(), before, "{name}");
+        assert!(energy > 0.0 && place.norm() < 1e9 && velocity.norm() > 0.0);
+        assert!(scales.iter().all(|scale| *scale > 0.0), "{name}");
     }
 }

@@ -494,3 +494,46 @@ fn what_has_no_nodal_equations_says_why() {
     let error = equations.state(&at(moved)).expect_err("rigid motion in one displacement");
     assert!(matches!(error, NodalError::ConditionsViolated { part } if part > 0.01 && part < 1.0), "{error}");
 }
+
+/// Another frame shows the same places and velocities of the nodes, and the same kinetic energy.
+#[test]
+fn frames_of_solids_show_the_same_nodes() {
+    for (name, raw) in [("hex8", soft_block(Kind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {
+        let body = Unreduced::new(raw);
+        let frame = Frame {
+            axes: nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.8).into_inner(),
+            ..body.frame
+        };
+        let equations = |conditions: &ReferenceConditions| {
+            NodalEquations::new(&body.model, &frame, conditions).expect("equations")
+        };
+        let (mean, held) = (
+            equations(&ReferenceConditions::MeanAxes),
+            equations(&ReferenceConditions::Held(holding(&body.model))),
+        );
+        let start = configuration(&body.shapes, &body.lively_state(2, 0.1));
+        assert!(matches!(held.state(&start), Err(NodalError::ConditionsViolated { .. })), "{name}");
+        let changed = held.reframed(&start).expect("another frame");
+        let (mut a, mut b) = (NodalEvaluation::new(&mean), NodalEvaluation::new(&held));
+        a.set(&mean.state(&start).expect("a state")).expect("a state");
+        b.set(&held.state(&changed).expect("a state")).expect("a state");
+        let speed = a.node_velocity(0).norm();
+        let turned = (a.configuration().omega - b.configuration().omega).norm();
+        assert!(turned > 1e-3 * a.configuration().omega.norm(), "{name}: another frame");
+        for i in 0..body.positions.len() {
+            assert!((a.place(i) - b.place(i)).norm() < 1e-13 * (1.0 + a.place(i).norm()), "{name}: node {i}");
+            let difference = (a.node_velocity(i) - b.node_velocity(i)).norm();
+            assert!(difference < 1e-11 * speed, "{name}: node {i} {difference:e}");
+        }
+        assert!((a.kinetic_energy() / b.kinetic_energy() - 1.0).abs() < 1e-12, "{name}");
+        // And back.
+        let back = mean.reframed(&b.configuration()).expect("the first frame");
+        let difference = DVector::from_vec(back.u) - DVector::from_vec(start.u);
+        assert!(difference.amax() < 1e-13 * body.size, "{name}: {:e}", difference.amax());
+    }
+    let body = Unreduced::fixture("frame_beams");
+    let equations =
+        NodalEquations::new(&body.model, &body.frame, &ReferenceConditions::MeanAxes).expect("equations");
+    let start = configuration(&body.shapes, &body.lively_state(2, 0.1));
+    assert_eq!(equations.reframed(&start), Err(NodalError::FrameTied));
+}

@@ -93,7 +93,6 @@ fn nodal_path(equations: &NodalEquations<'_>, start: &NodalConfiguration, instan
         Ok::<(), Failure>(())
     })
     .expect("integrates");
-    println!("{:?}", method.work());
     path
 }
 
@@ -156,13 +155,9 @@ fn all_modes_move_as_the_nodes_do() {
             NodalEquations::new(&model, body.frame(), &ReferenceConditions::MeanAxes).expect("equations");
         let lifting = NodalModes::new(&equations, &body).expect("the modes of this model");
         let (start, instants) = (tumbling(&body, 0.3, 0.05), instants(&body, periods));
-        let began = std::time::Instant::now();
         let nodal = nodal_path(&equations, &lifting.lift(&start), &instants);
-        println!("{name}: {} modes, nodal {:?}", body.n_modes(), began.elapsed());
         let reduced = reduced_path(&model, &body, &EmptySpace, &start, &instants);
-        println!("reduced {:?}", began.elapsed());
         let (deformation, error) = (stretch(&nodal), distance(&nodal, &reduced));
-        println!("{name}: {deformation:e} {error:e} of {:e}", radius(&body));
         assert!(deformation > 0.02 * radius(&body), "{name}: {deformation:e}");
         assert!(error < 1e-8 * deformation, "{name}: {:e}", error / deformation);
     }
@@ -193,8 +188,7 @@ fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
     let model = model_of(raw_fixture("mpc_block"));
     let body = body_of(&model, 8);
     let general = between_frames(&model, &body, &ReferenceConditions::Held(holding(&model)));
-    println!("{solid:?} {general:?}");
-    for (what, found, least, most) in [("solid", solid, 13.0, 19.0), ("general", general, 3.0, 5.0)] {
+    for (what, found, least, most) in [("solid", solid, 14.0, 20.0), ("general", general, 3.0, 5.0)] {
         for pair in found.windows(2) {
             let [distance, deformation] = [pair[0].0 / pair[1].0, pair[0].1 / pair[1].1];
             // The deformation goes with the square of the spin.
@@ -204,17 +198,21 @@ fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
     }
 }
 
-/// Linear momentum and angular momentum about the origin of the world of a solid: sums of m_ij v_j and x_i x m_ij v_j over places and
+/// Linear momentum and angular momentum about the centre of mass of a solid: sums of m_ij v_j and x_i x m_ij v_j over places and
 /// velocities of its nodes in the world.
 fn momenta_of_nodes(model: &FeModel, at: &NodalEvaluation<'_>) -> (Vector3<f64>, Vector3<f64>) {
     let mass = model.scalar_mass().expect("a solid");
+    let weighted = |of: &dyn Fn(usize) -> Vector3<f64>, i: usize| -> Vector3<f64> {
+        let (columns, values) = mass.row(i);
+        columns.iter().zip(values).map(|(&j, m)| of(j as usize) * *m).sum()
+    };
+    let whole: f64 = (0..mass.n()).flat_map(|i| mass.row(i).1).sum();
+    let centre = (0..mass.n()).map(|i| weighted(&|j| at.place(j), i)).sum::<Vector3<f64>>() / whole;
     let (mut linear, mut angular) = (Vector3::zeros(), Vector3::zeros());
     for i in 0..mass.n() {
-        let (columns, values) = mass.row(i);
-        let own: Vector3<f64> =
-            columns.iter().zip(values).map(|(&j, m)| at.node_velocity(j as usize) * *m).sum();
+        let own = weighted(&|j| at.node_velocity(j), i);
         linear += own;
-        angular += at.place(i).cross(&own);
+        angular += (at.place(i) - centre).cross(&own);
     }
     (linear, angular)
 }
@@ -243,16 +241,15 @@ fn drifts(
         Ok::<(), Failure>(())
     })
     .expect("integrates");
-    println!("{:?} {found:?}", method.work());
     found
 }
 
-/// Three hundred periods of the first mode.
+/// Two hundred periods of the first mode.
 #[test]
 fn long_motion_keeps_energy_and_momenta() {
     let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
     let body = body_of(&model, ALL);
-    let instants: Vec<f64> = (0..=200).map(|i| instants(&body, 300.0)[10] * f64::from(i) / 200.0).collect();
+    let instants: Vec<f64> = (0..=200).map(|i| instants(&body, 200.0)[10] * f64::from(i) / 200.0).collect();
     for conditions in [ReferenceConditions::MeanAxes, ReferenceConditions::Held(holding(&model))] {
         let equations = NodalEquations::new(&model, body.frame(), &conditions).expect("equations");
         let start = spinning_nodes(&equations, &spinning(&body, 0.3));
@@ -321,7 +318,6 @@ fn truncation_and_misprints_show_against_the_nodes() {
         distance(&spun, &reduced_path(&model, &body, &EmptySpace, &spinning(&body, 0.3), &instants))
             / stretch(&spun)
     });
-    println!("{errors:?}");
     assert!(errors.is_sorted_by(|a, b| a > b), "{errors:?}");
     assert!(errors[0] > 0.1 && errors[4] < 1e-8, "{errors:?}");
 
@@ -332,7 +328,6 @@ fn truncation_and_misprints_show_against_the_nodes() {
         distance(&bent, &reduced_path(&model, &whole, &misprint, &start, &instants)) / stretch(&bent);
     let right =
         distance(&bent, &reduced_path(&model, &whole, &EmptySpace, &start, &instants)) / stretch(&bent);
-    println!("{printed:e} {right:e}");
     assert!(printed > 1e-3 && right < 1e-8, "printed {printed:e}, right {right:e}");
 }
 
@@ -345,11 +340,8 @@ fn a_real_model_runs() {
         NodalEquations::new(&model, body.frame(), &ReferenceConditions::MeanAxes).expect("equations");
     let start = spinning(&body, 0.05);
     let instants = instants(&body, 0.25);
-    let began = std::time::Instant::now();
     let nodal = nodal_path(&equations, &spinning_nodes(&equations, &start), &instants);
-    println!("{:?}", began.elapsed());
     let reduced = reduced_path(&model, &body, &EmptySpace, &start, &instants);
     let error = distance(&nodal, &reduced) / stretch(&nodal);
-    println!("{error:e} {:e} {:?}", stretch(&nodal), began.elapsed());
     assert!(error > 1e-8 && error < 0.02, "{error:e}");
 }

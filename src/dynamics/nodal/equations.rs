@@ -11,7 +11,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 /// Part of the largest that the smallest singular value of C R may be.
 const INDEPENDENT: f64 = 1e-8;
 
-/// The equations of motion of all nodes in a floating frame (theory section 6, "The nodal equations"; \[ZG19\] eq. 67 to 98 for solids):
+/// The equations of motion of all nodes in a floating frame (theory 6.9 to 6.13; \[ZG19\] eq. 67 to 98 for solids):
 /// nothing is reduced, K and M are the model's.
 ///
 /// ```text
@@ -105,13 +105,15 @@ impl<'m> NodalEquations<'m> {
 
         let (_, length) = centre_and_length(&model.nodes().positions);
         let conditions_rigid = products(&rigid, &columns, moving);
-        // All of one unit: rotations by one over the size of the body.
-        let unit = |motion: usize| if motion < 3 { 1.0 } else { 1.0 / length };
-        let by_columns = columns_scaled(&conditions_rigid, moving, unit);
-        let values = by_columns.singular_values();
-        let rigid_part = conditions_rigid.transpose().try_inverse();
-        let independent = values.min() > INDEPENDENT * values.max();
-        let rigid_part = rigid_part.filter(|_| independent).ok_or(NodalError::ConditionsDependent)?;
+        let independent = match conditions {
+            ReferenceConditions::MeanAxes => true,
+            ReferenceConditions::Held(_) => {
+                let values = equilibrated(&conditions_rigid, length).singular_values();
+                values.min() > INDEPENDENT * values.max()
+            }
+        };
+        let rigid_part = conditions_rigid.transpose().try_inverse().filter(|_| independent);
+        let rigid_part = rigid_part.ok_or(NodalError::ConditionsDependent)?;
         let positions = model.nodes().positions.iter().map(|x| Vector3::from(*x) - frame.origin).collect();
         Ok(Self {
             model,
@@ -227,9 +229,14 @@ impl<'m> NodalEquations<'m> {
         }
     }
 
-    /// Takes rigid motion out of displacements: u - R (C R)^-1 C u. The part that was taken.
+    /// (C R)^-1 C u: the rigid motion in displacements.
+    pub(super) fn rigid_motion(&self, u: &[f64]) -> Vector6<f64> {
+        self.rigid_part * Self::sums(&self.conditions, u)
+    }
+
+    /// Takes it out, u - R (C R)^-1 C u, and returns it.
     pub(super) fn take_rigid(&self, u: &mut [f64]) -> Vector6<f64> {
-        let part = self.rigid_part * Self::sums(&self.conditions, u);
+        let part = self.rigid_motion(u);
         Self::add_motion(&self.rigid, -1.0, &part, u);
         part
     }
@@ -252,14 +259,14 @@ fn products(a: &Motions, b: &Motions, moving: &[usize]) -> Matrix6<f64> {
     sum
 }
 
-/// R'C' with rows of one unit and columns of one size.
-fn columns_scaled(matrix: &Matrix6<f64>, moving: &[usize], unit: impl Fn(usize) -> f64) -> Matrix6<f64> {
-    let mut scaled =
-        Matrix6::from_fn(|i, j| matrix[(i, j)] * if moving.contains(&i) { unit(i) } else { 1.0 });
+/// R'C' with rotations by one over the `length` of the body and columns of one size.
+fn equilibrated(matrix: &Matrix6<f64>, length: f64) -> Matrix6<f64> {
+    let mut scaled = *matrix;
+    scaled.fixed_rows_mut::<3>(3).unscale_mut(length);
     for mut column in scaled.column_iter_mut() {
         let size = column.norm();
         if size > 0.0 {
-            column /= size;
+            column.unscale_mut(size);
         }
     }
     scaled

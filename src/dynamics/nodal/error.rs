@@ -36,6 +36,8 @@ pub enum NodalError {
     },
     /// Damping is given by ratios of modes.
     DampingOfModes,
+    /// A frame that nodal rotations or rows without a place tie to the body.
+    FrameTied,
     /// The displacements do not fulfil the reference conditions.
     ConditionsViolated {
         /// Size of the rigid motion in them, relative to the largest displacement.
@@ -52,7 +54,7 @@ impl std::fmt::Display for NodalError {
                 "{found} degrees of freedom are held; help: hold {expected}, as many as the body has rigid motions"
             ),
             Self::ConditionsDependent => f.write_str(
-                "the held degrees of freedom leave a rigid motion free; help: hold three of one node, two of another and one of a third",
+                "the reference conditions leave a rigid motion free; help: hold three of one node, two of another and one of a third",
             ),
             Self::HeldWithoutMass(dof) => {
                 write!(f, "{dof} is to be held, but carries no mass; help: hold others, or take mean axes")
@@ -74,9 +76,12 @@ impl std::fmt::Display for NodalError {
             Self::DampingOfModes => f.write_str(
                 "damping ratios belong to modes, the nodal equations have none; help: give Rayleigh damping or a damping matrix",
             ),
+            Self::FrameTied => f.write_str(
+                "the frame of a body with nodal rotations or rows without a place cannot be changed; help: start without deformation",
+            ),
             Self::ConditionsViolated { part } => write!(
                 f,
-                "the displacements hold rigid motion, {part:.1e} of the largest of them; help: remove it, the frame moves with the body"
+                "the displacements hold rigid motion, {part:.1e} of the largest of them; help: change the frame (`reframed`), or take less deformation"
             ),
         }
     }

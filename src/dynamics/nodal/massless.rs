@@ -1,4 +1,4 @@
-//! What carries no mass follows from the rest: exact condensation (theory 6.14).
+//! What carries no mass follows from the rest: exact condensation (theory 6.13).
 
 use super::NodalError;
 use crate::linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
