@@ -212,7 +212,21 @@ impl<'m> NodalEquations<'m> {
         matrix
     }
 
-    /// x' R-like: the sums over all rows.
+    /// x += factor B_r nu at the displacements u.
+    pub(super) fn add_frame(&self, factor: f64, nu: &Vector6<f64>, u: &[f64], x: &mut [f64]) {
+        Self::add_motion(&self.rigid, factor, nu, x);
+        self.add_turned(factor, &nu.fixed_rows::<3>(3).into_owned(), u, x);
+    }
+
+    /// B_r'x at the displacements u.
+    pub(super) fn onto_frame(&self, u: &[f64], x: &[f64]) -> Vector6<f64> {
+        let mut both = Self::sums(&self.rigid, x);
+        let mut angular = both.fixed_rows_mut::<3>(3);
+        angular += self.moment(u, x);
+        both
+    }
+
+    /// The sums over all rows of `motions` times x.
     pub(super) fn sums(motions: &Motions, x: &[f64]) -> Vector6<f64> {
         let mut sum = [0.0; 6];
         for (motion, x) in motions.iter().zip(x) {

@@ -5,8 +5,9 @@ use super::massless::Room;
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude, normalised};
 use crate::dynamics::{EulerParameters, Orientation};
 use crate::integration::Failure;
+use crate::linalg::multiply_vector;
 use crate::model::Damping;
-use nalgebra::{LU, Matrix3, Matrix6, U6, Vector3, Vector6};
+use nalgebra::{LU, Matrix3, U6, Vector3, Vector6};
 
 /// The deformation is beyond what the conditions can follow.
 const LOST: Failure = Failure::Rates {
@@ -109,12 +110,11 @@ impl<'e> NodalEvaluation<'e> {
         (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
         self.row_forces.fill(0.0);
 
-        let matrix: Matrix6<f64> = body.conditions_at(&self.u);
+        let matrix = body.conditions_at(&self.u);
         (self.conditions, self.conditions_transposed) = (matrix.lu(), matrix.transpose().lu());
         let (linear, angular) = (vector(LINEAR), vector(ANGULAR) - self.offset.cross(&vector(LINEAR)));
-        let momenta = self.moving(&self.axes.tr_mul(&linear), &self.axes.tr_mul(&angular));
-        (self.p, self.h) = halves(&momenta);
-        let missing = momenta - self.onto_frame(&self.w);
+        (self.p, self.h) = (self.axes.tr_mul(&linear), self.axes.tr_mul(&angular));
+        let missing = joined(&self.p, &self.h) - body.onto_frame(&self.u, &self.w);
         let mu = self.conditions.solve(&missing).ok_or(LOST)?;
         NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
 
@@ -124,21 +124,13 @@ impl<'e> NodalEvaluation<'e> {
         let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
         (self.velocity, self.omega) = halves(&nu);
         self.ud.copy_from_slice(&self.vbar);
-        self.add_frame_velocity(-1.0);
+        body.add_frame(-1.0, &nu, &self.u, &mut self.ud);
         if !body.massless.is_empty() {
             body.massless.project(body.stiffness(), &mut self.ud, &mut self.room);
             self.vbar.copy_from_slice(&self.ud);
-            std::mem::swap(&mut self.ud, &mut self.vbar);
-            self.add_frame_velocity(1.0);
-            std::mem::swap(&mut self.ud, &mut self.vbar);
+            body.add_frame(1.0, &nu, &self.u, &mut self.vbar);
         }
         Ok(())
-    }
-
-    /// u' += factor B (V, omega).
-    fn add_frame_velocity(&mut self, factor: f64) {
-        NodalEquations::add_motion(&self.equations.rigid, factor, &self.nu(), &mut self.ud);
-        self.equations.add_turned(factor, &self.omega, &self.u, &mut self.ud);
     }
 
     /// y' (see [`NodalEquations::dimension`]) under the loads.
@@ -167,37 +159,41 @@ impl<'e> NodalEvaluation<'e> {
     /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is known from the momenta.
     fn find_rates(&mut self) -> Result<(), Failure> {
         let body = self.equations;
-        let [forces, moved] = [&mut self.first, &mut self.second];
-        forces.copy_from_slice(&self.row_forces);
-        body.add_turned(-1.0, &self.omega, &self.w, forces);
-        moved.copy_from_slice(&self.u);
+        self.first.copy_from_slice(&self.row_forces);
+        body.add_turned(-1.0, &self.omega, &self.w, &mut self.first);
+        self.take_internal_forces();
+        let torque = self.torque
+            - self.omega.cross(&self.h)
+            - self.velocity.cross(&self.p)
+            - body.moment(&self.ud, &self.w);
+        let wanted = joined(&(self.force - self.omega.cross(&self.p)), &torque);
+        let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
+        self.multipliers = self.conditions.solve(&missing).ok_or(LOST)?;
+        NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
+        Ok(())
+    }
+
+    /// `w_rate` = T'(f - D u') - K u for the forces f in `first`.
+    fn take_internal_forces(&mut self) {
+        let body = self.equations;
+        self.second.copy_from_slice(&self.u);
         match body.model.damping() {
             None => {}
             Some(Damping::Rayleigh { alpha, beta }) => {
                 body.weigh(&self.ud, &mut self.w_rate);
-                add_scaled(-alpha, &self.w_rate, forces);
-                add_scaled(*beta, &self.ud, moved);
+                add_scaled(-alpha, &self.w_rate, &mut self.first);
+                add_scaled(*beta, &self.ud, &mut self.second);
             }
             Some(Damping::Matrix(damping)) => {
-                crate::linalg::multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
-                add_scaled(-1.0, &self.w_rate, forces);
+                multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
+                add_scaled(-1.0, &self.w_rate, &mut self.first);
             }
             Some(Damping::Ratio(_) | Damping::Bands(_)) => unreachable!("refused at construction"),
         }
-        body.massless.add_static(forces, moved, &mut self.room);
-        crate::linalg::multiply_vector(body.stiffness(), 1, moved, &mut self.w_rate);
-        for (rate, force) in self.w_rate.iter_mut().zip(&*forces) {
-            *rate = force - *rate;
-        }
-        let of_forces = self.torque
-            - self.omega.cross(&self.h)
-            - self.velocity.cross(&self.p)
-            - body.moment(&self.ud, &self.w);
-        let wanted = self.moving(&(self.force - self.omega.cross(&self.p)), &of_forces);
-        let missing = wanted - self.onto_frame(&self.w_rate);
-        self.multipliers = self.conditions.solve(&missing).ok_or(LOST)?;
-        NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
-        Ok(())
+        // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the others.
+        body.massless.add_static(&self.first, &mut self.second, &mut self.room);
+        multiply_vector(body.stiffness(), 1, &self.second, &mut self.w_rate);
+        self.w_rate.iter_mut().zip(&self.first).for_each(|(rate, force)| *rate = force - *rate);
     }
 
     /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components in these axes.
@@ -217,8 +213,7 @@ impl<'e> NodalEvaluation<'e> {
         let nu = NodalEquations::sums(&body.conditions, udd);
         let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
         let (linear, angular) = halves(&nu);
-        NodalEquations::add_motion(&body.rigid, -1.0, &nu, udd);
-        body.add_turned(-1.0, &angular, &self.u, udd);
+        body.add_frame(-1.0, &nu, &self.u, udd);
         body.massless.project(body.stiffness(), udd, &mut self.room);
         let to_frame = body.frame.axes.transpose();
         Ok((to_frame * linear, to_frame * angular))
@@ -234,7 +229,7 @@ impl<'e> NodalEvaluation<'e> {
     }
 
     /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F and tau in the axes of the
-    /// frame, and f (N) in model axes, with lambda = 0.
+    /// frame, and f (N) in model axes, with lambda = 0; none on what has no mass.
     ///
     /// # Panics
     /// When a length is not N.
@@ -250,38 +245,28 @@ impl<'e> NodalEvaluation<'e> {
         let nu = body.in_model(linear, angular);
         let change = &mut self.first;
         change.copy_from_slice(udd);
-        NodalEquations::add_motion(&body.rigid, 1.0, &nu, change);
-        body.add_turned(1.0, &halves(&nu).1, &self.u, change);
+        body.add_frame(1.0, &nu, &self.u, change);
         body.add_turned(1.0, &self.omega, &self.ud, change);
         body.weigh(change, forces);
-        let (force, torque) = halves(&self.onto_frame(forces));
+        let (force, torque) = halves(&body.onto_frame(&self.u, forces));
         let force = force + self.omega.cross(&self.p);
         let torque = torque
             + body.moment(&self.ud, &self.w)
             + self.omega.cross(&self.h)
             + self.velocity.cross(&self.p);
-        let (force, torque) = halves(&self.moving(&force, &torque));
         body.add_turned(1.0, &self.omega, &self.w, forces);
-        crate::linalg::multiply_vector(body.stiffness(), 1, &self.u, &mut self.first);
-        add_scaled(1.0, &self.first, forces);
+        self.first.copy_from_slice(forces);
+        self.first.iter_mut().for_each(|force| *force = -*force);
+        self.take_internal_forces();
+        forces.iter_mut().zip(&self.w_rate).for_each(|(force, rate)| *force = -rate);
         let to_frame = body.frame.axes.transpose();
         (to_frame * force, to_frame * torque)
     }
+}
 
-    /// B'x.
-    pub(super) fn onto_frame(&self, x: &[f64]) -> Vector6<f64> {
-        let (linear, angular) = halves(&NodalEquations::sums(&self.equations.rigid, x));
-        self.moving(&linear, &(angular + self.equations.moment(&self.u, x)))
-    }
-
-    /// Both vectors, without what a plane body does not have.
-    fn moving(&self, linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-        let mut both = Vector6::zeros();
-        for &k in self.equations.moving {
-            both[k] = if k < 3 { linear[k] } else { angular[k - 3] };
-        }
-        both
-    }
+/// Both in one.
+fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::from_iterator(linear.iter().chain(angular).copied())
 }
 
 /// The linear and the angular part.

@@ -2,7 +2,7 @@
 
 use super::NodalEvaluation;
 use super::equations::NodalEquations;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 impl NodalEvaluation<'_> {
     /// Adds uniform gravity: the gradient of -g'(m R + A s), s = c + Phi_t'M u.
@@ -18,7 +18,7 @@ impl NodalEvaluation<'_> {
         moment += of_u.fixed_rows::<3>(0);
         self.force += own * mass[(0, 0)];
         self.torque += moment.cross(&own);
-        let mut linear = nalgebra::Vector6::zeros();
+        let mut linear = Vector6::zeros();
         linear.fixed_rows_mut::<3>(0).copy_from(&own);
         NodalEquations::add_motion(&body.mass_rigid, 1.0, &linear, &mut self.row_forces);
     }
@@ -44,7 +44,7 @@ impl NodalEvaluation<'_> {
     /// When there are not N.
     pub fn add_row_forces(&mut self, forces: &[f64]) {
         assert_eq!(forces.len(), self.row_forces.len(), "one force per row");
-        let both = self.onto_frame(forces);
+        let both = self.equations.onto_frame(&self.u, forces);
         self.force += both.fixed_rows::<3>(0);
         self.torque += both.fixed_rows::<3>(3);
         self.row_forces.iter_mut().zip(forces).for_each(|(sum, value)| *sum += value);

@@ -3,7 +3,7 @@
 use super::equations::NodalEquations;
 use super::{NodalError, NodalEvaluation};
 use crate::dynamics::{EulerParameters, Orientation};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector3;
 
 /// Largest rigid motion in displacements that is rounding, relative to the largest of them.
 const ROUNDING: f64 = 1e-8;
@@ -66,15 +66,14 @@ impl NodalEquations<'_> {
         }
         let attitude = normalised(attitude);
         let nu = self.in_model(&attitude.axes().tr_mul(velocity), omega);
-        Self::add_motion(&self.rigid, 1.0, &nu, &mut vbar);
-        self.add_turned(1.0, &nu.fixed_rows::<3>(3).into_owned(), &u, &mut vbar);
+        self.add_frame(1.0, &nu, &u, &mut vbar);
         let mut w = vec![0.0; n];
         self.weigh(&vbar, &mut w);
 
         let to_world = attitude.axes() * self.frame.axes.transpose();
-        let momenta = Self::sums(&self.rigid, &w);
+        let momenta = self.onto_frame(&u, &w);
         let linear = to_world * momenta.fixed_rows::<3>(0);
-        let angular = to_world * (momenta.fixed_rows::<3>(3) + self.moment(&u, &w));
+        let angular = to_world * momenta.fixed_rows::<3>(3);
         let mut state = Vec::with_capacity(self.dimension());
         state.extend(origin.iter().chain(&[0.0; 3]).chain(&attitude.0).chain(&linear).chain(&angular));
         state.extend(u);
@@ -159,11 +158,6 @@ impl NodalEvaluation<'_> {
     /// U = u'K u / 2.
     pub fn elastic_energy(&self) -> f64 {
         self.equations.elastic_energy(&self.u)
-    }
-
-    /// V and omega in model axes.
-    pub(super) fn nu(&self) -> Vector6<f64> {
-        Vector6::from_iterator(self.velocity.iter().chain(&self.omega).copied())
     }
 }
 
