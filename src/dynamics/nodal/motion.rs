@@ -19,8 +19,9 @@ const NOTHING: f64 = 1e-9;
 /// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    G, D: length / sqrt(n)    e: 1 / sqrt(n)
 /// ```
 ///
-/// so that the sum of the squares of all errors over their scales is the energy of the error, that of u bounded from above by the
-/// diagonal of K, relative to E. A body at rest has in place of E what deforms it by 1e-9 of its size.
+/// so that the mean square of error over scale is the energy of the error relative to E, with the diagonals of K and M in place of the
+/// matrices: strict for soft modes, whose u has less energy than that. A body at rest has in place of E what deforms it by 1e-9 of its
+/// size.
 #[derive(Debug)]
 pub struct NodalMotion<'e, L> {
     evaluation: NodalEvaluation<'e>,
