@@ -6,9 +6,12 @@ use faer::Mat;
 use flexbody::dynamics::{AngularVelocity, EquationsOfMotion, Evaluation, NodeShapes, Terms};
 use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
+use flexbody::model::LoadKind;
 use nalgebra::{DMatrix, DVector, Vector3};
 use support::equations::{Coriolis, State};
-use support::flexible::{accelerations, fixture, invariants_of, lively_state, made_of, oracle, set};
+use support::flexible::{
+    accelerations, fixture, invariants_of, lively_state, made_of, oracle, set, stressed,
+};
 use support::general::{
     GeneralBody, NodalBody, Row, RowKind, quasi_velocities, random_body, random_matrix, to_faer,
 };
@@ -137,7 +140,7 @@ fn converted_bodies_have_the_terms_of_section_six() {
 #[test]
 fn dropped_terms_are_zero_arrays() {
     for seed in 0..8u64 {
-        let terms = Terms { w1: seed & 1 == 0, w2: seed & 2 == 0, w3: seed & 4 == 0 };
+        let terms = Terms { w1: seed & 1 == 0, w2: seed & 2 == 0, w3: seed & 4 == 0, ..Terms::ALL };
         for (nodal, body) in [random_solid(seed), random_general(seed)] {
             let mut truncated = nodal.invariants();
             for (kept, array) in [
@@ -168,9 +171,11 @@ fn dropped_terms_are_zero_arrays() {
 fn jacobians_are_the_differences_of_the_forces() {
     let bodies = (0..6).flat_map(|seed| [random_solid(seed).1, random_general(seed).1]);
     let plane = ["plane_frame"].map(|name| fixture(name, 6, BodyFrame::Model));
+    let motion = [LoadKind::Spin, LoadKind::Acceleration, LoadKind::AngularAcceleration];
     for (at, body) in bodies.chain(plane).enumerate() {
         let nf = body.n_modes();
         let mut random = Random(at as u64);
+        let body = stressed(body, &motion[..at % 4], 1.0, &mut random);
         let mut parts = body.into_parts();
         parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, |i, j| 0.1 * (1 + i.min(j)) as f64));
         // Of the size of the other forces.

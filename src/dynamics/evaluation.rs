@@ -29,10 +29,13 @@ pub struct Evaluation<'a> {
     pub(super) w3_qd: Vec<f64>,
     /// (W3_a' - W3_a) qd.
     pub(super) skew_qd: Vec<f64>,
-    /// C(q) (3 x nf).
+    /// K^a_k q for each translation, and K^a_k qd.
+    pub(super) accelerated_q: Vec<f64>,
+    pub(super) accelerated_qd: Vec<f64>,
+    /// [C1(q); C(q)] (6 x nf).
     pub(super) coupling: Vec<f64>,
     first_moment: Vector3<f64>,
-    /// -c~ + W0 Q: momentum per angular velocity.
+    /// -c~ + W0 Q, c with what geometric stiffness adds: momentum per angular velocity.
     pub(super) lever: Matrix3<f64>,
     pub(super) lever_rate: Matrix3<f64>,
     inertia: Matrix3<f64>,
@@ -40,12 +43,13 @@ pub struct Evaluation<'a> {
     pub(super) momentum: Vector3<f64>,
     pub(super) angular_momentum: Vector3<f64>,
     pub(super) velocity_forces: Vec<f64>,
-    /// For [`Evaluation::accelerations`]: L^-1 [C1' C(q)'] (6 x nf) and modal forces.
+    /// For [`Evaluation::accelerations`]: L^-1 [C1(q)' C(q)'] (6 x nf) and modal forces.
     pub(super) whitened: Vec<f64>,
     pub(super) modal: Vec<f64>,
     /// For [`Evaluation::jacobian`]: products with rates and accelerations.
     pub(super) w2_scratch: Vec<f64>,
     pub(super) w3_scratch: [Vec<f64>; 2],
+    pub(super) accelerated_scratch: Vec<f64>,
 }
 
 impl<'a> Evaluation<'a> {
@@ -55,6 +59,7 @@ impl<'a> Evaluation<'a> {
         let zeros = |n: usize| vec![0.0; n];
         let of_pairs = || zeros(equations.w2.as_ref().map_or(0, |w2| w2.padded_rows()));
         let of_axes = || zeros(equations.w3.as_ref().map_or(0, |w3| w3.padded_rows()));
+        let of_translations = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
         let mut evaluation = Self {
             equations,
             arch: Arch::new(),
@@ -66,7 +71,9 @@ impl<'a> Evaluation<'a> {
             w3_q: of_axes(),
             w3_qd: of_axes(),
             skew_qd: of_axes(),
-            coupling: zeros(3 * nf),
+            accelerated_q: of_translations(),
+            accelerated_qd: of_translations(),
+            coupling: zeros(6 * nf),
             first_moment: Vector3::zeros(),
             lever: Matrix3::zeros(),
             lever_rate: Matrix3::zeros(),
@@ -79,6 +86,7 @@ impl<'a> Evaluation<'a> {
             modal: zeros(nf),
             w2_scratch: of_pairs(),
             w3_scratch: [of_axes(), of_axes()],
+            accelerated_scratch: of_translations(),
         };
         let (q, nu) = (zeros(nf), zeros(equations.n_velocities()));
         evaluation.set(&q, &nu);
@@ -134,8 +142,27 @@ impl<'a> Evaluation<'a> {
             }
         }
 
+        // C1(q), C1(q) qd and dC1/dt qd; what the motion of second order adds to the first moment.
+        self.coupling.copy_from_slice(&body.linear[C1 * nf..]);
+        let mut first_moment_rate = vector(C1, &of_qd);
+        let mut first_moment_bend = Vector3::zeros();
+        if let Some(accelerated) = &body.accelerated {
+            accelerated.times(q, &mut self.accelerated_q);
+            accelerated.times(qd, &mut self.accelerated_qd);
+            let (mut shift, mut rate) = (Vector3::zeros(), Vector3::zeros());
+            for k in 0..body.translations() {
+                let product = &self.accelerated_q[k * nf..][..nf];
+                add_scaled(1.0, product, &mut self.coupling[k * nf..][..nf]);
+                (shift[k], rate[k]) = (0.5 * dot(q, product), dot(qd, product));
+                first_moment_bend[k] = dot(qd, &self.accelerated_qd[k * nf..][..nf]);
+            }
+            self.first_moment += shift;
+            first_moment_rate += rate;
+            self.lever -= shift.cross_matrix();
+            self.lever_rate -= rate.cross_matrix();
+        }
+
         // C(q), C(q) qd and dC/dt qd.
-        self.coupling.copy_from_slice(&body.linear[C2 * nf..]);
         let mut coupling_qd = vector(C2, &of_qd);
         let mut coupling_rate_qd = Vector3::zeros();
         if let Some(w3) = &body.w3 {
@@ -147,7 +174,7 @@ impl<'a> Evaluation<'a> {
             }
             for (at, &a) in body.axes.iter().enumerate() {
                 let product = &self.w3_q[at * nf..][..nf];
-                add_scaled(1.0, product, &mut self.coupling[a * nf..][..nf]);
+                add_scaled(1.0, product, &mut self.coupling[(3 + a) * nf..][..nf]);
                 coupling_qd[a] += dot(product, qd);
                 if body.w3_skew.is_some() {
                     coupling_rate_qd[a] = dot(&self.w3_qd[at * nf..][..nf], qd);
@@ -155,10 +182,10 @@ impl<'a> Evaluation<'a> {
             }
         }
 
-        let p = body.mass * v + self.lever * w + vector(C1, &of_qd);
+        let p = body.mass * v + self.lever * w + first_moment_rate;
         let h = self.lever.tr_mul(&v) + self.inertia * w + coupling_qd;
         (self.momentum, self.angular_momentum) = (p, h);
-        let force = self.lever_rate * w + w.cross(&p);
+        let force = self.lever_rate * w + first_moment_bend + w.cross(&p);
         let torque =
             self.lever_rate.tr_mul(&v) + self.inertia_rate * w + coupling_rate_qd + w.cross(&h) + v.cross(&p);
 
@@ -168,6 +195,12 @@ impl<'a> Evaluation<'a> {
         for at in 0..9 {
             let weight = v[at / 3] * w[at % 3];
             add_scaled(-weight, body.row(W0 + at), modal);
+        }
+        if body.accelerated.is_some() {
+            let carried = w.cross(&v);
+            for k in 0..body.translations() {
+                add_scaled(carried[k], &self.accelerated_q[k * nf..][..nf], modal);
+            }
         }
         for (pair, &(a, b)) in PAIRS.iter().enumerate() {
             add_scaled(-0.5 * spin_product(&w, (a, b)), body.row(W1 + pair), modal);
@@ -189,17 +222,18 @@ impl<'a> Evaluation<'a> {
         self.equations
     }
 
-    /// s(q) = c + C1 q, first moment of the deformed body. Unit: mass length.
+    /// s(q) = c + C1 q + q'K^a q / 2, first moment of the deformed body, with its geometric stiffness K^a for acceleration. Unit:
+    /// mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
         self.first_moment
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q, inertia of the deformed body about the origin. Unit: mass length^2.
+    /// I(q) = I0 + W1 Q + Q'W2 Q, less q'K^omega q, inertia of the deformed body about the origin. Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         self.inertia
     }
 
-    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1 qd, body axes.
+    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q with what geometric stiffness adds to c.
     pub fn linear_momentum(&self) -> Vector3<f64> {
         self.momentum
     }
@@ -209,7 +243,7 @@ impl<'a> Evaluation<'a> {
         self.angular_momentum
     }
 
-    /// pi = C1'V + C(q)'omega + m_ff qd (nf).
+    /// pi = C1(q)'V + C(q)'omega + m_ff qd (nf).
     ///
     /// # Panics
     /// When `pi` has not nf entries.
@@ -301,7 +335,7 @@ impl<'a> Evaluation<'a> {
         matrix
     }
 
-    /// y += C1' linear + C(q)' angular + m_ff modal.
+    /// y += C1(q)' linear + C(q)' angular + m_ff modal.
     fn add_modal_inertia(&self, linear: &Vector3<f64>, angular: &Vector3<f64>, modal: &[f64], y: &mut [f64]) {
         for k in 0..3 {
             add_scaled(linear[k], self.equations.coupling_row(&self.coupling, k), y);

@@ -1,13 +1,12 @@
 //! Generalised forces of gravity and of forces at nodes.
 
-use super::equations::C1;
 use super::kernels::{add_scaled, dot};
 use super::{EquationsOfMotion, Evaluation};
 use crate::flex_body::FlexBody;
 use nalgebra::Vector3;
 
 impl Evaluation<'_> {
-    /// Adds the forces of uniform gravity: (m g, s x g, C1'g), the gradient of -g'(m R + A s).
+    /// Adds the forces of uniform gravity: (m g, s x g, C1(q)'g), the gradient of -g'(m R + A s).
     ///
     /// * `gravity`: A'g, in body axes. Unit: length/time^2.
     /// * `forces`: 6 + nf, of a plane body 3 + nf.
@@ -18,7 +17,7 @@ impl Evaluation<'_> {
         let body = self.equations();
         let modal = body.add_rigid(body.mass * gravity, self.first_moment().cross(gravity), forces);
         for k in 0..3 {
-            add_scaled(gravity[k], body.row(C1 + k), modal);
+            add_scaled(gravity[k], body.coupling_row(&self.coupling, k), modal);
         }
     }
 }

@@ -4,6 +4,7 @@
 mod accelerations;
 mod equations;
 mod evaluation;
+mod geometric;
 mod jacobian;
 mod kernels;
 mod loads;

@@ -163,11 +163,6 @@ impl Orientation<1> for PlaneAngle {
 }
 
 impl EquationsOfMotion {
-    /// Translations, of a plane body 2.
-    fn translations(&self) -> usize {
-        if self.rigid.len() == 3 { 2 } else { 3 }
-    }
-
     /// nu = H x'.
     ///
     /// * `rates`: x' = (R', theta', qd), 3 + R + nf; of a plane body 2 + R + nf.
