@@ -202,6 +202,43 @@ fn geometric_stiffness_is_the_inertia_of_motion_of_second_order() {
     }
 }
 
+/// The momenta change as `momentum_rates` says: they are cubic in time along straight lines, for which five points are exact.
+#[test]
+fn momenta_change_as_their_rates_say() {
+    for (at, name) in ["bracket_hex20", "frame_beams"].into_iter().enumerate() {
+        let mut random = Random(30 + at as u64);
+        let mut parts = fixture(name, 5, BodyFrame::Model).into_parts();
+        parts.invariants.modal_stiffness = Mat::zeros(5, 5);
+        let body = stressed(FlexBody::new(parts).expect("valid parts"), &MOTION, 0.3, &mut random);
+        let equations = EquationsOfMotion::new(&body, Terms::ALL);
+        let mut evaluation = Evaluation::new(&equations);
+        let mut numbers = |n: usize| DVector::from_fn(n, |_, _| 0.3 * random.signed());
+        let (q, nu, applied) = (numbers(5), numbers(11), numbers(11));
+        evaluation.set(q.as_slice(), nu.as_slice());
+        let (mut rates, mut acceleration) = (DVector::zeros(11), DVector::zeros(11));
+        evaluation.momentum_rates(applied.as_slice(), rates.as_mut_slice());
+        evaluation.accelerations(applied.as_slice(), acceleration.as_mut_slice()).expect("a body");
+        let (w, p, h) =
+            (nu.fixed_rows::<3>(3).into_owned(), evaluation.linear_momentum(), evaluation.angular_momentum());
+        let mut momenta = |time: f64| {
+            evaluation.set((&q + nu.rows(6, 5) * time).as_slice(), (&nu + &acceleration * time).as_slice());
+            let mut pi = vec![0.0; 5];
+            evaluation.modal_momentum(&mut pi);
+            let (p, h) = (evaluation.linear_momentum(), evaluation.angular_momentum());
+            DVector::from_iterator(11, p.iter().chain(&h).chain(&pi).copied())
+        };
+        let step = 0.1 / acceleration.norm().max(1.0);
+        let near = (momenta(step) - momenta(-step)) * (8.0 / 12.0 / step);
+        let mut found = near - (momenta(2.0 * step) - momenta(-2.0 * step)) / (12.0 * step);
+        for (first, carried) in [(0, w.cross(&p)), (3, w.cross(&h))] {
+            let mut part = found.fixed_rows_mut::<3>(first);
+            part += carried;
+        }
+        let error = (&found - &rates).norm() / (rates.norm() + momenta(0.0).norm() / step);
+        assert!(error < 1e-13, "{name}: {error:e}");
+    }
+}
+
 /// Terms are switched by themselves.
 #[test]
 fn geometric_stiffness_stays_without_the_inertia_that_it_corrects() {

@@ -12,7 +12,7 @@ mod modal_matrix;
 mod orientation;
 mod terms;
 
-pub use accelerations::NotPositiveDefinite;
+pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
 pub use loads::NodeShapes;
