@@ -213,7 +213,7 @@ fn momenta_change_as_their_rates_say() {
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let mut evaluation = Evaluation::new(&equations);
         let mut numbers = |n: usize| DVector::from_fn(n, |_, _| 0.3 * random.signed());
-        let (q, nu, applied) = (numbers(5), numbers(11), numbers(11));
+        let (q, nu, applied) = (numbers(5) * 0.03, numbers(11), numbers(11));
         evaluation.set(q.as_slice(), nu.as_slice());
         let (mut rates, mut acceleration) = (DVector::zeros(11), DVector::zeros(11));
         evaluation.momentum_rates(applied.as_slice(), rates.as_mut_slice());
