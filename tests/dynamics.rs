@@ -3,7 +3,7 @@
 mod support;
 
 use faer::Mat;
-use flexbody::dynamics::{AngularVelocity, EquationsOfMotion, Evaluation, NodeShapes, Terms};
+use flexbody::dynamics::{AngularVelocity, BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
 use flexbody::model::LoadKind;
@@ -271,12 +271,12 @@ fn loads_do_the_power_of_the_nodes() {
         let nu = quasi_velocities(&state);
         let mut evaluation = Evaluation::new(&equations);
         set(&mut evaluation, &state);
-        let nodes = NodeShapes::new(&body, &[4, 0, 2]);
-        assert_eq!((nodes.len(), nodes.is_empty()), (3, false));
         let (mut forces, mut power) = (DVector::zeros(11), 0.0);
         for (i, node) in [4, 0, 2].into_iter().enumerate() {
             let force = Vector3::new(0.3, -1.0, 0.2 + i as f64);
-            nodes.add_force(&evaluation, i, &force, forces.as_mut_slice());
+            let point = BodyPoint::node(&body, node);
+            assert!(!point.turns());
+            point.add_force(&evaluation, &force, forces.as_mut_slice());
             // By hand: x + u and its velocity.
             let shape = |q: &DVector<f64>| {
                 Vector3::from_fn(|k, _| (0..5).map(|j| body.modes().shape[(3 * node + k, j)] * q[j]).sum())
@@ -284,8 +284,8 @@ fn loads_do_the_power_of_the_nodes() {
             let place = Vector3::from(body.nodes().positions[node]) + shape(&state.q);
             let velocity =
                 state.axes.transpose() * state.velocity + state.omega.cross(&place) + shape(&state.qd);
-            assert!((nodes.place(&evaluation, i) - place).norm() < 1e-14);
-            assert!((nodes.velocity(&evaluation, i) - velocity).norm() < 1e-13);
+            assert!((point.place(&evaluation) - place).norm() < 1e-14);
+            assert!((point.velocity(&evaluation) - velocity).norm() < 1e-13);
             power += force.dot(&velocity);
         }
         assert!((forces.dot(&nu) - power).abs() < 1e-12 * power.abs().max(1.0), "seed {seed}");

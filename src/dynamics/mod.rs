@@ -7,14 +7,17 @@ mod evaluation;
 mod geometric;
 mod jacobian;
 mod kernels;
+mod load_jacobian;
 mod loads;
 mod modal_matrix;
 mod orientation;
+mod points;
 mod terms;
 
 pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
-pub use loads::NodeShapes;
+pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
+pub use points::BodyPoint;
 pub use terms::Terms;
