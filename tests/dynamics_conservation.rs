@@ -5,9 +5,11 @@ mod support;
 use flexbody::dynamics::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms};
 use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
+use flexbody::model::LoadKind;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use support::flexible::{fixture, oracle, soft_block};
+use support::flexible::{fixture, oracle, soft_block, stressed};
 use support::integrate;
+use support::random::Random;
 
 /// y = (R, Euler parameters, q, V, omega, qd); forces are added by `load`, which knows A.
 fn rate(
@@ -104,11 +106,50 @@ fn nothing(_: &Evaluation<'_>, _: &Matrix3<f64>, _: &DVector<f64>, _: &mut [f64]
 fn energy_and_momenta_are_kept_by_every_truncation() {
     for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Principal)] {
         for bits in 0..8 {
-            let terms = Terms { w1: bits & 1 == 0, w2: bits & 2 == 0, w3: bits & 4 == 0 };
+            let terms = Terms { w1: bits & 1 == 0, w2: bits & 2 == 0, w3: bits & 4 == 0, ..Terms::ALL };
             let drift = tumble(&body, terms, nothing, |_| 0.0);
             assert!(drift.deformation > 0.05 && drift.turns > 2.0, "{terms:?}: {drift:?}");
             let worst = drift.energy.max(drift.linear).max(drift.angular);
             assert!(worst < 1e-10, "{terms:?}: {drift:?}");
+        }
+    }
+}
+
+/// Each kind of load by itself and all together, of a solid and of a general mass, in gravity.
+#[test]
+fn energy_is_kept_with_geometric_stiffness() {
+    let motion = [LoadKind::Spin, LoadKind::Acceleration, LoadKind::AngularAcceleration];
+    for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Model)] {
+        let lambda = body.modes().eigenvalue[0];
+        let radius = (body.invariants().inertia()[(1, 1)] / body.invariants().mass).sqrt();
+        // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first stiffness.
+        let sizes = [0.5, 0.5 / radius, 0.5];
+        let single = (0..3).map(|at| at..at + 1);
+        for kinds in single.chain([0..3]) {
+            let mut random = Random(5);
+            let stiff = kinds
+                .clone()
+                .fold(body.clone(), |body, at| stressed(body, &motion[at..=at], sizes[at], &mut random));
+            let gravity = Vector3::new(0.2, -0.5, 1.0) * (0.02 * lambda * radius);
+            let equations = EquationsOfMotion::new(&stiff, Terms::ALL);
+            let potential = |y: &DVector<f64>| {
+                let mut at = Evaluation::new(&equations);
+                at.set(y.rows(7, equations.n_modes()).as_slice(), &vec![0.0; equations.n_velocities()]);
+                let s = orientation(y).axes() * at.first_moment();
+                -gravity.dot(&(body.invariants().mass * y.fixed_rows::<3>(0) + s))
+            };
+            let load = |at: &Evaluation<'_>, axes: &Matrix3<f64>, _: &DVector<f64>, forces: &mut [f64]| {
+                at.add_gravity(&(axes.transpose() * gravity), forces);
+            };
+            let drift = tumble(&stiff, Terms::ALL, load, potential);
+            assert!(drift.energy < 1e-10 && drift.deformation > 0.05, "{kinds:?}: {drift:?}");
+            let free = tumble(&stiff, Terms::ALL, nothing, |_| 0.0);
+            let worst = free.energy.max(free.linear).max(free.angular);
+            assert!(worst < 1e-10 && free.turns > 2.0, "{kinds:?}: {free:?}");
+            // And it acts.
+            let without = Terms { geometric_stiffness: false, ..Terms::ALL };
+            let soft = tumble(&stiff, without, nothing, |_| 0.0);
+            assert!((soft.deformation / free.deformation - 1.0).abs() > 1e-6, "{kinds:?}");
         }
     }
 }

@@ -6,8 +6,8 @@ use faer::Mat;
 use flexbody::basis::ModeSettings;
 use flexbody::convert::{ConvertSettings, convert};
 use flexbody::dynamics::{
-    Configuration, EquationsOfMotion, EulerParameters, Evaluation, NodalEquations, NodalError,
-    NodalEvaluation, NodalModes, NodeShapes, Orientation, ReferenceConditions, Terms,
+    BodyPoint, Configuration, EquationsOfMotion, EulerParameters, Evaluation, NodalEquations, NodalError,
+    NodalEvaluation, NodalModes, Orientation, ReferenceConditions, Terms,
 };
 use flexbody::eigen::Wanted;
 use flexbody::flex_body::{FlexBody, Frame};
@@ -413,7 +413,9 @@ fn loads_accelerate_the_nodes_as_they_accelerate_all_modes() {
         let lambda = whole.1.modes().eigenvalue[0];
         let gravity = Vector3::new(0.3, -1.0, if whole.1.dimension() == 2 { 0.0 } else { 0.4 }) * lambda;
         let own = axes.transpose() * gravity;
-        let node = NodeShapes::new(&whole.1, &[4]);
+        let node = BodyPoint::node(&whole.1, 4);
+        let moment = Vector3::new(0.2, -0.3, 0.5) * (lambda * whole.1.invariants().inertia()[(2, 2)]);
+        let moment = if whole.1.dimension() == 2 { Vector3::z() * moment.z } else { moment };
         let mass = whole.1.invariants().mass;
         assert_same_accelerations(
             name,
@@ -421,10 +423,16 @@ fn loads_accelerate_the_nodes_as_they_accelerate_all_modes() {
             |_, evaluation| {
                 evaluation.add_gravity(&gravity);
                 evaluation.add_force(4, &(gravity * mass));
+                if node.turns() {
+                    evaluation.add_torque(4, &moment);
+                }
             },
             |evaluation, forces| {
                 evaluation.add_gravity(&own, forces);
-                node.add_force(evaluation, 0, &(own * mass), forces);
+                node.add_force(evaluation, &(own * mass), forces);
+                if node.turns() {
+                    node.add_torque(evaluation, &axes.tr_mul(&moment), forces);
+                }
             },
         );
     }

@@ -1,6 +1,6 @@
 //! The equations of motion at one state.
 
-use super::equations::{C1, C2, LINEAR, PAIRS, W0, W1};
+use super::equations::{C1, LINEAR, PAIRS, W0, W1};
 use super::kernels::{WIDTH, add_scaled, dot};
 use super::{EquationsOfMotion, NotPositiveDefinite, Prescribed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
@@ -29,12 +29,15 @@ pub struct Evaluation<'a> {
     pub(super) w3_qd: Vec<f64>,
     /// (W3_a' - W3_a) qd.
     pub(super) skew_qd: Vec<f64>,
-    /// C(q) (3 x nf).
+    /// K^a_k q for each translation, and K^a_k qd.
+    pub(super) accelerated_q: Vec<f64>,
+    pub(super) accelerated_qd: Vec<f64>,
+    /// [C1(q); C(q)] (6 x nf).
     pub(super) coupling: Vec<f64>,
     first_moment: Vector3<f64>,
-    /// C1 qd.
+    /// C1(q) qd.
     c1_qd: Vector3<f64>,
-    /// -c~ + W0 Q: momentum per angular velocity.
+    /// -c~ + W0 Q, c with what geometric stiffness adds: momentum per angular velocity.
     pub(super) lever: Matrix3<f64>,
     pub(super) lever_rate: Matrix3<f64>,
     inertia: Matrix3<f64>,
@@ -42,12 +45,13 @@ pub struct Evaluation<'a> {
     pub(super) momentum: Vector3<f64>,
     pub(super) angular_momentum: Vector3<f64>,
     pub(super) velocity_forces: Vec<f64>,
-    /// For [`Evaluation::accelerations`]: L^-1 [C1' C(q)'] (6 x nf) and modal forces.
+    /// For [`Evaluation::accelerations`]: L^-1 [C1(q)' C(q)'] (6 x nf) and modal forces.
     pub(super) whitened: Vec<f64>,
     pub(super) modal: Vec<f64>,
     /// For [`Evaluation::jacobian`]: products with rates and accelerations.
     pub(super) w2_scratch: Vec<f64>,
     pub(super) w3_scratch: [Vec<f64>; 2],
+    pub(super) accelerated_scratch: Vec<f64>,
 }
 
 impl<'a> Evaluation<'a> {
@@ -57,6 +61,7 @@ impl<'a> Evaluation<'a> {
         let zeros = |n: usize| vec![0.0; n];
         let of_pairs = || zeros(equations.w2.as_ref().map_or(0, |w2| w2.padded_rows()));
         let of_axes = || zeros(equations.w3.as_ref().map_or(0, |w3| w3.padded_rows()));
+        let of_translations = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
         let mut evaluation = Self {
             equations,
             arch: Arch::new(),
@@ -68,7 +73,9 @@ impl<'a> Evaluation<'a> {
             w3_q: of_axes(),
             w3_qd: of_axes(),
             skew_qd: of_axes(),
-            coupling: zeros(3 * nf),
+            accelerated_q: of_translations(),
+            accelerated_qd: of_translations(),
+            coupling: zeros(6 * nf),
             first_moment: Vector3::zeros(),
             c1_qd: Vector3::zeros(),
             lever: Matrix3::zeros(),
@@ -82,6 +89,7 @@ impl<'a> Evaluation<'a> {
             modal: zeros(nf),
             w2_scratch: of_pairs(),
             w3_scratch: [of_axes(), of_axes()],
+            accelerated_scratch: of_translations(),
         };
         let (q, nu) = (zeros(nf), zeros(equations.n_velocities()));
         evaluation.set(&q, &nu);
@@ -165,11 +173,21 @@ impl<'a> Evaluation<'a> {
                 add_symmetric(&mut self.inertia, pair, dot(q, product));
             }
         }
-        self.coupling.copy_from_slice(&body.linear[C2 * nf..]);
+        self.coupling.copy_from_slice(&body.linear[C1 * nf..]);
+        if let Some(accelerated) = &body.accelerated {
+            accelerated.times(q, &mut self.accelerated_q);
+            let mut shift = Vector3::zeros();
+            for (k, product) in self.accelerated_q.chunks_exact(nf).take(body.translations()).enumerate() {
+                add_scaled(1.0, product, &mut self.coupling[k * nf..][..nf]);
+                shift[k] = 0.5 * dot(q, product);
+            }
+            self.first_moment += shift;
+            self.lever -= shift.cross_matrix();
+        }
         if let Some(w3) = &body.w3 {
             w3.times(q, &mut self.w3_q);
             for (&a, product) in body.axes.iter().zip(self.w3_q.chunks_exact(nf)) {
-                add_scaled(1.0, product, &mut self.coupling[a * nf..][..nf]);
+                add_scaled(1.0, product, &mut self.coupling[(3 + a) * nf..][..nf]);
             }
         }
     }
@@ -184,6 +202,17 @@ impl<'a> Evaluation<'a> {
         body.linear_panels.times(qd, &mut of_qd);
         self.c1_qd = Vector3::from_fn(|k, _| of_qd[C1 + k]);
         self.lever_rate = Matrix3::from_fn(|k, b| of_qd[W0 + 3 * k + b]);
+        let mut c1_rate_qd = Vector3::zeros();
+        if let Some(accelerated) = &body.accelerated {
+            accelerated.times(qd, &mut self.accelerated_qd);
+            let mut rate = Vector3::zeros();
+            for k in 0..body.translations() {
+                rate[k] = dot(&self.accelerated_q[k * nf..][..nf], qd);
+                c1_rate_qd[k] = dot(&self.accelerated_qd[k * nf..][..nf], qd);
+            }
+            self.c1_qd += rate;
+            self.lever_rate -= rate.cross_matrix();
+        }
         self.inertia_rate = Matrix3::zeros();
         for (pair, &axes) in PAIRS.iter().enumerate() {
             add_symmetric(&mut self.inertia_rate, axes, of_qd[W1 + pair]);
@@ -193,7 +222,7 @@ impl<'a> Evaluation<'a> {
                 add_symmetric(&mut self.inertia_rate, pair, 2.0 * dot(qd, product));
             }
         }
-        let coupling_qd = Vector3::from_fn(|a, _| dot(&self.coupling[a * nf..][..nf], qd));
+        let coupling_qd = Vector3::from_fn(|a, _| dot(&self.coupling[(3 + a) * nf..][..nf], qd));
         let mut coupling_rate_qd = Vector3::zeros();
         if let Some(w3) = &body.w3 {
             w3.times(qd, &mut self.w3_qd);
@@ -211,7 +240,7 @@ impl<'a> Evaluation<'a> {
         let p = body.mass * v + self.relative_momentum();
         let h = self.lever.tr_mul(&v) + self.inertia * w + coupling_qd;
         (self.momentum, self.angular_momentum) = (p, h);
-        let force = self.lever_rate * w + w.cross(&p);
+        let force = self.lever_rate * w + c1_rate_qd + w.cross(&p);
         let torque =
             self.lever_rate.tr_mul(&v) + self.inertia_rate * w + coupling_rate_qd + w.cross(&h) + v.cross(&p);
 
@@ -221,6 +250,12 @@ impl<'a> Evaluation<'a> {
         for at in 0..9 {
             let weight = v[at / 3] * w[at % 3];
             add_scaled(-weight, body.row(W0 + at), modal);
+        }
+        if body.accelerated.is_some() {
+            let carried = w.cross(&v);
+            for (k, product) in self.accelerated_q.chunks_exact(nf).take(body.translations()).enumerate() {
+                add_scaled(carried[k], product, modal);
+            }
         }
         for (pair, &(a, b)) in PAIRS.iter().enumerate() {
             add_scaled(-0.5 * spin_product(&w, (a, b)), body.row(W1 + pair), modal);
@@ -242,17 +277,18 @@ impl<'a> Evaluation<'a> {
         self.equations
     }
 
-    /// s(q) = c + C1 q, first moment of the deformed body. Unit: mass length.
+    /// s(q) = c + C1 q + q'K^a q / 2, first moment of the deformed body, with its geometric stiffness K^a for acceleration. Unit:
+    /// mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
         self.first_moment
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q, inertia of the deformed body about the origin. Unit: mass length^2.
+    /// I(q) = I0 + W1 Q + Q'W2 Q, less q'K^omega q, inertia of the deformed body about the origin. Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         self.inertia
     }
 
-    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1 qd, body axes.
+    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q with what geometric stiffness adds to c.
     pub fn linear_momentum(&self) -> Vector3<f64> {
         self.momentum
     }
@@ -262,7 +298,7 @@ impl<'a> Evaluation<'a> {
         self.angular_momentum
     }
 
-    /// pi = C1'V + C(q)'omega + m_ff qd (nf).
+    /// pi = C1(q)'V + C(q)'omega + m_ff qd (nf).
     ///
     /// # Panics
     /// When `pi` has not nf entries.
@@ -313,7 +349,13 @@ impl<'a> Evaluation<'a> {
         {
             *rate = applied - h;
         }
-        // h_nu has the rate of C(q)'omega, which belongs to pi'.
+        // h_nu has the rates of C1(q)'V and C(q)'omega, which belong to pi'.
+        if body.accelerated.is_some() {
+            let translations = self.accelerated_qd.chunks_exact(body.nf).take(body.translations());
+            for (k, product) in translations.enumerate() {
+                add_scaled(self.velocity[k], product, rate);
+            }
+        }
         if body.w3.is_some() {
             for (&a, product) in body.axes.iter().zip(self.w3_qd.chunks_exact(body.nf)) {
                 add_scaled(self.omega[a], product, rate);
@@ -395,7 +437,7 @@ impl<'a> Evaluation<'a> {
         matrix
     }
 
-    /// y += C1' linear + C(q)' angular + m_ff modal.
+    /// y += C1(q)' linear + C(q)' angular + m_ff modal.
     fn add_modal_inertia(&self, linear: &Vector3<f64>, angular: &Vector3<f64>, modal: &[f64], y: &mut [f64]) {
         for k in 0..3 {
             add_scaled(linear[k], self.equations.coupling_row(&self.coupling, k), y);

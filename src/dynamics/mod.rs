@@ -4,23 +4,27 @@
 mod accelerations;
 mod equations;
 mod evaluation;
+mod geometric;
 mod jacobian;
 mod kernels;
+mod load_jacobian;
 mod loads;
 mod modal_matrix;
 mod motion;
 mod nodal;
 mod orientation;
+mod points;
 mod terms;
 
 pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
-pub use loads::NodeShapes;
+pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{Balance, Configuration, EmptySpace, Motion, Place, Surroundings};
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
     ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
+pub use points::BodyPoint;
 pub use terms::Terms;

@@ -14,7 +14,7 @@ use flexbody::eigen::Wanted;
 use flexbody::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, GeneralTerms, Invariants};
-use flexbody::model::{FeModel, Nodes, RawModel};
+use flexbody::model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
 use flexbody::progress::SILENT;
 use flexbody::units::UnitSystem;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -138,6 +138,21 @@ pub fn made_of(
         coordinates: None,
     })
     .expect("valid parts")
+}
+
+/// `body` with random geometric stiffness for all loads of the given kinds, entries up to `size`.
+pub fn stressed(body: FlexBody, kinds: &[LoadKind], size: f64, random: &mut Random) -> FlexBody {
+    let (nf, dimension) = (body.n_modes(), body.dimension());
+    let mut parts = body.into_parts();
+    for kind in kinds {
+        for &component in kind.of_dimension(dimension) {
+            let a = Mat::from_fn(nf, nf, |_, _| 0.5 * size * random.signed());
+            let matrix = Mat::from_fn(nf, nf, |i, j| a[(i, j)] + a[(j, i)]);
+            let load = UnitLoad { kind: kind.clone(), component };
+            parts.geometric_stiffness.push(GeometricStiffness { load, matrix });
+        }
+    }
+    FlexBody::new(parts).expect("valid parts")
 }
 
 /// Puts an evaluation to the state of an oracle.

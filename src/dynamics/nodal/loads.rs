@@ -2,6 +2,7 @@
 
 use super::NodalEvaluation;
 use super::equations::NodalEquations;
+use crate::dynamics::{Orientation, RotationVector};
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEvaluation<'_> {
@@ -36,6 +37,33 @@ impl NodalEvaluation<'_> {
         self.force += own;
         self.torque += place.cross(&own);
         self.row_forces[d * i..d * (i + 1)].iter_mut().zip(&own).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// Adds a torque at node `i`, on the axes that its rotation vector theta turns: G(theta) t on its rotations (theory 6.8).
+    ///
+    /// * `torque`: world axes; of a plane body what it has along z.
+    ///
+    /// # Panics
+    /// When `i` is not below the number of nodes, or the node has no rotations.
+    pub fn add_torque(&mut self, i: usize, torque: &Vector3<f64>) {
+        let rows = self.equations.model.rows();
+        let rotations = rows.rotations();
+        let first = rotations.partition_point(|&(node, _)| (node as usize) < i);
+        let own = rotations[first..].iter().take_while(|&&(node, _)| node as usize == i);
+        let own: &[(u32, u8)] = &rotations[first..first + own.count()];
+        assert!(!own.is_empty(), "a node with rotations");
+        let at = rows.displacements() + first;
+        let mut turn = Vector3::zeros();
+        own.iter().zip(&self.u[at..]).for_each(|(&(_, axis), u)| turn[usize::from(axis)] = *u);
+        let mut torque = self.axes.tr_mul(torque);
+        if self.equations.model.dimension() == 2 {
+            (torque.x, torque.y) = (0.0, 0.0);
+        }
+        self.torque += torque;
+        let moment = RotationVector(turn).map() * torque;
+        for (&(_, axis), sum) in own.iter().zip(&mut self.row_forces[at..]) {
+            *sum += moment[usize::from(axis)];
+        }
     }
 
     /// Adds forces of all rows (N) that turn with the frame, model axes: forces of displacements, moments of rotations.
