@@ -13,5 +13,6 @@ mod errata;
 mod model_files;
 mod precision;
 mod real_models;
+mod rotation;
 mod small_models;
 mod symmetry;

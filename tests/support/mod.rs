@@ -9,6 +9,7 @@ pub mod flexible;
 pub mod general;
 pub mod integrate;
 pub mod mesh;
+pub mod motion;
 pub mod nodal;
 pub mod pipeline;
 pub mod plane;
