@@ -26,7 +26,7 @@ pub struct Explicit {
     /// What the control proposes for the next step.
     proposed: Option<f64>,
     /// Rates of the stages.
-    rates: [Vec<f64>; ALL_STAGES],
+    rates: Vec<Vec<f64>>,
     before: Vec<f64>,
     /// State of a stage.
     stage: Vec<f64>,
@@ -34,7 +34,7 @@ pub struct Explicit {
     /// Start, end and length of the last step; its rates serve the next one and interpolation.
     last: Option<[f64; 3]>,
     /// Coefficients of the interpolation.
-    polynomial: [Vec<f64>; 7],
+    polynomial: Vec<Vec<f64>>,
     interpolates: bool,
     work: Work,
 }
@@ -51,12 +51,12 @@ impl Explicit {
             tolerance,
             longest,
             proposed: None,
-            rates: std::array::from_fn(|_| zeros()),
+            rates: vec![zeros(); ALL_STAGES],
             before: zeros(),
             stage: zeros(),
             scales: zeros(),
             last: None,
-            polynomial: std::array::from_fn(|_| zeros()),
+            polynomial: vec![zeros(); 7],
             interpolates: false,
             work: Work::default(),
         }
@@ -107,7 +107,7 @@ impl Explicit {
                 h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
                 h => (h, time + h),
             };
-            if !(h > SMALLEST * time.abs()) {
+            if h.is_nan() || h <= SMALLEST * time.abs() {
                 return Err(Failure::StepTooSmall { time });
             }
             let error = match self.attempt(system, time, h) {

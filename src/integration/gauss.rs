@@ -192,8 +192,8 @@ impl Gauss {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
             let of = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
             let (lacks, mut lacks_p) = (of(&self.rates, x), of(&self.rates, p));
-            for i in 0..self.stages {
-                lacks_p[i] -= oscillator.stiffness * h * product(&self.weights[i], &lacks);
+            for (lacks_p, weights) in lacks_p.iter_mut().zip(&self.weights) {
+                *lacks_p -= oscillator.stiffness * h * product(weights, &lacks);
             }
             let correction: [f64; STAGES] = std::array::from_fn(|i| product(&inverse[i], &lacks_p));
             for i in 0..self.stages {
