@@ -24,13 +24,7 @@ const SOLVED: f64 = 1e-20;
 /// does not drift over millions of steps.
 #[derive(Debug, Clone)]
 pub struct Gauss {
-    stages: usize,
-    /// Places of the stages in the step, and weights of their rates.
-    nodes: [f64; STAGES],
-    weights: Square,
-    /// Stages and end of the next step from the increments of this one.
-    ahead: Square,
-    to_end: [f64; STAGES],
+    tableau: Box<Tableau>,
     /// Increments Z of the stages, and their rates.
     increments: [Vec<f64>; STAGES],
     rates: [Vec<f64>; STAGES],
@@ -45,12 +39,20 @@ pub struct Gauss {
     work: Work,
 }
 
-impl Gauss {
-    /// The method of the given order for `dimension` entries.
-    ///
-    /// # Panics
-    /// When the order is not 2, 4 or 6.
-    pub fn new(dimension: usize, order: usize) -> Self {
+/// A method: what its stages are made of.
+#[derive(Debug, Clone)]
+struct Tableau {
+    stages: usize,
+    /// Places of the stages in the step, and weights of their rates.
+    nodes: [f64; STAGES],
+    weights: Square,
+    /// Stages of the next step, and the end of this one, from the increments of this one.
+    ahead: Square,
+    to_end: [f64; STAGES],
+}
+
+impl Tableau {
+    fn new(order: usize) -> Self {
         let (a, b) = (3.0_f64.sqrt() / 6.0, 15.0_f64.sqrt());
         let (nodes, weights) = match order {
             2 => ([0.5, 0.0, 0.0], [[0.5, 0.0, 0.0], [0.0; 3], [0.0; 3]]),
@@ -77,13 +79,19 @@ impl Gauss {
                 if i < stages && j < stages { polynomial(j, 1.0 + nodes[i]) - to_end[j] } else { 0.0 }
             })
         });
+        Self { stages, nodes, weights, ahead, to_end }
+    }
+}
+
+impl Gauss {
+    /// The method of the given order for `dimension` entries.
+    ///
+    /// # Panics
+    /// When the order is not 2, 4 or 6.
+    pub fn new(dimension: usize, order: usize) -> Self {
         let zeros = || vec![0.0; dimension];
         Self {
-            stages,
-            nodes,
-            weights,
-            ahead,
-            to_end,
+            tableau: Box::new(Tableau::new(order)),
             increments: std::array::from_fn(|_| zeros()),
             rates: std::array::from_fn(|_| zeros()),
             stage: zeros(),
@@ -125,12 +133,12 @@ impl Gauss {
         let failed = Failure::NotConverged { time, step: h };
         let mut before = None;
         for _ in 0..MOST_CORRECTIONS {
-            for i in 0..self.stages {
+            for i in 0..self.tableau.stages {
                 for (at, stage) in self.stage.iter_mut().enumerate() {
                     *stage = state[at] + (self.increments[i][at] + self.carry[at]);
                 }
                 self.work.rates += 1;
-                system.rates(time + self.nodes[i] * h, &self.stage, &mut self.rates[i])?;
+                system.rates(time + self.tableau.nodes[i] * h, &self.stage, &mut self.rates[i])?;
             }
             let size = self.correct(h);
             // How much the corrections shrink; nothing is known at the first.
@@ -158,8 +166,8 @@ impl Gauss {
         if self.last == Some(h) {
             for at in 0..self.stage.len() {
                 let increments = self.increments.each_ref().map(|z| z[at]);
-                for i in 0..self.stages {
-                    self.increments[i][at] = product(&self.ahead[i], &increments);
+                for i in 0..self.tableau.stages {
+                    self.increments[i][at] = product(&self.tableau.ahead[i], &increments);
                 }
             }
             return;
@@ -171,8 +179,8 @@ impl Gauss {
 
     /// (I + d h A + lambda h^2 A^2)^-1.
     fn inverse(&self, oscillator: &Oscillator, h: f64) -> Square {
-        let n = self.stages;
-        let a = nalgebra::DMatrix::from_fn(n, n, |i, j| h * self.weights[i][j]);
+        let n = self.tableau.stages;
+        let a = nalgebra::DMatrix::from_fn(n, n, |i, j| h * self.tableau.weights[i][j]);
         let matrix =
             nalgebra::DMatrix::identity(n, n) + &a * oscillator.damping + &a * (&a * oscillator.stiffness);
         // The eigenvalues of A lie in the right half plane: regular for every damped oscillator; else it is left to the iteration.
@@ -184,38 +192,39 @@ impl Gauss {
     fn correct(&mut self, h: f64) -> f64 {
         for at in 0..self.stage.len() {
             let rates = self.rates.each_ref().map(|rates| rates[at]);
-            for i in 0..self.stages {
-                self.rates[i][at] = h * product(&self.weights[i], &rates) - self.increments[i][at];
+            for i in 0..self.tableau.stages {
+                self.rates[i][at] = h * product(&self.tableau.weights[i], &rates) - self.increments[i][at];
             }
         }
         for (oscillator, inverse) in &self.oscillators {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
             let of = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
             let (lacks, mut lacks_p) = (of(&self.rates, x), of(&self.rates, p));
-            for (lacks_p, weights) in lacks_p.iter_mut().zip(&self.weights) {
+            for (lacks_p, weights) in lacks_p.iter_mut().zip(&self.tableau.weights) {
                 *lacks_p -= oscillator.stiffness * h * product(weights, &lacks);
             }
             let correction: [f64; STAGES] = std::array::from_fn(|i| product(&inverse[i], &lacks_p));
-            for i in 0..self.stages {
+            for i in 0..self.tableau.stages {
                 self.rates[i][p] = correction[i];
-                self.rates[i][x] = lacks[i] + h * product(&self.weights[i], &correction);
+                self.rates[i][x] = lacks[i] + h * product(&self.tableau.weights[i], &correction);
             }
         }
         let mut sum = 0.0;
-        for (increments, corrections) in self.increments.iter_mut().zip(&self.rates).take(self.stages) {
+        for (increments, corrections) in self.increments.iter_mut().zip(&self.rates).take(self.tableau.stages)
+        {
             for ((z, correction), scale) in increments.iter_mut().zip(corrections).zip(&self.scales) {
                 *z += correction;
                 sum += (correction / scale).powi(2);
             }
         }
-        (sum / (self.stages * self.stage.len()) as f64).sqrt()
+        (sum / (self.tableau.stages * self.stage.len()) as f64).sqrt()
     }
 
     /// Adds the increment of the step with what rounding took before.
     fn advance(&mut self, state: &mut [f64]) {
         for (at, y) in state.iter_mut().enumerate() {
             let increments = self.increments.each_ref().map(|z| z[at]);
-            let increment = product(&self.to_end, &increments) + self.carry[at];
+            let increment = product(&self.tableau.to_end, &increments) + self.carry[at];
             let sum = *y + increment;
             // Exact where the state is larger than its increment; else the rounding is that of the increment.
             self.carry[at] = (*y - sum) + increment;
