@@ -1,4 +1,5 @@
-//! Cost of one evaluation of the equations of motion at 20 and 90 modes: `cargo bench --bench dynamics`.
+//! Cost of one evaluation of the equations of motion at 20 and 90 modes: `cargo bench --bench dynamics`, with `-- --json` for
+//! benches/dynamics.py.
 //!
 //! Accelerations of a free body from its state, each state another, beside the same equations in dense matrices of nalgebra as
 //! they are printed (theory section 6). Best of several: interruptions only ever slow a run down.
@@ -28,8 +29,18 @@ fn best_seconds(calls: usize, mut work: impl FnMut(usize)) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
+/// One line of the table, or one JSON object.
+fn tell(nf: usize, body: &str, what: &str, seconds: f64, dense: Option<f64>) {
+    let us = seconds * 1e6;
+    if std::env::args().any(|argument| argument == "--json") {
+        println!("{}", serde_json::json!({ "modes": nf, "body": body, "what": what, "us": us }));
+        return;
+    }
+    let ratio = dense.map_or(String::new(), |dense| format!("{:.1}", dense / seconds));
+    println!("{nf:>5} {:>40} {us:>10.2} us {ratio:>8}", format!("{body}, {what}"));
+}
+
 fn main() {
-    println!("{:>5} {:>30} {:>12} {:>8}", "modes", "accelerations", "us", "ratio");
     for nf in [20, 90] {
         for name in ["bracket_hex20", "shell_folded"] {
             let body = fixture(name, nf, BodyFrame::Principal);
@@ -40,7 +51,7 @@ fn main() {
             let dense = best_seconds(2000 / nf, |i| {
                 std::hint::black_box(oracle.accelerations(&states[i % states.len()]));
             });
-            println!("{nf:>5} {:>30} {:>12.2} {:>8.1}", format!("{name}, dense"), dense * 1e6, 1.0);
+            tell(nf, name, "dense matrices", dense, Some(dense));
             let free = vec![0.0; 6 + nf];
             for (what, terms) in [
                 ("all terms", Terms::ALL),
@@ -56,26 +67,22 @@ fn main() {
                     evaluation.accelerations(&free, &mut rates).expect("a body");
                     std::hint::black_box(&rates);
                 });
-                println!(
-                    "{nf:>5} {:>30} {:>12.2} {:>8.1}",
-                    format!("{name}, {what}"),
-                    seconds * 1e6,
-                    dense / seconds
-                );
+                tell(nf, name, what, seconds, Some(dense));
             }
         }
+        // Gravity and Jacobians, which implicit integrators take once per step.
+        let name = "bracket_hex20";
+        let body = fixture(name, nf, BodyFrame::Principal);
+        let equations = EquationsOfMotion::new(&body, Terms::ALL);
+        let n = equations.n_velocities();
+        let mut evaluation = Evaluation::new(&equations);
+        let state = lively_state(&mut Random(2), &body);
+        evaluation.set(state.q.as_slice(), quasi_velocities(&state).as_slice());
+        let (acceleration, mut by_q, mut by_nu) = (vec![0.1; n], vec![0.0; n * nf], vec![0.0; n * n]);
+        let jacobian = best_seconds(200, |_| evaluation.jacobian(&acceleration, &mut by_q, &mut by_nu));
+        let mut forces = vec![0.0; n];
+        let gravity = best_seconds(20_000, |_| evaluation.add_gravity(&Vector3::z(), &mut forces));
+        tell(nf, name, "Jacobians", jacobian, None);
+        tell(nf, name, "gravity", gravity, None);
     }
-    // Gravity and Jacobians, which implicit integrators take once per step.
-    let body = fixture("bracket_hex20", 90, BodyFrame::Principal);
-    let equations = EquationsOfMotion::new(&body, Terms::ALL);
-    let (n, nf) = (equations.n_velocities(), equations.n_modes());
-    let mut evaluation = Evaluation::new(&equations);
-    let state = lively_state(&mut Random(2), &body);
-    evaluation.set(state.q.as_slice(), quasi_velocities(&state).as_slice());
-    let (acceleration, mut by_q, mut by_nu) = (vec![0.1; n], vec![0.0; n * nf], vec![0.0; n * n]);
-    let jacobian = best_seconds(200, |_| evaluation.jacobian(&acceleration, &mut by_q, &mut by_nu));
-    let mut forces = vec![0.0; n];
-    let gravity = best_seconds(20_000, |_| evaluation.add_gravity(&Vector3::z(), &mut forces));
-    println!("{nf:>5} {:>30} {:>12.2}", "bracket_hex20, Jacobians", jacobian * 1e6);
-    println!("{nf:>5} {:>30} {:>12.2}", "bracket_hex20, gravity", gravity * 1e6);
 }
