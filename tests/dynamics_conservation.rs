@@ -7,20 +7,9 @@ use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
 use flexbody::model::LoadKind;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use support::elements::{Kind, MassRule, Material};
-use support::flexible::{body_of, fixture, oracle, stressed};
+use support::flexible::{fixture, oracle, soft_block, stressed};
 use support::integrate;
-use support::mesh::{Mesh, grid};
 use support::random::Random;
-
-/// A rubber-like block without any symmetry: W1, W2 and W3 all count.
-fn soft_block() -> FlexBody {
-    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
-        [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
-    });
-    body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), 10, BodyFrame::Principal)
-}
 
 /// y = (R, Euler parameters, q, V, omega, qd); forces are added by `load`, which knows A.
 fn rate(
@@ -115,7 +104,7 @@ fn nothing(_: &Evaluation<'_>, _: &Matrix3<f64>, _: &DVector<f64>, _: &mut [f64]
 
 #[test]
 fn energy_and_momenta_are_kept_by_every_truncation() {
-    for body in [soft_block(), fixture("frame_beams", 6, BodyFrame::Principal)] {
+    for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Principal)] {
         for bits in 0..8 {
             let terms = Terms { w1: bits & 1 == 0, w2: bits & 2 == 0, w3: bits & 4 == 0, ..Terms::ALL };
             let drift = tumble(&body, terms, nothing, |_| 0.0);
@@ -130,7 +119,7 @@ fn energy_and_momenta_are_kept_by_every_truncation() {
 #[test]
 fn energy_is_kept_with_geometric_stiffness() {
     let motion = [LoadKind::Spin, LoadKind::Acceleration, LoadKind::AngularAcceleration];
-    for body in [soft_block(), fixture("frame_beams", 6, BodyFrame::Model)] {
+    for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Model)] {
         let lambda = body.modes().eigenvalue[0];
         let radius = (body.invariants().inertia()[(1, 1)] / body.invariants().mass).sqrt();
         // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first stiffness.
@@ -168,7 +157,7 @@ fn energy_is_kept_with_geometric_stiffness() {
 /// [WP19] (16) and guideline IV: Q'W2 Qd twice in place of Q'W2 Qd + Qd'W2 Q, and the W3 term.
 #[test]
 fn misprinted_coriolis_terms_lose_angular_momentum_and_hide_from_the_energy() {
-    let body = soft_block();
+    let body = soft_block(10);
     let (own, nf) = (oracle(&body).reduced, body.n_modes());
     let misprint = |_: &Evaluation<'_>, _: &Matrix3<f64>, y: &DVector<f64>, forces: &mut [f64]| {
         let kron = |at: usize| DMatrix::<f64>::identity(3, 3).kronecker(&y.rows(at, nf).into_owned());

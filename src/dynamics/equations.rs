@@ -242,6 +242,17 @@ impl EquationsOfMotion {
         self.damping.add_product(factor, qd, y);
     }
 
+    /// Stiffness and damping of mode `j` alone, where the modes are mass-normalised.
+    pub(super) fn oscillator(&self, j: usize) -> Option<(f64, f64)> {
+        matches!(self.modal_mass, ModalMass::Identity)
+            .then(|| (self.stiffness.get(j, j), self.damping.get(j, j)))
+    }
+
+    /// qd'D qd: the power that damping takes.
+    pub(super) fn dissipation(&self, qd: &[f64]) -> f64 {
+        self.damping.quadratic(qd)
+    }
+
     /// Entries of a force and a torque that belong to rigid motions of the body.
     pub(super) fn put_rigid(&self, force: Vector3<f64>, torque: Vector3<f64>, rigid: &mut [f64]) {
         let at = |axis: usize| if axis < 3 { force[axis] } else { torque[axis - 3] };

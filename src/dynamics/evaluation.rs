@@ -237,7 +237,7 @@ impl<'a> Evaluation<'a> {
             }
         }
 
-        let p = body.mass * v + self.lever * w + self.c1_qd;
+        let p = body.mass * v + self.relative_momentum();
         let h = self.lever.tr_mul(&v) + self.inertia * w + coupling_qd;
         (self.momentum, self.angular_momentum) = (p, h);
         let force = self.lever_rate * w + c1_rate_qd + w.cross(&p);
@@ -327,25 +327,26 @@ impl<'a> Evaluation<'a> {
         (self.velocity, self.omega)
     }
 
+    /// q (nf).
+    pub fn modal_coordinates(&self) -> &[f64] {
+        &self.q
+    }
+
     /// qd (nf).
     pub fn modal_velocity(&self) -> &[f64] {
         &self.qd
     }
 
-    /// Rates of the momenta in the directions of world axes, resolved in body axes: p' + omega x p = F, h' + omega x h = tau - V x p and
-    /// pi' = dT/dq - K_ff q - D qd + Q for generalised forces `applied` = (F, tau, Q).
+    /// pi' = dT/dq - K_ff q - D qd + Q for modal forces `applied` = Q (nf).
     ///
     /// # Panics
-    /// When a length is not 6 + nf (of a plane body 3 + nf).
-    pub fn momentum_rates(&self, applied: &[f64], rates: &mut [f64]) {
+    /// When a length is not nf.
+    pub fn modal_momentum_rate(&self, applied: &[f64], rate: &mut [f64]) {
         let body = self.equations;
-        let (force, torque, modal) = body.split(applied);
-        assert_eq!(rates.len(), applied.len(), "as many rates as forces");
-        let (rigid, flexible) = rates.split_at_mut(body.rigid.len());
-        // V x m V left out: it would leave its rounding.
-        body.put_rigid(force, torque - self.velocity.cross(&(self.lever * self.omega + self.c1_qd)), rigid);
-        let h = &self.velocity_forces[rigid.len()..];
-        for ((rate, applied), h) in flexible.iter_mut().zip(modal).zip(h) {
+        assert!(applied.len() == body.nf && rate.len() == body.nf, "one entry per mode");
+        for ((rate, applied), h) in
+            rate.iter_mut().zip(applied).zip(&self.velocity_forces[body.rigid.len()..])
+        {
             *rate = applied - h;
         }
         // h_nu has the rates of C1(q)'V and C(q)'omega, which belong to pi'.
@@ -357,10 +358,15 @@ impl<'a> Evaluation<'a> {
         }
         if body.w3.is_some() {
             for (&a, product) in body.axes.iter().zip(self.w3_qd.chunks_exact(body.nf)) {
-                add_scaled(self.omega[a], product, flexible);
+                add_scaled(self.omega[a], product, rate);
             }
         }
-        body.add_internal(-1.0, &self.q, &self.qd, flexible);
+        body.add_internal(-1.0, &self.q, &self.qd, rate);
+    }
+
+    /// p - m V = (-c~ + W0 Q) omega + C1 qd: linear momentum of the motion about the origin, body axes.
+    pub fn relative_momentum(&self) -> Vector3<f64> {
+        self.lever * self.omega + self.c1_qd
     }
 
     /// h_nu: the forces that the inertia of the body takes without acceleration (6 + nf, or 3 + nf).

@@ -13,8 +13,8 @@ const MOST_CORRECTIONS: usize = 100;
 /// Corrections below this part of the scales have reached rounding when they no longer shrink.
 const NEAR_ROUNDING: f64 = 1e-9;
 
-/// What is left of the stages, in scales: below the rounding of the state.
-const SOLVED: f64 = 1e-17;
+/// What is left of the stages, in scales: so far below rounding that it does not add up over millions of steps.
+const SOLVED: f64 = 1e-20;
 
 /// Collocation at Gauss points (Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3): order 2 (the implicit midpoint rule), 4
 /// or 6 with steps of one length.
@@ -124,7 +124,7 @@ impl Gauss {
         self.prepare(system, time, h);
         system.scales(state, &mut self.scales);
         let failed = Failure::NotConverged { time, step: h };
-        let mut before = f64::INFINITY;
+        let mut before = None;
         for _ in 0..MOST_CORRECTIONS {
             for i in 0..self.stages {
                 for (at, stage) in self.stage.iter_mut().enumerate() {
@@ -134,19 +134,21 @@ impl Gauss {
                 system.rates(time + self.nodes[i] * h, &self.stage, &mut self.rates[i])?;
             }
             let size = self.correct(h);
-            if !size.is_finite() || (size > 2.0 * before && size > NEAR_ROUNDING) {
+            // How much the corrections shrink; nothing is known at the first.
+            let ratio = before.map(|before: f64| size / before);
+            let stalled = |ratio: f64| ratio > 0.5 && size < NEAR_ROUNDING;
+            if !size.is_finite() || ratio.is_some_and(|ratio| ratio > 2.0 && !stalled(ratio)) {
                 self.work.rejected += 1;
                 return Err(failed);
             }
-            let ratio = size / before;
-            if size == 0.0 || size * ratio <= SOLVED || (ratio > 0.5 && size < NEAR_ROUNDING) {
+            if size == 0.0 || ratio.is_some_and(|ratio| size * ratio <= SOLVED || stalled(ratio)) {
                 self.advance(state);
                 self.last = Some((end, h));
                 self.work.steps += 1;
                 system.settle(state);
                 return Ok(());
             }
-            before = size;
+            before = Some(size);
         }
         self.work.rejected += 1;
         Err(failed)

@@ -1,7 +1,9 @@
 //! Flexible bodies for tests of their equations of motion, and the oracles that belong to them.
 
+use super::elements::{Kind, MassRule, Material};
 use super::equations::{ReducedBody, State};
 use super::general::{GeneralBody, dense, quasi_velocities};
+use super::mesh::{Mesh, grid};
 use super::nodal::reduced;
 use super::random::Random;
 use faer::Mat;
@@ -31,6 +33,15 @@ pub fn fixture(name: &str, modes: usize, frame: BodyFrame) -> FlexBody {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
     body_of(raw, modes, frame)
+}
+
+/// A rubber-like block without any symmetry: W1, W2 and W3 all count.
+pub fn soft_block(modes: usize) -> FlexBody {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
+        [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
+    });
+    body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), modes, BodyFrame::Principal)
 }
 
 /// The oracle that has the body's invariants.
