@@ -154,6 +154,35 @@ fn points_move_as_their_velocities_say() {
     }
 }
 
+/// Rates of the velocities in the world while nu is constant in body axes.
+#[test]
+fn velocities_drift_as_they_say() {
+    for (what, body, point) in points() {
+        let mut random = Random(11);
+        let equations = EquationsOfMotion::new(&body, Terms::ALL);
+        let (q, nu) = state(&mut random, &body, &point);
+        let r = equations.n_rigid();
+        let mut evaluation = Evaluation::new(&equations);
+        let mut at = |time: f64| {
+            let moved: Vec<f64> = q.iter().zip(&nu[r..]).map(|(q, qd)| q + time * qd).collect();
+            evaluation.set(&moved, &nu);
+            // Axes of the body relative to those at time 0.
+            let turn = RotationVector(evaluation.rigid_velocity().1 * time).axes();
+            let angular = point.angular_velocity(&evaluation).unwrap_or_else(Vector3::zeros);
+            let (linear, angular) = (turn * point.velocity(&evaluation), turn * angular);
+            DVector::from_iterator(6, linear.iter().chain(angular.iter()).copied())
+        };
+        let rates = derivative(3e-4, &mut at);
+        let size = 1.0 + at(0.0).norm();
+        let drift = point.velocity_drift(&evaluation);
+        let error = (rates.fixed_rows::<3>(0) - drift).norm() / size;
+        assert!(error < 1e-10 && drift.norm() > 0.1, "{what}: velocity {error:e}");
+        let Some(angular) = point.angular_drift(&evaluation) else { continue };
+        let error = (rates.fixed_rows::<3>(3) - angular).norm() / size;
+        assert!(error < 1e-10, "{what}: angular velocity {error:e}");
+    }
+}
+
 /// A load at an averaging interface is its share of forces at the nodes (theory 5.3).
 #[test]
 fn loads_at_an_interface_are_forces_at_its_nodes() {

@@ -54,6 +54,13 @@ impl Motion {
         value
     }
 
+    /// -qd'K qd.
+    fn bend(&self, qd: &[f64]) -> Vector3<f64> {
+        let mut value = Vector3::zeros();
+        self.second.iter().for_each(|(k, matrix)| value[*k] -= matrix.quadratic(qd));
+        value
+    }
+
     fn product(&self, x: &[f64]) -> Vector3<f64> {
         assert_eq!(x.len(), self.nf, "modes of the same body");
         Vector3::from_fn(|k, _| dot(self.row(k), x))
@@ -154,6 +161,23 @@ impl BodyPoint {
         let rate = self.rotation.as_ref()?.rate(&evaluation.q, &evaluation.qd);
         // G gives components in the turned axes, and A G = G'.
         Some(evaluation.omega + self.turn(evaluation)?.map().tr_mul(&rate))
+    }
+
+    /// What the velocity v of the point changes in the world without accelerations: with J nu = v its acceleration is J nu' and this,
+    /// omega x v + omega x dr/dt + (d2r/dq dq) qd qd. For constraints between bodies.
+    pub fn velocity_drift(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
+        let rate = self.translation.rate(&evaluation.q, &evaluation.qd);
+        evaluation.omega.cross(&(self.velocity(evaluation) + rate)) + self.translation.bend(&evaluation.qd)
+    }
+
+    /// The same of the angular velocity: d(omega_p)/dt without accelerations. `None` where the point has no orientation.
+    pub fn angular_drift(&self, evaluation: &Evaluation<'_>) -> Option<Vector3<f64>> {
+        let rotation = self.rotation.as_ref()?;
+        let (turn, rate) = (self.turn(evaluation)?, rotation.rate(&evaluation.q, &evaluation.qd));
+        let relative = turn.map().tr_mul(&rate);
+        // G(theta)' = G(-theta).
+        let bend = turn.map().tr_mul(&rotation.bend(&evaluation.qd)) - RotationVector(-turn.0).drift(&-rate);
+        Some(evaluation.omega.cross(&relative) + bend)
     }
 
     /// Adds a force b at the point: (b, r x b, (dr/dq)'b).
