@@ -27,7 +27,7 @@ import h5py
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent / "peers"))
-from measure import read_model  # noqa: E402
+from measure import node_order, read_model  # noqa: E402
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # settings of Exudyn under their older names
 import exudyn as exu  # noqa: E402
@@ -61,7 +61,10 @@ class Start:
                         "-o", self.path], check=True, stdout=subprocess.DEVNULL)
         _, self.mass, _ = read_model(model)
         with h5py.File(self.path) as f:
-            self.positions, shapes = f["nodes/position"][()], f["modes/shape"][()]
+            # The body's nodes have another order than the rows of M.
+            place = {node: i for i, node in enumerate(f["nodes/id"][()])}
+            order = [place[node] for node in node_order(model)]
+            self.positions, shapes = f["nodes/position"][()][order], f["modes/shape"][()][:, order]
             self.lam, inertia, mass = f["modes/eigenvalue"][()], f["invariants/I0"][()], f["invariants/mass"][0]
         self.shapes = shapes.reshape(modes, -1).T.copy()
         first, self.size = np.sqrt(self.lam[0]), np.sqrt(np.linalg.norm(inertia))

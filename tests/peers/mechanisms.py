@@ -25,7 +25,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "benches/peers"))
-from measure import read_model  # noqa: E402
+from measure import node_order, read_model  # noqa: E402
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)  # settings of Exudyn under their older names
 import exudyn as exu  # noqa: E402
@@ -34,7 +34,7 @@ from exudyn.FEM import FEMinterface, ObjectFFRFreducedOrderInterface  # noqa: E4
 
 MODES = 8
 INSTANTS = 8
-STEPS = [4000, 8000, 16000]
+STEPS = [2000, 4000, 8000]
 
 
 class Body:
@@ -47,7 +47,11 @@ class Body:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         _, mass, _ = read_model(folder)
         with h5py.File(path) as f:
-            self.positions, shapes, self.ids = f["nodes/position"][()], f["modes/shape"][()], list(f["nodes/id"][()])
+            # The body's nodes have another order than the rows of M.
+            place = {node: i for i, node in enumerate(f["nodes/id"][()])}
+            self.ids = node_order(folder)
+            order = [place[node] for node in self.ids]
+            self.positions, shapes = f["nodes/position"][()][order], f["modes/shape"][()][:, order]
             lam = f["modes/eigenvalue"][()]
             self.interfaces = {name: [self.ids.index(i) for i in group["node_id"][()]] for name, group in f["interfaces"].items()}
         self.rate = np.sqrt(lam[0])
