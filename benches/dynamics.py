@@ -186,7 +186,7 @@ end, with this step and with half of it. Both programs make the same error of fo
 
 ## One evaluation
 
-`cargo bench --bench dynamics`: state in, accelerations of the free body out; best of several, wall clock. *Dense matrices* is theory section 6 as it is
+`cargo bench --bench dynamics`: state in, accelerations of the free body out; microseconds of processor time, best of several. *Dense matrices* is theory section 6 as it is
 printed, in matrices of nalgebra. bracket_hex20 is a solid, shell_folded has a general mass matrix.
 
 | body | modes | dense matrices (us) | all terms (us) | ratio | without W3 (us) | W1 only (us) |
