@@ -7,11 +7,12 @@ use flexbody::dynamics::{
     Place, Prescribed, Surroundings, Terms,
 };
 use flexbody::flex_body::FlexBody;
-use flexbody::integration::{Explicit, Failure, Gauss, Method, System, integrate};
+use flexbody::integration::Method;
 use flexbody::invariants::BodyFrame;
 use nalgebra::{DVector, Vector3};
 use support::flexible::{fixture, soft_block};
 use support::integrate as reference;
+use support::motion::{adaptive, conserving, run};
 
 /// Spin about an axis near the middle one with `spin` of the first circular frequency, bent, flying.
 fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
@@ -33,34 +34,6 @@ fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
 /// Times of one turn.
 fn turn(start: &Configuration) -> f64 {
     std::f64::consts::TAU / start.omega.norm()
-}
-
-fn run(
-    equations: &EquationsOfMotion,
-    surroundings: &dyn Surroundings,
-    start: &Configuration,
-    method: impl Fn(usize) -> Method,
-    instants: &[f64],
-    breaks: &[f64],
-) -> (Vec<Configuration>, Vec<Balance>) {
-    let (mut motion, mut state) = Motion::new(equations, surroundings, start);
-    let mut observer = Motion::new(equations, surroundings, start).0;
-    let (mut places, mut balances) = (Vec::new(), Vec::new());
-    integrate(&mut method(motion.dimension()), &mut motion, &mut state, instants, breaks, |time, state| {
-        places.push(observer.configuration(time, state)?);
-        balances.push(observer.balance(time, state)?);
-        Ok::<(), Failure>(())
-    })
-    .expect("a body that moves");
-    (places, balances)
-}
-
-fn adaptive(tolerance: f64) -> impl Fn(usize) -> Method {
-    move |n| Method::Explicit(Explicit::new(n, tolerance, f64::MAX))
-}
-
-fn conserving(order: usize, step: f64) -> impl Fn(usize) -> Method {
-    move |n| Method::Gauss { method: Gauss::new(n, order), step }
 }
 
 /// Largest difference of two configurations: attitude, and modes and rates relative to `scale`.

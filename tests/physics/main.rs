@@ -14,5 +14,6 @@ mod mechanisms;
 mod model_files;
 mod precision;
 mod real_models;
+mod rotation;
 mod small_models;
 mod symmetry;

@@ -79,6 +79,31 @@ impl Mesh {
         })
     }
 
+    /// A ring about the z axis of `around` hexahedra, of square section with the given side.
+    pub fn ring(kind: Kind, around: i32, radius: f64, side: f64) -> Self {
+        let mesh = Self::from_cells(kind, &grid([1, around, 1]), |[r, t, z]| {
+            let angle = std::f64::consts::TAU * t / f64::from(around);
+            let radius = radius + side * (r - 0.5);
+            [radius * angle.cos(), radius * angle.sin(), side * z]
+        });
+        mesh.welded(1e-9 * radius)
+    }
+
+    /// The mesh with nodes closer than `distance` made one.
+    fn welded(self, distance: f64) -> Self {
+        let (mut nodes, mut numbers) = (Vec::<[f64; 3]>::new(), Vec::new());
+        for x in &self.nodes {
+            let near = |y: &[f64; 3]| (Vector3::from(*x) - Vector3::from(*y)).norm() < distance;
+            numbers.push(nodes.iter().position(near).unwrap_or_else(|| {
+                nodes.push(*x);
+                nodes.len() - 1
+            }));
+        }
+        let renumbered = |list: Vec<usize>| list.into_iter().map(|i| numbers[i]).collect();
+        let elements = self.elements.into_iter().map(|(kind, list)| (kind, renumbered(list))).collect();
+        Self { nodes, elements }
+    }
+
     /// An L-shaped bracket of cubes: `arm` cells along x and along z, `width` along y, two cells thick.
     pub fn bracket(kind: Kind, arm: i32, width: i32, cell: f64) -> Self {
         let cells: Vec<_> = grid([arm, width, arm]).into_iter().filter(|c| c[0] < 2 || c[2] < 2).collect();

@@ -10,6 +10,7 @@ pub mod general;
 pub mod integrate;
 pub mod jointed;
 pub mod mesh;
+pub mod motion;
 pub mod nodal;
 pub mod pipeline;
 pub mod plane;
