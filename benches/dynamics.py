@@ -39,7 +39,7 @@ MODES = [20, 90]
 STEPS = {20: 1500, 90: 150}  # of Exudyn in one turn
 MORE = {20: 30, 90: 60}  # times as many of ours
 TURNS = 5
-AGREEMENT = 1e-7  # of places, axes and amplitudes, relative; the error of the method is below
+AGREEMENT = 1e-9  # of places, axes and amplitudes, relative
 EVALUATIONS = 4  # of a step
 
 
