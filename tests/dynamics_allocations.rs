@@ -1,11 +1,12 @@
-//! Evaluations of the equations of motion take no memory from the heap.
+//! Evaluations of the equations of motion and steps of the integrators take no memory from the heap.
 
 mod support;
 
 use flexbody::dynamics::{
-    BodyPoint, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes, LoadJacobian, Orientation,
-    RotationVector, Terms,
+    BodyPoint, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes,
+    LoadJacobian, Motion, Orientation, Prescribed, RotationVector, Terms,
 };
+use flexbody::integration::{Explicit, Gauss, System as _};
 use flexbody::invariants::BodyFrame;
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -69,6 +70,8 @@ fn evaluations_allocate_nothing() {
             evaluation.mass_matrix(&mut square);
             evaluation.jacobian(&rates, &mut by_q, &mut square);
             evaluation.modal_momentum(&mut pi);
+            evaluation.modal_momentum_rate(&q, &mut pi);
+            evaluation.set_momenta(&q, &rates, &Prescribed::NOTHING).expect("a body");
             let energy = evaluation.kinetic_energy() + evaluation.elastic_energy();
             evaluation.mass_matrix_of(&euler, &mut larger);
             evaluation.velocity_forces_of(&euler, &euler.rate(&Vector3::x()).into(), &mut longer);
@@ -83,4 +86,37 @@ fn evaluations_allocate_nothing() {
             drop(one);
         }
     }
+}
+
+#[test]
+fn steps_allocate_nothing_after_the_first() {
+    let body = fixture("cube_hex8", 8, BodyFrame::Principal);
+    let equations = EquationsOfMotion::new(&body, Terms::ALL);
+    let period = std::f64::consts::TAU / body.modes().eigenvalue[7].sqrt();
+    let start = Configuration {
+        origin: Vector3::zeros(),
+        attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+        velocity: Vector3::zeros(),
+        omega: Vector3::new(0.1, 1.0, 0.2) / period * 0.01,
+        q: vec![0.0; 8],
+        qd: vec![0.0; 8],
+    };
+    let (mut motion, mut state) = Motion::new(&equations, &EmptySpace, &start);
+    let (mut explicit, mut gauss) =
+        (Explicit::new(motion.dimension(), 1e-9, period), Gauss::new(motion.dimension(), 4));
+    let mut time = explicit.step(&mut motion, 0.0, &mut state, period).expect("a step");
+    let mut within = state.clone();
+    let before = COUNT.get();
+    for _ in 0..5 {
+        time = explicit.step(&mut motion, time, &mut state, 10.0 * period).expect("a step");
+        explicit.interpolate(&mut motion, time, &state, &mut within).expect("a state");
+    }
+    assert_eq!(COUNT.get(), before, "explicit");
+    let step = 0.05 * period;
+    gauss.step(&mut motion, time, &mut state, step).expect("a step");
+    let before = COUNT.get();
+    for i in 1..5 {
+        gauss.step(&mut motion, time + f64::from(i) * step, &mut state, step).expect("a step");
+    }
+    assert_eq!(COUNT.get(), before, "Gauss");
 }

@@ -3,8 +3,8 @@
 mod support;
 
 use flexbody::dynamics::{
-    Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Motion, Orientation,
-    Place, Prescribed, Surroundings, Terms,
+    Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place,
+    Prescribed, Surroundings, Terms,
 };
 use flexbody::flex_body::FlexBody;
 use flexbody::integration::Method;

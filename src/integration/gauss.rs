@@ -40,8 +40,8 @@ pub struct Gauss {
     carry: Vec<f64>,
     /// (I + d h A + lambda h^2 A^2)^-1 of every oscillator.
     oscillators: Vec<(Oscillator, Square)>,
-    /// End and length of the last step, whose increments start the next.
-    last: Option<(f64, f64)>,
+    /// Length of the last step, whose increments start the next.
+    last: Option<f64>,
     work: Work,
 }
 
@@ -106,7 +106,7 @@ impl Gauss {
         self.carry.fill(0.0);
     }
 
-    /// Takes the step from `time` to `end`.
+    /// Takes a step of `h` from `time`. It goes on from the last one unless [`Gauss::restart`] was called.
     ///
     /// # Errors
     /// [`Failure::NotConverged`] where the step is too long for what the oscillators leave to the iteration, or what the system says.
@@ -118,10 +118,9 @@ impl Gauss {
         system: &mut dyn System,
         time: f64,
         state: &mut [f64],
-        end: f64,
+        h: f64,
     ) -> Result<(), Failure> {
-        let h = end - time;
-        self.prepare(system, time, h);
+        self.prepare(system, h);
         system.scales(state, &mut self.scales);
         let failed = Failure::NotConverged { time, step: h };
         let mut before = None;
@@ -143,7 +142,7 @@ impl Gauss {
             }
             if size == 0.0 || ratio.is_some_and(|ratio| size * ratio <= SOLVED || stalled(ratio)) {
                 self.advance(state);
-                self.last = Some((end, h));
+                self.last = Some(h);
                 self.work.steps += 1;
                 system.settle(state);
                 return Ok(());
@@ -155,11 +154,8 @@ impl Gauss {
     }
 
     /// Increments to start from, and the oscillators for this length.
-    fn prepare(&mut self, system: &dyn System, time: f64, h: f64) {
-        // Times are rounded: lengths that are meant to be the same differ by that.
-        let same = |length: f64| (length - h).abs() <= 8.0 * f64::EPSILON * time.abs().max(h);
-        let last = self.last.filter(|&(end, length)| end == time && same(length));
-        if last.is_some() {
+    fn prepare(&mut self, system: &dyn System, h: f64) {
+        if self.last == Some(h) {
             for at in 0..self.stage.len() {
                 let increments = self.increments.each_ref().map(|z| z[at]);
                 for i in 0..self.stages {

@@ -2,6 +2,9 @@
 
 use super::{Explicit, Failure, Gauss, System, Work};
 
+/// What lengths may differ by, relative, as rounding of times makes them.
+const STEP_ROUNDING: f64 = 1e-9;
+
 /// How a system is integrated.
 #[derive(Debug, Clone)]
 pub enum Method {
@@ -57,7 +60,7 @@ pub fn integrate<E: From<Failure>>(
     observe(start, state)?;
     let mut wanted = instants[1..].iter().copied().peekable();
     let stops = breaks.iter().copied().filter(|&at| start < at && at < last).chain([last]);
-    let mut time = start;
+    let (mut time, mut length) = (start, 0.0);
     let mut within = vec![0.0; state.len()];
     for stop in stops {
         method.restart();
@@ -75,14 +78,18 @@ pub fn integrate<E: From<Failure>>(
                 Method::Gauss { method, step } => {
                     let end = wanted.peek().map_or(stop, |&instant| instant.min(stop));
                     let from = time;
-                    let steps = ((end - from) / *step * (1.0 - 1e-12)).ceil().max(1.0);
+                    let steps = ((end - from) / *step * (1.0 - STEP_ROUNDING)).ceil().max(1.0);
+                    // Lengths that differ by the rounding of times are one length.
+                    let even = (end - from) / steps;
+                    if (length - even).abs() > STEP_ROUNDING * even {
+                        length = even;
+                    }
                     let mut taken = 0.0;
                     while taken < steps {
-                        taken += 1.0;
-                        let next = if taken < steps { from + (end - from) * (taken / steps) } else { end };
-                        method.step(system, time, state, next)?;
+                        method.step(system, time, state, length)?;
                         finite(state, time)?;
-                        time = next;
+                        taken += 1.0;
+                        time = if taken < steps { from + taken * length } else { end };
                     }
                 }
             }
