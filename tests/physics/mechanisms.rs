@@ -114,10 +114,7 @@ impl Mechanism {
         let instants: Vec<f64> = (1..=count).map(|i| self.duration * i as f64 / count as f64).collect();
         let (mut worst, mut drift, mut open, mut fall) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
         system.run(&mut y, &instants, 1e-9, |system, at, y| {
-            let origins = (0..bodies.len()).map(|body| {
-                let first = y.len() / bodies.len() * body;
-                Vector3::from_column_slice(&y[first..first + 3])
-            });
+            let origins = (0..bodies.len()).map(|body| system.origin(y, body));
             let points = shown.iter().map(|end| match end {
                 End::Ground(place) => *place,
                 End::Body(body, point) => system.place(y, *body, point),
@@ -130,7 +127,8 @@ impl Mechanism {
                 .sum();
             drift = drift.max((system.energy(y) - energy).abs());
             fall = fall.max((lift - energy).abs());
-            open = open.max(system.violation(y).0);
+            let (gap, rate) = system.violation(y);
+            open = open.max(gap).max(rate / system.scales.rate);
         });
         println!(
             "{what}: {worst:e} from Exudyn, whose error is about {:e}; energy {:e}",

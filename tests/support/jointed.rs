@@ -75,7 +75,8 @@ impl<'a> Jointed<'a> {
         EulerParameters(e.into())
     }
 
-    fn origin(&self, y: &[f64], body: usize) -> Vector3<f64> {
+    /// World place of the origin of a body.
+    pub fn origin(&self, y: &[f64], body: usize) -> Vector3<f64> {
         Vector3::from_column_slice(&y[self.first(body)..][..3])
     }
 
