@@ -1,7 +1,8 @@
-//! Cost of one evaluation of the equations of motion at 20 and 90 modes: `cargo bench --bench dynamics`.
+//! Cost of one evaluation of the equations of motion at 20 and 90 modes: `cargo bench --bench dynamics`, with `-- --json` for
+//! benches/dynamics.py.
 //!
 //! Accelerations of a free body from its state, each state another, beside the same equations in dense matrices of nalgebra as
-//! they are printed (theory section 6). Best of several: interruptions only ever slow a run down.
+//! they are printed (theory section 6). Processor time on Linux, best of several: other programs only ever slow a run down.
 
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -21,21 +22,47 @@ use support::flexible::{fixture, lively_state, oracle};
 use support::general::{quasi_velocities, raw_fixture};
 use support::random::Random;
 
-const REPEATS: usize = 7;
+const REPEATS: usize = 5;
 
-/// Seconds of one call, of `calls` in a row.
-fn best_seconds(calls: usize, mut work: impl FnMut(usize)) -> f64 {
-    (0..REPEATS)
-        .map(|_| {
-            let began = Instant::now();
-            (0..calls).for_each(&mut work);
-            began.elapsed().as_secs_f64() / calls as f64
-        })
-        .fold(f64::INFINITY, f64::min)
+/// Seconds that a run should take: long beside the resolution of processor time.
+const RUN: f64 = 0.2;
+
+/// Seconds that `work` takes: of the processor where the system tells, else on the clock.
+fn seconds(work: impl FnOnce()) -> f64 {
+    let processor = || -> Option<f64> {
+        let told = std::fs::read_to_string("/proc/self/schedstat").ok()?;
+        Some(told.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
+    };
+    let (clock, before) = (Instant::now(), processor());
+    work();
+    let elapsed = clock.elapsed().as_secs_f64();
+    before.zip(processor()).map_or(elapsed, |(before, after)| after - before)
+}
+
+/// Seconds of one call, of many in a row.
+fn best_seconds(mut work: impl FnMut(usize)) -> f64 {
+    let mut run = |calls: usize| seconds(|| (0..calls).for_each(&mut work)) / calls as f64;
+    // Long enough to tell how many calls make a run.
+    let mut calls = 16;
+    while run(calls) * (calls as f64) < 0.1 * RUN {
+        calls *= 4;
+    }
+    let calls = (RUN / run(calls)).ceil() as usize;
+    (0..REPEATS).map(|_| run(calls)).fold(f64::INFINITY, f64::min)
+}
+
+/// One line of the table, or one JSON object.
+fn tell(nf: usize, body: &str, what: &str, seconds: f64, dense: Option<f64>) {
+    let us = seconds * 1e6;
+    if std::env::args().any(|argument| argument == "--json") {
+        println!("{}", serde_json::json!({ "modes": nf, "body": body, "what": what, "us": us }));
+        return;
+    }
+    let ratio = dense.map_or(String::new(), |dense| format!("{:.1}", dense / seconds));
+    println!("{nf:>5} {:>40} {us:>10.2} us {ratio:>8}", format!("{body}, {what}"));
 }
 
 fn main() {
-    println!("{:>5} {:>30} {:>12} {:>8}", "modes", "accelerations", "us", "ratio");
     for nf in [20, 90] {
         for name in ["bracket_hex20", "shell_folded"] {
             let body = fixture(name, nf, BodyFrame::Principal);
@@ -43,10 +70,10 @@ fn main() {
             let states: Vec<State> = (0..16).map(|_| lively_state(&mut random, &body)).collect();
             let velocities: Vec<DVector<f64>> = states.iter().map(quasi_velocities).collect();
             let oracle = oracle(&body);
-            let dense = best_seconds(2000 / nf, |i| {
+            let dense = best_seconds(|i| {
                 std::hint::black_box(oracle.accelerations(&states[i % states.len()]));
             });
-            println!("{nf:>5} {:>30} {:>12.2} {:>8.1}", format!("{name}, dense"), dense * 1e6, 1.0);
+            tell(nf, name, "dense matrices", dense, Some(dense));
             let free = vec![0.0; 6 + nf];
             for (what, terms) in [
                 ("all terms", Terms::ALL),
@@ -56,34 +83,30 @@ fn main() {
                 let equations = EquationsOfMotion::new(&body, terms);
                 let mut evaluation = Evaluation::new(&equations);
                 let mut rates = vec![0.0; 6 + nf];
-                let seconds = best_seconds(200_000 / nf, |i| {
+                let cost = best_seconds(|i| {
                     let at = i % states.len();
                     evaluation.set(states[at].q.as_slice(), velocities[at].as_slice());
                     evaluation.accelerations(&free, &mut rates).expect("a body");
                     std::hint::black_box(&rates);
                 });
-                println!(
-                    "{nf:>5} {:>30} {:>12.2} {:>8.1}",
-                    format!("{name}, {what}"),
-                    seconds * 1e6,
-                    dense / seconds
-                );
+                tell(nf, name, what, cost, Some(dense));
             }
         }
+        // Gravity and Jacobians, which implicit integrators take once per step.
+        let name = "bracket_hex20";
+        let body = fixture(name, nf, BodyFrame::Principal);
+        let equations = EquationsOfMotion::new(&body, Terms::ALL);
+        let n = equations.n_velocities();
+        let mut evaluation = Evaluation::new(&equations);
+        let state = lively_state(&mut Random(2), &body);
+        evaluation.set(state.q.as_slice(), quasi_velocities(&state).as_slice());
+        let (acceleration, mut by_q, mut by_nu) = (vec![0.1; n], vec![0.0; n * nf], vec![0.0; n * n]);
+        let jacobian = best_seconds(|_| evaluation.jacobian(&acceleration, &mut by_q, &mut by_nu));
+        let mut forces = vec![0.0; n];
+        let gravity = best_seconds(|_| evaluation.add_gravity(&Vector3::z(), &mut forces));
+        tell(nf, name, "Jacobians", jacobian, None);
+        tell(nf, name, "gravity", gravity, None);
     }
-    // Gravity and Jacobians, which implicit integrators take once per step.
-    let body = fixture("bracket_hex20", 90, BodyFrame::Principal);
-    let equations = EquationsOfMotion::new(&body, Terms::ALL);
-    let (n, nf) = (equations.n_velocities(), equations.n_modes());
-    let mut evaluation = Evaluation::new(&equations);
-    let state = lively_state(&mut Random(2), &body);
-    evaluation.set(state.q.as_slice(), quasi_velocities(&state).as_slice());
-    let (acceleration, mut by_q, mut by_nu) = (vec![0.1; n], vec![0.0; n * nf], vec![0.0; n * n]);
-    let jacobian = best_seconds(200, |_| evaluation.jacobian(&acceleration, &mut by_q, &mut by_nu));
-    let mut forces = vec![0.0; n];
-    let gravity = best_seconds(20_000, |_| evaluation.add_gravity(&Vector3::z(), &mut forces));
-    println!("{nf:>5} {:>30} {:>12.2}", "bracket_hex20, Jacobians", jacobian * 1e6);
-    println!("{nf:>5} {:>30} {:>12.2}", "bracket_hex20, gravity", gravity * 1e6);
     // All nodes: what the reduction saves.
     for name in ["cube_hex8", "bracket_hex20"] {
         let model = FeModel::from_raw(raw_fixture(name)).expect("a body").model;
@@ -100,7 +123,7 @@ fn main() {
         };
         let state = equations.state(&start).expect("a state");
         let (mut motion, mut rates) = (NodalMotion::free(&equations), state.clone());
-        let nodal = best_seconds(50, |_| motion.rates(0.0, &state, &mut rates).expect("rates"));
-        println!("{:>5} {:>30} {:>12.2}", model.rows().len(), format!("{name}, all nodes"), nodal * 1e6);
+        let nodal = best_seconds(|_| motion.rates(0.0, &state, &mut rates).expect("rates"));
+        tell(model.rows().len(), name, "all nodes", nodal, None);
     }
 }

@@ -125,7 +125,7 @@ fn energy_is_kept_with_geometric_stiffness() {
         // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first stiffness.
         let sizes = [0.5, 0.5 / radius, 0.5];
         let single = (0..3).map(|at| at..at + 1);
-        for kinds in single.chain([0..3]) {
+        for kinds in single.chain(std::iter::once(0..3)) {
             let mut random = Random(5);
             let stiff = kinds
                 .clone()

@@ -62,7 +62,7 @@ fn points() -> Vec<(&'static str, FlexBody, BodyPoint)> {
     ]
 }
 
-/// Amplitudes for which the point moves and turns by numbers of the size of one.
+/// Amplitudes for which the point turns, or moves where it has no orientation, by numbers of the size of one.
 fn state(random: &mut Random, body: &FlexBody, point: &BodyPoint) -> (Vec<f64>, Vec<f64>) {
     let equations = EquationsOfMotion::new(body, Terms::ALL);
     let mut evaluation = Evaluation::new(&equations);
@@ -72,8 +72,8 @@ fn state(random: &mut Random, body: &FlexBody, point: &BodyPoint) -> (Vec<f64>, 
         let mut nu = vec![0.0; equations.n_velocities()];
         nu[equations.n_rigid() + j] = 1.0;
         evaluation.set(&vec![0.0; nf], &nu);
-        let turned = point.angular_velocity(&evaluation).map_or(0.0, |w| w.norm());
-        size = size.max(turned).max(point.velocity(&evaluation).norm());
+        let speed = point.angular_velocity(&evaluation).unwrap_or_else(|| point.velocity(&evaluation)).norm();
+        size = size.max(speed);
     }
     let mut numbers = |n: usize, size: f64| -> Vec<f64> { (0..n).map(|_| size * random.signed()).collect() };
     let rigid = numbers(equations.n_rigid(), 1.0);
@@ -139,7 +139,7 @@ fn points_move_as_their_velocities_say() {
         let (v, w) = evaluation.rigid_velocity();
         let place = Vector3::from_column_slice(&now.as_slice()[..3]);
         let velocity = v + w.cross(&place) + rates.fixed_rows::<3>(0);
-        let error = (velocity - point.velocity(&evaluation)).norm();
+        let error = (velocity - point.velocity(&evaluation)).norm() / (1.0 + place.norm());
         assert!(error < 1e-11, "{what}: velocity {error:e}");
         let Some(angular) = point.angular_velocity(&evaluation) else {
             assert!(!point.turns() && point.axes(&evaluation).is_none());
@@ -151,6 +151,35 @@ fn points_move_as_their_velocities_say() {
         let rate = Matrix3::from_column_slice(&rates.as_slice()[3..]) * axes.transpose();
         let error = (rate - (angular - w).cross_matrix()).norm();
         assert!(error < 1e-11, "{what}: angular velocity {error:e}");
+    }
+}
+
+/// Rates of the velocities in the world while nu is constant in body axes.
+#[test]
+fn velocities_drift_as_they_say() {
+    for (what, body, point) in points() {
+        let mut random = Random(11);
+        let equations = EquationsOfMotion::new(&body, Terms::ALL);
+        let (q, nu) = state(&mut random, &body, &point);
+        let r = equations.n_rigid();
+        let mut evaluation = Evaluation::new(&equations);
+        let mut at = |time: f64| {
+            let moved: Vec<f64> = q.iter().zip(&nu[r..]).map(|(q, qd)| q + time * qd).collect();
+            evaluation.set(&moved, &nu);
+            // Axes of the body relative to those at time 0.
+            let turn = RotationVector(evaluation.rigid_velocity().1 * time).axes();
+            let angular = point.angular_velocity(&evaluation).unwrap_or_else(Vector3::zeros);
+            let (linear, angular) = (turn * point.velocity(&evaluation), turn * angular);
+            DVector::from_iterator(6, linear.iter().chain(angular.iter()).copied())
+        };
+        let rates = derivative(3e-4, &mut at);
+        let size = 1.0 + at(0.0).norm();
+        let drift = point.velocity_drift(&evaluation);
+        let error = (rates.fixed_rows::<3>(0) - drift).norm() / size;
+        assert!(error < 1e-10 && drift.norm() > 0.1, "{what}: velocity {error:e}");
+        let Some(angular) = point.angular_drift(&evaluation) else { continue };
+        let error = (rates.fixed_rows::<3>(3) - angular).norm() / size;
+        assert!(error < 1e-10, "{what}: angular velocity {error:e}");
     }
 }
 

@@ -68,11 +68,17 @@ def read_model(folder):
     stiffness, mass = read_matrix(folder, files["stiffness"]), read_matrix(folder, files["mass"])
     with open(folder / files["nodes"]) as table:
         position = {int(r["node"]): (float(r["x"]), float(r["y"]), float(r["z"])) for r in csv.DictReader(table)}
-    with open(folder / files["dofs"]) as table:
+    return stiffness, mass, np.array([position[n] for n in node_order(folder)])
+
+
+def node_order(folder):
+    """Node numbers in the order of the matrix rows."""
+    files = tomllib.loads((Path(folder) / "model.toml").read_text())["files"]
+    with open(Path(folder) / files["dofs"]) as table:
         labels = [(int(r["node"]), int(r["dir"])) for r in csv.DictReader(table)]
     nodes = list(dict.fromkeys(node for node, _ in labels))
     assert labels == [(n, d) for n in nodes for d in (1, 2, 3)], "rows must run node by node, x y z"
-    return stiffness, mass, np.array([position[n] for n in nodes])
+    return nodes
 
 
 def shift_estimate(stiffness, mass, positions):

@@ -1,8 +1,7 @@
 //! Generalised forces of gravity, and their derivatives.
 
-use super::equations::EquationsOfMotion;
 use super::kernels::add_scaled;
-use super::{Evaluation, LoadJacobian};
+use super::{EquationsOfMotion, Evaluation, LoadJacobian};
 use nalgebra::Vector3;
 
 impl Evaluation<'_> {

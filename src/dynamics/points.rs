@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// A vector that is linear in q, and where the body has geometric stiffness for the load that does work on it quadratic (theory 7.5).
 #[derive(Debug, Clone)]
-struct Motion {
+struct PointMotion {
     nf: usize,
     /// 3 x nf, row-major.
     rows: Vec<f64>,
@@ -19,7 +19,7 @@ struct Motion {
     second: Vec<(usize, ModalMatrix)>,
 }
 
-impl Motion {
+impl PointMotion {
     fn new(nf: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let rows = (0..3 * nf).map(|at| entry(at / nf, at % nf)).collect();
         Self { nf, rows, second: Vec::new() }
@@ -54,6 +54,13 @@ impl Motion {
         value
     }
 
+    /// -qd'K qd.
+    fn bend(&self, qd: &[f64]) -> Vector3<f64> {
+        let mut value = Vector3::zeros();
+        self.second.iter().for_each(|(k, matrix)| value[*k] -= matrix.quadratic(qd));
+        value
+    }
+
     fn product(&self, x: &[f64]) -> Vector3<f64> {
         assert_eq!(x.len(), self.nf, "modes of the same body");
         Vector3::from_fn(|k, _| dot(self.row(k), x))
@@ -85,8 +92,8 @@ impl Motion {
 #[derive(Debug, Clone)]
 pub struct BodyPoint {
     position: Vector3<f64>,
-    translation: Motion,
-    rotation: Option<Motion>,
+    translation: PointMotion,
+    rotation: Option<PointMotion>,
 }
 
 impl BodyPoint {
@@ -96,7 +103,7 @@ impl BodyPoint {
     /// When the index is not below the number of nodes.
     pub fn node(body: &FlexBody, node: usize) -> Self {
         let (modes, nf) = (body.modes(), body.n_modes());
-        let of = |shape: &Mat<f64>| Motion::new(nf, |k, j| shape[(3 * node + k, j)]);
+        let of = |shape: &Mat<f64>| PointMotion::new(nf, |k, j| shape[(3 * node + k, j)]);
         // Nodes without rotations have zeros in their place.
         let rotation = modes.rotation.as_ref().map(of).filter(|rows| rows.rows.iter().any(|v| *v != 0.0));
         Self {
@@ -114,7 +121,7 @@ impl BodyPoint {
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
         let rows = interface.rows(body.nodes(), modes.shape.as_ref(), rotation, body.dimension())?;
         let of = |rows: &Mat<f64>, kind: LoadKind| {
-            let motion = Motion::new(nf, |k, j| rows[(k, j)]);
+            let motion = PointMotion::new(nf, |k, j| rows[(k, j)]);
             if terms.geometric_stiffness { motion.with_geometric_stiffness(body, &kind) } else { motion }
         };
         Some(Self {
@@ -129,7 +136,7 @@ impl BodyPoint {
         self.rotation.is_some()
     }
 
-    /// Place in the deformed body, r(q) = x + Psi_t q.
+    /// Place in the deformed body, r(q) = x + Psi_t q (theory 6.8 and, with geometric stiffness, 7.5).
     ///
     /// # Panics
     /// Here and below when the body is another.
@@ -154,6 +161,23 @@ impl BodyPoint {
         let rate = self.rotation.as_ref()?.rate(&evaluation.q, &evaluation.qd);
         // G gives components in the turned axes, and A G = G'.
         Some(evaluation.omega + self.turn(evaluation)?.map().tr_mul(&rate))
+    }
+
+    /// What the velocity v of the point changes in the world without accelerations: with J nu = v its acceleration is J nu' and this,
+    /// omega x v + omega x dr/dt + (d2r/dq dq) qd qd. For constraints between bodies.
+    pub fn velocity_drift(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
+        let rate = self.translation.rate(&evaluation.q, &evaluation.qd);
+        evaluation.omega.cross(&(self.velocity(evaluation) + rate)) + self.translation.bend(&evaluation.qd)
+    }
+
+    /// The same of the angular velocity: d(omega_p)/dt without accelerations. `None` where the point has no orientation.
+    pub fn angular_drift(&self, evaluation: &Evaluation<'_>) -> Option<Vector3<f64>> {
+        let rotation = self.rotation.as_ref()?;
+        let (turn, rate) = (self.turn(evaluation)?, rotation.rate(&evaluation.q, &evaluation.qd));
+        let relative = turn.map().tr_mul(&rate);
+        // G(theta)' = G(-theta).
+        let bend = turn.map().tr_mul(&rotation.bend(&evaluation.qd)) - RotationVector(-turn.0).drift(&-rate);
+        Some(evaluation.omega.cross(&relative) + bend)
     }
 
     /// Adds a force b at the point: (b, r x b, (dr/dq)'b).
@@ -252,7 +276,7 @@ impl BodyPoint {
     fn add_second(
         &self,
         evaluation: &Evaluation<'_>,
-        motion: &Motion,
+        motion: &PointMotion,
         load: &Vector3<f64>,
         jacobian: &mut LoadJacobian<'_>,
     ) {
@@ -271,7 +295,7 @@ impl BodyPoint {
         Some(RotationVector(self.rotation.as_ref()?.at(&evaluation.q)))
     }
 
-    fn orientation(&self, evaluation: &Evaluation<'_>) -> (&Motion, RotationVector) {
+    fn orientation(&self, evaluation: &Evaluation<'_>) -> (&PointMotion, RotationVector) {
         let rotation = self.rotation.as_ref().zip(self.turn(evaluation));
         rotation.expect("a point with an orientation")
     }

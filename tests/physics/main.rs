@@ -10,6 +10,7 @@ mod beams;
 mod convergence;
 mod covariance;
 mod errata;
+mod mechanisms;
 mod model_files;
 mod precision;
 mod real_models;

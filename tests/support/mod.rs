@@ -8,6 +8,7 @@ pub mod files;
 pub mod flexible;
 pub mod general;
 pub mod integrate;
+pub mod jointed;
 pub mod mesh;
 pub mod motion;
 pub mod nodal;
