@@ -132,7 +132,7 @@ codes! {
     InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
-    Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom; the digits of K may also be too few for a body this thin or with stiffnesses this far apart";
+    Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
     MassIndefinite = "FB503", Error, Untrustworthy, "mass matrix is indefinite", "negative lumped masses or wrong signs: export the consistent mass";
     StiffnessIndefinite = "FB504", Error, Untrustworthy, "stiffness matrix is indefinite", "check for negative springs, prestress beyond buckling, wrong signs";
     FactorizationFailed = "FB505", Error, Untrustworthy, "factorisation failed or is inaccurate", "the model may be scaled pathologically; check units and stiffness contrasts";
