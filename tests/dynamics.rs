@@ -3,12 +3,15 @@
 mod support;
 
 use faer::Mat;
-use flexbody::dynamics::{AngularVelocity, EquationsOfMotion, Evaluation, NodeShapes, Terms};
+use flexbody::dynamics::{AngularVelocity, BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
+use flexbody::model::LoadKind;
 use nalgebra::{DMatrix, DVector, Vector3};
 use support::equations::{Coriolis, State};
-use support::flexible::{accelerations, fixture, invariants_of, lively_state, made_of, oracle, set};
+use support::flexible::{
+    accelerations, fixture, invariants_of, lively_state, made_of, oracle, set, stressed,
+};
 use support::general::{
     GeneralBody, NodalBody, Row, RowKind, quasi_velocities, random_body, random_matrix, to_faer,
 };
@@ -137,7 +140,7 @@ fn converted_bodies_have_the_terms_of_section_six() {
 #[test]
 fn dropped_terms_are_zero_arrays() {
     for seed in 0..8u64 {
-        let terms = Terms { w1: seed & 1 == 0, w2: seed & 2 == 0, w3: seed & 4 == 0 };
+        let terms = Terms { w1: seed & 1 == 0, w2: seed & 2 == 0, w3: seed & 4 == 0, ..Terms::ALL };
         for (nodal, body) in [random_solid(seed), random_general(seed)] {
             let mut truncated = nodal.invariants();
             for (kept, array) in [
@@ -168,9 +171,11 @@ fn dropped_terms_are_zero_arrays() {
 fn jacobians_are_the_differences_of_the_forces() {
     let bodies = (0..6).flat_map(|seed| [random_solid(seed).1, random_general(seed).1]);
     let plane = ["plane_frame"].map(|name| fixture(name, 6, BodyFrame::Model));
+    let motion = [LoadKind::Spin, LoadKind::Acceleration, LoadKind::AngularAcceleration];
     for (at, body) in bodies.chain(plane).enumerate() {
         let nf = body.n_modes();
         let mut random = Random(at as u64);
+        let body = stressed(body, &motion[..at % 4], 1.0, &mut random);
         let mut parts = body.into_parts();
         parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, |i, j| 0.1 * (1 + i.min(j)) as f64));
         // Of the size of the other forces.
@@ -266,12 +271,12 @@ fn loads_do_the_power_of_the_nodes() {
         let nu = quasi_velocities(&state);
         let mut evaluation = Evaluation::new(&equations);
         set(&mut evaluation, &state);
-        let nodes = NodeShapes::new(&body, &[4, 0, 2]);
-        assert_eq!((nodes.len(), nodes.is_empty()), (3, false));
         let (mut forces, mut power) = (DVector::zeros(11), 0.0);
         for (i, node) in [4, 0, 2].into_iter().enumerate() {
             let force = Vector3::new(0.3, -1.0, 0.2 + i as f64);
-            nodes.add_force(&evaluation, i, &force, forces.as_mut_slice());
+            let point = BodyPoint::node(&body, node);
+            assert!(!point.turns());
+            point.add_force(&evaluation, &force, forces.as_mut_slice());
             // By hand: x + u and its velocity.
             let shape = |q: &DVector<f64>| {
                 Vector3::from_fn(|k, _| (0..5).map(|j| body.modes().shape[(3 * node + k, j)] * q[j]).sum())
@@ -279,8 +284,8 @@ fn loads_do_the_power_of_the_nodes() {
             let place = Vector3::from(body.nodes().positions[node]) + shape(&state.q);
             let velocity =
                 state.axes.transpose() * state.velocity + state.omega.cross(&place) + shape(&state.qd);
-            assert!((nodes.place(&evaluation, i) - place).norm() < 1e-14);
-            assert!((nodes.velocity(&evaluation, i) - velocity).norm() < 1e-13);
+            assert!((point.place(&evaluation) - place).norm() < 1e-14);
+            assert!((point.velocity(&evaluation) - velocity).norm() < 1e-13);
             power += force.dot(&velocity);
         }
         assert!((forces.dot(&nu) - power).abs() < 1e-12 * power.abs().max(1.0), "seed {seed}");

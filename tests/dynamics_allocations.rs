@@ -3,7 +3,8 @@
 mod support;
 
 use flexbody::dynamics::{
-    EquationsOfMotion, EulerParameters, Evaluation, NodeShapes, Orientation, RotationVector, Terms,
+    BodyPoint, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes, LoadJacobian, Orientation,
+    RotationVector, Terms,
 };
 use flexbody::invariants::BodyFrame;
 use nalgebra::Vector3;
@@ -42,7 +43,8 @@ fn evaluations_allocate_nothing() {
         for terms in [Terms::ALL, Terms::NONE] {
             let equations = EquationsOfMotion::new(&body, terms);
             let (n, nf) = (equations.n_velocities(), equations.n_modes());
-            let nodes = NodeShapes::new(&body, &[0, 3]);
+            let point = BodyPoint::node(&body, 3);
+            let mut by_turn = vec![0.0; 3 * n];
             let (q, nu) = (vec![1e-3; nf], vec![0.1; n]);
             let (mut forces, mut rates) = (vec![0.0; n], vec![0.0; n]);
             let (mut square, mut by_q, mut pi) = (vec![0.0; n * n], vec![0.0; n * nf], vec![0.0; nf]);
@@ -54,7 +56,14 @@ fn evaluations_allocate_nothing() {
             let before = COUNT.get();
             evaluation.set(&q, &nu);
             evaluation.add_gravity(&Vector3::z(), &mut forces);
-            nodes.add_force(&evaluation, 1, &Vector3::x(), &mut forces);
+            point.add_force(&evaluation, &Vector3::x(), &mut forces);
+            let mut jacobian = LoadJacobian { by_q: &mut by_q, by_turn: &mut by_turn };
+            evaluation.add_gravity_jacobian(&Vector3::z(), &mut jacobian);
+            point.add_force_jacobian(&evaluation, &Vector3::x(), LoadAxes::World, &mut jacobian);
+            if point.turns() {
+                point.add_torque(&evaluation, &Vector3::y(), &mut forces);
+                point.add_torque_jacobian(&evaluation, &Vector3::y(), LoadAxes::World, &mut jacobian);
+            }
             evaluation.accelerations(&forces, &mut rates).expect("a body");
             evaluation.balance(&rates, &mut forces);
             evaluation.mass_matrix(&mut square);

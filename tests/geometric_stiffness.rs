@@ -6,6 +6,7 @@ use faer::{Mat, Scale};
 use flexbody::basis::{BasisChoice, FreeSurface, Loads};
 use flexbody::convert::{Conversion, ConvertSettings, convert};
 use flexbody::diagnostic::Code;
+use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use flexbody::eigen::Wanted;
 use flexbody::error::Result;
 use flexbody::flex_body::FlexBody;
@@ -304,6 +305,19 @@ fn a_spinning_beam_stiffens_as_its_centrifugal_tension_says_and_softens_without(
             (0..3).filter(|k| *k != spin_axis).map(|k| body.invariants().s[k][k][(mode, mode)]).sum();
         assert!(if bending == spin_axis { taken < 0.01 } else { taken > 0.99 });
         assert!(found > taken);
+        // So do the equations of motion at the rate of the first bending frequency.
+        let (mut nu, lambda) = (vec![0.0; 16], body.modes().eigenvalue[mode]);
+        nu[3 + spin_axis] = lambda.sqrt();
+        let equations = EquationsOfMotion::new(&body, Terms::ALL);
+        let mut evaluation = Evaluation::new(&equations);
+        evaluation.set(&[0.0; 10], &nu);
+        let (mut by_q, mut by_nu) = (vec![0.0; 16 * 10], vec![0.0; 16 * 16]);
+        evaluation.jacobian(&[0.0; 16], &mut by_q, &mut by_nu);
+        let stiffer = by_q[(6 + mode) * 10 + mode] / lambda - 1.0;
+        assert!(
+            (stiffer / (tension - taken) - 1.0).abs() < 0.1 && stiffer > 0.0,
+            "{stiffer} {tension} {taken}"
+        );
     }
 }
 

@@ -1,9 +1,11 @@
 //! The constants of the equations of motion, laid out for their evaluation.
 
 use super::Terms;
+use super::geometric::geometric_stiffness;
 use super::kernels::Panels;
 use super::modal_matrix::{ModalMass, ModalMatrix};
 use crate::flex_body::FlexBody;
+use crate::model::LoadKind;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -35,8 +37,10 @@ pub(super) const LINEAR: usize = 21;
 /// 3 + nf: V_x, V_y, omega_z, qd. Units are those of the body: length/time, 1/time and, q being the amplitudes of mass-normalised
 /// modes, mass^(1/2) length/time.
 ///
-/// [`Evaluation`](super::Evaluation) computes with them. The equations hold for the mass matrices of solids and for general ones;
-/// the centrifugal stiffening that a body may carry as geometric stiffness (theory 7.3) is not among the terms.
+/// [`Evaluation`](super::Evaluation) computes with them. The equations hold for the mass matrices of solids and for general ones.
+/// Geometric stiffness of the body (theory 7.3) for spin, acceleration and angular acceleration is part of the kinetic energy: it
+/// belongs to motion of second order in q that adds q'K^a_k q / 2 to the first moment, q'K^alpha_k to row k of C(q), and takes
+/// q'K^omega(omega) q / 2 from T (theory 7.4).
 ///
 /// ```
 /// # fn check(body: &flexbody::flex_body::FlexBody) {
@@ -65,12 +69,14 @@ pub struct EquationsOfMotion {
     pub(super) linear: Vec<f64>,
     /// The same for products.
     pub(super) linear_panels: Panels,
-    /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`: T sees no more of W2.
+    /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`, less geometric stiffness for spin: T sees no more of W2.
     pub(super) w2: Option<Panels>,
-    /// W3_a' for each of `axes`.
+    /// W3_a' for each of `axes`, with geometric stiffness for angular acceleration.
     pub(super) w3: Option<Panels>,
     /// W3_a' - W3_a where that is not 2 W3_a', the blocks not being skew.
     pub(super) w3_skew: Option<Panels>,
+    /// Geometric stiffness for acceleration along each axis that the body moves along.
+    pub(super) accelerated: Option<Panels>,
     pub(super) modal_mass: ModalMass,
     pub(super) stiffness: ModalMatrix,
     pub(super) damping: ModalMatrix,
@@ -107,33 +113,50 @@ impl EquationsOfMotion {
         let linear: Vec<f64> = (0..LINEAR * nf).map(|at| of_row(at / nf, at % nf)).collect();
         let linear_panels = Panels::new(LINEAR, nf, |row, j| linear[row * nf + j]);
 
-        let w2 = terms.w2.then(|| {
-            let w2 = invariants.w2();
-            let block = |&(a, b): &(usize, usize)| {
-                Mat::from_fn(nf, nf, |i, j| {
-                    0.5 * (w2[(a * nf + i, b * nf + j)] + w2[(a * nf + j, b * nf + i)])
-                })
-            };
-            Panels::stacked(&pairs.iter().map(block).collect::<Vec<_>>())
+        let geometric = |kind| terms.geometric_stiffness.then(|| geometric_stiffness(body, &kind)).flatten();
+        let stacked = |count: usize, entry: &dyn Fn(usize, usize, usize) -> f64| {
+            let block = |at| Mat::from_fn(nf, nf, |i, j| entry(at, i, j));
+            Panels::stacked(&(0..count).map(block).collect::<Vec<_>>())
+        };
+        let spin = geometric(LoadKind::Spin);
+        let w2 = terms.w2.then(|| invariants.w2());
+        let w2 = (w2.is_some() || spin.is_some()).then(|| {
+            stacked(pairs.len(), &|at, i, j| {
+                let (a, b) = pairs[at];
+                let own = w2
+                    .as_ref()
+                    .map_or(0.0, |w2| 0.5 * (w2[(a * nf + i, b * nf + j)] + w2[(a * nf + j, b * nf + i)]));
+                let component = LoadKind::SPIN.iter().position(|&axes| axes == (a, b));
+                let taken = spin.as_ref().zip(component).map_or(0.0, |(spin, c)| spin(c, i, j));
+                // w'E w has both orders of a pair, the load one.
+                own - if a == b { taken } else { 0.5 * taken }
+            })
         });
-        let (w3, w3_skew) = if terms.w3 {
-            let w3 = invariants.w3();
-            let blocks = |f: &dyn Fn(f64, f64) -> f64| {
-                let block =
-                    |&a: &usize| Mat::from_fn(nf, nf, |i, j| f(w3[(a * nf + i, j)], w3[(a * nf + j, i)]));
-                Panels::stacked(&axes.iter().map(block).collect::<Vec<_>>())
+        let turned = geometric(LoadKind::AngularAcceleration);
+        let (w3, w3_skew) = if terms.w3 || turned.is_some() {
+            let w3 = terms.w3.then(|| invariants.w3());
+            // (W3_a)_ij and (W3_a)_ji.
+            let entries = |at: usize, i: usize, j: usize| {
+                let a = axes[at];
+                w3.as_ref().map_or((0.0, 0.0), |w3| (w3[(a * nf + i, j)], w3[(a * nf + j, i)]))
             };
             let general = invariants.general.is_some();
-            // Of a solid the blocks are skew: what is left of W3 + W3' is rounding.
-            let transposed = if general {
-                blocks(&|_, mirrored| mirrored)
-            } else {
-                blocks(&|own, mirrored| 0.5 * (mirrored - own))
+            let transposed = stacked(axes.len(), &|at, i, j| {
+                let (own, mirrored) = entries(at, i, j);
+                // Of a solid the blocks are skew: what is left of W3 + W3' is rounding.
+                let w3 = if general { mirrored } else { 0.5 * (mirrored - own) };
+                w3 + turned.as_ref().map_or(0.0, |turned| turned(axes[at], i, j))
+            });
+            let skew = |at: usize, i: usize, j: usize| {
+                let (own, mirrored) = entries(at, i, j);
+                mirrored - own
             };
-            (Some(transposed), general.then(|| blocks(&|own, mirrored| mirrored - own)))
+            (Some(transposed), (general || turned.is_some()).then(|| stacked(axes.len(), &skew)))
         } else {
             (None, None)
         };
+        let accelerated =
+            geometric(LoadKind::Acceleration).map(|along| stacked(if plane { 2 } else { 3 }, &along));
         let of_ratios = |i: usize, j: usize| {
             if i == j { 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt() } else { 0.0 }
         };
@@ -157,6 +180,7 @@ impl EquationsOfMotion {
             w2,
             w3,
             w3_skew,
+            accelerated,
             modal_mass: ModalMass::new(invariants.modal_mass().as_ref(), MASS_ROUNDING),
             stiffness: ModalMatrix::new(invariants.modal_stiffness.as_ref(), STIFFNESS_ROUNDING),
             damping,
@@ -201,9 +225,14 @@ impl EquationsOfMotion {
         (velocity, omega, modal)
     }
 
-    /// Row `axis` of [C1; C(q)], given C(q).
-    pub(super) fn coupling_row<'v>(&'v self, coupling: &'v [f64], axis: usize) -> &'v [f64] {
-        if axis < 3 { self.row(C1 + axis) } else { &coupling[(axis - 3) * self.nf..][..self.nf] }
+    /// Row `axis` of [C1(q); C(q)].
+    pub(super) fn coupling_row<'v>(&self, coupling: &'v [f64], axis: usize) -> &'v [f64] {
+        &coupling[axis * self.nf..][..self.nf]
+    }
+
+    /// Number of axes that the body moves along.
+    pub(super) fn translations(&self) -> usize {
+        if self.rigid.len() == 3 { 2 } else { 3 }
     }
 
     /// y += factor (K_ff q + D qd).
@@ -211,6 +240,17 @@ impl EquationsOfMotion {
     pub(super) fn add_internal(&self, factor: f64, q: &[f64], qd: &[f64], y: &mut [f64]) {
         self.stiffness.add_product(factor, q, y);
         self.damping.add_product(factor, qd, y);
+    }
+
+    /// Stiffness and damping of mode `j` alone, where the modes are mass-normalised.
+    pub(super) fn oscillator(&self, j: usize) -> Option<(f64, f64)> {
+        matches!(self.modal_mass, ModalMass::Identity)
+            .then(|| (self.stiffness.get(j, j), self.damping.get(j, j)))
+    }
+
+    /// qd'D qd: the power that damping takes.
+    pub(super) fn dissipation(&self, qd: &[f64]) -> f64 {
+        self.damping.quadratic(qd)
     }
 
     /// Entries of a force and a torque that belong to rigid motions of the body.

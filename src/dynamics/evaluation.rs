@@ -1,8 +1,8 @@
 //! The equations of motion at one state.
 
-use super::EquationsOfMotion;
-use super::equations::{C1, C2, LINEAR, PAIRS, W0, W1};
+use super::equations::{C1, LINEAR, PAIRS, W0, W1};
 use super::kernels::{WIDTH, add_scaled, dot};
+use super::{EquationsOfMotion, NotPositiveDefinite, Prescribed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use pulp::Arch;
 
@@ -29,10 +29,15 @@ pub struct Evaluation<'a> {
     pub(super) w3_qd: Vec<f64>,
     /// (W3_a' - W3_a) qd.
     pub(super) skew_qd: Vec<f64>,
-    /// C(q) (3 x nf).
+    /// K^a_k q for each translation, and K^a_k qd.
+    pub(super) accelerated_q: Vec<f64>,
+    pub(super) accelerated_qd: Vec<f64>,
+    /// [C1(q); C(q)] (6 x nf).
     pub(super) coupling: Vec<f64>,
     first_moment: Vector3<f64>,
-    /// -c~ + W0 Q: momentum per angular velocity.
+    /// C1(q) qd.
+    c1_qd: Vector3<f64>,
+    /// -c~ + W0 Q, c with what geometric stiffness adds: momentum per angular velocity.
     pub(super) lever: Matrix3<f64>,
     pub(super) lever_rate: Matrix3<f64>,
     inertia: Matrix3<f64>,
@@ -40,12 +45,13 @@ pub struct Evaluation<'a> {
     pub(super) momentum: Vector3<f64>,
     pub(super) angular_momentum: Vector3<f64>,
     pub(super) velocity_forces: Vec<f64>,
-    /// For [`Evaluation::accelerations`]: L^-1 [C1' C(q)'] (6 x nf) and modal forces.
+    /// For [`Evaluation::accelerations`]: L^-1 [C1(q)' C(q)'] (6 x nf) and modal forces.
     pub(super) whitened: Vec<f64>,
     pub(super) modal: Vec<f64>,
     /// For [`Evaluation::jacobian`]: products with rates and accelerations.
     pub(super) w2_scratch: Vec<f64>,
     pub(super) w3_scratch: [Vec<f64>; 2],
+    pub(super) accelerated_scratch: Vec<f64>,
 }
 
 impl<'a> Evaluation<'a> {
@@ -55,6 +61,7 @@ impl<'a> Evaluation<'a> {
         let zeros = |n: usize| vec![0.0; n];
         let of_pairs = || zeros(equations.w2.as_ref().map_or(0, |w2| w2.padded_rows()));
         let of_axes = || zeros(equations.w3.as_ref().map_or(0, |w3| w3.padded_rows()));
+        let of_translations = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
         let mut evaluation = Self {
             equations,
             arch: Arch::new(),
@@ -66,8 +73,11 @@ impl<'a> Evaluation<'a> {
             w3_q: of_axes(),
             w3_qd: of_axes(),
             skew_qd: of_axes(),
-            coupling: zeros(3 * nf),
+            accelerated_q: of_translations(),
+            accelerated_qd: of_translations(),
+            coupling: zeros(6 * nf),
             first_moment: Vector3::zeros(),
+            c1_qd: Vector3::zeros(),
             lever: Matrix3::zeros(),
             lever_rate: Matrix3::zeros(),
             inertia: Matrix3::zeros(),
@@ -79,6 +89,7 @@ impl<'a> Evaluation<'a> {
             modal: zeros(nf),
             w2_scratch: of_pairs(),
             w3_scratch: [of_axes(), of_axes()],
+            accelerated_scratch: of_translations(),
         };
         let (q, nu) = (zeros(nf), zeros(equations.n_velocities()));
         evaluation.set(&q, &nu);
@@ -103,62 +114,133 @@ impl<'a> Evaluation<'a> {
         self.q.copy_from_slice(q);
         self.qd.copy_from_slice(qd);
         (self.velocity, self.omega) = (velocity, omega);
-        self.arch.dispatch(|| self.evaluate());
+        self.arch.dispatch(|| {
+            self.deform();
+            self.move_on();
+        });
     }
 
-    #[inline(always)] // compiled once per instruction set
-    fn evaluate(&mut self) {
+    /// Goes to the state with modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of nu. At the cost of
+    /// [`Evaluation::set`] and one solution with Mc.
+    ///
+    /// * `prescribed`: V or omega that are given instead; the momenta that belong to them follow, and those of `momenta` are not read.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`]; the state is then without meaning.
+    ///
+    /// # Panics
+    /// When the lengths are not those of the equations.
+    pub fn set_momenta(
+        &mut self,
+        q: &[f64],
+        momenta: &[f64],
+        prescribed: &Prescribed,
+    ) -> Result<(), NotPositiveDefinite> {
         let body = self.equations;
-        let (nf, v, w) = (body.nf, self.velocity, self.omega);
-        let (q, qd) = (&self.q[..], &self.qd[..]);
-        let (mut of_q, mut of_qd) = ([0.0; WIDTH], [0.0; WIDTH]);
-        body.linear_panels.times(q, &mut of_q);
-        body.linear_panels.times(qd, &mut of_qd);
-        let vector = |row: usize, of: &[f64; WIDTH]| Vector3::new(of[row], of[row + 1], of[row + 2]);
-        let matrix = |of: &[f64; WIDTH]| Matrix3::from_fn(|k, b| of[W0 + 3 * k + b]);
-        self.first_moment = body.first_moment + vector(C1, &of_q);
-        self.lever = matrix(&of_q) - body.first_moment.cross_matrix();
-        self.lever_rate = matrix(&of_qd);
+        assert_eq!(q.len(), body.nf, "one coordinate per mode");
+        let (p, h, pi) = body.split(momenta);
+        self.q.copy_from_slice(q);
+        self.modal.copy_from_slice(pi);
+        self.arch
+            .dispatch(|| {
+                self.deform();
+                let (velocity, omega) = self.solve(&p, &h, prescribed)?;
+                (self.velocity, self.omega) = (velocity, omega);
+                self.qd.copy_from_slice(&self.modal);
+                self.move_on();
+                Some(())
+            })
+            .ok_or(NotPositiveDefinite)
+    }
 
-        // I(q) and its rate; w_a w_b summed over both orders of a pair.
-        (self.inertia, self.inertia_rate) = (body.inertia, Matrix3::zeros());
-        for (pair, &(a, b)) in PAIRS.iter().enumerate() {
-            add_symmetric(&mut self.inertia, (a, b), of_q[W1 + pair]);
-            add_symmetric(&mut self.inertia_rate, (a, b), of_qd[W1 + pair]);
+    /// What depends on q alone.
+    #[inline(always)] // compiled once per instruction set
+    fn deform(&mut self) {
+        let body = self.equations;
+        let nf = body.nf;
+        let q = &self.q[..];
+        let mut of_q = [0.0; WIDTH];
+        body.linear_panels.times(q, &mut of_q);
+        self.first_moment = body.first_moment + Vector3::from_fn(|k, _| of_q[C1 + k]);
+        self.lever = Matrix3::from_fn(|k, b| of_q[W0 + 3 * k + b]) - body.first_moment.cross_matrix();
+        self.inertia = body.inertia;
+        for (pair, &axes) in PAIRS.iter().enumerate() {
+            add_symmetric(&mut self.inertia, axes, of_q[W1 + pair]);
         }
         if let Some(w2) = &body.w2 {
             w2.times(q, &mut self.w2_q);
             for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
                 add_symmetric(&mut self.inertia, pair, dot(q, product));
+            }
+        }
+        self.coupling.copy_from_slice(&body.linear[C1 * nf..]);
+        if let Some(accelerated) = &body.accelerated {
+            accelerated.times(q, &mut self.accelerated_q);
+            let mut shift = Vector3::zeros();
+            for (k, product) in self.accelerated_q.chunks_exact(nf).take(body.translations()).enumerate() {
+                add_scaled(1.0, product, &mut self.coupling[k * nf..][..nf]);
+                shift[k] = 0.5 * dot(q, product);
+            }
+            self.first_moment += shift;
+            self.lever -= shift.cross_matrix();
+        }
+        if let Some(w3) = &body.w3 {
+            w3.times(q, &mut self.w3_q);
+            for (&a, product) in body.axes.iter().zip(self.w3_q.chunks_exact(nf)) {
+                add_scaled(1.0, product, &mut self.coupling[(3 + a) * nf..][..nf]);
+            }
+        }
+    }
+
+    /// What depends on the velocities, after [`Evaluation::deform`].
+    #[inline(always)] // compiled once per instruction set
+    fn move_on(&mut self) {
+        let body = self.equations;
+        let (nf, v, w) = (body.nf, self.velocity, self.omega);
+        let qd = &self.qd[..];
+        let mut of_qd = [0.0; WIDTH];
+        body.linear_panels.times(qd, &mut of_qd);
+        self.c1_qd = Vector3::from_fn(|k, _| of_qd[C1 + k]);
+        self.lever_rate = Matrix3::from_fn(|k, b| of_qd[W0 + 3 * k + b]);
+        let mut c1_rate_qd = Vector3::zeros();
+        if let Some(accelerated) = &body.accelerated {
+            accelerated.times(qd, &mut self.accelerated_qd);
+            let mut rate = Vector3::zeros();
+            for k in 0..body.translations() {
+                rate[k] = dot(&self.accelerated_q[k * nf..][..nf], qd);
+                c1_rate_qd[k] = dot(&self.accelerated_qd[k * nf..][..nf], qd);
+            }
+            self.c1_qd += rate;
+            self.lever_rate -= rate.cross_matrix();
+        }
+        self.inertia_rate = Matrix3::zeros();
+        for (pair, &axes) in PAIRS.iter().enumerate() {
+            add_symmetric(&mut self.inertia_rate, axes, of_qd[W1 + pair]);
+        }
+        if body.w2.is_some() {
+            for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
                 add_symmetric(&mut self.inertia_rate, pair, 2.0 * dot(qd, product));
             }
         }
-
-        // C(q), C(q) qd and dC/dt qd.
-        self.coupling.copy_from_slice(&body.linear[C2 * nf..]);
-        let mut coupling_qd = vector(C2, &of_qd);
+        let coupling_qd = Vector3::from_fn(|a, _| dot(&self.coupling[(3 + a) * nf..][..nf], qd));
         let mut coupling_rate_qd = Vector3::zeros();
         if let Some(w3) = &body.w3 {
-            w3.times(q, &mut self.w3_q);
             w3.times(qd, &mut self.w3_qd);
             match &body.w3_skew {
-                Some(skew) => skew.times(qd, &mut self.skew_qd),
-                None => self.skew_qd.iter_mut().zip(&self.w3_qd).for_each(|(skew, w3)| *skew = 2.0 * w3),
-            }
-            for (at, &a) in body.axes.iter().enumerate() {
-                let product = &self.w3_q[at * nf..][..nf];
-                add_scaled(1.0, product, &mut self.coupling[a * nf..][..nf]);
-                coupling_qd[a] += dot(product, qd);
-                if body.w3_skew.is_some() {
-                    coupling_rate_qd[a] = dot(&self.w3_qd[at * nf..][..nf], qd);
+                Some(skew) => {
+                    skew.times(qd, &mut self.skew_qd);
+                    for (&a, product) in body.axes.iter().zip(self.w3_qd.chunks_exact(nf)) {
+                        coupling_rate_qd[a] = dot(product, qd);
+                    }
                 }
+                None => self.skew_qd.iter_mut().zip(&self.w3_qd).for_each(|(skew, w3)| *skew = 2.0 * w3),
             }
         }
 
-        let p = body.mass * v + self.lever * w + vector(C1, &of_qd);
+        let p = body.mass * v + self.relative_momentum();
         let h = self.lever.tr_mul(&v) + self.inertia * w + coupling_qd;
         (self.momentum, self.angular_momentum) = (p, h);
-        let force = self.lever_rate * w + w.cross(&p);
+        let force = self.lever_rate * w + c1_rate_qd + w.cross(&p);
         let torque =
             self.lever_rate.tr_mul(&v) + self.inertia_rate * w + coupling_rate_qd + w.cross(&h) + v.cross(&p);
 
@@ -168,6 +250,12 @@ impl<'a> Evaluation<'a> {
         for at in 0..9 {
             let weight = v[at / 3] * w[at % 3];
             add_scaled(-weight, body.row(W0 + at), modal);
+        }
+        if body.accelerated.is_some() {
+            let carried = w.cross(&v);
+            for (k, product) in self.accelerated_q.chunks_exact(nf).take(body.translations()).enumerate() {
+                add_scaled(carried[k], product, modal);
+            }
         }
         for (pair, &(a, b)) in PAIRS.iter().enumerate() {
             add_scaled(-0.5 * spin_product(&w, (a, b)), body.row(W1 + pair), modal);
@@ -189,17 +277,18 @@ impl<'a> Evaluation<'a> {
         self.equations
     }
 
-    /// s(q) = c + C1 q, first moment of the deformed body. Unit: mass length.
+    /// s(q) = c + C1 q + q'K^a q / 2, first moment of the deformed body, with its geometric stiffness K^a for acceleration. Unit:
+    /// mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
         self.first_moment
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q, inertia of the deformed body about the origin. Unit: mass length^2.
+    /// I(q) = I0 + W1 Q + Q'W2 Q, less q'K^omega q, inertia of the deformed body about the origin. Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         self.inertia
     }
 
-    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1 qd, body axes.
+    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q with what geometric stiffness adds to c.
     pub fn linear_momentum(&self) -> Vector3<f64> {
         self.momentum
     }
@@ -209,7 +298,7 @@ impl<'a> Evaluation<'a> {
         self.angular_momentum
     }
 
-    /// pi = C1'V + C(q)'omega + m_ff qd (nf).
+    /// pi = C1(q)'V + C(q)'omega + m_ff qd (nf).
     ///
     /// # Panics
     /// When `pi` has not nf entries.
@@ -231,6 +320,53 @@ impl<'a> Evaluation<'a> {
     /// U = q' K_ff q / 2.
     pub fn elastic_energy(&self) -> f64 {
         0.5 * self.equations.stiffness.quadratic(&self.q)
+    }
+
+    /// V, omega: velocity of the origin and angular velocity of the body frame, body axes.
+    pub fn rigid_velocity(&self) -> (Vector3<f64>, Vector3<f64>) {
+        (self.velocity, self.omega)
+    }
+
+    /// q (nf).
+    pub fn modal_coordinates(&self) -> &[f64] {
+        &self.q
+    }
+
+    /// qd (nf).
+    pub fn modal_velocity(&self) -> &[f64] {
+        &self.qd
+    }
+
+    /// pi' = dT/dq - K_ff q - D qd + Q for modal forces `applied` = Q (nf).
+    ///
+    /// # Panics
+    /// When a length is not nf.
+    pub fn modal_momentum_rate(&self, applied: &[f64], rate: &mut [f64]) {
+        let body = self.equations;
+        assert!(applied.len() == body.nf && rate.len() == body.nf, "one entry per mode");
+        for ((rate, applied), h) in
+            rate.iter_mut().zip(applied).zip(&self.velocity_forces[body.rigid.len()..])
+        {
+            *rate = applied - h;
+        }
+        // h_nu has the rates of C1(q)'V and C(q)'omega, which belong to pi'.
+        if body.accelerated.is_some() {
+            let translations = self.accelerated_qd.chunks_exact(body.nf).take(body.translations());
+            for (k, product) in translations.enumerate() {
+                add_scaled(self.velocity[k], product, flexible);
+            }
+        }
+        if body.w3.is_some() {
+            for (&a, product) in body.axes.iter().zip(self.w3_qd.chunks_exact(body.nf)) {
+                add_scaled(self.omega[a], product, rate);
+            }
+        }
+        body.add_internal(-1.0, &self.q, &self.qd, rate);
+    }
+
+    /// p - m V = (-c~ + W0 Q) omega + C1 qd: linear momentum of the motion about the origin, body axes.
+    pub fn relative_momentum(&self) -> Vector3<f64> {
+        self.lever * self.omega + self.c1_qd
     }
 
     /// h_nu: the forces that the inertia of the body takes without acceleration (6 + nf, or 3 + nf).
@@ -301,7 +437,7 @@ impl<'a> Evaluation<'a> {
         matrix
     }
 
-    /// y += C1' linear + C(q)' angular + m_ff modal.
+    /// y += C1(q)' linear + C(q)' angular + m_ff modal.
     fn add_modal_inertia(&self, linear: &Vector3<f64>, angular: &Vector3<f64>, modal: &[f64], y: &mut [f64]) {
         for k in 0..3 {
             add_scaled(linear[k], self.equations.coupling_row(&self.coupling, k), y);

@@ -12,8 +12,8 @@ impl Evaluation<'_> {
     /// * `by_q`: df/dq (n x nf), row-major.
     /// * `by_nu`: df/dnu (n x n), row-major.
     ///
-    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = (W0)_j and I_j = dI/dq_j = (W1)_j + 2 (E q)_j, where E is
-    /// the part of W2 that the kinetic energy sees (theory 6.4), transposes as N^T and rates as dN, dI:
+    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = dN/dq_j = (W0)_j and I_j = dI/dq_j = (W1)_j + 2 (E q)_j, where E
+    /// is the part of W2 that the kinetic energy sees (theory 6.4), transposes as N^T and rates as dN, dI:
     ///
     /// ```text
     /// dF/dq_j      = N_j alpha + omega x N_j omega
@@ -30,6 +30,14 @@ impl Evaluation<'_> {
     /// dQ/dqd       = sum_a omega_a (W3_a^T - W3_a) + D
     /// ```
     ///
+    /// Geometric stiffness K^a for acceleration adds -(K^a q)_j~ to N_j, and
+    ///
+    /// ```text
+    /// dF/dq_j      : (K^a qdd)_j + 2 omega x (K^a qd)_j
+    /// dQ_i/dq_j    : K^a_ij . (V' + omega x V)
+    /// dF/dqd_j     : 2 (K^a qd)_j
+    /// ```
+    ///
     /// # Panics
     /// When a length is another.
     pub fn jacobian(&mut self, acceleration: &[f64], by_q: &mut [f64], by_nu: &mut [f64]) {
@@ -42,15 +50,18 @@ impl Evaluation<'_> {
         for j in 0..nf {
             self.modal_columns(j, (&linear, &angular), by_q, by_nu);
         }
-        self.modal_block(&angular, by_q, by_nu);
+        self.modal_block(&(linear + self.omega.cross(&self.velocity)), &angular, by_q, by_nu);
     }
 
-    /// The products with W2 and W3 that an evaluation does not need.
+    /// The products with W2, W3 and K^a that an evaluation does not need.
     #[inline(always)] // compiled once per instruction set
     fn multiply(&mut self, modal: &[f64]) {
         let body = self.equations;
         if let Some(w2) = &body.w2 {
             w2.times(&self.qd, &mut self.w2_scratch);
+        }
+        if let Some(accelerated) = &body.accelerated {
+            accelerated.times(modal, &mut self.accelerated_scratch);
         }
         if let Some(w3) = &body.w3 {
             let [transposed, skew] = &mut self.w3_scratch;
@@ -92,7 +103,17 @@ impl Evaluation<'_> {
         let body = self.equations;
         let (n, nf, r) = (body.n_velocities(), body.nf, body.rigid.len());
         let (v, w) = (&self.velocity, &self.omega);
-        let lever = Matrix3::from_fn(|k, b| body.row(W0 + 3 * k + b)[j]);
+        let mut lever = Matrix3::from_fn(|k, b| body.row(W0 + 3 * k + b)[j]);
+        let (mut accelerated_modal, mut accelerated_qd) = (Vector3::zeros(), Vector3::zeros());
+        if body.accelerated.is_some() {
+            let of = |products: &[f64]| {
+                let mut column = Vector3::zeros();
+                (0..body.translations()).for_each(|k| column[k] = products[k * nf + j]);
+                column
+            };
+            lever -= of(&self.accelerated_q).cross_matrix();
+            (accelerated_modal, accelerated_qd) = (of(&self.accelerated_scratch), of(&self.accelerated_qd));
+        }
         let (mut inertia, mut inertia_rate) = (Matrix3::zeros(), Matrix3::zeros());
         for (pair, &axes) in PAIRS.iter().enumerate() {
             add_symmetric(&mut inertia, axes, body.row(W1 + pair)[j]);
@@ -125,7 +146,7 @@ impl Evaluation<'_> {
         let (p, rate) = (lever * w, lever.tr_mul(v) + inertia * w);
 
         let by_qj = (
-            lever * angular + w.cross(&p),
+            lever * angular + accelerated_modal + w.cross(&(p + 2.0 * accelerated_qd)),
             lever.tr_mul(linear)
                 + inertia * angular
                 + w3_modal
@@ -134,7 +155,10 @@ impl Evaluation<'_> {
                 + v.cross(&p),
         );
         let symmetric_qd = w3_qd + w3_qd + skew_qd;
-        let by_rate = (p + w.cross(&c1), rate + symmetric_qd + w.cross(&coupling) + v.cross(&c1));
+        let by_rate = (
+            p + 2.0 * accelerated_qd + w.cross(&c1),
+            rate + symmetric_qd + w.cross(&coupling) + v.cross(&c1),
+        );
         let by_rigid = (-p, skew_qd - rate);
         let entry = |(a, b): &(Vector3<f64>, Vector3<f64>), axis: usize| {
             if axis < 3 { a[axis] } else { b[axis - 3] }
@@ -146,8 +170,14 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Derivatives of the modal forces by q and qd.
-    fn modal_block(&self, angular: &Vector3<f64>, by_q: &mut [f64], by_nu: &mut [f64]) {
+    /// Derivatives of the modal forces by q and qd; `linear` is the acceleration of the origin, V' + omega x V.
+    fn modal_block(
+        &self,
+        linear: &Vector3<f64>,
+        angular: &Vector3<f64>,
+        by_q: &mut [f64],
+        by_nu: &mut [f64],
+    ) {
         let body = self.equations;
         let (n, nf, r, w) = (body.n_velocities(), body.nf, body.rigid.len(), &self.omega);
         for i in 0..nf {
@@ -162,6 +192,13 @@ impl Evaluation<'_> {
                 for (at, &pair) in body.pairs.iter().enumerate() {
                     let factor = spin_product(w, pair);
                     of_q.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
+                }
+            }
+            if let Some(accelerated) = &body.accelerated {
+                for k in 0..body.translations() {
+                    of_q.iter_mut()
+                        .zip(accelerated.row(k * nf + i))
+                        .for_each(|(sum, e)| *sum += linear[k] * e);
                 }
             }
             if let Some(w3) = &body.w3 {

@@ -36,6 +36,14 @@ impl ModalMatrix {
         }
     }
 
+    /// (A x)_i.
+    pub(super) fn row_product(&self, i: usize, x: &[f64]) -> f64 {
+        match self {
+            Self::Diagonal(diagonal) => diagonal[i] * x[i],
+            Self::Full { n, entries } => dot(&entries[i * n..][..*n], x),
+        }
+    }
+
     /// y += factor A x.
     #[inline(always)] // compiled once per instruction set
     pub(super) fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {

@@ -118,6 +118,16 @@ impl RotationVector {
         let (b, c) = (2.0 * (0.5 * f).sin().powi(2) / square, (f - sin) / (square * f));
         [sin / f, b, c, (sin / f - 2.0 * b) / square, (b - 3.0 * c) / square]
     }
+
+    /// d(G x)/dv for a constant x.
+    pub(super) fn map_derivative(&self, x: &Vector3<f64>) -> Matrix3<f64> {
+        let [_, b, c, b_slope, c_slope] = self.coefficients();
+        let v = &self.0;
+        let once = v.cross(x);
+        let twice = v.cross(&once);
+        let stretched = (twice * c_slope - once * b_slope) * v.transpose();
+        stretched + x.cross_matrix() * b - (once.cross_matrix() + v.cross_matrix() * x.cross_matrix()) * c
+    }
 }
 
 impl Orientation<3> for RotationVector {
@@ -163,11 +173,6 @@ impl Orientation<1> for PlaneAngle {
 }
 
 impl EquationsOfMotion {
-    /// Translations, of a plane body 2.
-    fn translations(&self) -> usize {
-        if self.rigid.len() == 3 { 2 } else { 3 }
-    }
-
     /// nu = H x'.
     ///
     /// * `rates`: x' = (R', theta', qd), 3 + R + nf; of a plane body 2 + R + nf.

@@ -4,7 +4,7 @@
 ///
 /// A group is there or not in every place where it acts: mass matrix, inertia forces, momenta and energy. What is left are the equations
 /// of motion of the truncated kinetic energy, which keep that energy and both momenta whatever is dropped. m, c, I0, C1, C2, W0 and
-/// m_ff are always there. Without W2 and W3 an evaluation costs a multiple of nf, not of nf^2.
+/// m_ff are always there. Without W2, W3 and geometric stiffness an evaluation costs a multiple of nf, not of nf^2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Terms {
     /// W1: inertia linear in q, and the constant centrifugal load of the modes.
@@ -13,13 +13,16 @@ pub struct Terms {
     pub w2: bool,
     /// W3: coupling of rotation and modes through q, and the Coriolis force among modes.
     pub w3: bool,
+    /// Geometric stiffness for the motion of the frame and for forces at interfaces (theory 7.4), of a body that has it. That for
+    /// spin is free of cost where W2 is kept.
+    pub geometric_stiffness: bool,
 }
 
 impl Terms {
-    /// Everything: the exact equations.
-    pub const ALL: Self = Self { w1: true, w2: true, w3: true };
+    /// Everything that the body has: the exact equations.
+    pub const ALL: Self = Self { w1: true, w2: true, w3: true, geometric_stiffness: true };
     /// Nothing that depends on the deformation but the first moment c + C1 q.
-    pub const NONE: Self = Self { w1: false, w2: false, w3: false };
+    pub const NONE: Self = Self { w1: false, w2: false, w3: false, geometric_stiffness: false };
 }
 
 impl Default for Terms {

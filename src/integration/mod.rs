@@ -1,5 +1,12 @@
 //! Time integration of ordinary differential equations; knows no bodies.
 
+mod dormand_prince;
+mod explicit;
+mod gauss;
+mod schedule;
 mod system;
 
-pub use system::{Failure, System};
+pub use explicit::Explicit;
+pub use gauss::Gauss;
+pub use schedule::{Method, integrate};
+pub use system::{Failure, Oscillator, System, Work};

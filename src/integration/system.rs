@@ -16,8 +16,37 @@ pub trait System {
     /// root mean square of error / scale that a step may add.
     fn scales(&self, state: &[f64], scales: &mut [f64]);
 
+    /// The stiff part of the system that implicit steps solve without iterating; none unless the system knows one.
+    fn oscillators(&self) -> &[Oscillator] {
+        &[]
+    }
+
     /// Restores what holds exactly, as the length of Euler parameters; called after every step that is taken.
     fn settle(&self, _state: &mut [f64]) {}
+}
+
+/// A pair of entries with x' = p + ... and p' = -stiffness x - damping p + ..., where the rest varies slowly or little.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Oscillator {
+    /// Index of x.
+    pub coordinate: usize,
+    /// Index of p.
+    pub momentum: usize,
+    /// Square of the circular frequency.
+    pub stiffness: f64,
+    /// Rate of decay of p.
+    pub damping: f64,
+}
+
+/// What an integration has done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps tried and not taken.
+    pub rejected: u64,
+    /// Evaluations of f(t, y).
+    pub rates: u64,
 }
 
 /// Why an integration cannot go on.

@@ -27,6 +27,9 @@ impl LoadKind {
     pub const NAMES: [&'static str; 6] =
         ["acceleration", "angular_acceleration", "spin", "force", "moment", "load"];
 
+    /// Axes of the components of [`LoadKind::Spin`].
+    pub const SPIN: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
     /// Name of the kind.
     pub fn name(&self) -> &'static str {
         Self::NAMES[match self {
@@ -68,9 +71,6 @@ impl LoadKind {
         }
     }
 }
-
-/// Axes of the components of [`LoadKind::Spin`].
-const SPIN: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 /// A unit load.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -125,12 +125,12 @@ impl UnitLoad {
         match self.kind {
             LoadKind::Named(_) => vec![1.0],
             LoadKind::Spin => {
-                let (a, b) = SPIN[component];
+                let (a, b) = LoadKind::SPIN[component];
                 let product = |i: usize, j: usize| axes[(a, i)] * axes[(b, j)];
                 let of = |&(i, j): &(usize, usize)| {
                     if i == j { product(i, i) } else { product(i, j) + product(j, i) }
                 };
-                SPIN.iter().map(of).collect()
+                LoadKind::SPIN.iter().map(of).collect()
             }
             _ => axes.row(component).iter().copied().collect(),
         }
@@ -253,9 +253,10 @@ mod tests {
         let axes = nalgebra::Rotation3::from_euler_angles(0.4, -1.1, 2.0);
         let turned = nalgebra::Vector3::new(0.3, -0.7, 1.9);
         let spin = axes * turned;
-        for (component, (a, b)) in SPIN.into_iter().enumerate() {
+        for (component, (a, b)) in LoadKind::SPIN.into_iter().enumerate() {
             let along = UnitLoad { kind: LoadKind::Spin, component }.along(axes.matrix());
-            let sum: f64 = along.iter().zip(SPIN).map(|(c, (i, j))| c * turned[i] * turned[j]).sum();
+            let sum: f64 =
+                along.iter().zip(LoadKind::SPIN).map(|(c, (i, j))| c * turned[i] * turned[j]).sum();
             assert!((sum - spin[a] * spin[b]).abs() < 1e-14, "{component}");
         }
     }

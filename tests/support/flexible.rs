@@ -1,7 +1,9 @@
 //! Flexible bodies for tests of their equations of motion, and the oracles that belong to them.
 
+use super::elements::{Kind, MassRule, Material};
 use super::equations::{ReducedBody, State};
 use super::general::{GeneralBody, dense, quasi_velocities};
+use super::mesh::{Mesh, grid};
 use super::nodal::reduced;
 use super::random::Random;
 use faer::Mat;
@@ -12,7 +14,7 @@ use flexbody::eigen::Wanted;
 use flexbody::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, GeneralTerms, Invariants};
-use flexbody::model::{FeModel, Nodes, RawModel};
+use flexbody::model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
 use flexbody::progress::SILENT;
 use flexbody::units::UnitSystem;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -31,6 +33,15 @@ pub fn fixture(name: &str, modes: usize, frame: BodyFrame) -> FlexBody {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name);
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
     body_of(raw, modes, frame)
+}
+
+/// A rubber-like block without any symmetry: W1, W2 and W3 all count.
+pub fn soft_block(modes: usize) -> FlexBody {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
+        [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
+    });
+    body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), modes, BodyFrame::Principal)
 }
 
 /// The oracle that has the body's invariants.
@@ -127,6 +138,21 @@ pub fn made_of(
         coordinates: None,
     })
     .expect("valid parts")
+}
+
+/// `body` with random geometric stiffness for all loads of the given kinds, entries up to `size`.
+pub fn stressed(body: FlexBody, kinds: &[LoadKind], size: f64, random: &mut Random) -> FlexBody {
+    let (nf, dimension) = (body.n_modes(), body.dimension());
+    let mut parts = body.into_parts();
+    for kind in kinds {
+        for &component in kind.of_dimension(dimension) {
+            let a = Mat::from_fn(nf, nf, |_, _| 0.5 * size * random.signed());
+            let matrix = Mat::from_fn(nf, nf, |i, j| a[(i, j)] + a[(j, i)]);
+            let load = UnitLoad { kind: kind.clone(), component };
+            parts.geometric_stiffness.push(GeometricStiffness { load, matrix });
+        }
+    }
+    FlexBody::new(parts).expect("valid parts")
 }
 
 /// Puts an evaluation to the state of an oracle.

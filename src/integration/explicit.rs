@@ -1,0 +1,238 @@
+//! Explicit Runge-Kutta steps of order 8 with error control.
+
+use super::dormand_prince::{A, ALL_STAGES, C, ERROR_3, ERROR_5, INTERPOLATION, STAGES};
+use super::{Failure, System, Work};
+
+/// The step is chosen for this part of the tolerance.
+const SAFETY: f64 = 0.9;
+
+/// How much a step may shrink or grow at once.
+const SHRINK: f64 = 1.0 / 3.0;
+const GROW: f64 = 6.0;
+
+/// Steps below this part of the time do not move it.
+const SMALLEST: f64 = 16.0 * f64::EPSILON;
+
+/// The method of Dormand and Prince of order 8 with control of the step, DOP853 of Hairer, Norsett and Wanner (Solving Ordinary
+/// Differential Equations I, II.5 and II.10), and their interpolation of order 7.
+///
+/// A step is taken when the root mean square over the entries of error / scale is at most the tolerance, the error being
+/// h e5^2 / sqrt(e5^2 + 0.01 e3^2) of the embedded solutions of order 5 and 3. Undamped oscillations are stable up to about
+/// h omega = 6, which the control finds by itself.
+#[derive(Debug, Clone)]
+pub struct Explicit {
+    tolerance: f64,
+    longest: f64,
+    /// What the control proposes for the next step.
+    proposed: Option<f64>,
+    /// Rates of the stages.
+    rates: [Vec<f64>; ALL_STAGES],
+    before: Vec<f64>,
+    /// State of a stage.
+    stage: Vec<f64>,
+    scales: Vec<f64>,
+    /// Start, end and length of the last step; its rates serve the next one and interpolation.
+    last: Option<[f64; 3]>,
+    /// Coefficients of the interpolation.
+    polynomial: [Vec<f64>; 7],
+    interpolates: bool,
+    work: Work,
+}
+
+impl Explicit {
+    /// Steps of at most `longest` for `dimension` entries whose error is kept below `tolerance` times the scales of the system.
+    ///
+    /// # Panics
+    /// When the tolerance or the longest step is not positive.
+    pub fn new(dimension: usize, tolerance: f64, longest: f64) -> Self {
+        assert!(tolerance > 0.0 && longest > 0.0, "a positive tolerance and step");
+        let zeros = || vec![0.0; dimension];
+        Self {
+            tolerance,
+            longest,
+            proposed: None,
+            rates: std::array::from_fn(|_| zeros()),
+            before: zeros(),
+            stage: zeros(),
+            scales: zeros(),
+            last: None,
+            polynomial: std::array::from_fn(|_| zeros()),
+            interpolates: false,
+            work: Work::default(),
+        }
+    }
+
+    /// What was done so far.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Forgets the last step, since f or the state jumps here.
+    pub fn restart(&mut self) {
+        (self.proposed, self.last) = (None, None);
+    }
+
+    /// Takes one step from `time`, to `end` at most, and returns its end.
+    ///
+    /// # Errors
+    /// [`Failure::StepTooSmall`], or what the system says at the state itself.
+    ///
+    /// # Panics
+    /// When the state has another number of entries.
+    pub fn step(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        state: &mut [f64],
+        end: f64,
+    ) -> Result<f64, Failure> {
+        self.before.copy_from_slice(state);
+        system.scales(state, &mut self.scales);
+        if self.last.is_some_and(|[_, until, _]| until == time) {
+            self.rates.swap(0, STAGES);
+        } else {
+            self.stage.copy_from_slice(state);
+            self.evaluate(system, 0, time, 0.0)?;
+        }
+        let mut length = match self.proposed {
+            Some(length) => length,
+            None => self.first_length(system, time, end - time)?,
+        };
+        let mut grow = GROW;
+        loop {
+            // A rest too short for a step of its own is shared.
+            let left = end - time;
+            let (h, until) = match length.min(self.longest) {
+                h if h >= left * (1.0 - SMALLEST) => (left, end),
+                h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
+                h => (h, time + h),
+            };
+            if !(h > SMALLEST * time.abs()) {
+                return Err(Failure::StepTooSmall { time });
+            }
+            let error = match self.attempt(system, time, h) {
+                Ok(error) => error,
+                // No rates on the way: what is there is not far enough from where there are none.
+                Err(Failure::Rates { .. }) => f64::INFINITY,
+                Err(failure) => return Err(failure),
+            };
+            let factor = (SAFETY * error.powf(-1.0 / 8.0)).clamp(SHRINK, grow);
+            if error <= 1.0 {
+                self.proposed = Some(if h < length { length.max(h * factor) } else { h * factor });
+                state.copy_from_slice(&self.stage);
+                system.settle(state);
+                self.stage.copy_from_slice(state);
+                self.evaluate(system, STAGES, until, 0.0)?;
+                (self.last, self.interpolates) = (Some([time, until, h]), false);
+                self.work.steps += 1;
+                return Ok(until);
+            }
+            self.work.rejected += 1;
+            // NaN shrinks too.
+            length = h * if factor < 1.0 { factor } else { SHRINK };
+            grow = 1.0;
+        }
+    }
+
+    /// The state at `time` within the last step, of order 7.
+    ///
+    /// # Errors
+    /// Those of the system.
+    ///
+    /// # Panics
+    /// Without a step since the start.
+    pub fn interpolate(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        after: &[f64],
+        state: &mut [f64],
+    ) -> Result<(), Failure> {
+        let [start, _, h] = self.last.expect("a step was taken");
+        if !self.interpolates {
+            for index in STAGES + 1..ALL_STAGES {
+                self.combine(index, h);
+                self.evaluate(system, index, start, h)?;
+            }
+            for (i, (before, after)) in self.before.iter().zip(after).enumerate() {
+                let (change, first, last) = (after - before, h * self.rates[0][i], h * self.rates[STAGES][i]);
+                self.polynomial[0][i] = change;
+                self.polynomial[1][i] = first - change;
+                self.polynomial[2][i] = 2.0 * change - first - last;
+                for (row, weights) in INTERPOLATION.iter().enumerate() {
+                    self.polynomial[3 + row][i] = h * self.weighted(weights, i);
+                }
+            }
+            self.interpolates = true;
+        }
+        let x = (time - start) / h;
+        state.fill(0.0);
+        for (power, coefficients) in self.polynomial.iter().enumerate().rev() {
+            let factor = if power % 2 == 0 { x } else { 1.0 - x };
+            state.iter_mut().zip(coefficients).for_each(|(y, c)| *y = (*y + c) * factor);
+        }
+        state.iter_mut().zip(&self.before).for_each(|(y, before)| *y += before);
+        system.settle(state);
+        Ok(())
+    }
+
+    /// `self.stage` of a step of `h` from `self.before`.
+    fn combine(&mut self, index: usize, h: f64) {
+        self.stage.copy_from_slice(&self.before);
+        for &(j, a) in A[index] {
+            let weight = h * a;
+            self.stage.iter_mut().zip(&self.rates[j]).for_each(|(y, rate)| *y += weight * rate);
+        }
+    }
+
+    fn evaluate(&mut self, system: &mut dyn System, index: usize, start: f64, h: f64) -> Result<(), Failure> {
+        self.work.rates += 1;
+        system.rates(start + C[index] * h, &self.stage, &mut self.rates[index])
+    }
+
+    fn weighted(&self, weights: &[(usize, f64)], i: usize) -> f64 {
+        weights.iter().map(|&(j, weight)| weight * self.rates[j][i]).sum()
+    }
+
+    /// The state after a step, to `self.stage`, and its error relative to the tolerance.
+    fn attempt(&mut self, system: &mut dyn System, time: f64, h: f64) -> Result<f64, Failure> {
+        for index in 1..STAGES {
+            self.combine(index, h);
+            self.evaluate(system, index, time, h)?;
+        }
+        self.combine(STAGES, h);
+        let (mut e5, mut e3) = (0.0, 0.0);
+        for (i, scale) in self.scales.iter().enumerate() {
+            e5 += (self.weighted(ERROR_5, i) / scale).powi(2);
+            e3 += (self.weighted(ERROR_3, i) / scale).powi(2);
+        }
+        if e5 == 0.0 && e3 == 0.0 {
+            return Ok(0.0);
+        }
+        Ok(h * e5 / ((e5 + 0.01 * e3) * self.scales.len() as f64).sqrt() / self.tolerance)
+    }
+
+    /// A first length from the rate of the state and that rate's own, in the unit of time that they set.
+    fn first_length(&mut self, system: &mut dyn System, time: f64, left: f64) -> Result<f64, Failure> {
+        let scales = std::mem::take(&mut self.scales);
+        let size = |of: &dyn Fn(usize) -> f64| {
+            let sum: f64 = scales.iter().enumerate().map(|(i, scale)| (of(i) / scale).powi(2)).sum();
+            (sum / scales.len() as f64).sqrt()
+        };
+        let longest = self.longest.min(left);
+        let speed = size(&|i| self.rates[0][i]);
+        let probe = if speed > 0.0 { (0.01 / speed).min(longest) } else { 1e-6 * longest };
+        for (i, y) in self.stage.iter_mut().enumerate() {
+            *y = self.before[i] + probe * self.rates[0][i];
+        }
+        let probed = self.evaluate(system, 1, time + probe, 0.0);
+        let change = size(&|i| self.rates[1][i] - self.rates[0][i]) / probe;
+        self.scales = scales;
+        let pace = speed.max(change.sqrt());
+        Ok(match probed {
+            Ok(()) if pace > 0.0 && pace.is_finite() => (self.tolerance.powf(1.0 / 8.0) / pace).min(longest),
+            Ok(()) if pace == 0.0 => longest,
+            _ => probe,
+        })
+    }
+}

@@ -1,0 +1,233 @@
+//! Implicit steps that conserve: collocation at the points of Gauss.
+
+use super::{Failure, Oscillator, System, Work};
+
+/// Stages of the method of the highest order here.
+const STAGES: usize = 3;
+
+type Square = [[f64; STAGES]; STAGES];
+
+/// Corrections of a step: where they contract at all, they are down to rounding long before.
+const MOST_CORRECTIONS: usize = 100;
+
+/// Corrections below this part of the scales have reached rounding when they no longer shrink.
+const NEAR_ROUNDING: f64 = 1e-9;
+
+/// What is left of the stages, in scales: so far below rounding that it does not add up over millions of steps.
+const SOLVED: f64 = 1e-20;
+
+/// Collocation at Gauss points (Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3): order 2 (the implicit midpoint rule), 4
+/// or 6 with steps of one length.
+///
+/// The methods are symmetric, symplectic and keep quadratic invariants, and stable for every step. Stages are solved down to rounding,
+/// by iterations that treat the [`Oscillator`]s of the system exactly; increments are summed with compensation, so that rounding
+/// does not drift over millions of steps.
+#[derive(Debug, Clone)]
+pub struct Gauss {
+    stages: usize,
+    /// Places of the stages in the step, and weights of their rates.
+    nodes: [f64; STAGES],
+    weights: Square,
+    /// Stages and end of the next step from the increments of this one.
+    ahead: Square,
+    to_end: [f64; STAGES],
+    /// Increments Z of the stages, and their rates.
+    increments: [Vec<f64>; STAGES],
+    rates: [Vec<f64>; STAGES],
+    stage: Vec<f64>,
+    scales: Vec<f64>,
+    /// What rounding took from the state.
+    carry: Vec<f64>,
+    /// (I + d h A + lambda h^2 A^2)^-1 of every oscillator.
+    oscillators: Vec<(Oscillator, Square)>,
+    /// End and length of the last step, whose increments start the next.
+    last: Option<(f64, f64)>,
+    work: Work,
+}
+
+impl Gauss {
+    /// The method of the given order for `dimension` entries.
+    ///
+    /// # Panics
+    /// When the order is not 2, 4 or 6.
+    pub fn new(dimension: usize, order: usize) -> Self {
+        let (a, b) = (3.0_f64.sqrt() / 6.0, 15.0_f64.sqrt());
+        let (nodes, weights) = match order {
+            2 => ([0.5, 0.0, 0.0], [[0.5, 0.0, 0.0], [0.0; 3], [0.0; 3]]),
+            4 => ([0.5 - a, 0.5 + a, 0.0], [[0.25, 0.25 - a, 0.0], [0.25 + a, 0.25, 0.0], [0.0; 3]]),
+            6 => (
+                [0.5 - b / 10.0, 0.5, 0.5 + b / 10.0],
+                [
+                    [5.0 / 36.0, 2.0 / 9.0 - b / 15.0, 5.0 / 36.0 - b / 30.0],
+                    [5.0 / 36.0 + b / 24.0, 2.0 / 9.0, 5.0 / 36.0 - b / 24.0],
+                    [5.0 / 36.0 + b / 30.0, 2.0 / 9.0 + b / 15.0, 5.0 / 36.0],
+                ],
+            ),
+            _ => panic!("Gauss methods of order 2, 4 and 6, not {order}"),
+        };
+        let stages = order / 2;
+        // The polynomial through zero and the increments.
+        let polynomial = |j: usize, x: f64| {
+            let others = (0..stages).filter(|&k| k != j);
+            others.fold(x / nodes[j], |product, k| product * (x - nodes[k]) / (nodes[j] - nodes[k]))
+        };
+        let to_end = std::array::from_fn(|j| if j < stages { polynomial(j, 1.0) } else { 0.0 });
+        let ahead = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                if i < stages && j < stages { polynomial(j, 1.0 + nodes[i]) - to_end[j] } else { 0.0 }
+            })
+        });
+        let zeros = || vec![0.0; dimension];
+        Self {
+            stages,
+            nodes,
+            weights,
+            ahead,
+            to_end,
+            increments: std::array::from_fn(|_| zeros()),
+            rates: std::array::from_fn(|_| zeros()),
+            stage: zeros(),
+            scales: zeros(),
+            carry: zeros(),
+            oscillators: Vec::new(),
+            last: None,
+            work: Work::default(),
+        }
+    }
+
+    /// What was done so far.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Forgets the last step, since f or the state jumps here.
+    pub fn restart(&mut self) {
+        self.last = None;
+        self.carry.fill(0.0);
+    }
+
+    /// Takes the step from `time` to `end`.
+    ///
+    /// # Errors
+    /// [`Failure::NotConverged`] where the step is too long for what the oscillators leave to the iteration, or what the system says.
+    ///
+    /// # Panics
+    /// When the state has another number of entries.
+    pub fn step(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        state: &mut [f64],
+        end: f64,
+    ) -> Result<(), Failure> {
+        let h = end - time;
+        self.prepare(system, time, h);
+        system.scales(state, &mut self.scales);
+        let failed = Failure::NotConverged { time, step: h };
+        let mut before = None;
+        for _ in 0..MOST_CORRECTIONS {
+            for i in 0..self.stages {
+                for (at, stage) in self.stage.iter_mut().enumerate() {
+                    *stage = state[at] + (self.increments[i][at] + self.carry[at]);
+                }
+                self.work.rates += 1;
+                system.rates(time + self.nodes[i] * h, &self.stage, &mut self.rates[i])?;
+            }
+            let size = self.correct(h);
+            // How much the corrections shrink; nothing is known at the first.
+            let ratio = before.map(|before: f64| size / before);
+            let stalled = |ratio: f64| ratio > 0.5 && size < NEAR_ROUNDING;
+            if !size.is_finite() || ratio.is_some_and(|ratio| ratio > 2.0 && !stalled(ratio)) {
+                self.work.rejected += 1;
+                return Err(failed);
+            }
+            if size == 0.0 || ratio.is_some_and(|ratio| size * ratio <= SOLVED || stalled(ratio)) {
+                self.advance(state);
+                self.last = Some((end, h));
+                self.work.steps += 1;
+                system.settle(state);
+                return Ok(());
+            }
+            before = Some(size);
+        }
+        self.work.rejected += 1;
+        Err(failed)
+    }
+
+    /// Increments to start from, and the oscillators for this length.
+    fn prepare(&mut self, system: &dyn System, time: f64, h: f64) {
+        // Times are rounded: lengths that are meant to be the same differ by that.
+        let same = |length: f64| (length - h).abs() <= 8.0 * f64::EPSILON * time.abs().max(h);
+        let last = self.last.filter(|&(end, length)| end == time && same(length));
+        if last.is_some() {
+            for at in 0..self.stage.len() {
+                let increments = self.increments.each_ref().map(|z| z[at]);
+                for i in 0..self.stages {
+                    self.increments[i][at] = product(&self.ahead[i], &increments);
+                }
+            }
+            return;
+        }
+        self.increments.iter_mut().for_each(|z| z.fill(0.0));
+        let own = system.oscillators().iter();
+        self.oscillators = own.map(|&oscillator| (oscillator, self.inverse(&oscillator, h))).collect();
+    }
+
+    /// (I + d h A + lambda h^2 A^2)^-1.
+    fn inverse(&self, oscillator: &Oscillator, h: f64) -> Square {
+        let n = self.stages;
+        let a = nalgebra::DMatrix::from_fn(n, n, |i, j| h * self.weights[i][j]);
+        let matrix =
+            nalgebra::DMatrix::identity(n, n) + &a * oscillator.damping + &a * (&a * oscillator.stiffness);
+        // The eigenvalues of A lie in the right half plane: regular for every damped oscillator; else it is left to the iteration.
+        let inverse = matrix.try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
+        std::array::from_fn(|i| std::array::from_fn(|j| if i < n && j < n { inverse[(i, j)] } else { 0.0 }))
+    }
+
+    /// Corrects the increments by what they lack, h A f - Z, seen through the oscillators; root mean square in scales.
+    fn correct(&mut self, h: f64) -> f64 {
+        for at in 0..self.stage.len() {
+            let rates = self.rates.each_ref().map(|rates| rates[at]);
+            for i in 0..self.stages {
+                self.rates[i][at] = h * product(&self.weights[i], &rates) - self.increments[i][at];
+            }
+        }
+        for (oscillator, inverse) in &self.oscillators {
+            let (x, p) = (oscillator.coordinate, oscillator.momentum);
+            let of = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
+            let (lacks, mut lacks_p) = (of(&self.rates, x), of(&self.rates, p));
+            for i in 0..self.stages {
+                lacks_p[i] -= oscillator.stiffness * h * product(&self.weights[i], &lacks);
+            }
+            let correction: [f64; STAGES] = std::array::from_fn(|i| product(&inverse[i], &lacks_p));
+            for i in 0..self.stages {
+                self.rates[i][p] = correction[i];
+                self.rates[i][x] = lacks[i] + h * product(&self.weights[i], &correction);
+            }
+        }
+        let mut sum = 0.0;
+        for (increments, corrections) in self.increments.iter_mut().zip(&self.rates).take(self.stages) {
+            for ((z, correction), scale) in increments.iter_mut().zip(corrections).zip(&self.scales) {
+                *z += correction;
+                sum += (correction / scale).powi(2);
+            }
+        }
+        (sum / (self.stages * self.stage.len()) as f64).sqrt()
+    }
+
+    /// Adds the increment of the step with what rounding took before.
+    fn advance(&mut self, state: &mut [f64]) {
+        for (at, y) in state.iter_mut().enumerate() {
+            let increments = self.increments.each_ref().map(|z| z[at]);
+            let increment = product(&self.to_end, &increments) + self.carry[at];
+            let sum = *y + increment;
+            // Exact where the state is larger than its increment; else the rounding is that of the increment.
+            self.carry[at] = (*y - sum) + increment;
+            *y = sum;
+        }
+    }
+}
+
+fn product(a: &[f64; STAGES], b: &[f64; STAGES]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
