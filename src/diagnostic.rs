@@ -87,6 +87,8 @@ codes! {
     DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... each once", "number the rows from 0 or leave the column out";
     InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
     InterfaceAcross = "FB210", Error, BadInput, "interface has nodes of several bodies", "give each body an interface of its own";
+    SceneSyntax = "FB211", Error, BadInput, "scene is not valid TOML or has unknown, missing or mistyped keys", "see docs/simulate.md for the keys";
+    SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "flexbody inspect shows the modes and interfaces of the body";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
@@ -153,6 +155,9 @@ codes! {
     LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
     GeometricStiffnessNone = "FB530", Warning, Done, "centrifugal loads without geometric stiffness: the body softens where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to rates far below the one that is named";
     GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act along the others";
+    SimulationStopped = "FB540", Error, Untrustworthy, "simulation cannot go on", "look at spin, loads and dropped terms: the motion leaves the range of the model";
+    LinearRangeLeft = "FB541", Warning, Done, "deflections beyond the range of linear elasticity", "trust the result as a trend only; a body of several flexible parts carries larger deflections";
+    SpinSoftens = "FB542", Warning, Done, "spin at which a body without geometric stiffness is too soft", "convert the model with [[geometric_stiffness]] for spin";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -59,6 +59,11 @@ impl Error {
         Self { diagnostics: self.diagnostics.into_iter().map(|d| d.about(&what)).collect() }
     }
 
+    /// Adds the file that every message is about.
+    pub fn in_file(self, file: impl AsRef<std::path::Path>) -> Self {
+        Self { diagnostics: self.diagnostics.into_iter().map(|d| d.in_file(&file)).collect() }
+    }
+
     /// The exit code of the first error.
     pub fn exit_code(&self) -> ExitCode {
         self.first_error().code().exit_code()

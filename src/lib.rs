@@ -24,6 +24,7 @@ pub mod output;
 pub mod progress;
 pub mod provenance;
 pub mod report;
+pub mod scene;
 pub mod store;
 pub mod units;
 pub mod verification;

@@ -2,7 +2,8 @@
 //! the table, and leaves nothing behind.
 //!
 //! A case is a folder with a `model.toml`, or with a file `args` (one command-line argument per line), and
-//! `expected.txt`: what `flexbody convert` prints to stderr, warnings of a case that succeeds included. A new case
+//! `expected.txt`: what `flexbody convert` prints to stderr, warnings of a case that succeeds included. With a `scene.toml` it is what
+//! `flexbody simulate` prints of it, for four modes of the model of `fixtures/models` that the file `body` names. A new case
 //! needs no code. `FLEXBODY_BLESS=1 cargo test --test bad_input` writes the reports; read the difference.
 
 use flexbody::diagnostic::Code;
@@ -22,20 +23,35 @@ fn subfolders(folder: &Path) -> Vec<PathBuf> {
     entries(folder).into_iter().filter(|p| p.is_dir()).collect()
 }
 
-/// What is wrong with one case, empty when nothing is.
-fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
-    let output_folder = tempfile::tempdir().unwrap();
-    let output = output_folder.path().join("body.flex.h5");
-    let inputs = fs::read_to_string(case.join("args")).unwrap_or_else(|_| "model.toml".to_owned());
-    let before = entries(case);
+/// A body of four modes.
+fn convert(model: &str, body: &Path) {
+    let manifest =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(model).join("model.toml");
     let run = Command::new(env!("CARGO_BIN_EXE_flexbody"))
-        .arg("convert")
-        .args(inputs.lines())
+        .args(["convert", "--quiet", "--modes", "4"])
+        .arg(manifest)
         .arg("--output")
-        .arg(&output)
-        .current_dir(case)
+        .arg(body)
         .output()
         .unwrap();
+    assert!(run.status.success(), "{model}: {}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// What is wrong with one case, empty when nothing is.
+fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
+    let (input_folder, output_folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let output = output_folder.path().join("body.flex.h5");
+    let before = entries(case);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
+    if let Ok(model) = fs::read_to_string(case.join("body")) {
+        let body = input_folder.path().join("body.flex.h5");
+        convert(model.trim(), &body);
+        command.arg("simulate").arg(body).args(["--scene", "scene.toml"]);
+    } else {
+        let inputs = fs::read_to_string(case.join("args")).unwrap_or_else(|_| "model.toml".to_owned());
+        command.arg("convert").args(inputs.lines());
+    }
+    let run = command.arg("--output").arg(&output).current_dir(case).output().unwrap();
     let report = String::from_utf8(run.stderr).unwrap();
     if bless {
         fs::write(case.join("expected.txt"), &report).unwrap();

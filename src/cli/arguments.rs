@@ -31,6 +31,34 @@ pub enum Command {
     Check(CheckArguments),
     /// Compare two flex-body files, whatever the signs and bases of their modes
     Compare(CompareArguments),
+    /// Simulate a body in a scene: free or loaded, from initial conditions
+    #[command(
+        after_help = "Example:\n  flexbody simulate rod.flex.h5 --scene tumble.toml -o tumble.h5 --csv tumble.csv --report tumble.html"
+    )]
+    Simulate(SimulateArguments),
+}
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub struct SimulateArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// What the body does (see docs/simulate.md)
+    #[arg(long, value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// HDF5 file to write the motion to
+    #[arg(short, long, value_name = "MOTION.h5")]
+    pub output: Option<PathBuf>,
+    /// Table to write the motion to
+    #[arg(long, value_name = "MOTION.csv")]
+    pub csv: Option<PathBuf>,
+    /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
 }
 
 /// Arguments of `convert`.

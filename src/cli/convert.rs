@@ -3,7 +3,7 @@
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName};
 use super::checkpoint::resume;
 use super::output::{Outcome, tell};
-use super::places::{Places, Reserved};
+use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
 use super::watcher::Watcher;
 use crate::basis::{
@@ -24,7 +24,6 @@ use crate::progress::Event;
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, render};
 use crate::store;
 use crate::units::UnitSystem;
-use std::path::Path;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -311,13 +310,6 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
     Ok(schemes)
 }
 
-fn format_of(path: &Path) -> Result<Format> {
-    Format::from_path(path).ok_or_else(|| {
-        let message = format!("report {} has no known extension", path.display());
-        Diagnostic::new(Code::Usage, message).with_help("name it .html, .json or .txt").into()
-    })
-}
-
 fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
         (Some(manifest), ..) => read_manifest(manifest),
@@ -361,20 +353,7 @@ fn refuse_overwriting(
     let geometric = files.geometric_stiffness.iter().map(|one| Some(&one.matrix.path));
     let inputs =
         matrices.chain(loads).chain(damping).chain(geometric).chain(tables).chain(masses).chain(interfaces);
-    let place = |path: &Path| {
-        std::fs::canonicalize(path)
-            .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
-    };
-    let mut taken: Vec<_> = inputs.flatten().map(|path| place(path)).collect();
-    for output in outputs.iter().flat_map(Places::all) {
-        let path = place(output);
-        if taken.contains(&path) {
-            let message = format!("output {} is an input or another output of this run", output.display());
-            return Err(Diagnostic::new(Code::Usage, message).with_help("choose another output name").into());
-        }
-        taken.push(path);
-    }
-    Ok(())
+    refuse_replacing(inputs.flatten(), outputs.iter().flat_map(Places::all))
 }
 
 /// Sets the number of threads for the whole process; the number in force.

@@ -9,6 +9,7 @@ mod inspect;
 mod output;
 mod places;
 mod resources;
+mod simulate;
 mod watcher;
 
 pub use arguments::Arguments;

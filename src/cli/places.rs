@@ -1,9 +1,11 @@
-//! Where the outputs of a conversion go: each is reserved before the work, and appears after it.
+//! Where outputs go: each is reserved before the work, and appears after it.
 
 use super::arguments::ConvertArguments;
 use super::checkpoint::CheckpointFile;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::output::OutputSlot;
+use crate::report::Format;
 use crate::store;
 use std::path::{Path, PathBuf};
 
@@ -44,6 +46,35 @@ impl Places {
             checkpoint: self.checkpoint.as_deref().map(CheckpointFile::open).transpose()?,
         })
     }
+}
+
+/// The format of a report by its file name.
+pub(super) fn format_of(path: &Path) -> Result<Format> {
+    Format::from_path(path).ok_or_else(|| {
+        let message = format!("report {} has no known extension", path.display());
+        Diagnostic::new(Code::Usage, message).with_help("name it .html, .json or .txt").into()
+    })
+}
+
+/// No output may replace an input or another output.
+pub(super) fn refuse_replacing<'p>(
+    inputs: impl Iterator<Item = &'p PathBuf>,
+    outputs: impl Iterator<Item = &'p PathBuf>,
+) -> Result<()> {
+    let place = |path: &Path| {
+        std::fs::canonicalize(path)
+            .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
+    };
+    let mut taken: Vec<_> = inputs.map(|path| place(path)).collect();
+    for output in outputs {
+        let path = place(output);
+        if taken.contains(&path) {
+            let message = format!("output {} is an input or another output of this run", output.display());
+            return Err(Diagnostic::new(Code::Usage, message).with_help("choose another output name").into());
+        }
+        taken.push(path);
+    }
+    Ok(())
 }
 
 /// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`.

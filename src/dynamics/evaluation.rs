@@ -353,7 +353,7 @@ impl<'a> Evaluation<'a> {
         if body.accelerated.is_some() {
             let translations = self.accelerated_qd.chunks_exact(body.nf).take(body.translations());
             for (k, product) in translations.enumerate() {
-                add_scaled(self.velocity[k], product, flexible);
+                add_scaled(self.velocity[k], product, rate);
             }
         }
         if body.w3.is_some() {

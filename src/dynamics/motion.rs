@@ -62,6 +62,8 @@ pub struct Balance {
     pub kinetic: f64,
     /// Elastic energy.
     pub elastic: f64,
+    /// Kinetic energy of the flight, P^2 / 2m: what is left of the rest does not depend on who looks.
+    pub flight: f64,
     /// Work of forces, damping and prescribed motion since the start.
     pub work: f64,
     /// Linear momentum.
@@ -234,6 +236,11 @@ impl<'a> Motion<'a> {
         (motion, state)
     }
 
+    /// Mass of the body, and its radius of gyration sqrt(tr(I) / 2m) about the centre of mass.
+    pub fn size(&self) -> (f64, f64) {
+        (self.size.mass, self.size.radius)
+    }
+
     /// The body at a state: what [`Evaluation`] tells.
     ///
     /// # Errors
@@ -265,13 +272,14 @@ impl<'a> Motion<'a> {
     /// # Errors
     /// Those of [`Motion::evaluate`].
     pub fn balance(&mut self, time: f64, state: &[f64]) -> Result<Balance, Failure> {
-        let (layout, reference) = (self.layout(), self.reference);
+        let (layout, reference, mass) = (self.layout(), self.reference, self.size.mass);
         let (place, evaluation) = self.evaluate(time, state)?;
         let linear = place.axes * evaluation.linear_momentum();
         let angular = place.axes * evaluation.angular_momentum();
         Ok(Balance {
             kinetic: evaluation.kinetic_energy(),
             elastic: evaluation.elastic_energy(),
+            flight: 0.5 * linear.norm_squared() / mass,
             work: state[layout.work()],
             linear,
             angular: angular + (place.origin - reference).cross(&linear),

@@ -1,14 +1,13 @@
 //! The manifest `model.toml`. Its machine-readable contract is `schemas/manifest.schema.json`.
 
-use super::bytes::InputFile;
 use super::model_files::{MatrixLocation, ModelFiles, stem};
+use super::walk::{Table, Value, Walk, integer, read_toml, real};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::units::UnitSystem;
 use std::ops::Range;
 use std::path::Path;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeValue;
 
 mod basis;
 mod damping;
@@ -26,54 +25,10 @@ const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs"];
 /// FB101, FB106 when it cannot be read; FB201 for syntax, unknown, missing or mistyped keys; FB202 for units;
 /// FB205 for nodes listed twice in an interface. All of them, in the order of lines.
 pub fn read_manifest(path: impl AsRef<Path>) -> Result<ModelFiles> {
-    let path = path.as_ref();
-    let file = InputFile::open(path)?;
-    let text = std::str::from_utf8(file.bytes()).map_err(|e| {
-        let line = line_at(file.bytes(), e.valid_up_to());
-        Diagnostic::new(Code::ManifestSyntax, "manifest is not UTF-8 text").in_file(path).at_line(line)
-    })?;
-    let mut walk = Walk { path, text, found: Vec::new() };
-    let (document, errors) = DeTable::parse_recoverable(text);
-    for error in &errors {
-        let message = error.message().to_owned();
-        walk.complain(Code::ManifestSyntax, error.span().unwrap_or(0..0), message);
-    }
-    // After a syntax error the rest of the document is guesswork.
-    let files = if errors.is_empty() { walk.model(document.get_ref()) } else { None };
-    match files {
-        Some(files) if walk.found.is_empty() => Ok(files),
-        _ => {
-            walk.found.sort_by_key(Diagnostic::line);
-            Err(Error::new(walk.found))
-        }
-    }
-}
-
-type Table<'t> = DeTable<'t>;
-type Value<'t> = Spanned<DeValue<'t>>;
-
-/// The line (from 1) of the byte at `offset`.
-fn line_at(text: &[u8], offset: usize) -> usize {
-    1 + text[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
-}
-
-/// Reads tables and collects what is wrong with them.
-struct Walk<'a> {
-    path: &'a Path,
-    text: &'a str,
-    found: Vec<Diagnostic>,
+    read_toml(path.as_ref(), "manifest", Code::ManifestSyntax, |walk, top| walk.model(top))
 }
 
 impl Walk<'_> {
-    fn at(&self, code: Code, span: Range<usize>, message: String) -> Diagnostic {
-        let line = line_at(self.text.as_bytes(), span.start);
-        Diagnostic::new(code, message).in_file(self.path).at_line(line)
-    }
-
-    fn complain(&mut self, code: Code, span: Range<usize>, message: String) {
-        self.found.push(self.at(code, span, message));
-    }
-
     /// `None` only with something in `found`.
     fn model(&mut self, top: &Table) -> Option<ModelFiles> {
         self.known_keys(top, "the manifest", TOP);
@@ -129,61 +84,6 @@ impl Walk<'_> {
         })
     }
 
-    /// Complains about every key that is not in `known`, naming the nearest that is.
-    fn known_keys(&mut self, table: &Table, place: &str, known: &[&str]) {
-        for key in table.keys() {
-            let name = key.get_ref().as_ref();
-            if known.contains(&name) {
-                continue;
-            }
-            let nearest = known
-                .iter()
-                .map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate))
-                .min()
-                .filter(|&(distance, candidate)| distance <= 2 && distance < candidate.len());
-            let unknown = format!("key `{name}` is not known in {place}");
-            let unknown = self.at(Code::ManifestSyntax, key.span(), unknown);
-            let help = match nearest {
-                Some((_, candidate)) => format!("did you mean `{candidate}`?"),
-                None => format!("known keys: {}", known.join(", ")),
-            };
-            self.found.push(unknown.with_help(help));
-        }
-    }
-
-    fn mistyped(&mut self, key: &str, value: &Value, expected: &str) {
-        let message = format!("`{key}` is {}, expected {expected}", with_article(value.get_ref().type_str()));
-        self.complain(Code::ManifestSyntax, value.span(), message);
-    }
-
-    /// A table and where it stands.
-    fn table<'t, 'i>(&mut self, table: &'t Table<'i>, key: &str) -> Option<(&'t Table<'i>, Range<usize>)> {
-        let value = table.get(key)?;
-        match value.get_ref() {
-            DeValue::Table(inner) => Some((inner, value.span())),
-            _ => {
-                self.mistyped(key, value, "a table");
-                None
-            }
-        }
-    }
-
-    /// A string that is not empty.
-    fn string(&mut self, table: &Table, key: &str) -> Option<String> {
-        let value = table.get(key)?;
-        match value.get_ref() {
-            DeValue::String(text) if text.is_empty() => {
-                self.complain(Code::ManifestSyntax, value.span(), format!("`{key}` is empty"));
-                None
-            }
-            DeValue::String(text) => Some(text.to_string()),
-            _ => {
-                self.mistyped(key, value, "a string");
-                None
-            }
-        }
-    }
-
     fn dimension(&mut self, table: &Table) -> Option<u8> {
         let value = table.get("dimension")?;
         match integer(value) {
@@ -235,24 +135,6 @@ impl Walk<'_> {
         }
         Some(name)
     }
-}
-
-fn integer(value: &Value) -> Option<i64> {
-    let number = value.get_ref().as_integer()?;
-    i64::from_str_radix(number.as_str(), number.radix()).ok()
-}
-
-fn real(value: &Value) -> Option<f64> {
-    match value.get_ref() {
-        DeValue::Float(number) => number.as_str().parse().ok(),
-        DeValue::Integer(_) => integer(value).map(|number| number as f64),
-        _ => None,
-    }
-}
-
-fn with_article(kind: &str) -> String {
-    let article = if kind.starts_with(['a', 'i']) { "an" } else { "a" };
-    format!("{article} {kind}")
 }
 
 #[cfg(test)]

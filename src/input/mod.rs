@@ -15,6 +15,7 @@ mod reader;
 mod shapes;
 mod table;
 mod tables;
+mod walk;
 
 pub use bytes::InputFile;
 pub use compression::Compression;
@@ -23,3 +24,4 @@ pub use model_files::{InterfaceNodes, InterfaceSource, LoadSource, MatrixLocatio
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use shapes::read_shapes;
+pub(crate) use walk::{Table, Value, Walk, integer, read_toml, real};

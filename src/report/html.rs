@@ -6,7 +6,7 @@ use super::geometric_stiffness::{GeometricStiffnessFacts, softening_in_words};
 use super::guarantee::cut;
 use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
-use crate::diagnostic::Severity;
+use crate::diagnostic::{Diagnostic, Severity};
 use crate::flex_body::Truncation;
 use crate::invariants::ERROR_NORMS;
 use std::collections::HashMap;
@@ -15,21 +15,24 @@ const STYLE: &str = include_str!("report.css");
 
 pub(super) fn render(facts: &Facts) -> String {
     let mut html = String::new();
-    let name = escape(&facts.model.name);
-    html.push_str(&format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name}: flexible body report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p class=\"quiet\">Flexible body report, {}</p>\n</header>\n<main>\n",
-        escape(&facts.generator)
-    ));
     verdict(&mut html, facts);
     body(&mut html, facts);
     modes(&mut html, facts);
     lumped(&mut html, facts);
     lumped_modes(&mut html, facts);
-    diagnostics(&mut html, facts);
+    diagnostics_table(&mut html, &facts.diagnostics);
     run(&mut html, facts);
     origin(&mut html, facts);
-    html.push_str("</main>\n</body>\n</html>\n");
-    html
+    page(&facts.model.name, "Flexible body report", &facts.generator, &html)
+}
+
+/// A whole page about `name`; `content` is markup.
+pub(super) fn page(name: &str, kind: &str, generator: &str, content: &str) -> String {
+    let (name, generator) = (escape(name), escape(generator));
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name}: {}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p class=\"quiet\">{kind}, {generator}</p>\n</header>\n<main>\n{content}</main>\n</body>\n</html>\n",
+        kind.to_lowercase()
+    )
 }
 
 /// Text for element content and quoted attributes.
@@ -48,12 +51,12 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-fn section(html: &mut String, title: &str) {
+pub(super) fn section(html: &mut String, title: &str) {
     html.push_str(&format!("<h2>{title}</h2>\n"));
 }
 
 /// A list of terms; the values are markup.
-fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a str, String)>) {
+pub(super) fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a str, String)>) {
     html.push_str("<dl>\n");
     for (term, value) in items {
         html.push_str(&format!("<dt>{}</dt><dd>{value}</dd>\n", escape(term)));
@@ -340,14 +343,13 @@ fn lumped_modes(html: &mut String, facts: &Facts) {
     );
 }
 
-fn diagnostics(html: &mut String, facts: &Facts) {
+pub(super) fn diagnostics_table(html: &mut String, found: &[Diagnostic]) {
     section(html, "Diagnostics");
-    if facts.diagnostics.is_empty() {
+    if found.is_empty() {
         html.push_str("<p>None.</p>\n");
         return;
     }
-    let rows: Vec<_> = facts
-        .diagnostics
+    let rows: Vec<_> = found
         .iter()
         .map(|d| {
             let severity = match d.severity() {

@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations.
 
 mod bar_chart;
 mod clusters;
@@ -9,11 +9,13 @@ mod geometric_stiffness;
 mod guarantee;
 mod html;
 mod identities;
+mod line_chart;
 mod lumped;
 mod mass_properties;
 mod numbers;
 mod render;
 mod run_data;
+mod simulation;
 mod text;
 
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
@@ -21,3 +23,4 @@ pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
+pub use simulation::{SimulationFacts, simulation_csv};

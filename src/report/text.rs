@@ -5,7 +5,7 @@ use super::facts::RunFacts;
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
-use crate::diagnostic::Severity;
+use crate::diagnostic::{Diagnostic, Severity};
 
 /// Columns of a terminal that every terminal has.
 const WIDTH: usize = 80;
@@ -30,7 +30,7 @@ pub(super) fn render(facts: &Facts) -> String {
     if let Some(run) = &facts.run {
         timing(&mut page, run);
     }
-    diagnostics(&mut page, facts);
+    diagnostics_lines(&mut page, &facts.diagnostics);
     page.0
 }
 
@@ -228,12 +228,12 @@ fn timing(page: &mut Page, run: &RunFacts) {
     }
 }
 
-fn diagnostics(page: &mut Page, facts: &Facts) {
+pub(super) fn diagnostics_lines(page: &mut Page, found: &[Diagnostic]) {
     for (severity, label) in
         [(Severity::Error, "errors"), (Severity::Warning, "warnings"), (Severity::Note, "notes")]
     {
-        let found: Vec<_> = facts.diagnostics.iter().filter(|d| d.severity() == severity).collect();
-        page.list(label, &found, |d| format!("{} {}", d.code().id(), plain(d.message())));
+        let of_severity: Vec<_> = found.iter().filter(|d| d.severity() == severity).collect();
+        page.list(label, &of_severity, |d| format!("{} {}", d.code().id(), plain(d.message())));
     }
 }
 

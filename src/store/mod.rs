@@ -1,4 +1,4 @@
-//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; and the checkpoint of a search.
+//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; the checkpoint of a search; the file of a simulation.
 //! The only room that names HDF5 for output.
 
 mod assemble;
@@ -12,6 +12,7 @@ mod names;
 mod read;
 mod scan;
 mod schema;
+mod simulation;
 mod structure;
 mod value;
 mod write;
@@ -20,5 +21,6 @@ pub use crate::output::OutputSlot;
 pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
 pub use document::{format_markdown, format_schema};
 pub use read::{read, validate};
+pub use simulation::fill_simulation;
 pub use structure::structure;
 pub use write::{fill_slot, prepare_output, write, write_to};

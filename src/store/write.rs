@@ -103,7 +103,7 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
 }
 
 /// Makes a group that keeps the order of its members and attributes, and no time stamps.
-fn make(parent: &hdf5::Group, name: &str) -> hdf5::Result<hdf5::Group> {
+pub(super) fn make(parent: &hdf5::Group, name: &str) -> hdf5::Result<hdf5::Group> {
     parent
         .create_group_builder()
         .obj_track_times(false)

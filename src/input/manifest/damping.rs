@@ -1,9 +1,8 @@
 //! The table `[damping]`.
 
-use super::{MatrixLocation, Table, Value, Walk, real};
+use super::{MatrixLocation, Table, Value, Walk};
 use crate::diagnostic::Code;
 use crate::model::{Damping, DampingBand};
-use std::ops::Range;
 use std::path::Path;
 use toml::de::DeValue;
 
@@ -62,18 +61,5 @@ impl Walk<'_> {
             bands.push(DampingBand { to_hz: end.unwrap_or(Some(f64::INFINITY))?, ratio });
         }
         Some(bands)
-    }
-
-    /// A number that must be there; `span` is that of its table.
-    fn number(&mut self, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
-        let Some(value) = table.get(key) else {
-            self.complain(Code::ManifestSyntax, span.clone(), format!("key `{key}` is missing"));
-            return None;
-        };
-        let number = real(value);
-        if number.is_none() {
-            self.mistyped(key, value, "a number");
-        }
-        number
     }
 }

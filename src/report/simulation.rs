@@ -1,0 +1,390 @@
+//! What a user reads of a simulation: facts, the summary, the table and the page with plots.
+
+use super::Format;
+use super::html::{diagnostics_table, escape, page, section, terms};
+use super::line_chart::{Line, STYLES, line_chart};
+use super::numbers::{counted, significant};
+use super::run_data::RunData;
+use super::text::{Page, diagnostics_lines};
+use crate::diagnostic::Diagnostic;
+use crate::dynamics::Balance;
+use crate::integration::Work;
+use crate::provenance::generator;
+use crate::scene::{Drift, Recording, Scheme};
+use crate::units::UnitSystem;
+use nalgebra::Vector3;
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Facts of a simulation, and its recording.
+#[derive(Debug, Clone, Serialize)]
+pub struct SimulationFacts<'a> {
+    generator: String,
+    scene: &'a str,
+    body: &'a str,
+    units: UnitFacts,
+    method: MethodFacts,
+    duration: f64,
+    instants: usize,
+    steps: u64,
+    rejected_steps: u64,
+    evaluations: u64,
+    energy_drift: f64,
+    linear_momentum_drift: f64,
+    angular_momentum_drift: f64,
+    first: EnergyFacts,
+    last: EnergyFacts,
+    largest_spin: f64,
+    largest_deflection: f64,
+    points: Vec<PointFacts<'a>>,
+    diagnostics: &'a [Diagnostic],
+    wall_seconds: f64,
+    cpu_seconds: f64,
+    #[serde(skip)]
+    recording: &'a Recording,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct UnitFacts {
+    length: String,
+    mass: String,
+    time: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "name", rename_all = "lowercase")]
+enum MethodFacts {
+    Adaptive { order: usize, tolerance: f64 },
+    Conserving { order: usize, step: f64 },
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct EnergyFacts {
+    kinetic: f64,
+    elastic: f64,
+    work: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct PointFacts<'a> {
+    name: &'a str,
+    largest_deflection: f64,
+    last_place: [f64; 3],
+}
+
+impl<'a> SimulationFacts<'a> {
+    /// Facts of a recording whose numbers are in `units`, and of the run that made it.
+    pub fn new(recording: &'a Recording, units: &UnitSystem, run: &'a RunData) -> Self {
+        let Drift { energy, linear, angular } = recording.drift();
+        let Work { steps, rejected, rates } = recording.work;
+        let energies = |balance: Option<&Balance>| {
+            let of = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
+            EnergyFacts { kinetic: of(|b| b.kinetic), elastic: of(|b| b.elastic), work: of(|b| b.work) }
+        };
+        let largest =
+            |vectors: &mut dyn Iterator<Item = Vector3<f64>>| vectors.map(|v| v.norm()).fold(0.0, f64::max);
+        let points = recording.paths.iter().map(|path| PointFacts {
+            name: &path.name,
+            largest_deflection: largest(&mut path.deflection.iter().copied()),
+            last_place: path.place.last().copied().unwrap_or_default().into(),
+        });
+        Self {
+            generator: generator(),
+            scene: &recording.scene,
+            body: &recording.body,
+            units: UnitFacts {
+                length: units.length.name().to_owned(),
+                mass: units.mass.name().to_owned(),
+                time: units.time.name().to_owned(),
+            },
+            method: match recording.scheme {
+                Scheme::Adaptive { tolerance } => MethodFacts::Adaptive { order: 8, tolerance },
+                Scheme::Conserving { order, step } => {
+                    MethodFacts::Conserving { order, step: step.unwrap_or(f64::NAN) }
+                }
+            },
+            duration: recording.time.last().copied().unwrap_or(0.0),
+            instants: recording.time.len(),
+            steps,
+            rejected_steps: rejected,
+            evaluations: rates,
+            energy_drift: energy,
+            linear_momentum_drift: linear,
+            angular_momentum_drift: angular,
+            first: energies(recording.balances.first()),
+            last: energies(recording.balances.last()),
+            largest_spin: largest(&mut recording.states.iter().map(|state| state.omega)),
+            largest_deflection: recording.deflection,
+            points: points.collect(),
+            diagnostics: &run.diagnostics,
+            wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
+            cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
+            recording,
+        }
+    }
+
+    /// The facts in a format, ending with a line break.
+    pub fn render(&self, format: Format) -> String {
+        match format {
+            Format::Json => {
+                let json = serde_json::to_string_pretty(self);
+                json.expect("keys are strings and numbers that are not finite become null") + "\n"
+            }
+            Format::Text => self.text(),
+            Format::Html => self.html(),
+        }
+    }
+
+    fn unit(&self, mass: i32, length: i32, time: i32) -> String {
+        let UnitFacts { length: l, mass: m, time: t } = &self.units;
+        let powers = [(m, mass), (l, length), (t, time)];
+        let factor = |(name, power): (&String, i32)| match power {
+            0 => None,
+            1 => Some(name.clone()),
+            p => Some(format!("{name}^{p}")),
+        };
+        powers.into_iter().filter_map(factor).collect::<Vec<_>>().join(" ")
+    }
+
+    fn method_in_words(&self) -> String {
+        match self.method {
+            MethodFacts::Adaptive { order, tolerance } => {
+                format!("adaptive, order {order}, tolerance {tolerance:e}")
+            }
+            MethodFacts::Conserving { order, step } => {
+                format!("conserving, order {order}, step {} {}", significant(step, 4), self.units.time)
+            }
+        }
+    }
+
+    fn work_in_words(&self) -> String {
+        let rejected = if self.rejected_steps > 0 {
+            format!(", {} rejected", self.rejected_steps)
+        } else {
+            String::new()
+        };
+        format!("{}{rejected}, {} evaluations", counted(self.steps as usize, "step"), self.evaluations)
+    }
+
+    fn energy_in_words(&self, energy: &EnergyFacts) -> String {
+        let unit = self.unit(1, 2, -2);
+        format!(
+            "kinetic {} + elastic {} {unit}",
+            significant(energy.kinetic, 6),
+            significant(energy.elastic, 6)
+        )
+    }
+
+    fn text(&self) -> String {
+        let mut page = Page(String::new());
+        let duration = significant(self.duration, 6);
+        let instants = counted(self.instants, "instant");
+        page.entry(
+            "Simulation",
+            &format!("{}: {}, {duration} {}, {instants}", self.scene, self.body, self.units.time),
+        );
+        page.entry("Method", &format!("{}: {}", self.method_in_words(), self.work_in_words()));
+        page.entry("Energy", &format!("{} at the start", self.energy_in_words(&self.first)));
+        page.entry("", &format!("{} at the end", self.energy_in_words(&self.last)));
+        if self.last.work != 0.0 {
+            let work = significant(self.last.work, 6);
+            page.entry("", &format!("work of loads and damping {work} {}", self.unit(1, 2, -2)));
+        }
+        page.entry(
+            "Drift",
+            &format!(
+                "energy {:.1e}, linear momentum {:.1e}, angular momentum {:.1e}",
+                self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift
+            ),
+        );
+        page.entry("Spin", &format!("at most {} rad/{}", significant(self.largest_spin, 5), self.units.time));
+        let part = significant(100.0 * self.largest_deflection, 3);
+        page.entry("Deflection", &format!("{part} % of the largest extent of the body"));
+        for point in &self.points {
+            let [x, y, z] = point.last_place.map(|v| significant(v, 6));
+            let deflection = significant(point.largest_deflection, 4);
+            let length = &self.units.length;
+            page.entry(
+                "Point",
+                &format!(
+                    "{}: ends at {x}, {y}, {z} {length}, deflected by at most {deflection} {length}",
+                    point.name
+                ),
+            );
+        }
+        let (wall, cpu) = (self.wall_seconds, self.cpu_seconds);
+        page.entry(
+            "Time",
+            &format!("{} wall, {} CPU", super::numbers::duration(wall), super::numbers::duration(cpu)),
+        );
+        diagnostics_lines(&mut page, self.diagnostics);
+        page.0
+    }
+
+    fn html(&self) -> String {
+        let mut html = String::new();
+        let small = |drift: f64| format!("{drift:.1e}");
+        let _ = writeln!(
+            html,
+            "<p class=\"verdict\"><strong>Energy drift {}, momentum drift {} (linear), {} (angular).</strong> {}: {}.</p>",
+            small(self.energy_drift),
+            small(self.linear_momentum_drift),
+            small(self.angular_momentum_drift),
+            escape(&self.method_in_words()),
+            self.work_in_words()
+        );
+        section(&mut html, "Motion");
+        let units = |mass, length, time| escape(&self.unit(mass, length, time));
+        let mut items = vec![
+            ("Body", escape(self.body)),
+            (
+                "Duration",
+                format!(
+                    "{} {}, {}",
+                    significant(self.duration, 6),
+                    escape(&self.units.time),
+                    counted(self.instants, "instant")
+                ),
+            ),
+            ("Energy at the start", escape(&self.energy_in_words(&self.first))),
+            ("Energy at the end", escape(&self.energy_in_words(&self.last))),
+            ("Work of loads and damping", format!("{} {}", significant(self.last.work, 6), units(1, 2, -2))),
+            (
+                "Largest spin",
+                format!("{} rad/{}", significant(self.largest_spin, 5), escape(&self.units.time)),
+            ),
+            (
+                "Largest deflection",
+                format!(
+                    "{} % of the largest extent of the body",
+                    significant(100.0 * self.largest_deflection, 3)
+                ),
+            ),
+        ];
+        for point in &self.points {
+            let [x, y, z] = point.last_place.map(|v| significant(v, 6));
+            items.push((
+                "Point",
+                format!(
+                    "{}, deflected by at most {} {length}; ends at {x}, {y}, {z} {length}",
+                    escape(point.name),
+                    significant(point.largest_deflection, 4),
+                    length = escape(&self.units.length)
+                ),
+            ));
+        }
+        terms(&mut html, items);
+        section(&mut html, "Plots");
+        self.plots(&mut html);
+        diagnostics_table(&mut html, self.diagnostics);
+        page(self.scene, "Simulation of a flexible body", &self.generator, &html)
+    }
+
+    fn plots(&self, html: &mut String) {
+        let Recording { time, states, balances, paths, reactions, .. } = self.recording;
+        let mut chart = |title: &str, lines: Vec<Line>, unit: String| {
+            html.push_str(&line_chart(title, time, &lines, &self.units.time, &unit));
+        };
+        let line = |name: &str, values: Vec<f64>| Line { name: name.to_owned(), values };
+        let components = |vectors: &[Vector3<f64>]| -> Vec<Line> {
+            (0..3).map(|k| line(["x", "y", "z"][k], vectors.iter().map(|v| v[k]).collect())).collect()
+        };
+        let energy = self.unit(1, 2, -2);
+        let of = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
+        let internal = vec![
+            line("kinetic, no flight", of(|b| b.kinetic - b.flight)),
+            line("elastic", of(|b| b.elastic)),
+            line("work", of(|b| b.work)),
+        ];
+        chart("Energy", internal, energy.clone());
+        let first = balances.first().map_or(0.0, |b| b.kinetic + b.elastic);
+        let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
+        chart("Drift of the energy", vec![line("less work", lost)], energy);
+        let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
+        chart("Angular velocity, body axes", components(&omega), format!("rad {}^-1", self.units.time));
+        chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
+        for path in paths {
+            let title = format!("Deflection of {}, body axes", path.name);
+            chart(&title, components(&path.deflection), self.units.length.clone());
+        }
+        if let Some(reactions) = reactions {
+            let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
+            chart("Torque of the prescribed motion, body axes", components(&torques), self.unit(1, 2, -2));
+        }
+    }
+
+    fn modal_unit(&self) -> String {
+        format!("{}^(1/2) {}", self.units.mass, self.units.length)
+    }
+
+    /// The modal coordinates with the largest amplitudes.
+    fn liveliest(&self) -> Vec<Line> {
+        let states = &self.recording.states;
+        let nf = states.first().map_or(0, |state| state.q.len());
+        let peak = |j: usize| states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
+        let mut modes: Vec<(usize, f64)> = (0..nf).map(|j| (j, peak(j))).collect();
+        modes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let of_mode = |&(j, _): &(usize, f64)| Line {
+            name: format!("mode {}", j + 1),
+            values: states.iter().map(|state| state.q[j]).collect(),
+        };
+        modes.iter().take(STYLES).map(of_mode).collect()
+    }
+}
+
+/// A recording as a table of comma-separated values, a row for every instant; numbers round-trip.
+pub fn simulation_csv(recording: &Recording) -> String {
+    let Recording { time, states, balances, paths, reactions, .. } = recording;
+    let nf = states.first().map_or(0, |state| state.q.len());
+    let mut head = vec!["time".to_owned()];
+    let xyz = |name: &str| ["x", "y", "z"].map(|k| format!("{name}_{k}"));
+    head.extend(xyz("origin"));
+    head.extend((0..4).map(|k| format!("attitude_{k}")));
+    head.extend(xyz("velocity"));
+    head.extend(xyz("angular_velocity"));
+    head.extend((1..=nf).map(|j| format!("q_{j}")));
+    head.extend((1..=nf).map(|j| format!("qd_{j}")));
+    head.extend(["kinetic", "elastic", "work"].map(str::to_owned));
+    head.extend(["linear_momentum", "angular_momentum"].iter().flat_map(|name| xyz(name)));
+    if reactions.is_some() {
+        head.extend(["reaction_force", "reaction_torque"].iter().flat_map(|name| xyz(name)));
+    }
+    for path in paths {
+        head.extend(xyz(&format!("{} place", path.name)));
+        head.extend(xyz(&format!("{} deflection", path.name)));
+    }
+    let mut out = head.iter().map(|cell| csv_cell(cell)).collect::<Vec<_>>().join(",");
+    for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
+        let mut row = vec![*time];
+        row.extend(&state.origin);
+        row.extend(state.attitude.0);
+        row.extend(&state.velocity);
+        row.extend(&state.omega);
+        row.extend(&state.q);
+        row.extend(&state.qd);
+        row.extend([balance.kinetic, balance.elastic, balance.work]);
+        row.extend(&balance.linear);
+        row.extend(&balance.angular);
+        if let Some(reactions) = reactions {
+            row.extend(&reactions[i].0);
+            row.extend(&reactions[i].1);
+        }
+        for path in paths {
+            row.extend(&path.place[i]);
+            row.extend(&path.deflection[i]);
+        }
+        out.push('\n');
+        out.push_str(&row.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(","));
+    }
+    out.push('\n');
+    out
+}
+
+/// Names are data: quoted where they hold what separates.
+fn csv_cell(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}

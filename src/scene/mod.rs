@@ -1,0 +1,14 @@
+//! What a body is to do: the scene file, and its simulation.
+
+mod description;
+mod history;
+mod read;
+mod recording;
+mod simulate;
+mod surroundings;
+
+pub use description::{Axes, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
+pub use history::History;
+pub use read::read_scene;
+pub use recording::{Drift, Path, Recording};
+pub use simulate::simulate;

@@ -1,0 +1,194 @@
+//! The simulation of a scene.
+
+use super::surroundings::SceneForces;
+use super::{Path, Recording, Scene, Scheme};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::dynamics::{
+    BodyPoint, Configuration, EquationsOfMotion, EulerParameters, Evaluation, Motion, Surroundings,
+};
+use crate::error::{Error, Result};
+use crate::flex_body::FlexBody;
+use crate::integration::{Explicit, Failure, Gauss, Method, System, integrate};
+use crate::model::LoadKind;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+/// Steps of the conserving method per shortest period, unless said.
+const STEPS_PER_PERIOD: f64 = 20.0;
+
+/// Deflections up to this part of the extent of the body are those of linear elasticity.
+const LINEAR_RANGE: f64 = 0.1;
+
+/// The motion of `body` in `scene`, and what has to be said about it; `watch` hears which part of the duration is done.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body, FB540 when the integration cannot go on.
+pub fn simulate(
+    body: &FlexBody,
+    scene: &Scene,
+    mut watch: impl FnMut(f64),
+) -> Result<(Recording, Vec<Diagnostic>)> {
+    let (forces, points) = SceneForces::new(body, scene)?;
+    let equations = EquationsOfMotion::new(body, scene.run.terms);
+    let start = start(body, scene, &forces);
+    let (mut motion, mut state) = Motion::new(&equations, &forces, &start);
+    let mut observer = Motion::new(&equations, &forces, &start).0;
+
+    let (duration, outputs) = (scene.run.duration, scene.run.outputs);
+    let time: Vec<f64> = (0..=outputs).map(|i| duration * (i as f64 / outputs as f64)).collect();
+    let (scheme, mut method) = method(body, scene, motion.dimension());
+    let mut recording = Recording {
+        scene: scene.name.clone(),
+        body: body.source().name.clone(),
+        scheme,
+        time: Vec::with_capacity(time.len()),
+        states: Vec::with_capacity(time.len()),
+        balances: Vec::with_capacity(time.len()),
+        reactions: scene.spin.is_some().then(Vec::new),
+        paths: scene
+            .watched
+            .iter()
+            .map(|point| Path { name: point.to_string(), place: Vec::new(), deflection: Vec::new() })
+            .collect(),
+        work: method.work(),
+        size: motion.size(),
+        deflection: 0.0,
+    };
+    let undeformed = Evaluation::new(&equations);
+    let rest: Vec<Vector3<f64>> = points.iter().map(|point| point.place(&undeformed)).collect();
+    let observe = |time: f64, state: &[f64]| {
+        recording.time.push(time);
+        recording.states.push(observer.configuration(time, state)?);
+        recording.balances.push(observer.balance(time, state)?);
+        if let Some(reactions) = &mut recording.reactions {
+            reactions.push(observer.reaction(time, state)?);
+        }
+        let (place, evaluation) = observer.evaluate(time, state)?;
+        for ((path, point), rest) in recording.paths.iter_mut().zip(&points).zip(&rest) {
+            let at: Vector3<f64> = BodyPoint::place(point, evaluation);
+            path.place.push(place.origin + place.axes * at);
+            path.deflection.push(at - rest);
+        }
+        watch(time / duration);
+        Ok::<(), Failure>(())
+    };
+    integrate(&mut method, &mut motion, &mut state, &time, &breaks(scene), observe)
+        .map_err(|failure| stopped(scene, &method, failure))?;
+    recording.work = method.work();
+    let (deflection, at) = largest_deflection(body, &recording);
+    recording.deflection = deflection;
+    let found = remarks(body, scene, &recording, at);
+    Ok((recording, found))
+}
+
+/// The state at time zero. What is prescribed replaces what the scene says of it.
+fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configuration {
+    let initial = &scene.initial;
+    let (mut q, mut qd) = (vec![0.0; body.n_modes()], vec![0.0; body.n_modes()]);
+    for start in &initial.modes {
+        (q[start.mode], qd[start.mode]) = (start.amplitude, start.rate);
+    }
+    let prescribed = forces.prescribed(0.0).0;
+    Configuration {
+        origin: initial.origin,
+        attitude: attitude(&initial.rotation),
+        velocity: prescribed.linear.unwrap_or(initial.velocity),
+        omega: prescribed.angular.unwrap_or(initial.angular_velocity),
+        q,
+        qd,
+    }
+}
+
+/// Euler parameters of a rotation vector.
+fn attitude(rotation: &Vector3<f64>) -> EulerParameters {
+    let angle = rotation.norm();
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    let e = if angle > 0.0 { rotation * (sin / angle) } else { Vector3::zeros() };
+    EulerParameters([cos, e.x, e.y, e.z])
+}
+
+fn method(body: &FlexBody, scene: &Scene, dimension: usize) -> (Scheme, Method) {
+    match scene.run.scheme {
+        Scheme::Adaptive { tolerance } => {
+            let explicit = Explicit::new(dimension, tolerance, scene.run.duration);
+            (scene.run.scheme, Method::Explicit(explicit))
+        }
+        Scheme::Conserving { order, step } => {
+            let fastest = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+            let step = step.unwrap_or(TAU / fastest / STEPS_PER_PERIOD).min(scene.run.duration);
+            let method = Method::Gauss { method: Gauss::new(dimension, order), step };
+            (Scheme::Conserving { order, step: Some(step) }, method)
+        }
+    }
+}
+
+/// Times at which something in the scene is not smooth.
+fn breaks(scene: &Scene) -> Vec<f64> {
+    let loads = scene.loads.iter().map(|load| &load.history);
+    let mut times: Vec<f64> =
+        loads.chain(scene.spin.iter().map(|spin| &spin.rate)).flat_map(|history| history.breaks()).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
+}
+
+fn stopped(scene: &Scene, method: &Method, failure: Failure) -> Error {
+    let work = method.work();
+    let message = format!("simulation of `{}` stopped after {} steps: {failure}", scene.name, work.steps);
+    let help = match failure {
+        Failure::NotConverged { .. } => "take a shorter step, or the adaptive method",
+        _ => "the motion may leave the range of the model: look at spin, loads and dropped terms",
+    };
+    Diagnostic::new(Code::SimulationStopped, message).with_help(help).into()
+}
+
+/// The largest deflection of a node when the elastic energy is largest, relative to the extent of the body; and that time.
+fn largest_deflection(body: &FlexBody, recording: &Recording) -> (f64, f64) {
+    let energies = recording.balances.iter().map(|balance| balance.elastic).enumerate();
+    let at = energies.fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most }).0;
+    let (shape, q) = (&body.modes().shape, &recording.states[at].q);
+    let component = |row: usize| -> f64 { q.iter().enumerate().map(|(j, q)| shape[(row, j)] * q).sum() };
+    let deflections =
+        (0..body.nodes().positions.len()).map(|i| Vector3::from_fn(|k, _| component(3 * i + k)).norm());
+    let extent = (0..3)
+        .map(|k| {
+            let along = body.nodes().positions.iter().map(|x| x[k]);
+            along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+        })
+        .fold(0.0, f64::max);
+    (deflections.fold(0.0, f64::max) / extent, recording.time[at])
+}
+
+fn remarks(body: &FlexBody, scene: &Scene, recording: &Recording, at: f64) -> Vec<Diagnostic> {
+    let (mut found, unit) = (Vec::new(), body.units().time.name());
+    if recording.deflection > LINEAR_RANGE {
+        let message = format!(
+            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}: modes are those of small deformation",
+            100.0 * recording.deflection,
+            rounded(at)
+        );
+        found.push(Diagnostic::new(Code::LinearRangeLeft, message));
+    }
+    let stiffened = scene.run.terms.geometric_stiffness
+        && body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    if scene.run.terms.w2 && !stiffened {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let Some(limit) = body.invariants().softening_rate(axis) else { continue };
+            let largest = recording.states.iter().map(|state| state.omega[axis].abs()).fold(0.0, f64::max);
+            if largest > limit {
+                let lost = (0.1 * largest / limit).powi(2) * 100.0;
+                let message = format!(
+                    "spin about {name} reaches {} rad/{unit}: without geometric stiffness it takes {lost:.2} % of the stiffness of some motion",
+                    rounded(largest)
+                );
+                found.push(Diagnostic::new(Code::SpinSoftens, message));
+            }
+        }
+    }
+    found
+}
+
+/// Four digits are enough to find a place.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

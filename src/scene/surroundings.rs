@@ -1,0 +1,121 @@
+//! A scene as forces and prescribed motion of one body.
+
+use super::{Axes, Load, Point, Scene, Spin};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::dynamics::{BodyPoint, Evaluation, Place, Prescribed, Surroundings};
+use crate::error::{Error, Result};
+use crate::flex_body::FlexBody;
+use nalgebra::Vector3;
+
+/// What acts on a body in a scene.
+pub(super) struct SceneForces<'a> {
+    gravity: Option<Vector3<f64>>,
+    loads: Vec<(BodyPoint, &'a Load)>,
+    spin: Option<&'a Spin>,
+}
+
+impl<'a> SceneForces<'a> {
+    /// Resolves the names of `scene`; and the points that it watches.
+    ///
+    /// # Errors
+    /// FB212 for nodes, interfaces and modes that the body has not, for torques where it has no orientation, and for
+    /// vectors that leave the plane of a plane body. All of them.
+    pub fn new(body: &FlexBody, scene: &'a Scene) -> Result<(Self, Vec<BodyPoint>)> {
+        let mut found = Vec::new();
+        let mut wrong = |message: String| found.push(Diagnostic::new(Code::SceneBody, message));
+        for start in &scene.initial.modes {
+            if start.mode >= body.n_modes() {
+                wrong(format!("mode {} does not exist: the body has {}", start.mode + 1, body.n_modes()));
+            }
+        }
+        if body.dimension() == 2 {
+            leaving_the_plane(scene).into_iter().for_each(|what| {
+                wrong(format!(
+                    "{what} leaves the plane of the body: vectors have z = 0, rotations x = y = 0"
+                ));
+            });
+        }
+        let mut points = |place: &Point| point(body, scene, place).map_err(&mut wrong).ok();
+        let watched = scene.watched.iter().map(&mut points).collect();
+        let loads: Option<Vec<_>> = scene.loads.iter().map(|load| Some((points(&load.at)?, load))).collect();
+        for (point, load) in loads.iter().flatten() {
+            if load.torque != Vector3::zeros() && !point.turns() {
+                wrong(format!("no torque can act at {}: it has no orientation", load.at));
+            }
+        }
+        match (watched, loads) {
+            (Some(watched), Some(loads)) if found.is_empty() => {
+                Ok((Self { gravity: scene.gravity, loads, spin: scene.spin.as_ref() }, watched))
+            }
+            _ => Err(Error::new(found)),
+        }
+    }
+}
+
+fn point(body: &FlexBody, scene: &Scene, place: &Point) -> std::result::Result<BodyPoint, String> {
+    match place {
+        Point::Node(number) => {
+            let at = body.nodes().ids.iter().position(|id| id == number);
+            at.map(|at| BodyPoint::node(body, at)).ok_or_else(|| format!("the body has no node {number}"))
+        }
+        Point::Interface(name) => {
+            let interface = body.interfaces().iter().find(|interface| interface.name == *name);
+            let interface = interface.ok_or_else(|| {
+                let all: Vec<&str> = body.interfaces().iter().map(|i| i.name.as_str()).collect();
+                let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
+                format!("the body has no interface `{name}`: {known}")
+            })?;
+            BodyPoint::interface(body, interface, scene.run.terms)
+                .ok_or_else(|| format!("interface `{name}` has no reference point: name a node of it"))
+        }
+    }
+}
+
+/// Vectors of a scene that a plane body cannot follow.
+fn leaving_the_plane(scene: &Scene) -> Vec<String> {
+    let in_plane = |v: &Vector3<f64>| v.z == 0.0;
+    let about_normal = |v: &Vector3<f64>| v.x == 0.0 && v.y == 0.0;
+    let initial = &scene.initial;
+    let mut checks = vec![
+        (in_plane(&initial.origin), "`origin`".to_owned()),
+        (in_plane(&initial.velocity), "`velocity`".to_owned()),
+        (about_normal(&initial.rotation), "`rotation`".to_owned()),
+        (about_normal(&initial.angular_velocity), "`angular_velocity`".to_owned()),
+        (scene.gravity.as_ref().is_none_or(in_plane), "`gravity`".to_owned()),
+        (scene.spin.as_ref().is_none_or(|spin| about_normal(&spin.axis)), "`axis` of [spin]".to_owned()),
+    ];
+    for load in &scene.loads {
+        checks.push((in_plane(&load.force), format!("`force` at {}", load.at)));
+        checks.push((about_normal(&load.torque), format!("`torque` at {}", load.at)));
+    }
+    checks.into_iter().filter(|(fits, _)| !fits).map(|(_, what)| what).collect()
+}
+
+impl Surroundings for SceneForces<'_> {
+    fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]) {
+        if let Some(gravity) = &self.gravity {
+            evaluation.add_gravity(&place.axes.tr_mul(gravity), forces);
+        }
+        for (point, load) in &self.loads {
+            let factor = load.history.at(time).0;
+            let in_body = |v: &Vector3<f64>| match load.axes {
+                Axes::World => place.axes.tr_mul(v) * factor,
+                Axes::Body => v * factor,
+            };
+            point.add_force(evaluation, &in_body(&load.force), forces);
+            if load.torque != Vector3::zeros() {
+                point.add_torque(evaluation, &in_body(&load.torque), forces);
+            }
+        }
+    }
+
+    fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
+        let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
+        let (rate, slope) = spin.rate.at(time);
+        let linear = spin.hold.then(Vector3::zeros);
+        (
+            Prescribed { linear, angular: Some(spin.axis * rate) },
+            Prescribed { linear, angular: Some(spin.axis * slope) },
+        )
+    }
+}
