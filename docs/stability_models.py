@@ -93,8 +93,8 @@ def modes(k, m, dofs, x, dimension):
     r = solve_lower(cholesky(r.T.dot(m).dot(r)), r.T).T
     mr, kr = m.dot(r), k.dot(r)
     k = k - mr.dot(kr.T) - kr.dot(mr.T) + mr.dot(r.T.dot(kr)).dot(mr.T)
-    # So many digits are there that a shift far below every mode costs none.
-    tau = mpfr("1e-6") * min(k[i, i] / m[i, i] for i in range(len(k)) if m[i, i] > 0 and k[i, i] > 0)
+    # So many digits are there that no shift costs any.
+    tau = min(k[i, i] / m[i, i] for i in range(len(k)) if m[i, i] > 0 and k[i, i] > 0)
     lower = cholesky(k + tau * m)
     s = solve_lower(lower, solve_lower(lower, m).T)
     y = lower.T.dot(r)

@@ -3,7 +3,9 @@
 //!
 //!     cargo run --release --example extreme_motion -- body.flex.h5
 
-use flexbody::dynamics::{Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Motion, Terms};
+use flexbody::dynamics::{
+    Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Motion, Orientation, Terms,
+};
 use flexbody::flex_body::FlexBody;
 use flexbody::integration::{Explicit, Failure, Gauss, Method, System, integrate};
 use flexbody::store;
@@ -22,7 +24,7 @@ struct Case {
 
 const PLAIN: Case = Case { spin: 0.05, deformation: 1e-3, periods: 20.0 };
 
-/// Energy and angular momentum lost relative to the first, largest |q| beside the size of the body, and the state at the end.
+/// Largest change of energy and angular momentum relative to what there was,  largest |q| beside the size of the body, and the state at the end.
 struct Run {
     energy: f64,
     angular: f64,
@@ -48,11 +50,13 @@ fn main() {
         let [a, b] = runs.map(|run| told(&run));
         println!("{}", json!({ "family": "spin", "case": spin, "gauss": a, "explicit": b, "apart": apart }));
     }
-    for part in [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0] {
-        let [a, b, c] = [2, 4, 6].map(|order| told(&run(&body, PLAIN, gauss(order, part))));
+    for part in [0.03f64, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0] {
+        // Long enough that no step is cut short by what is looked at.
+        let case = Case { periods: PLAIN.periods * part.max(1.0), ..PLAIN };
+        let [a, b, c] = [2, 4, 6].map(|order| told(&run(&body, case, gauss(order, part))));
         println!("{}", json!({ "family": "step", "case": part, "gauss2": a, "gauss4": b, "gauss6": c }));
     }
-    for deformation in [1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6, 1e150] {
+    for deformation in [1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
         let case = Case { deformation, ..PLAIN };
         let [a, b] = [told(&run(&body, case, gauss(6, 0.1))), told(&run(&body, case, explicit))];
         println!("{}", json!({ "family": "deformation", "case": deformation, "gauss": a, "explicit": b }));
@@ -103,11 +107,12 @@ fn run(body: &FlexBody, case: Case, method: impl Fn(usize) -> Method) -> Result<
         Ok::<(), Failure>(())
     })?;
     let (energy, angular) = balances[0];
-    let relative = |lost: f64, whole: f64| if lost == 0.0 { 0.0 } else { lost / whole };
+    // What the energy could have of angular momentum: at least what there is.
+    let whole = (2.0 * energy * body.invariants().inertia()[(2, 2)]).sqrt();
     let worst = |lost: &dyn Fn(&(f64, Vector3<f64>)) -> f64| balances.iter().map(lost).fold(0.0, f64::max);
     Ok(Run {
-        energy: worst(&|b| relative((b.0 - energy).abs(), energy)),
-        angular: worst(&|b| relative((b.1 - angular).norm(), angular.norm())),
+        energy: worst(&|b| (b.0 - energy).abs() / energy),
+        angular: worst(&|b| (b.1 - angular).norm() / whole),
         largest: largest / size(body),
         end,
     })
