@@ -44,12 +44,13 @@ def tumbled(data, values, units, dimension):
     y = np.concatenate([[1, 0, 0, 0], np.zeros(nf), inertia.dot(rate), np.zeros(nf)])
     step = TURNS * 2 * np.pi / STEPS
     try:
-        for _ in range(STEPS):
-            a = change(y)
-            b = change(y + step / 2 * a)
-            c = change(y + step / 2 * b)
-            y = y + step / 6 * (a + 2 * b + 2 * c + change(y + step * c))
-        w, _, _ = velocities(y[4:4 + nf], y[4 + nf:7 + nf], y[7 + nf:])
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(STEPS):
+                a = change(y)
+                b = change(y + step / 2 * a)
+                c = change(y + step / 2 * b)
+                y = y + step / 6 * (a + 2 * b + 2 * c + change(y + step * c))
+            w, _, _ = velocities(y[4:4 + nf], y[4 + nf:7 + nf], y[7 + nf:])
     except np.linalg.LinAlgError:  # a bent needle: its mass matrix is singular to double precision
         return np.full(7 + nf, np.nan)
     # Rates in units of the first, deformations of what the spin makes of them.

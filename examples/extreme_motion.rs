@@ -109,10 +109,10 @@ fn run(body: &FlexBody, case: Case, method: impl Fn(usize) -> Method) -> Result<
     let (energy, angular) = balances[0];
     // What the energy could have of angular momentum: at least what there is.
     let whole = (2.0 * energy * body.invariants().inertia()[(2, 2)]).sqrt();
-    let worst = |lost: &dyn Fn(&(f64, Vector3<f64>)) -> f64| balances.iter().map(lost).fold(0.0, f64::max);
+    let most = |lost: &mut dyn Iterator<Item = f64>, whole: f64| lost.fold(0.0, f64::max) / whole;
     Ok(Run {
-        energy: worst(&|b| (b.0 - energy).abs() / energy),
-        angular: worst(&|b| (b.1 - angular).norm() / whole),
+        energy: most(&mut balances.iter().map(|b| (b.0 - energy).abs()), energy),
+        angular: most(&mut balances.iter().map(|b| (b.1 - angular).norm()), whole),
         largest: largest / size(body),
         end,
     })
