@@ -134,7 +134,7 @@ pub fn convert_resumed(
     let (frame, mass_properties) = match (model.scalar_mass(), model.dimension()) {
         (Some(mass), 2) => choose_plane_frame(mass, positions, settings.frame)?,
         (Some(mass), _) => choose_frame(mass, positions, settings.frame)?,
-        (None, d) => choose_general_frame(|about| rigid_mass(model, about), positions, d, settings.frame)?,
+        (None, d) => choose_general_frame(|about| rigid_mass(model, &about), positions, d, settings.frame)?,
     };
     let place = Place::new(model, frame);
     let modes = BodyModes::new(model, &place, &found.solution.vectors);

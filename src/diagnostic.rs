@@ -127,6 +127,8 @@ codes! {
     BodiesCoupled = "FB421", Error, BadInput, "damping or geometric stiffness couples bodies that K and M leave separate", "leave the entries between bodies out";
     RowsUnheld = "FB422", Error, BadInput, "stiffness leaves rows without coordinates free", "add the nodes to the node table, or remove these degrees of freedom";
     RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
+    MagnitudeExtreme = "FB424", Error, BadInput, "numbers too large or too small to be multiplied in double precision", "write the model in units in which its numbers are closer to one";
+    NodesRounded = "FB425", Warning, Done, "node positions do not fit the stiffness to all digits", "write coordinates with 17 digits, and the body near the origin: far from it coordinates are rounded to their own size";
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
     InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";

@@ -426,7 +426,8 @@ fn the_general_condensation_of_a_solid_is_that_of_its_scalar_mass() {
         let stiffness = Mat::identity(5, 5);
         let positions = frame.to_body(&model.nodes().positions);
         let expected = condense(scalar, &positions, turned.as_ref(), stiffness.clone());
-        let fields = model.rigid_fields(frame.origin.into(), 1.0);
+        let mut fields = model.rigid_fields(frame.origin.into(), 1.0);
+        frame.rotate_rigid(&mut fields);
         let motion = RigidMotion { fields: fields.as_ref(), displacements: n, axes };
         let general = condense_general(&whole, &motion, shapes.as_ref(), stiffness);
         for (what, error) in primary_differences(&expected, &general) {

@@ -78,7 +78,9 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
                     "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
                 )
             } else {
-                Diagnostic::new(Code::Mechanism, message)
+                Diagnostic::new(Code::Mechanism, message).with_help(
+                    "connect the parts or remove the free degree of freedom; of a body very thin, or with stiffnesses far apart, K has lost its softest ones to rounding",
+                )
             }
         }
         EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(

@@ -20,9 +20,16 @@ impl Place {
     }
 }
 
-/// R'MR of the unit translations and rotations about a point in model coordinates.
-pub(crate) fn rigid_mass(model: &FeModel, about: [f64; 3]) -> Mat<f64> {
-    let rigid = model.rigid_fields(about, 1.0);
+/// Unit translations along the axes of a frame and unit rotations about them (rows of the model).
+fn rigid_fields(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let mut fields = model.rigid_fields(frame.origin.into(), 1.0);
+    frame.rotate_rigid(&mut fields);
+    fields
+}
+
+/// R'MR of the unit translations and rotations of a frame.
+pub(crate) fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let rigid = rigid_fields(model, frame);
     gram(rigid.as_ref(), model.pencil().apply_mass(rigid.as_ref()).as_ref())
 }
 
@@ -106,7 +113,7 @@ impl BodyModes {
         if let Some(mass) = model.scalar_mass() {
             return condense(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
         }
-        let fields = model.rigid_fields(place.frame.origin.into(), 1.0);
+        let fields = rigid_fields(model, &place.frame);
         let motion = RigidMotion {
             fields: fields.as_ref(),
             displacements: model.rows().displacements(),

@@ -129,7 +129,10 @@ impl<'a> Krylov<'a> {
         let n = self.problem.pencil.n();
         let seed = self.random;
         self.random += 1;
-        let x = Mat::from_fn(n, width, |i, j| noise(seed, i as u64, j as u64));
+        // Of M-norm about one, by a power of two: what the operator makes of it can be squared in any units.
+        let heaviest = self.mass_diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let unit = (-0.5 * heaviest.log2()).round().exp2();
+        let x = Mat::from_fn(n, width, |i, j| unit * noise(seed, i as u64, j as u64));
         counters.mass_columns += width as u64;
         let mut y = self.problem.pencil.apply_mass(x.as_ref());
         counters.solved_columns += width as u64;

@@ -14,7 +14,7 @@ use super::problem::{
 use super::refine::{Refined, refine, residuals as residuals_of};
 use super::single;
 use super::start::{Snapshot, first_shift, fitting_start};
-use crate::linalg::{Analysis, Cholesky, is_positive_semidefinite};
+use crate::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 use crate::progress::{Event, Watch};
 use faer::Mat;
 
@@ -26,6 +26,9 @@ const DENSE_AT_MOST: usize = 9000;
 
 /// Part of all modes beyond which the dense path does less work than a Krylov basis of twice that size.
 const DENSE_PART: f64 = 0.2;
+
+/// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one: a digit.
+const FAR: f64 = 0.1;
 
 /// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
 pub(super) const CLUSTER_GAP: f64 = 1e-9;
@@ -127,11 +130,22 @@ fn search_densely(
     let pencil = &problem.pencil;
     let finite = dense::finite_eigenvalues(pencil).ok_or(EigenFailure::MassIndefinite)?;
     let flexible = finite.saturating_sub(problem.rigid.ncols());
-    // The mean shift does for few modes too, however far below it they lie: their subspace is accurate, and the
-    // refinement separates them.
-    let tau = dense::shift(problem.first_estimate, dense::highest_estimate(pencil));
-    let spectrum = dense::Spectrum::new(problem, tau)?;
-    let last = cluster_end(wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
+    let mean = dense::shift(problem.first_estimate, dense::highest_estimate(pencil));
+    let mut spectrum = dense::Spectrum::new(problem, mean)?;
+    let end =
+        |spectrum: &dense::Spectrum| cluster_end(wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
+    let mut last = end(&spectrum);
+    // Far above the wanted modes a shift crowds them together, which costs the digits by which they differ. Once it is known
+    // where they are, another is placed between them, if that matrix can be factored.
+    let highest = if last > 0 { spectrum.eigenvalue(last - 1) } else { mean };
+    let among = dense::shift(problem.first_estimate.min(highest), highest);
+    if among < FAR * mean
+        && let Ok(closer) = dense::Spectrum::new(problem, among)
+    {
+        spectrum = closer;
+        last = end(&spectrum);
+    }
+    let tau = spectrum.factor.shift();
     let found = Refined::new(problem, spectrum.vectors(last), counters)?;
     let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
     check_zero_energy(problem, &refined)?;

@@ -83,7 +83,12 @@ impl CauchySchwarz {
 
     /// I0_kk.
     fn moment(&self, k: usize) -> f64 {
-        self.second_moment.sum() - self.second_moment[k]
+        self.second_moment[(k + 1) % 3] + self.second_moment[(k + 2) % 3]
+    }
+
+    /// The largest I0_kk: what entries of J and Ibar that are sums of several of I0, of W1 and C2, are relative to.
+    fn largest_moment(&self) -> f64 {
+        (0..3).map(|k| self.moment(k)).fold(0.0, f64::max)
     }
 }
 
@@ -95,7 +100,7 @@ pub(super) fn scaled(difference: f64, bound: f64) -> f64 {
 /// Largest difference of each primary quantity of two bodies of the same nodes, frame and basis, relative to the
 /// Cauchy-Schwarz bounds of `a`: `mass`, `first_moment`, `second_moment`, `C1`, `Ibar`, `S`, and
 /// `modal_stiffness` relative to sqrt(K_pp K_qq); `W0`, `W3` and `modal_mass` where M does not commute with rotations. NaN when a
-/// number is.
+/// number is. J and Ibar of such a body have the bounds of I0, and of W1 and C2, which they stand for.
 ///
 /// Two independent evaluations agree to 1e-12 in all of them.
 ///
@@ -108,10 +113,21 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
     let axes = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
     let modes = || (0..nf).flat_map(|p| (0..nf).map(move |q| (p, q)));
     let first = |k: usize| scaled(a.first_moment[k] - b.first_moment[k], bound.first_moment(k));
-    let second =
-        |(k, l)| scaled(a.second_moment[(k, l)] - b.second_moment[(k, l)], bound.second_moment(k, l));
+    let general = a.general.is_some() || b.general.is_some();
+    // J and Ibar then stand for I0, W1 and C2, and have the bounds of these.
+    let of_j = |k: usize, l: usize| match general {
+        false => bound.second_moment(k, l),
+        true if k == l => bound.largest_moment(),
+        true => bound.inertia(k, l),
+    };
+    let of_ibar = |k: usize, l: usize, p: usize| match general {
+        false => bound.ibar(k, p),
+        true if k == l => bound.largest_moment().sqrt() * bound.mode(p),
+        true => bound.c2(3 - k - l, p),
+    };
+    let second = |(k, l)| scaled(a.second_moment[(k, l)] - b.second_moment[(k, l)], of_j(k, l));
     let c1 = |k: usize, p: usize| scaled(a.c1[(k, p)] - b.c1[(k, p)], bound.c1(p));
-    let ibar = |(k, l): (usize, usize), p: usize| scaled(a.ibar[k][l][p] - b.ibar[k][l][p], bound.ibar(k, p));
+    let ibar = |(k, l): (usize, usize), p: usize| scaled(a.ibar[k][l][p] - b.ibar[k][l][p], of_ibar(k, l, p));
     let s = |(k, l): (usize, usize), (p, q)| scaled(a.s[k][l][(p, q)] - b.s[k][l][(p, q)], bound.s(p, q));
     let largest_stiffness = (0..nf).fold(0.0, |m: f64, p| m.max(a.modal_stiffness[(p, p)].abs()));
     let stiffness = |p: usize| a.modal_stiffness[(p, p)].abs().max(f64::EPSILON * largest_stiffness);
@@ -131,7 +147,7 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         ("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, worst)),
         ("modal_stiffness", modes().map(k_ff).fold(0.0, worst)),
     ];
-    if a.general.is_some() || b.general.is_some() {
+    if general {
         let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
         table.push(("W0", entries(a.w0(), b.w0(), &|_, column| bound.c1(column % nf))));
         table.push(("W3", entries(a.w3(), b.w3(), &by_modes)));

@@ -44,6 +44,26 @@ impl Frame {
             }
         }
     }
+
+    /// Turns rigid fields (six columns: unit translations along the model axes, unit rotations about them; in the plane two and one) to
+    /// those of the body axes, in place.
+    ///
+    /// # Panics
+    /// When there are neither six columns nor three.
+    pub fn rotate_rigid(&self, fields: &mut Mat<f64>) {
+        // About z in the plane: the one rotation stays what it is.
+        let (d, groups) = match fields.ncols() {
+            3 => (2, 1),
+            6 => (3, 2),
+            other => panic!("{other} rigid fields, not 3 or 6"),
+        };
+        for row in 0..fields.nrows() {
+            for first in (0..groups).map(|group| group * d) {
+                let old = Vector3::from_fn(|l, _| if l < d { fields[(row, first + l)] } else { 0.0 });
+                (0..d).for_each(|k| fields[(row, first + k)] = self.axes.column(k).dot(&old));
+            }
+        }
+    }
 }
 
 /// Which body frame to use.
@@ -125,19 +145,19 @@ pub fn choose_plane_frame(
     scalar_frame(mass, positions, choice, true)
 }
 
-/// The same for any mass, given the matrix R'MR of its unit translations and unit rotations about a point in model coordinates:
+/// The same for any mass, given the matrix R'MR of its unit translations and unit rotations of a frame:
 /// 6x6, of a body in the plane (`dimension` 2) 3x3.
 ///
 /// # Errors
 /// As [`choose_frame`].
 pub fn choose_general_frame(
-    rigid_mass: impl Fn([f64; 3]) -> Mat<f64>,
+    rigid_mass: impl Fn(Frame) -> Mat<f64>,
     positions: &[[f64; 3]],
     dimension: usize,
     choice: BodyFrame,
 ) -> Result<(Frame, MassProperties)> {
     frame_of(positions, choice, dimension == 2, |middle, offset| {
-        rigid_inertia(rigid_mass((middle + offset).into()).as_ref())
+        rigid_inertia(rigid_mass(Frame { origin: middle + offset, ..Frame::model() }).as_ref())
     })
 }
 

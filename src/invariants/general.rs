@@ -17,10 +17,11 @@ const BLOCK: usize = 32;
 /// What stays approximate for a mass that does not commute with rotations.
 pub const GENERAL_REMARK: &str = "exact: m, c, I0, C1, C2, m_ff; W0 to W3 take the rotations of nodes as small, an error that falls with the element size";
 
-/// How the rows of a model move with the body frame, in model axes.
+/// How the rows of a model, which are components along the model axes, move with the body frame.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidMotion<'a> {
-    /// N x 6: unit translations, then unit rotations about the origin of the body frame; of a plane body N x 3.
+    /// N x 6: unit translations along the body axes, then unit rotations about them; of a plane body N x 3. Turned before they are
+    /// multiplied ([`Frame::rotate_rigid`](super::Frame::rotate_rigid)), so that slender bodies keep the digits of their small moments.
     pub fields: MatRef<'a, f64>,
     /// Rows of displacements, d per vector, which come first; all others keep their values when the body turns.
     pub displacements: usize,
@@ -56,8 +57,8 @@ pub fn condense_general(
     let columns = Columns { motion, shapes };
     let products = Products { gram: columns.gram(mass), rigid: columns.rigid(), nf };
     match columns.rigid() {
-        3 => products.in_plane(motion.axes, modal_stiffness),
-        _ => products.in_space(motion.axes, modal_stiffness),
+        3 => products.in_plane(modal_stiffness),
+        _ => products.in_space(modal_stiffness),
     }
 }
 
@@ -91,15 +92,12 @@ impl Columns<'_> {
         if row >= self.motion.displacements {
             return 0.0;
         }
-        // e_b x psi is -psi_m along l and psi_l along m, for (b, l, m) cyclic.
-        let (d, b) = (if self.rigid() == 3 { 2 } else { 3 }, self.axes().start + block);
-        let (l, m) = ((b + 1) % 3, (b + 2) % 3);
-        let first = row / d * d;
-        match row % d {
-            k if k == l => -self.shapes[(first + m, j)],
-            k if k == m => self.shapes[(first + l, j)],
-            _ => 0.0,
-        }
+        let d = if self.rigid() == 3 { 2 } else { 3 };
+        let (first, k) = (row / d * d, row % d);
+        let axis = self.motion.axes.column(self.axes().start + block);
+        let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+        let along = |k: usize| if k < d { self.shapes[(first + k, j)] } else { 0.0 };
+        axis[l] * along(m) - axis[m] * along(l)
     }
 
     fn block(&self, columns: Range<usize>) -> Mat<f64> {
@@ -131,7 +129,7 @@ impl Columns<'_> {
     }
 }
 
-/// The Gram matrix of [`Columns`], model axes.
+/// The Gram matrix of [`Columns`].
 struct Products {
     gram: Mat<f64>,
     rigid: usize,
@@ -153,58 +151,47 @@ impl Products {
         Mat::from_fn(self.nf, self.nf, |i, j| self.gram[(self.mode(i), self.mode(j))])
     }
 
-    fn in_space(&self, axes: Matrix3<f64>, modal_stiffness: Mat<f64>) -> Invariants {
+    fn in_space(&self, modal_stiffness: Mat<f64>) -> Invariants {
         let (g, nf) = (&self.gram, self.nf);
-        let to_body = axes.transpose();
-        let tensor = |f: &dyn Fn(usize, usize) -> f64| to_body * Matrix3::from_fn(f) * axes;
-        let vector = |f: &dyn Fn(usize) -> f64| to_body * Vector3::from_fn(|k, _| f(k));
         let (mass, first_moment, second_moment) = rigid_inertia(g.as_ref().submatrix(0, 0, 6, 6));
-        let second_moment = tensor(&|k, l| second_moment[(k, l)]);
-        let c1: Vec<Vector3<f64>> = (0..nf).map(|j| vector(&|k| g[(k, self.mode(j))])).collect();
-        let c2: Vec<Vector3<f64>> = (0..nf).map(|j| vector(&|k| g[(3 + k, self.mode(j))])).collect();
-        let w0: Vec<Matrix3<f64>> = (0..nf).map(|j| tensor(&|k, b| g[(k, self.turned(b, j))])).collect();
-        let ibar: Vec<Matrix3<f64>> =
-            (0..nf).map(|j| ibar_of(&tensor(&|k, b| g[(3 + k, self.turned(b, j))]), &c2[j])).collect();
+        let ibar: Vec<Matrix3<f64>> = (0..nf)
+            .map(|j| {
+                let half = Matrix3::from_fn(|k, b| g[(3 + k, self.turned(b, j))]);
+                ibar_of(&half, &Vector3::from_fn(|k, _| g[(3 + k, self.mode(j))]))
+            })
+            .collect();
         let mut s = [(); 3].map(|()| [(); 3].map(|()| Mat::zeros(nf, nf)));
-        let mut w3 = Mat::zeros(3 * nf, nf);
         for i in 0..nf {
             for j in 0..nf {
-                let w2 = tensor(&|a, b| g[(self.turned(a, i), self.turned(b, j))]);
-                let entry = s_of(&w2);
+                let entry = s_of(&Matrix3::from_fn(|a, b| g[(self.turned(a, i), self.turned(b, j))]));
                 for (k, row) in s.iter_mut().enumerate() {
                     for (l, s) in row.iter_mut().enumerate() {
                         s[(i, j)] = entry[(k, l)];
                     }
                 }
-                let w = vector(&|a| g[(self.turned(a, i), self.mode(j))]);
-                (0..3).for_each(|a| w3[(a * nf + i, j)] = w[a]);
             }
         }
         symmetrise(&mut s);
         Invariants {
             mass,
-            first_moment: to_body * first_moment,
-            second_moment: (second_moment + second_moment.transpose()) * 0.5,
-            c1: Mat::from_fn(3, nf, |k, j| c1[j][k]),
+            first_moment,
+            second_moment,
+            c1: self.c1(),
             ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect())),
             s,
             modal_stiffness,
             general: Some(GeneralTerms {
-                w0: Mat::from_fn(3, 3 * nf, |k, column| w0[column % nf][(k, column / nf)]),
-                w3,
+                w0: Mat::from_fn(3, 3 * nf, |k, column| g[(k, self.turned(column / nf, column % nf))]),
+                w3: Mat::from_fn(3 * nf, nf, |row, j| g[(self.turned(row / nf, row % nf), self.mode(j))]),
                 modal_mass: self.modal_mass(),
                 plane: false,
             }),
         }
     }
 
-    fn in_plane(&self, axes: Matrix3<f64>, modal_stiffness: Mat<f64>) -> Invariants {
+    fn in_plane(&self, modal_stiffness: Mat<f64>) -> Invariants {
         let (g, nf) = (&self.gram, self.nf);
-        let vector = |f: &dyn Fn(usize) -> f64| axes.transpose() * Vector3::new(f(0), f(1), 0.0);
         let (mass, first_moment, second_moment) = rigid_inertia(g.as_ref().submatrix(0, 0, 3, 3));
-        let second_moment = axes.transpose() * second_moment * axes;
-        let c1: Vec<Vector3<f64>> = (0..nf).map(|j| vector(&|k| g[(k, self.mode(j))])).collect();
-        let w0: Vec<Vector3<f64>> = (0..nf).map(|j| vector(&|k| g[(k, self.turned(0, j))])).collect();
         let ibar: Vec<Matrix3<f64>> =
             (0..nf).map(|j| plane_ibar(g[(2, self.turned(0, j))], g[(2, self.mode(j))])).collect();
         let w2 = |i: usize, j: usize| g[(self.turned(0, i), self.turned(0, j))];
@@ -212,14 +199,17 @@ impl Products {
         let zero = || Mat::zeros(nf, nf);
         Invariants {
             mass,
-            first_moment: axes.transpose() * first_moment,
-            second_moment: (second_moment + second_moment.transpose()) * 0.5,
-            c1: Mat::from_fn(3, nf, |k, j| c1[j][k]),
+            first_moment,
+            second_moment,
+            c1: self.c1(),
             ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect())),
             s: [[half(), zero(), zero()], [zero(), half(), zero()], [zero(), zero(), zero()]],
             modal_stiffness,
             general: Some(GeneralTerms {
-                w0: Mat::from_fn(3, 3 * nf, |k, c| if c < 2 * nf { 0.0 } else { w0[c % nf][k] }),
+                w0: Mat::from_fn(3, 3 * nf, |k, c| match c.checked_sub(2 * nf) {
+                    Some(j) if k < 2 => g[(k, self.turned(0, j))],
+                    _ => 0.0,
+                }),
                 w3: Mat::from_fn(3 * nf, nf, |row, j| match row.checked_sub(2 * nf) {
                     Some(i) => g[(self.turned(0, i), self.mode(j))],
                     None => 0.0,
@@ -228,6 +218,12 @@ impl Products {
                 plane: true,
             }),
         }
+    }
+
+    /// Phi_t' M Psi; of a plane body none along z.
+    fn c1(&self) -> Mat<f64> {
+        let d = if self.rigid == 3 { 2 } else { 3 };
+        Mat::from_fn(3, self.nf, |k, j| if k < d { self.gram[(k, self.mode(j))] } else { 0.0 })
     }
 }
 
@@ -244,8 +240,16 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
         0.5 * (g[(l, 3 + m)] - g[(m, 3 + l)])
     };
     let inertia = Matrix3::from_fn(|k, l| 0.5 * (g[(3 + k, 3 + l)] + g[(3 + l, 3 + k)]));
-    let second_moment = Matrix3::identity() * (0.5 * inertia.trace()) - inertia;
-    (mass, Vector3::from_fn(|k, _| moment(k)), second_moment)
+    (mass, Vector3::from_fn(|k, _| moment(k)), second_moment_of(&inertia))
+}
+
+/// J that gives I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small where the third moment
+/// is, and a needle keeps the digits of its small moment, J_ll + J_mm.
+fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
+    Matrix3::from_fn(|k, l| {
+        let (a, b) = (inertia[((k + 1) % 3, (k + 1) % 3)], inertia[((k + 2) % 3, (k + 2) % 3)]);
+        if k == l { 0.5 * (a.min(b) + (a.max(b) - inertia[(k, k)])) } else { -inertia[(k, l)] }
+    })
 }
 
 /// J of a plane body of which the moment about z is known alone: the same in all directions about its centre of mass, so that it

@@ -3,6 +3,7 @@
 use super::geometric_stiffness::{check_loads, missing_components};
 use super::interface::resolve_references;
 use super::layout::{Layout, layout, name_some};
+use super::magnitude::check_magnitudes;
 use super::mass_structure::{MassForm, mass_form};
 use super::placeless::{check_massless, misplaced, recover};
 use super::rigid::{centre_and_length, rigid_count, rigid_residuals};
@@ -148,6 +149,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
         unreachable!("an asymmetric matrix is an error")
     };
     check_diagonals(&stiffness, &mass, label, &raw, &mut found);
+    found.extend(check_magnitudes(&stiffness, &mass, &nodes, &raw));
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
@@ -184,8 +186,9 @@ pub(super) fn finish(
     if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
         found.push(diagnostic.in_file(&body.raw.stiffness.path));
     }
-    let limit = rounding(body.raw.stiffness.digits, 3).max(1e-6);
-    let rigid_residual = check_rigid_motion(&body, limit, &mut found);
+    let written = body.raw.stiffness.digits;
+    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
+    let rigid_residual = check_rigid_motion(&body, limits, &mut found);
     check_rigid_damping(&body, &mut found);
     found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
     stop_on_error(&mut found)?;

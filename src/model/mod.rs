@@ -6,6 +6,7 @@ mod fe_model;
 mod geometric_stiffness;
 mod interface;
 mod layout;
+mod magnitude;
 mod mass_structure;
 mod nodes;
 mod placeless;

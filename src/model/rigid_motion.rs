@@ -7,9 +7,14 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::linalg::{Pencil, gram};
 use faer::Mat;
 
-/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body. Node tables written with few digits leave
-/// 1e-6 without harm; supports leave 0.01 to 1.
-pub(super) fn check_rigid_motion(body: &Assembled, limit: f64, found: &mut Vec<Diagnostic>) -> f64 {
+/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second limit: node tables written
+/// with few digits leave up to 1e-6, supports 0.01 to 1. Above the first, what is known of the positions is told: the invariants have
+/// no more digits than that.
+pub(super) fn check_rigid_motion(
+    body: &Assembled,
+    (rounded, limit): (f64, f64),
+    found: &mut Vec<Diagnostic>,
+) -> f64 {
     let Assembled { raw, nodes, rows, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);
     let fields = rows.rigid_fields(&nodes.positions, centre, length);
@@ -37,6 +42,11 @@ pub(super) fn check_rigid_motion(body: &Assembled, limit: f64, found: &mut Vec<D
         };
         let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
         found.push(diagnostic.in_file(&raw.stiffness.path).with_help(help));
+    } else if worst > rounded {
+        let message = format!(
+            "|K R| reaches {worst:.1e} of the row sum of |K|: node positions and stiffness agree to about as much of the size of the body"
+        );
+        found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&raw.nodes_path));
     }
     worst
 }
