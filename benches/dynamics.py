@@ -198,6 +198,12 @@ Jacobians by all coordinates and velocities and gravity, bracket_hex20:
 | modes | Jacobians (us) | gravity (us) |
 |---|---|---|
 {others}
+
+The unreduced equations of all nodes, state in, rates out ([theory (6.9)](theory.md#6-mass-matrices-that-do-not-commute-with-a-rotation)):
+
+| body | rows of K and M | all nodes (us) |
+|---|---|---|
+{nodal}
 """
 
 
@@ -235,8 +241,10 @@ def main():
         dense, every, no_w3, w1 = (cost[body, modes, what] for what in ["dense matrices", "all terms", "without W3", "W1 only"])
         evaluations.append([body, modes, number(dense), number(every), f"{dense / every:.0f}", number(no_w3), number(w1)])
     others = [[m, number(cost["bracket_hex20", m, "Jacobians"]), number(cost["bracket_hex20", m, "gravity"])] for m in MODES]
+    nodal = sorted([body, rows, number(us)] for (body, rows, what), us in cost.items() if what == "all nodes")
     page = PAGE.format(machine=machine(), python=platform.python_version(), exudyn=version("exudyn"), numpy=version("numpy"), turns=TURNS,
-                       peers=table(peers), trajectories=table(trajectories), evaluations=table(evaluations), others=table(others))
+                       peers=table(peers), trajectories=table(trajectories), evaluations=table(evaluations), others=table(others),
+                       nodal=table(nodal))
     (ROOT / "docs/dynamics.md").write_text(page)
 
 
