@@ -49,8 +49,10 @@ differ by a part g are known to 10^-16 / g at best, which is what `out` shows of
 after the body tumbled free for {turns} periods of its first mode at a twentieth of its frequency about an axis between the principal ones, with the modes up to ten times the first.
 16 stands for 16 or more. *told* are warnings and notes of the run; *refused* is an error with its exit code, and no file.
 
-Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in any quantity without a warning
-that says so. Written by `python3 docs/make_stability.py`, which fails if that is not so; `tests/extremes.rs` holds what is said here.
+Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in frequencies, I0 or W1, or from its files in W2 and W3,
+without a warning that says so. What `flexbody` itself leaves of W2 and W3 can be less where two modes differ by less than the digits of K resolve (bricks of 1 : 1e3): their span is
+right, and the motion with it. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. Written by
+`python3 docs/make_stability.py`, which fails if this is not so; `tests/extremes.rs` holds what is said here.
 
 ![digits kept against digits that the files hold](images/stability.svg)
 """
@@ -157,7 +159,9 @@ def is_silent(found):
     """Whether more is wrong of a body than its diagnostics say."""
     if found["exit"] or TOLD & set(found["codes"]):
         return False
-    return max(sum(found[name]) for name in QUANTITIES if name != "tumbling") > SILENT
+    # What is left of W2 and W3 between nearly repeated modes is a matter of the pair.
+    errors = [sum(found[name]) for name in ("f", "I0", "W1")] + [found[name][0] for name in ("W2", "W3")]
+    return max(errors) > SILENT
 
 
 def kept(error):
