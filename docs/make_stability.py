@@ -187,7 +187,7 @@ def table(rows):
 MOTION = {
     "spin": ("Spin", "The bar of three bricks with eight modes, a little bent, set spinning near its middle axis at this part of its first frequency and left alone for twenty periods. Where the "
              "centrifugal term outweighs the stiffness (from about the first frequency on) the body stretches until its moment of inertia has slowed it, by amounts that linear elasticity does not know: `largest` is "
-             "the largest modal coordinate beside the size of the body, root of tr J. `gauss`: order 6, a tenth of the fastest mode's radian a step; `explicit`: order 8, tolerance 1e-12; `apart`: their states at the end.",
+             "the largest modal coordinate beside the size of the body, root of tr J. `gauss`: order 6, a tenth of the fastest mode's radian a step; `explicit`: order 8, tolerance 1e-12; `apart`: their states at the end; `nudged`: the states at the end of two explicit runs whose first bend differs by 10^-9 of it. Where both are of one size the motion is chaotic, and nobody follows it for long: energy and momentum are what is left to hold.",
              ("gauss", "explicit")),
     "step": ("Steps", "The same at a twentieth of the first frequency, with steps of this many radians of the fastest mode. Collocation is stable for every step that its equations can be solved for.", ("gauss2", "gauss4", "gauss6")),
     "deformation": ("Deformation", "The same, bent at the start by this part of its size in the first mode.", ("gauss", "explicit")),
@@ -207,7 +207,7 @@ def motion(program, bar):
            "(`examples/extreme_motion.rs`). A run that cannot go on ends with the reason; none goes on with numbers that are not finite.", ""]
     for family, (title, what, methods) in MOTION.items():
         own = [row for row in rows if row["family"] == family]
-        apart = ["apart"] if "apart" in own[0] else []
+        apart = [key for key in ("apart", "nudged") if key in own[0]]
         head = [title.lower(), *(f"{m} {k}" for m in methods for k in ("energy", "angular momentum", "largest")), *apart]
         out += [f"### {title}", "", what, "", "| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
         for row in own:
