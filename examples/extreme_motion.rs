@@ -55,7 +55,10 @@ fn main() {
         };
         let (apart, nudged) = (between(&runs[0], &runs[1]), between(&nudged, &runs[1]));
         let [a, b] = runs.map(|run| told(&run));
-        println!("{}", json!({ "family": "spin", "case": spin, "gauss": a, "explicit": b, "apart": apart, "nudged": nudged }));
+        println!(
+            "{}",
+            json!({ "family": "spin", "case": spin, "gauss": a, "explicit": b, "apart": apart, "nudged": nudged })
+        );
     }
     for part in [0.03f64, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0] {
         // Long enough that no step is cut short by what is looked at.

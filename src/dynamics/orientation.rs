@@ -53,9 +53,25 @@ impl Orientation<3> for AngularVelocity {
 pub struct EulerParameters(pub [f64; 4]);
 
 impl EulerParameters {
+    /// The same rotation with p'p = 1.
+    pub fn normalised(&self) -> Self {
+        let length = self.0.iter().map(|p| p * p).sum::<f64>().sqrt();
+        Self(self.0.map(|p| p / length))
+    }
+
     /// p' = G'omega / 4.
     pub fn rate(&self, omega: &Vector3<f64>) -> [f64; 4] {
         (self.map().tr_mul(omega) * 0.25).into()
+    }
+}
+
+impl From<RotationVector> for EulerParameters {
+    /// (cos f/2, v/f sin f/2) with f = |v|.
+    fn from(RotationVector(vector): RotationVector) -> Self {
+        let angle = vector.norm();
+        let (sin, cos) = (0.5 * angle).sin_cos();
+        let e = if angle > 0.0 { vector * (sin / angle) } else { Vector3::zeros() };
+        Self([cos, e.x, e.y, e.z])
     }
 }
 

@@ -4,7 +4,7 @@ use super::surroundings::SceneForces;
 use super::{Path, Recording, Scene, Scheme};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{
-    BodyPoint, Configuration, EquationsOfMotion, EulerParameters, Evaluation, Motion, Surroundings,
+    BodyPoint, Configuration, EquationsOfMotion, Evaluation, Motion, RotationVector, Surroundings,
 };
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
@@ -91,20 +91,12 @@ fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configurat
     let prescribed = forces.prescribed(0.0).0;
     Configuration {
         origin: initial.origin,
-        attitude: attitude(&initial.rotation),
+        attitude: RotationVector(initial.rotation).into(),
         velocity: prescribed.linear.unwrap_or(initial.velocity),
         omega: prescribed.angular.unwrap_or(initial.angular_velocity),
         q,
         qd,
     }
-}
-
-/// Euler parameters of a rotation vector.
-fn attitude(rotation: &Vector3<f64>) -> EulerParameters {
-    let angle = rotation.norm();
-    let (sin, cos) = (0.5 * angle).sin_cos();
-    let e = if angle > 0.0 { rotation * (sin / angle) } else { Vector3::zeros() };
-    EulerParameters([cos, e.x, e.y, e.z])
 }
 
 fn method(body: &FlexBody, scene: &Scene, dimension: usize) -> (Scheme, Method) {

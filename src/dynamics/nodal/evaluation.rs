@@ -2,7 +2,7 @@
 
 use super::equations::NodalEquations;
 use super::massless::Room;
-use super::state::{ANGULAR, LINEAR, OFFSET, attitude, normalised};
+use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
 use crate::dynamics::{EulerParameters, Orientation};
 use crate::integration::Failure;
 use crate::linalg::multiply_vector;
@@ -104,7 +104,7 @@ impl<'e> NodalEvaluation<'e> {
         self.offset = vector(OFFSET);
         self.origin = vector(0) + self.offset;
         self.attitude = attitude(frame);
-        self.axes = normalised(&self.attitude).axes() * body.frame.axes.transpose();
+        self.axes = self.attitude.normalised().axes() * body.frame.axes.transpose();
         self.u.copy_from_slice(u);
         self.w.copy_from_slice(w);
         (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());

@@ -2,7 +2,7 @@
 
 use super::NodalEvaluation;
 use super::equations::NodalEquations;
-use super::state::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, attitude, normalised};
+use super::state::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, attitude};
 use crate::dynamics::Orientation;
 use crate::integration::{Failure, System};
 use nalgebra::{Vector3, Vector6};
@@ -66,7 +66,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     fn energy(&self, state: &[f64]) -> f64 {
         let body = self.evaluation.equations;
         let (frame, u, w) = body.parts(state);
-        let axes = normalised(&attitude(frame)).axes();
+        let axes = attitude(frame).normalised().axes();
         let linear = Vector3::from_column_slice(&frame[LINEAR..LINEAR + 3]) / body.rigid_mass[(0, 0)];
         let drift = body.in_model(&axes.tr_mul(&linear), &Vector3::zeros());
         let about_centre = |((w, mass_rigid), mass): ((&f64, &[f64; 6]), &f64)| {
@@ -104,7 +104,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
 
     /// Euler parameters of unit length; C u = 0.
     fn settle(&self, state: &mut [f64]) {
-        let unit = normalised(&attitude(state));
+        let unit = attitude(state).normalised();
         state[ATTITUDE..LINEAR].copy_from_slice(&unit.0);
         let body = self.evaluation.equations;
         body.take_rigid(&mut state[DISPLACEMENTS..][..body.n_rows()]);

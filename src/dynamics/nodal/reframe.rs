@@ -1,7 +1,6 @@
 //! The same motion of the nodes, seen from the frame that the conditions ask for.
 
 use super::equations::NodalEquations;
-use super::state::normalised;
 use super::{NodalConfiguration, NodalError};
 use crate::dynamics::{EulerParameters, Orientation};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -56,10 +55,10 @@ impl NodalEquations<'_> {
         let to_frame = |v: Vector3<f64>| self.frame.axes.tr_mul(&v);
         let (shift, turn): (_, Matrix3<f64>) =
             (to_frame(shift), self.frame.axes.transpose() * turn.matrix() * self.frame.axes);
-        let axes = normalised(attitude).axes();
+        let axes = attitude.normalised().axes();
         let quaternion =
             |m: &Matrix3<f64>| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*m));
-        let EulerParameters([w, i, j, k]) = normalised(attitude);
+        let EulerParameters([w, i, j, k]) = attitude.normalised();
         let whole = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, i, j, k)) * quaternion(&turn);
         Ok(NodalConfiguration {
             origin: origin + axes * shift,

@@ -64,7 +64,7 @@ impl NodalEquations<'_> {
         if moved > ROUNDING * largest {
             return Err(NodalError::ConditionsViolated { part: moved / largest });
         }
-        let attitude = normalised(attitude);
+        let attitude = attitude.normalised();
         let nu = self.in_model(&attitude.axes().tr_mul(velocity), omega);
         self.add_frame(1.0, &nu, &u, &mut vbar);
         let mut w = vec![0.0; n];
@@ -95,18 +95,12 @@ pub(super) fn attitude(frame: &[f64]) -> EulerParameters {
     EulerParameters([frame[ATTITUDE], frame[ATTITUDE + 1], frame[ATTITUDE + 2], frame[ATTITUDE + 3]])
 }
 
-/// Euler parameters of unit length: a state has them but for the error of its integration.
-pub(super) fn normalised(EulerParameters(p): &EulerParameters) -> EulerParameters {
-    let length = p.iter().map(|p| p * p).sum::<f64>().sqrt();
-    EulerParameters(p.map(|p| p / length))
-}
-
 impl NodalEvaluation<'_> {
     /// The state as positions and velocities.
     pub fn configuration(&self) -> NodalConfiguration {
         NodalConfiguration {
             origin: self.origin,
-            attitude: normalised(&self.attitude),
+            attitude: self.attitude.normalised(),
             velocity: self.axes * self.velocity,
             omega: self.equations.frame.axes.tr_mul(&self.omega),
             u: self.u.clone(),
