@@ -2,6 +2,8 @@
 
 mod support;
 
+use flexbody::diagnostic::Code;
+use flexbody::dynamics::Terms;
 use flexbody::scene::{read_scene, simulate};
 use flexbody::store;
 use hdf5_metno as hdf5;
@@ -99,7 +101,7 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
 
     let body = store::read(place.join("body.flex.h5")).expect("a body");
     let described = read_scene(place.join("scene.toml")).expect("a scene");
-    let (recording, _) = simulate(&body, &described, |_| ()).expect("a motion");
+    let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     assert_eq!(recording.time.len(), 41);
     let file = hdf5::File::open(first.path().join("motion.h5")).expect("HDF5");
     let array = |name: &str| file.dataset(name).expect(name).read_raw::<f64>().expect("numbers");
@@ -178,6 +180,33 @@ fn plane_bodies_move_in_their_plane() {
     let impulse = momentum(rows.last().unwrap()) - momentum(&rows[0]);
     let weight = 9.81 * body.invariants().mass;
     assert!((impulse + weight * 0.02).abs() < 1e-12 * weight, "{impulse:e}");
+}
+
+#[test]
+fn terms_are_those_of_the_scene() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let read = |terms: &str| {
+        scene(folder.path(), &format!("[run]\nduration = 1\n{terms}"));
+        read_scene(folder.path().join("scene.toml")).expect("a scene").run.terms
+    };
+    assert_eq!(read(""), Terms::ALL);
+    assert_eq!(read("terms = [\"W1\", \"W3\"]"), Terms { w2: false, ..Terms::ALL });
+    assert_eq!(read("terms = []"), Terms { geometric_stiffness: true, ..Terms::NONE });
+}
+
+#[test]
+fn a_recording_that_does_not_fit_is_refused_before_any_work() {
+    let folder = folder_with("bracket_hex20", 2);
+    scene(folder.path(), "[run]\nduration = 1e6\noutputs = 1000000\n");
+    let body = store::read(folder.path().join("body.flex.h5")).expect("a body");
+    let described = read_scene(folder.path().join("scene.toml")).expect("a scene");
+    let error =
+        simulate(&body, &described, Some(1_000_000_000), |_| ()).expect_err("a gigabyte is not enough");
+    assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
+    assert_eq!(
+        error.diagnostics()[0].message(),
+        "recording 1000001 instants takes 1.584 GB, 1.000 GB are left"
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::arguments::SimulateArguments;
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
+use super::resources::memory_left;
 use super::watcher::Watcher;
 use crate::error::Result;
 use crate::output::OutputSlot;
@@ -23,8 +24,9 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let scene = read_scene(&arguments.scene)?;
     let body = store::read(&arguments.body)?;
     watcher.hear(Event::Phase("simulation"));
-    let (recording, diagnostics) = simulate(&body, &scene, |part| watcher.hear(Event::Fraction(part)))
-        .map_err(|error| error.in_file(&arguments.scene))?;
+    let (recording, diagnostics) =
+        simulate(&body, &scene, memory_left(None), |part| watcher.hear(Event::Fraction(part)))
+            .map_err(|error| error.in_file(&arguments.scene))?;
     let run = RunData { phases: watcher.finish(), diagnostics, ..RunData::default() };
     tell(arguments.printing, &run.diagnostics);
     let facts = SimulationFacts::new(&recording, body.units(), &run);

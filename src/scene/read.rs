@@ -167,7 +167,7 @@ fn terms(walk: &mut Walk<'_>, value: &Value) -> Option<Terms> {
         walk.mistyped("terms", value, "a list of \"W1\", \"W2\", \"W3\"");
         return None;
     };
-    let mut terms = Terms::NONE;
+    let mut terms = Terms { geometric_stiffness: true, ..Terms::NONE };
     for name in names.iter() {
         match name.get_ref() {
             DeValue::String(text) if text == "W1" => terms.w1 = true,

@@ -19,16 +19,28 @@ const STEPS_PER_PERIOD: f64 = 20.0;
 /// Deflections up to this part of the extent of the body are those of linear elasticity.
 const LINEAR_RANGE: f64 = 0.1;
 
-/// The motion of `body` in `scene`, and what has to be said about it; `watch` hears which part of the duration is done.
+/// Bytes that a recorded number takes: itself, and as text of a table.
+const BYTES: f64 = 8.0 + 25.0;
+
+/// Numbers of an instant besides modes and watched points.
+const NUMBERS: usize = 44;
+
+/// The motion of `body` in `scene`, and what has to be said about it.
+///
+/// * `memory`: bytes that there are for the recording and tables of it; `None` where it is not known.
+/// * `watch`: hears which part of the duration is done.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body, FB540 when the integration cannot go on.
+/// FB212 where the scene does not fit the body, FB540 when the integration cannot go on; FB601, before any work, when the recording does
+/// not fit the memory.
 pub fn simulate(
     body: &FlexBody,
     scene: &Scene,
+    memory: Option<u64>,
     mut watch: impl FnMut(f64),
 ) -> Result<(Recording, Vec<Diagnostic>)> {
     let (forces, points) = SceneForces::new(body, scene)?;
+    refuse_too_much(body, scene, memory)?;
     let equations = EquationsOfMotion::new(body, scene.run.terms);
     let start = start(body, scene, &forces);
     let (mut motion, mut state) = Motion::new(&equations, &forces, &start);
@@ -79,6 +91,23 @@ pub fn simulate(
     recording.deflection = deflection;
     let found = remarks(body, scene, &recording, at);
     Ok((recording, found))
+}
+
+fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
+    let numbers = NUMBERS + 2 * body.n_modes() + 6 * scene.watched.len();
+    let needed = (scene.run.outputs + 1) as f64 * numbers as f64 * BYTES;
+    match memory {
+        Some(left) if needed > left as f64 => {
+            let message = format!(
+                "recording {} instants takes {:.3} GB, {:.3} GB are left",
+                scene.run.outputs + 1,
+                needed / 1e9,
+                left as f64 / 1e9
+            );
+            Err(Diagnostic::new(Code::MemoryShort, message).with_help("record fewer `outputs`").into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The state at time zero. What is prescribed replaces what the scene says of it.

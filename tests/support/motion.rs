@@ -2,6 +2,40 @@
 
 use flexbody::dynamics::{Balance, Configuration, EquationsOfMotion, Motion, Surroundings};
 use flexbody::integration::{Explicit, Failure, Gauss, Method, System, integrate};
+use nalgebra::Vector3;
+
+/// What free motion keeps: energy, and momenta along world axes.
+pub struct Kept {
+    pub energy: f64,
+    pub linear: Vector3<f64>,
+    pub angular: Vector3<f64>,
+}
+
+/// Largest relative changes of what is kept, and how lively the motion was.
+#[derive(Debug, Default)]
+pub struct Drift {
+    pub energy: f64,
+    pub linear: f64,
+    pub angular: f64,
+    pub deformation: f64,
+    pub turns: f64,
+}
+
+impl Drift {
+    /// Adds a state: what it keeps of the first, |q| beside the size of the body, radians turned since the last.
+    pub fn add(&mut self, first: &Kept, now: &Kept, deformation: f64, turned: f64) {
+        self.energy = self.energy.max((now.energy / first.energy - 1.0).abs());
+        self.linear = self.linear.max((now.linear - first.linear).norm() / first.linear.norm());
+        self.angular = self.angular.max((now.angular - first.angular).norm() / first.angular.norm());
+        self.deformation = self.deformation.max(deformation);
+        self.turns += turned / std::f64::consts::TAU;
+    }
+
+    /// The worst of what should be kept.
+    pub fn worst(&self) -> f64 {
+        self.energy.max(self.linear).max(self.angular)
+    }
+}
 
 /// The states at the instants, the first of which is the start, with their balances.
 pub fn run(
