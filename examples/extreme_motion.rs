@@ -110,9 +110,10 @@ fn run(body: &FlexBody, case: Case, method: impl Fn(usize) -> Method) -> Result<
     let (mut balances, mut largest, mut end) = (Vec::new(), 0.0f64, first);
     let mut method = method(motion.dimension());
     integrate(&mut method, &mut motion, &mut state, &instants, &[], |time, state| {
-        let balance = observer.balance(time, state)?;
+        let now = observer.evaluate(time, state)?;
+        let balance = now.balance();
         balances.push((balance.kinetic + balance.elastic, balance.angular));
-        end = observer.configuration(time, state)?;
+        end = now.configuration();
         largest = end.q.iter().fold(largest, |most, q| most.max(q.abs()));
         Ok::<(), Failure>(())
     })?;

@@ -111,10 +111,10 @@ fn reduced_path(
     let (shape, positions) = (&body.modes().shape, &body.nodes().positions);
     assert_eq!(positions.len(), model.nodes().len());
     integrate(&mut method, &mut motion, &mut state, instants, &[], |time, state| {
-        let now = other.configuration(time, state)?;
-        let (place, _) = other.evaluate(time, state)?;
+        let now = other.evaluate(time, state)?;
+        let (place, q) = (now.place(), now.evaluation().modal_coordinates());
         let moved = |i: usize| {
-            Vector3::from_fn(|k, _| (0..now.q.len()).map(|j| shape[(3 * i + k, j)] * now.q[j]).sum::<f64>())
+            Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * i + k, j)] * q[j]).sum::<f64>())
         };
         let node = |i: usize| place.origin + place.axes * (Vector3::from(positions[i]) + moved(i));
         path.push((0..positions.len()).map(node).collect());

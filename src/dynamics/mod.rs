@@ -14,17 +14,19 @@ mod motion;
 mod nodal;
 mod orientation;
 mod points;
+mod snapshot;
 mod terms;
 
 pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
 pub use load_jacobian::{LoadAxes, LoadJacobian};
-pub use motion::{Balance, Configuration, EmptySpace, Motion, Place, Surroundings};
+pub use motion::{EmptySpace, Motion, Place, Surroundings};
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
     ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use points::BodyPoint;
+pub use snapshot::{Balance, Configuration, Snapshot};
 pub use terms::Terms;

@@ -1,6 +1,8 @@
 //! The motion of one body in space as a system that can be integrated.
 
-use super::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Prescribed};
+use super::{
+    Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Prescribed, Snapshot,
+};
 use crate::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3};
 
@@ -38,44 +40,6 @@ impl Surroundings for EmptySpace {
     fn add_forces(&self, _: f64, _: &Place, _: &Evaluation<'_>, _: &mut [f64]) {}
 }
 
-/// A state in the velocities that a reader thinks in.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Configuration {
-    /// Origin of the body frame, world axes.
-    pub origin: Vector3<f64>,
-    /// Attitude of the frame, of unit length.
-    pub attitude: EulerParameters,
-    /// Velocity of the origin, world axes.
-    pub velocity: Vector3<f64>,
-    /// Angular velocity of the frame, body axes.
-    pub omega: Vector3<f64>,
-    /// Modal coordinates (nf).
-    pub q: Vec<f64>,
-    /// Their rates (nf).
-    pub qd: Vec<f64>,
-}
-
-/// What the motion of a body keeps or exchanges, at one time. Momenta in world axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Balance {
-    /// Kinetic energy.
-    pub kinetic: f64,
-    /// Elastic energy.
-    pub elastic: f64,
-    /// Kinetic energy of the flight, P^2 / 2m: what is left of the rest does not depend on who looks.
-    pub flight: f64,
-    /// Work of forces, damping and prescribed motion since the start.
-    pub work: f64,
-    /// Linear momentum.
-    pub linear: Vector3<f64>,
-    /// Angular momentum about where the origin of the body was at the start.
-    pub angular: Vector3<f64>,
-    /// Impulse of the forces since the start.
-    pub impulse: Vector3<f64>,
-    /// Their angular impulse about the same point.
-    pub angular_impulse: Vector3<f64>,
-}
-
 /// The equations of motion of one body as a [`System`] in momenta:
 ///
 /// ```text
@@ -90,7 +54,7 @@ pub struct Balance {
 /// mass D vanishes, and what is left is a Hamiltonian system on quaternions with a constant structure, which Gauss collocation keeps
 /// (McLachlan, Modin, Verdier, Collective symplectic integrators, Nonlinearity 27, 2014).
 ///
-/// W, j and k collect work and impulses for [`Motion::balance`]. A plane body uses the entries of its plane.
+/// W, j and k collect work and impulses for [`Snapshot::balance`]. A plane body uses the entries of its plane.
 pub struct Motion<'a> {
     evaluation: Evaluation<'a>,
     surroundings: &'a dyn Surroundings,
@@ -241,60 +205,28 @@ impl<'a> Motion<'a> {
         (self.size.mass, self.size.radius)
     }
 
-    /// The body at a state: what [`Evaluation`] tells.
+    /// The body at a state.
     ///
     /// # Errors
     /// [`Failure::Rates`] where the mass matrix of the deformed body is not positive definite.
-    pub fn evaluate(&mut self, time: f64, state: &[f64]) -> Result<(Place, &Evaluation<'a>), Failure> {
-        let (place, _) = self.go_to(time, state)?;
-        Ok((place, &self.evaluation))
-    }
-
-    /// The state as positions and velocities.
-    ///
-    /// # Errors
-    /// Those of [`Motion::evaluate`].
-    pub fn configuration(&mut self, time: f64, state: &[f64]) -> Result<Configuration, Failure> {
-        let (place, evaluation) = self.evaluate(time, state)?;
-        let (velocity, omega) = evaluation.rigid_velocity();
-        Ok(Configuration {
-            origin: place.origin,
+    pub fn evaluate<'m>(&'m mut self, time: f64, state: &'m [f64]) -> Result<Snapshot<'m>, Failure> {
+        let (place, rates) = self.go_to(time, state)?;
+        let reaction = match rates {
+            Prescribed::NOTHING => (Vector3::zeros(), Vector3::zeros()),
+            _ => self.apply(time, &place, &rates)?,
+        };
+        let layout = self.layout();
+        Ok(Snapshot {
+            place,
             attitude: attitude(state),
-            velocity: place.axes * velocity,
-            omega,
-            q: evaluation.modal_coordinates().to_vec(),
-            qd: evaluation.modal_velocity().to_vec(),
-        })
-    }
-
-    /// Energies, momenta and what the surroundings put in.
-    ///
-    /// # Errors
-    /// Those of [`Motion::evaluate`].
-    pub fn balance(&mut self, time: f64, state: &[f64]) -> Result<Balance, Failure> {
-        let (layout, reference, mass) = (self.layout(), self.reference, self.size.mass);
-        let (place, evaluation) = self.evaluate(time, state)?;
-        let linear = place.axes * evaluation.linear_momentum();
-        let angular = place.axes * evaluation.angular_momentum();
-        Ok(Balance {
-            kinetic: evaluation.kinetic_energy(),
-            elastic: evaluation.elastic_energy(),
-            flight: 0.5 * linear.norm_squared() / mass,
+            evaluation: &self.evaluation,
+            reference: self.reference,
+            mass: self.size.mass,
             work: state[layout.work()],
-            linear,
-            angular: angular + (place.origin - reference).cross(&linear),
             impulse: vector(state, layout.impulse()),
             angular_impulse: vector(state, layout.angular_impulse()),
+            reaction,
         })
-    }
-
-    /// Force and torque about the origin that the prescribed motion takes, body axes; zero where nothing is prescribed.
-    ///
-    /// # Errors
-    /// Those of [`Motion::evaluate`].
-    pub fn reaction(&mut self, time: f64, state: &[f64]) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
-        let (place, rates) = self.go_to(time, state)?;
-        self.apply(time, &place, &rates)
     }
 
     fn layout(&self) -> Layout {

@@ -3,9 +3,7 @@
 use super::surroundings::SceneForces;
 use super::{Path, Recording, Scene, Scheme};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::dynamics::{
-    BodyPoint, Configuration, EquationsOfMotion, Evaluation, Motion, RotationVector, Surroundings,
-};
+use crate::dynamics::{Configuration, EquationsOfMotion, Evaluation, Motion, RotationVector, Surroundings};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
 use crate::integration::{Explicit, Failure, Gauss, Method, System, integrate};
@@ -70,15 +68,15 @@ pub fn simulate(
     let rest: Vec<Vector3<f64>> = points.iter().map(|point| point.place(&undeformed)).collect();
     let observe = |time: f64, state: &[f64]| {
         recording.time.push(time);
-        recording.states.push(observer.configuration(time, state)?);
-        recording.balances.push(observer.balance(time, state)?);
+        let now = observer.evaluate(time, state)?;
+        recording.states.push(now.configuration());
+        recording.balances.push(now.balance());
         if let Some(reactions) = &mut recording.reactions {
-            reactions.push(observer.reaction(time, state)?);
+            reactions.push(now.reaction());
         }
-        let (place, evaluation) = observer.evaluate(time, state)?;
         for ((path, point), rest) in recording.paths.iter_mut().zip(&points).zip(&rest) {
-            let at: Vector3<f64> = BodyPoint::place(point, evaluation);
-            path.place.push(place.origin + place.axes * at);
+            let at = point.place(now.evaluation());
+            path.place.push(now.place().origin + now.place().axes * at);
             path.deflection.push(at - rest);
         }
         watch(time / duration);

@@ -50,8 +50,9 @@ pub fn run(
     let mut observer = Motion::new(equations, surroundings, start).0;
     let (mut places, mut balances) = (Vec::new(), Vec::new());
     integrate(&mut method(motion.dimension()), &mut motion, &mut state, instants, breaks, |time, state| {
-        places.push(observer.configuration(time, state)?);
-        balances.push(observer.balance(time, state)?);
+        let now = observer.evaluate(time, state)?;
+        places.push(now.configuration());
+        balances.push(now.balance());
         Ok::<(), Failure>(())
     })
     .expect("a body that moves");
