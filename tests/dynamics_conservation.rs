@@ -2,41 +2,15 @@
 
 mod support;
 
-use flexbody::dynamics::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms};
+use flexbody::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
 use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
 use flexbody::model::LoadKind;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use support::flexible::{fixture, oracle, soft_block, stressed};
 use support::integrate;
-use support::motion::{Drift, Kept};
+use support::motion::{Drift, Kept, orientation, velocity_rates};
 use support::random::Random;
-
-/// y = (R, Euler parameters, q, V, omega, qd); forces are added by `load`, which knows A.
-fn rate(
-    equations: &EquationsOfMotion,
-    y: &DVector<f64>,
-    load: &impl Fn(&Evaluation<'_>, &Matrix3<f64>, &DVector<f64>, &mut [f64]),
-) -> DVector<f64> {
-    let nf = equations.n_modes();
-    let euler = orientation(y);
-    let (q, nu) = (y.rows(7, nf).into_owned(), y.rows(7 + nf, 6 + nf).into_owned());
-    let mut evaluation = Evaluation::new(equations);
-    evaluation.set(q.as_slice(), nu.as_slice());
-    let (mut forces, mut found) = (vec![0.0; 6 + nf], DVector::zeros(6 + nf));
-    load(&evaluation, &euler.axes(), y, &mut forces);
-    evaluation.accelerations(&forces, found.as_mut_slice()).expect("a body");
-    let velocity = euler.axes() * nu.fixed_rows::<3>(0);
-    let turn = euler.rate(&nu.fixed_rows::<3>(3).into_owned());
-    let modal = nu.rows(6, nf).into_owned();
-    let parts = velocity.iter().chain(&turn).chain(&modal).chain(&found).copied();
-    DVector::from_iterator(y.len(), parts)
-}
-
-/// The Euler parameters, of unit length but for the error of the integration.
-fn orientation(y: &DVector<f64>) -> EulerParameters {
-    EulerParameters(y.fixed_rows::<4>(3).normalize().into())
-}
 
 /// Energy and world momenta (about the world origin), with `potential` energy.
 fn kept(equations: &EquationsOfMotion, y: &DVector<f64>, potential: f64) -> Kept {
@@ -81,7 +55,7 @@ fn tumble(
     let (first, mut found) = (kept(&y), Drift::default());
     let radius = body.invariants().inertia()[(1, 1)].sqrt();
     for _ in 0..steps {
-        y = integrate::step(&y, step, &|y| rate(&equations, y, &load));
+        y = integrate::step(&y, step, &|y| velocity_rates(&equations, y, &load));
         found.add(&first, &kept(&y), y.rows(7, nf).norm() / radius, y.rows(10 + nf, 3).norm() * step);
     }
     found

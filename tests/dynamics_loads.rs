@@ -96,6 +96,22 @@ fn derivative(step: f64, mut f: impl FnMut(f64) -> DVector<f64>) -> DVector<f64>
     (near * 8.0 - (f(2.0 * step) - f(-2.0 * step))) / (12.0 * step)
 }
 
+/// f at time 0 and its rate while the velocities nu stay what they are in body axes; the evaluation is left at time 0.
+fn along(
+    evaluation: &mut Evaluation<'_>,
+    (q, nu): (&[f64], &[f64]),
+    f: impl Fn(&Evaluation<'_>, f64) -> DVector<f64>,
+) -> (DVector<f64>, DVector<f64>) {
+    let r = evaluation.equations().n_rigid();
+    let mut at = |time: f64| {
+        let moved: Vec<f64> = q.iter().zip(&nu[r..]).map(|(q, qd)| q + time * qd).collect();
+        evaluation.set(&moved, nu);
+        f(evaluation, time)
+    };
+    let rate = derivative(3e-4, &mut at);
+    (at(0.0), rate)
+}
+
 #[test]
 fn forces_and_torques_do_their_power() {
     for (what, body, point) in points() {
@@ -125,17 +141,12 @@ fn points_move_as_their_velocities_say() {
         let mut random = Random(9);
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let (q, nu) = state(&mut random, &body, &point);
-        let r = equations.n_rigid();
         let mut evaluation = Evaluation::new(&equations);
-        let mut at = |time: f64| {
-            let moved: Vec<f64> = q.iter().zip(&nu[r..]).map(|(q, qd)| q + time * qd).collect();
-            evaluation.set(&moved, &nu);
-            let axes = point.axes(&evaluation).unwrap_or_else(Matrix3::identity);
-            let place = point.place(&evaluation);
+        let (now, rates) = along(&mut evaluation, (&q, &nu), |evaluation, _| {
+            let axes = point.axes(evaluation).unwrap_or_else(Matrix3::identity);
+            let place = point.place(evaluation);
             DVector::from_iterator(12, place.iter().chain(axes.iter()).copied())
-        };
-        let rates = derivative(3e-4, &mut at);
-        let now = at(0.0);
+        });
         let (v, w) = evaluation.rigid_velocity();
         let place = Vector3::from_column_slice(&now.as_slice()[..3]);
         let velocity = v + w.cross(&place) + rates.fixed_rows::<3>(0);
@@ -161,19 +172,15 @@ fn velocities_drift_as_they_say() {
         let mut random = Random(11);
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let (q, nu) = state(&mut random, &body, &point);
-        let r = equations.n_rigid();
         let mut evaluation = Evaluation::new(&equations);
-        let mut at = |time: f64| {
-            let moved: Vec<f64> = q.iter().zip(&nu[r..]).map(|(q, qd)| q + time * qd).collect();
-            evaluation.set(&moved, &nu);
+        let (now, rates) = along(&mut evaluation, (&q, &nu), |evaluation, time| {
             // Axes of the body relative to those at time 0.
             let turn = RotationVector(evaluation.rigid_velocity().1 * time).axes();
-            let angular = point.angular_velocity(&evaluation).unwrap_or_else(Vector3::zeros);
-            let (linear, angular) = (turn * point.velocity(&evaluation), turn * angular);
+            let angular = point.angular_velocity(evaluation).unwrap_or_else(Vector3::zeros);
+            let (linear, angular) = (turn * point.velocity(evaluation), turn * angular);
             DVector::from_iterator(6, linear.iter().chain(angular.iter()).copied())
-        };
-        let rates = derivative(3e-4, &mut at);
-        let size = 1.0 + at(0.0).norm();
+        });
+        let size = 1.0 + now.norm();
         let drift = point.velocity_drift(&evaluation);
         let error = (rates.fixed_rows::<3>(0) - drift).norm() / size;
         assert!(error < 1e-10 && drift.norm() > 0.1, "{what}: velocity {error:e}");

@@ -12,7 +12,7 @@ use flexbody::invariants::BodyFrame;
 use nalgebra::{DVector, Vector3};
 use support::flexible::{fixture, soft_block};
 use support::integrate as reference;
-use support::motion::{adaptive, conserving, run};
+use support::motion::{adaptive, conserving, orientation, run, velocity_rates};
 
 /// Spin about an axis near the middle one with `spin` of the first circular frequency, bent, flying.
 fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
@@ -59,23 +59,10 @@ fn by_velocities(
     y.rows_mut(7 + nf, 3).copy_from(&start.attitude.axes().tr_mul(&start.velocity));
     y.rows_mut(10 + nf, 3).copy_from(&start.omega);
     y.rows_mut(13 + nf, nf).copy_from_slice(&start.qd);
-    let attitude = |y: &DVector<f64>| EulerParameters(y.fixed_rows::<4>(3).normalize().into());
-    let rate = |y: &DVector<f64>| {
-        let nu = y.rows(7 + nf, 6 + nf).into_owned();
-        let mut evaluation = Evaluation::new(equations);
-        evaluation.set(y.rows(7, nf).as_slice(), nu.as_slice());
-        let mut found = DVector::zeros(6 + nf);
-        evaluation.accelerations(&vec![0.0; 6 + nf], found.as_mut_slice()).expect("a body");
-        let e = attitude(y);
-        let velocity = e.axes() * nu.fixed_rows::<3>(0);
-        let turn = e.rate(&nu.fixed_rows::<3>(3).into_owned());
-        let qd = nu.rows(6, nf).into_owned();
-        DVector::from_iterator(y.len(), velocity.iter().chain(&turn).chain(&qd).chain(&found).copied())
-    };
     for _ in 0..steps {
-        y = reference::step(&y, duration / steps as f64, &rate);
+        y = reference::step(&y, duration / steps as f64, &|y| velocity_rates(equations, y, &|_, _, _, _| {}));
     }
-    let e = attitude(&y);
+    let e = orientation(&y);
     Configuration {
         origin: y.fixed_rows::<3>(0).into_owned(),
         attitude: e,

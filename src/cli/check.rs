@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::input::{read_manifest, read_model};
-use crate::invariants::{BodyFrame, Expected, IdentityCheck, identities};
+use crate::invariants::BodyFrame;
 use crate::model::{FeModel, RawModel};
 use crate::report::{identities_json, identities_text};
 use crate::store;
@@ -14,7 +14,7 @@ use crate::verification::{changed_sources, verify};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     let body = store::read(&arguments.body)?;
-    let mut checks = own_identities(&body);
+    let mut checks = body.identities(frame_of(&body));
     if let Some(manifest) = &arguments.against {
         let model = model_of(&body, read_model(&read_manifest(manifest)?)?)?;
         tell(arguments.printing, &changed_sources(&body, &model));
@@ -36,19 +36,8 @@ fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
     })
 }
 
-fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
+/// What the frame of `body` was meant to be.
+fn frame_of(body: &FlexBody) -> BodyFrame {
     let name = body.source().settings["frame"].as_str();
-    let frame =
-        BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model);
-    let expected = Expected {
-        mass_normalised: true,
-        free_surface: true,
-        frame,
-        origin: body.frame().origin,
-        eigenvalues: Some(&body.modes().eigenvalue),
-        eigenvalue_noise: body.certificate().rigid_noise,
-    };
-    let mut checks = identities(body.invariants(), &expected);
-    checks.extend(body.parts().interface_identities());
-    checks
+    BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model)
 }

@@ -3,7 +3,7 @@
 use super::validate::problems;
 use super::{Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source};
 use crate::error::{Error, Result};
-use crate::invariants::{Frame, Invariants};
+use crate::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
 use crate::model::{GeometricStiffness, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -116,5 +116,21 @@ impl FlexBody {
     /// K and M in interface coordinates, of a basis that has them.
     pub fn coordinates(&self) -> Option<&InterfaceCoordinates> {
         self.parts.coordinates.as_ref()
+    }
+
+    /// Every identity that the file itself can be held to (theory section 10), those of the interface coordinates included; `frame` is what the
+    /// body frame was meant to be.
+    pub fn identities(&self, frame: BodyFrame) -> Vec<IdentityCheck> {
+        let expected = Expected {
+            mass_normalised: true,
+            free_surface: true,
+            frame,
+            origin: self.parts.frame.origin,
+            eigenvalues: Some(&self.parts.modes.eigenvalue),
+            eigenvalue_noise: self.parts.certificate.rigid_noise,
+        };
+        let mut checks = identities(&self.parts.invariants, &expected);
+        checks.extend(self.parts.interface_identities());
+        checks
     }
 }

@@ -6,7 +6,7 @@ use super::layout::{Layout, layout, name_some};
 use super::magnitude::check_magnitudes;
 use super::mass_structure::{MassForm, mass_form};
 use super::placeless::{check_massless, misplaced, recover};
-use super::rigid::{centre_and_length, rigid_count, rigid_residuals};
+use super::rigid::{centre_and_length, extents, rigid_count, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
 use super::{BodyNumber, Damping, DofLabel, FeModel, GeometricStiffness, Nodes, RawMatrix, RawModel, Rows};
 use crate::diagnostic::{Code, Diagnostic, Severity};
@@ -466,25 +466,15 @@ fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, fou
         return;
     }
     let total: f64 = mass.as_csc().values().iter().sum::<f64>() * raw.units.mass.to_si();
-    let extent = |k: usize| {
-        let (low, high) = nodes
-            .positions
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x[k]), h.max(x[k])));
-        (high - low) * raw.units.length.to_si()
-    };
-    let volume = extent(0) * extent(1) * extent(2);
+    let [x, y, z] = extents(&nodes.positions).map(|extent| extent * raw.units.length.to_si());
+    let volume = x * y * z;
     if volume <= 0.0 {
         return;
     }
     let density = total / volume;
     if !(DENSITY.0..=DENSITY.1).contains(&density) {
-        let message = format!(
-            "{total:.3e} kg in a box of {:.3e} x {:.3e} x {:.3e} m is {density:.1e} kg/m^3",
-            extent(0),
-            extent(1),
-            extent(2)
-        );
+        let message =
+            format!("{total:.3e} kg in a box of {x:.3e} x {y:.3e} x {z:.3e} m is {density:.1e} kg/m^3");
         found.push(Diagnostic::new(Code::InertiaImplausible, message));
     }
 }

@@ -1,5 +1,6 @@
 //! Whether the numbers of a model can be multiplied with each other in double precision.
 
+use super::rigid::extents;
 use super::{Nodes, RawModel};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::linalg::SymmetricMatrix;
@@ -21,12 +22,7 @@ pub(super) fn check_magnitudes(
         |m: &SymmetricMatrix| m.as_csc().values().par_iter().map(|v| v.abs()).reduce(|| 0.0, f64::max);
     let (k, m) = (largest(stiffness), largest(mass));
     let far = nodes.positions.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let extent = |axis: usize| {
-        let along = nodes.positions.iter().map(|x| x[axis]);
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        high - low
-    };
-    let size = (0..3).map(extent).fold(0.0, f64::max);
+    let size = extents(&nodes.positions).into_iter().fold(0.0, f64::max);
     if [k, m, size].contains(&0.0) {
         return None; // said by name elsewhere
     }

@@ -23,6 +23,6 @@ pub use geometric_stiffness::{GeometricStiffness, LoadKind, UnitLoad};
 pub use interface::{Coupling, InterfaceMotion, NodeSet, Reference};
 pub use nodes::{DofLabel, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
-pub use rigid::{centre_and_length, rigid_count, rigid_fields};
+pub use rigid::{centre_and_length, extents, rigid_count, rigid_fields};
 pub use rows::Rows;
 pub use several::{BodyNumber, check_bodies};

@@ -56,6 +56,16 @@ pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
     (centre, if length > 0.0 { length } else { 1.0 })
 }
 
+/// Size of the box around the positions along each axis; zero without positions.
+pub fn extents(positions: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|k| {
+        let (low, high) = positions
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (x[k].min(low), x[k].max(high)));
+        (high - low).max(0.0)
+    })
+}
+
 /// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows, with r_j the size that a field has
 /// at row j in general: values near one mean a support and values near roundoff a free body.
 pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {

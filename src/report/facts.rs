@@ -11,6 +11,7 @@ use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, Interface, MassStructure, Truncation};
 use crate::invariants::GENERAL_REMARK;
 use crate::provenance::{self, SourceFile};
+use crate::units::UnitSystem;
 use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
@@ -250,12 +251,7 @@ impl ModelFacts {
                 MassStructure::General => "general",
             },
             approximation: (source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK),
-            units: UnitFacts {
-                length: units.length.name().to_owned(),
-                mass: units.mass.name().to_owned(),
-                time: units.time.name().to_owned(),
-                stated: units.stated,
-            },
+            units: UnitFacts::new(units),
             files: source.files.clone(),
             interfaces: body
                 .interfaces()
@@ -292,6 +288,15 @@ impl ModeFacts {
 }
 
 impl UnitFacts {
+    pub fn new(units: &UnitSystem) -> Self {
+        Self {
+            length: units.length.name().to_owned(),
+            mass: units.mass.name().to_owned(),
+            time: units.time.name().to_owned(),
+            stated: units.stated,
+        }
+    }
+
     pub fn mass(&self) -> String {
         named(&self.mass, "kg")
     }
@@ -300,15 +305,18 @@ impl UnitFacts {
         named(&self.length, "m")
     }
 
+    pub fn time(&self) -> String {
+        named(&self.time, "s")
+    }
+
     pub fn inertia(&self) -> String {
         format!("{} {}^2", self.mass(), self.length())
     }
 
     /// All three, and whether they are a guess.
     pub fn in_words(&self) -> String {
-        let time = named(&self.time, "s");
         let assumed = if self.stated { "" } else { " assumed, none stated" };
-        format!("{}, {}, {time}{assumed}", self.length(), self.mass())
+        format!("{}, {}, {}{assumed}", self.length(), self.mass(), self.time())
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a user reads of a simulation: facts, the summary, the table and the page with plots.
 
 use super::Format;
+use super::facts::UnitFacts;
 use super::html::{diagnostics_table, escape, page, section, terms};
 use super::line_chart::{Line, STYLES, line_chart};
 use super::numbers::{counted, significant};
@@ -45,13 +46,6 @@ pub struct SimulationFacts<'a> {
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct UnitFacts {
-    length: String,
-    mass: String,
-    time: String,
-}
-
-#[derive(Debug, Clone, Serialize)]
 #[serde(tag = "name", rename_all = "lowercase")]
 enum MethodFacts {
     Adaptive { order: usize, tolerance: f64 },
@@ -92,11 +86,7 @@ impl<'a> SimulationFacts<'a> {
             generator: generator(),
             scene: &recording.scene,
             body: &recording.body,
-            units: UnitFacts {
-                length: units.length.name().to_owned(),
-                mass: units.mass.name().to_owned(),
-                time: units.time.name().to_owned(),
-            },
+            units: UnitFacts::new(units),
             method: match recording.scheme {
                 Scheme::Adaptive { tolerance } => MethodFacts::Adaptive { order: 8, tolerance },
                 Scheme::Conserving { order, step } => {
@@ -136,11 +126,10 @@ impl<'a> SimulationFacts<'a> {
     }
 
     fn unit(&self, mass: i32, length: i32, time: i32) -> String {
-        let UnitFacts { length: l, mass: m, time: t } = &self.units;
-        let powers = [(m, mass), (l, length), (t, time)];
-        let factor = |(name, power): (&String, i32)| match power {
+        let powers = [(self.units.mass(), mass), (self.units.length(), length), (self.units.time(), time)];
+        let factor = |(name, power): (String, i32)| match power {
             0 => None,
-            1 => Some(name.clone()),
+            1 => Some(name),
             p => Some(format!("{name}^{p}")),
         };
         powers.into_iter().filter_map(factor).collect::<Vec<_>>().join(" ")
@@ -152,7 +141,7 @@ impl<'a> SimulationFacts<'a> {
                 format!("adaptive, order {order}, tolerance {tolerance:e}")
             }
             MethodFacts::Conserving { order, step } => {
-                format!("conserving, order {order}, step {} {}", significant(step, 4), self.units.time)
+                format!("conserving, order {order}, step {} {}", significant(step, 4), self.units.time())
             }
         }
     }
@@ -181,7 +170,7 @@ impl<'a> SimulationFacts<'a> {
         let instants = counted(self.instants, "instant");
         page.entry(
             "Simulation",
-            &format!("{}: {}, {duration} {}, {instants}", self.scene, self.body, self.units.time),
+            &format!("{}: {}, {duration} {}, {instants}", self.scene, self.body, self.units.time()),
         );
         page.entry("Method", &format!("{}: {}", self.method_in_words(), self.work_in_words()));
         page.entry("Energy", &format!("{} at the start", self.energy_in_words(&self.first)));
@@ -197,13 +186,16 @@ impl<'a> SimulationFacts<'a> {
                 self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift
             ),
         );
-        page.entry("Spin", &format!("at most {} rad/{}", significant(self.largest_spin, 5), self.units.time));
+        page.entry(
+            "Spin",
+            &format!("at most {} rad/{}", significant(self.largest_spin, 5), self.units.time()),
+        );
         let part = significant(100.0 * self.largest_deflection, 3);
         page.entry("Deflection", &format!("{part} % of the largest extent of the body"));
         for point in &self.points {
             let [x, y, z] = point.last_place.map(|v| significant(v, 6));
             let deflection = significant(point.largest_deflection, 4);
-            let length = &self.units.length;
+            let length = &self.units.length();
             page.entry(
                 "Point",
                 &format!(
@@ -242,7 +234,7 @@ impl<'a> SimulationFacts<'a> {
                 format!(
                     "{} {}, {}",
                     significant(self.duration, 6),
-                    escape(&self.units.time),
+                    escape(&self.units.time()),
                     counted(self.instants, "instant")
                 ),
             ),
@@ -251,7 +243,7 @@ impl<'a> SimulationFacts<'a> {
             ("Work of loads and damping", format!("{} {}", significant(self.last.work, 6), units(1, 2, -2))),
             (
                 "Largest spin",
-                format!("{} rad/{}", significant(self.largest_spin, 5), escape(&self.units.time)),
+                format!("{} rad/{}", significant(self.largest_spin, 5), escape(&self.units.time())),
             ),
             (
                 "Largest deflection",
@@ -269,7 +261,7 @@ impl<'a> SimulationFacts<'a> {
                     "{}, deflected by at most {} {length}; ends at {x}, {y}, {z} {length}",
                     escape(point.name),
                     significant(point.largest_deflection, 4),
-                    length = escape(&self.units.length)
+                    length = escape(&self.units.length())
                 ),
             ));
         }
@@ -283,7 +275,7 @@ impl<'a> SimulationFacts<'a> {
     fn plots(&self, html: &mut String) {
         let Recording { time, states, balances, paths, reactions, .. } = self.recording;
         let mut chart = |title: &str, lines: Vec<Line>, unit: String| {
-            html.push_str(&line_chart(title, time, &lines, &self.units.time, &unit));
+            html.push_str(&line_chart(title, time, &lines, &self.units.time(), &unit));
         };
         let line = |name: &str, values: Vec<f64>| Line { name: name.to_owned(), values };
         let components = |vectors: &[Vector3<f64>]| -> Vec<Line> {
@@ -301,11 +293,11 @@ impl<'a> SimulationFacts<'a> {
         let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
         chart("Drift of the energy", vec![line("less work", lost)], energy);
         let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
-        chart("Angular velocity, body axes", components(&omega), format!("rad {}^-1", self.units.time));
+        chart("Angular velocity, body axes", components(&omega), format!("rad {}^-1", self.units.time()));
         chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
         for path in paths {
             let title = format!("Deflection of {}, body axes", path.name);
-            chart(&title, components(&path.deflection), self.units.length.clone());
+            chart(&title, components(&path.deflection), self.units.length().clone());
         }
         if let Some(reactions) = reactions {
             let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
@@ -314,7 +306,7 @@ impl<'a> SimulationFacts<'a> {
     }
 
     fn modal_unit(&self) -> String {
-        format!("{}^(1/2) {}", self.units.mass, self.units.length)
+        format!("{}^(1/2) {}", self.units.mass(), self.units.length())
     }
 
     /// The modal coordinates with the largest amplitudes.

@@ -1,8 +1,10 @@
 //! Motions of bodies by the library's integrators.
 
-use flexbody::dynamics::{Balance, Configuration, EquationsOfMotion, Motion, Surroundings};
+use flexbody::dynamics::{
+    Balance, Configuration, EquationsOfMotion, EulerParameters, Evaluation, Motion, Orientation, Surroundings,
+};
 use flexbody::integration::{Explicit, Failure, Gauss, Method, System, integrate};
-use nalgebra::Vector3;
+use nalgebra::{DVector, Matrix3, Vector3};
 
 /// What free motion keeps: energy, and momenta along world axes.
 pub struct Kept {
@@ -67,4 +69,30 @@ pub fn adaptive(tolerance: f64) -> impl Fn(usize) -> Method {
 /// The method that conserves.
 pub fn conserving(order: usize, step: f64) -> impl Fn(usize) -> Method {
     move |n| Method::Gauss { method: Gauss::new(n, order), step }
+}
+
+/// y' of y = (R, Euler parameters, q, V, omega, qd), V in body axes; forces are added by `load`, which knows A.
+pub fn velocity_rates(
+    equations: &EquationsOfMotion,
+    y: &DVector<f64>,
+    load: &impl Fn(&Evaluation<'_>, &Matrix3<f64>, &DVector<f64>, &mut [f64]),
+) -> DVector<f64> {
+    let nf = equations.n_modes();
+    let euler = orientation(y);
+    let (q, nu) = (y.rows(7, nf).into_owned(), y.rows(7 + nf, 6 + nf).into_owned());
+    let mut evaluation = Evaluation::new(equations);
+    evaluation.set(q.as_slice(), nu.as_slice());
+    let (mut forces, mut found) = (vec![0.0; 6 + nf], DVector::zeros(6 + nf));
+    load(&evaluation, &euler.axes(), y, &mut forces);
+    evaluation.accelerations(&forces, found.as_mut_slice()).expect("a body");
+    let velocity = euler.axes() * nu.fixed_rows::<3>(0);
+    let turn = euler.rate(&nu.fixed_rows::<3>(3).into_owned());
+    let modal = nu.rows(6, nf).into_owned();
+    let parts = velocity.iter().chain(&turn).chain(&modal).chain(&found).copied();
+    DVector::from_iterator(y.len(), parts)
+}
+
+/// The Euler parameters, of unit length but for the error of the integration.
+pub fn orientation(y: &DVector<f64>) -> EulerParameters {
+    EulerParameters(y.fixed_rows::<4>(3).normalize().into())
 }
