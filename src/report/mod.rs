@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections.
 
 mod bar_chart;
 mod clusters;
@@ -15,6 +15,7 @@ mod mass_properties;
 mod numbers;
 mod render;
 mod run_data;
+mod selection;
 mod simulation;
 mod text;
 
@@ -23,4 +24,5 @@ pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
+pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
