@@ -1,6 +1,6 @@
 //! A scene as data. Numbers are in the units of the body that it is for.
 
-use super::History;
+use super::{History, Requirements};
 use crate::dynamics::Terms;
 use nalgebra::Vector3;
 
@@ -21,13 +21,15 @@ pub struct Scene {
     pub spin: Option<Spin>,
     /// Places whose paths are recorded.
     pub watched: Vec<Point>,
+    /// What is demanded of the body.
+    pub requirements: Requirements,
 }
 
 /// How a scene is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// From time zero to this.
-    pub duration: f64,
+    /// From time zero to this; `None` where nothing is to be simulated.
+    pub duration: Option<f64>,
     /// Instants recorded after the first, evenly spaced.
     pub outputs: usize,
     /// Integration method.

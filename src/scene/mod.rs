@@ -3,7 +3,9 @@
 mod description;
 mod history;
 mod read;
+mod read_requirements;
 mod recording;
+mod requirements;
 mod simulate;
 mod surroundings;
 
@@ -11,4 +13,5 @@ pub use description::{Axes, Initial, Load, ModeStart, Point, Run, Scene, Scheme,
 pub use history::History;
 pub use read::read_scene;
 pub use recording::{Drift, Path, Recording};
+pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 pub use simulate::simulate;

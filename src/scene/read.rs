@@ -1,5 +1,6 @@
 //! Reads `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
+use super::read_requirements::{self, requirements};
 use super::{Axes, History, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
 use crate::diagnostic::Code;
 use crate::dynamics::Terms;
@@ -48,16 +49,12 @@ pub fn read_scene(path: impl AsRef<Path>) -> Result<Scene> {
 
 /// `None` only with something in `found`, as everything here.
 fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
-    walk.known_keys(top, "the scene", TOP);
+    let required = read_requirements::TABLES.map(|(name, _)| name);
+    walk.known_keys(top, "the scene", &[TOP, &required].concat());
     let name = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
     let run = match walk.table(top, "run") {
         Some((table, span)) => run(walk, table, span),
-        None => {
-            if !top.contains_key("run") {
-                walk.wrong(0..0, "table [run] is missing".to_owned());
-            }
-            None
-        }
+        None => run(walk, &Table::new(), 0..0),
     };
     let initial = match walk.table(top, "initial") {
         Some((table, _)) => initial(walk, table),
@@ -70,6 +67,7 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         walk.known_keys(table, "[[watch]]", WATCH);
         place(walk, table, span)
     });
+    let requirements = requirements(walk, top);
     Some(Scene {
         name: name?,
         run: run?,
@@ -78,6 +76,7 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         loads: loads?,
         spin: transposed(spin)?,
         watched: watched?,
+        requirements: requirements?,
     })
 }
 
@@ -91,7 +90,10 @@ fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
 
 fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
     walk.known_keys(table, "[run]", RUN);
-    let duration = positive(walk, table, "duration", &span);
+    let duration = match table.contains_key("duration") {
+        true => positive(walk, table, "duration", &span).map(Some),
+        false => Some(None),
+    };
     let outputs = match table.get("outputs") {
         None => Some(OUTPUTS),
         Some(value) => {
@@ -192,25 +194,12 @@ fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
         ["origin", "velocity", "rotation", "angular_velocity"].map(&mut or_zero);
     let modes = list(walk, table, "mode", |walk, table, span| {
         walk.known_keys(table, "[[initial.mode]]", MODE);
-        let number = match table.get("number") {
-            Some(value) => {
-                let number =
-                    integer(value).and_then(|number| usize::try_from(number).ok()).filter(|&n| n > 0);
-                if number.is_none() {
-                    walk.mistyped("number", value, "the number of a mode, from 1");
-                }
-                number?
-            }
-            None => {
-                walk.wrong(span, "key `number` is missing in [[initial.mode]]".to_owned());
-                return None;
-            }
-        };
+        let number = mode_number(walk, table, &span, "[[initial.mode]]");
         let mut or_zero = |key: &str| {
             if table.contains_key(key) { finite(walk, table, key, &span) } else { Some(0.0) }
         };
         let (amplitude, rate) = (or_zero("amplitude"), or_zero("rate"));
-        Some(ModeStart { mode: number - 1, amplitude: amplitude?, rate: rate? })
+        Some(ModeStart { mode: number?, amplitude: amplitude?, rate: rate? })
     });
     Some(Initial {
         origin: origin?,
@@ -219,6 +208,24 @@ fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
         angular_velocity: angular_velocity?,
         modes: modes?,
     })
+}
+
+/// The number of a mode, from 0.
+pub(super) fn mode_number(
+    walk: &mut Walk<'_>,
+    table: &Table,
+    span: &Range<usize>,
+    place: &str,
+) -> Option<usize> {
+    let Some(value) = table.get("number") else {
+        walk.wrong(span.clone(), format!("key `number` is missing in {place}"));
+        return None;
+    };
+    let number = integer(value).and_then(|number| usize::try_from(number).ok()).filter(|&n| n > 0);
+    if number.is_none() {
+        walk.mistyped("number", value, "the number of a mode, from 1");
+    }
+    Some(number? - 1)
 }
 
 fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> {
@@ -367,7 +374,7 @@ fn points(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Hist
 }
 
 /// The tables `[[key]]`.
-fn list<T>(
+pub(super) fn list<T>(
     walk: &mut Walk<'_>,
     table: &Table,
     key: &str,
@@ -396,7 +403,7 @@ fn list<T>(
 }
 
 /// Three finite numbers.
-fn vector(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<Vector3<f64>> {
+pub(super) fn vector(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<Vector3<f64>> {
     let components: Option<Vec<f64>> = match value.get_ref() {
         DeValue::Array(list) => list.iter().map(|item| real(item).filter(|v| v.is_finite())).collect(),
         _ => None,
@@ -411,7 +418,7 @@ fn vector(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<Vector3<f64>>
 }
 
 /// A finite number that must be there.
-fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+pub(super) fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
     let number = walk.number(table, key, span)?;
     if !number.is_finite() {
         walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a finite number"));
@@ -421,7 +428,7 @@ fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) ->
 }
 
 /// A positive number that must be there.
-fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+pub(super) fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
     let number = finite(walk, table, key, span)?;
     if number <= 0.0 {
         walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a positive number"));
@@ -431,7 +438,7 @@ fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) 
 }
 
 /// Where the value of `key` stands; `span` is that of its table.
-fn place_of(table: &Table, key: &str, span: &Range<usize>) -> Range<usize> {
+pub(super) fn place_of(table: &Table, key: &str, span: &Range<usize>) -> Range<usize> {
     table.get(key).map_or_else(|| span.clone(), |value| value.span())
 }
 
@@ -445,7 +452,6 @@ mod tests {
         let schema: serde_json::Value =
             serde_json::from_str(include_str!("../../schemas/scene.schema.json")).expect("JSON");
         let lists = [
-            ("/properties", TOP),
             ("/properties/run/properties", RUN),
             ("/properties/initial/properties", INITIAL),
             ("/properties/initial/properties/mode/items/properties", MODE),
@@ -456,7 +462,12 @@ mod tests {
             ("/$defs/history/anyOf/2/properties", HISTORIES[1].1),
             ("/$defs/history/anyOf/3/properties", HISTORIES[2].1),
         ];
-        for (pointer, known) in lists {
+        let required = read_requirements::TABLES;
+        let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));
+        let top = [TOP, &read_requirements::TABLES.map(|(name, _)| name)].concat();
+        let lists = lists.into_iter().map(|(pointer, keys)| (pointer.to_owned(), keys));
+        for (pointer, known) in lists.chain(required).chain([("/properties".to_owned(), &top[..])]) {
+            let pointer = &pointer;
             let object = schema.pointer(pointer).and_then(|v| v.as_object()).expect(pointer);
             let (mut listed, mut known): (Vec<&str>, Vec<&str>) =
                 (object.keys().map(String::as_str).collect(), known.to_vec());

@@ -9,6 +9,7 @@ use crate::flex_body::FlexBody;
 use crate::integration::{Explicit, Failure, Gauss, Method, System, integrate};
 use crate::model::{LoadKind, extents};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// Steps of the conserving method per shortest period, unless said.
@@ -37,6 +38,11 @@ pub fn simulate(
     memory: Option<u64>,
     mut watch: impl FnMut(f64),
 ) -> Result<(Recording, Vec<Diagnostic>)> {
+    let body = &*damped(body, scene)?;
+    let Some(duration) = scene.run.duration else {
+        let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
+        return Err(diagnostic.with_help("give `duration` in [run]").into());
+    };
     let (forces, points) = SceneForces::new(body, scene)?;
     refuse_too_much(body, scene, memory)?;
     let equations = EquationsOfMotion::new(body, scene.run.terms);
@@ -44,9 +50,9 @@ pub fn simulate(
     let (mut motion, mut state) = Motion::new(&equations, &forces, &start);
     let mut observer = Motion::new(&equations, &forces, &start).0;
 
-    let (duration, outputs) = (scene.run.duration, scene.run.outputs);
+    let outputs = scene.run.outputs;
     let time: Vec<f64> = (0..=outputs).map(|i| duration * (i as f64 / outputs as f64)).collect();
-    let (scheme, mut method) = method(body, scene, motion.dimension());
+    let (scheme, mut method) = method(body, scene, duration, motion.dimension());
     let mut recording = Recording {
         scene: scene.name.clone(),
         body: body.source().name.clone(),
@@ -91,6 +97,19 @@ pub fn simulate(
     Ok((recording, found))
 }
 
+/// The body with the damping of the scene where it has none of its own.
+pub(crate) fn damped<'b>(body: &'b FlexBody, scene: &Scene) -> Result<Cow<'b, FlexBody>> {
+    let modes = body.modes();
+    match scene.requirements.damping {
+        Some(ratio) if modes.modal_damping.is_none() && modes.damping_ratio.iter().all(|&r| r == 0.0) => {
+            let mut parts = body.clone().into_parts();
+            parts.modes.damping_ratio.fill(ratio);
+            Ok(Cow::Owned(FlexBody::new(parts)?))
+        }
+        _ => Ok(Cow::Borrowed(body)),
+    }
+}
+
 fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
     let numbers = NUMBERS + 2 * body.n_modes() + 6 * scene.watched.len();
     let needed = (scene.run.outputs + 1) as f64 * numbers as f64 * BYTES;
@@ -126,15 +145,15 @@ fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configurat
     }
 }
 
-fn method(body: &FlexBody, scene: &Scene, dimension: usize) -> (Scheme, Method) {
+fn method(body: &FlexBody, scene: &Scene, duration: f64, dimension: usize) -> (Scheme, Method) {
     match scene.run.scheme {
         Scheme::Adaptive { tolerance } => {
-            let explicit = Explicit::new(dimension, tolerance, scene.run.duration);
+            let explicit = Explicit::new(dimension, tolerance, duration);
             (scene.run.scheme, Method::Explicit(explicit))
         }
         Scheme::Conserving { order, step } => {
             let fastest = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
-            let step = step.unwrap_or(TAU / fastest / STEPS_PER_PERIOD).min(scene.run.duration);
+            let step = step.unwrap_or(TAU / fastest / STEPS_PER_PERIOD).min(duration);
             let method = Method::Gauss { method: Gauss::new(dimension, order), step };
             (Scheme::Conserving { order, step: Some(step) }, method)
         }

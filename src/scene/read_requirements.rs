@@ -1,0 +1,193 @@
+//! Reads the tables of a scene that say what is demanded of the body.
+
+use super::read::{finite, list, place_of, positive, vector};
+use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+use crate::input::{Table, Value, Walk, integer, real};
+use nalgebra::Vector3;
+use toml::de::DeValue;
+
+/// The tables, for the list of known ones.
+pub(super) const TABLES: [(&str, &[&str]); 7] = [
+    ("motion", &["angular_velocity", "angular_acceleration"]),
+    ("attachment", &["kind", "inertia", "first_frequency"]),
+    ("limits", &["deflection", "stress", "mode_stress", "mode"]),
+    ("band", &["frequency"]),
+    ("damping", &["ratio"]),
+    ("tolerance", &["attitude", "deflection", "stress", "reaction"]),
+    ("cost", &["multiplications"]),
+];
+
+const LIMITED_MODE: &[&str] = &["number", "amplitude"];
+
+/// Damping ratios from this on are no oscillations.
+const CRITICAL: f64 = 1.0;
+
+/// `None` only with something in `found`.
+pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requirements> {
+    let mut all = Some(Requirements::default());
+    for (name, keys) in TABLES {
+        let Some((table, span)) = walk.table(top, name) else {
+            if top.contains_key(name) {
+                all = None;
+            }
+            continue;
+        };
+        walk.known_keys(table, &format!("[{name}]"), keys);
+        let optional = |walk: &mut Walk<'_>, key: &str| match table.contains_key(key) {
+            true => positive(walk, table, key, &span).map(Some),
+            false => Some(None),
+        };
+        let mut put = || -> Option<()> {
+            let mut read = Requirements::default();
+            let target = all.as_mut().unwrap_or(&mut read);
+            match name {
+                "motion" => {
+                    let [velocity, acceleration] =
+                        ["angular_velocity", "angular_acceleration"].map(|key| range(walk, table, key));
+                    target.motion =
+                        MotionRange { angular_velocity: velocity?, angular_acceleration: acceleration? };
+                }
+                "attachment" => {
+                    let (kind, inertia) = (kind(walk, table), attached_inertia(walk, table));
+                    let first_frequency = optional(walk, "first_frequency");
+                    target.attachment =
+                        Attachment { kind: kind?, inertia: inertia?, first_frequency: first_frequency? };
+                }
+                "limits" => target.limits = limits(walk, table, &span)?,
+                "band" => target.band = Some(positive(walk, table, "frequency", &span)?),
+                "damping" => {
+                    let ratio = positive(walk, table, "ratio", &span)?;
+                    if ratio >= CRITICAL {
+                        let message = format!("`ratio` is {ratio}, expected a number below 1");
+                        walk.wrong(place_of(table, "ratio", &span), message);
+                        return None;
+                    }
+                    target.damping = Some(ratio);
+                }
+                "tolerance" => {
+                    let Tolerance { attitude, deflection, stress, reaction } = Tolerance::default();
+                    let [a, d, s, r] = [
+                        ("attitude", attitude),
+                        ("deflection", deflection),
+                        ("stress", stress),
+                        ("reaction", reaction),
+                    ]
+                    .map(|(key, default)| Some(optional(walk, key)?.unwrap_or(default)));
+                    target.tolerance = Tolerance { attitude: a?, deflection: d?, stress: s?, reaction: r? };
+                }
+                _ => {
+                    let value = table.get("multiplications");
+                    let count = value
+                        .and_then(integer)
+                        .and_then(|count| usize::try_from(count).ok())
+                        .filter(|&count| count > 0);
+                    if count.is_none() {
+                        let message = "`multiplications` is not a positive whole number".to_owned();
+                        walk.wrong(place_of(table, "multiplications", &span), message);
+                    }
+                    target.multiplications = Some(count?);
+                }
+            }
+            Some(())
+        };
+        if put().is_none() {
+            all = None;
+        }
+    }
+    all
+}
+
+/// A number that is not negative, or three of them.
+fn range(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Option<Range>> {
+    let Some(value) = table.get(key) else { return Some(None) };
+    if let DeValue::Array(_) = value.get_ref() {
+        let components = vector(walk, key, value)?;
+        return Some(Some(Range::Axes(not_negative(walk, key, value, components)?)));
+    }
+    let length = number(walk, key, value, "a number or a list of three")?;
+    not_negative(walk, key, value, Vector3::repeat(length)).map(|_| Some(Range::Any(length)))
+}
+
+fn attached_inertia(walk: &mut Walk<'_>, table: &Table) -> Option<Vector3<f64>> {
+    let Some(value) = table.get("inertia") else { return Some(Vector3::zeros()) };
+    let inertia = match value.get_ref() {
+        DeValue::Array(_) => vector(walk, "inertia", value)?,
+        _ => Vector3::repeat(number(walk, "inertia", value, "a number or a list of three")?),
+    };
+    not_negative(walk, "inertia", value, inertia)
+}
+
+fn number(walk: &mut Walk<'_>, key: &str, value: &Value, expected: &str) -> Option<f64> {
+    let number = real(value).filter(|number| number.is_finite());
+    if number.is_none() {
+        walk.mistyped(key, value, expected);
+    }
+    number
+}
+
+fn not_negative(
+    walk: &mut Walk<'_>,
+    key: &str,
+    value: &Value,
+    components: Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    if components.iter().any(|component| *component < 0.0) {
+        walk.wrong(value.span(), format!("`{key}` is a magnitude and cannot be negative"));
+        return None;
+    }
+    Some(components)
+}
+
+fn kind(walk: &mut Walk<'_>, table: &Table) -> Option<AttachmentKind> {
+    let Some(value) = table.get("kind") else { return Some(AttachmentKind::default()) };
+    let kinds = [AttachmentKind::Free, AttachmentKind::Soft, AttachmentKind::Stiff];
+    let known = match value.get_ref() {
+        DeValue::String(text) => kinds.into_iter().find(|kind| kind.name() == text.as_ref()),
+        _ => None,
+    };
+    if known.is_none() {
+        walk.mistyped("kind", value, "\"free\", \"soft\" or \"stiff\"");
+    }
+    known
+}
+
+fn limits(walk: &mut Walk<'_>, table: &Table, span: &std::ops::Range<usize>) -> Option<Limits> {
+    let mut optional = |key: &str| match table.contains_key(key) {
+        true => positive(walk, table, key, span).map(Some),
+        false => Some(None),
+    };
+    let (deflection, stress) = (optional("deflection"), optional("stress"));
+    let mode_stress: Option<Option<Vec<f64>>> = match table.get("mode_stress") {
+        None => Some(None),
+        Some(value) => {
+            let list: Option<Vec<f64>> = match value.get_ref() {
+                DeValue::Array(list) => {
+                    list.iter().map(|item| real(item).filter(|v| v.is_finite() && *v >= 0.0)).collect()
+                }
+                _ => None,
+            };
+            if list.is_none() {
+                walk.wrong(value.span(), "`mode_stress` is not a list of numbers from 0".to_owned());
+            }
+            list.map(Some)
+        }
+    };
+    let modes = list(walk, table, "mode", |walk, table, span| {
+        walk.known_keys(table, "[[limits.mode]]", LIMITED_MODE);
+        let number = super::read::mode_number(walk, table, &span, "[[limits.mode]]");
+        let amplitude = finite(walk, table, "amplitude", &span).filter(|amplitude| *amplitude >= 0.0);
+        if amplitude.is_none() && table.contains_key("amplitude") {
+            walk.wrong(span, "`amplitude` is a magnitude and cannot be negative".to_owned());
+        }
+        Some((number?, amplitude?))
+    });
+    let stress = match (stress?, mode_stress?) {
+        (Some(limit), Some(modes)) => Some((limit, modes)),
+        (None, None) => None,
+        _ => {
+            walk.wrong(span.clone(), "`stress` and `mode_stress` need each other".to_owned());
+            return None;
+        }
+    };
+    Some(Limits { deflection: deflection?, stress, modes: modes? })
+}

@@ -1,0 +1,116 @@
+//! What a scene demands of a body, and what it says about motion that nobody simulates. All of it is optional.
+
+use nalgebra::Vector3;
+
+/// What decides which terms and modes a body needs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Requirements {
+    /// Motion beyond that of the run.
+    pub motion: MotionRange,
+    /// How the body is joined to others.
+    pub attachment: Attachment,
+    /// What the body may suffer.
+    pub limits: Limits,
+    /// Highest frequency of interest, oscillations per time.
+    pub band: Option<f64>,
+    /// Modal damping ratio of a body that has no damping of its own.
+    pub damping: Option<f64>,
+    /// Largest errors.
+    pub tolerance: Tolerance,
+    /// Multiplications that an evaluation of the equations of motion may take: instead of tolerances.
+    pub multiplications: Option<usize>,
+}
+
+/// Largest rotation of the body frame; `None`: what the run shows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MotionRange {
+    /// Angular velocity.
+    pub angular_velocity: Option<Range>,
+    /// Angular acceleration.
+    pub angular_acceleration: Option<Range>,
+}
+
+/// Largest magnitude of a vector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// In any direction.
+    Any(f64),
+    /// Of the components along the body axes.
+    Axes(Vector3<f64>),
+}
+
+impl Range {
+    /// Largest length of a vector within the range.
+    pub fn length(&self) -> f64 {
+        match self {
+            Self::Any(length) => *length,
+            Self::Axes(components) => components.norm(),
+        }
+    }
+}
+
+/// How a body is joined to others.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Attachment {
+    /// Kind.
+    pub kind: AttachmentKind,
+    /// Inertia that joints attach to the body, about the axes of its frame; zero is the conservative default.
+    pub inertia: Vector3<f64>,
+    /// First frequency of the assembled machine, oscillations per time.
+    pub first_frequency: Option<f64>,
+}
+
+/// Kinds of attachment, the most sensitive first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AttachmentKind {
+    /// Nothing holds the body: its rotation is its own. The conservative default.
+    #[default]
+    Free,
+    /// Compliant joints.
+    Soft,
+    /// Joints that prescribe its rotation.
+    Stiff,
+}
+
+impl AttachmentKind {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Free => "free",
+            Self::Soft => "soft",
+            Self::Stiff => "stiff",
+        }
+    }
+}
+
+/// What a body may suffer; from it follow the largest modal amplitudes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Limits {
+    /// Largest deflection of a node.
+    pub deflection: Option<f64>,
+    /// Largest stress, and that of every mode at unit amplitude.
+    pub stress: Option<(f64, Vec<f64>)>,
+    /// Largest amplitudes of modes (numbers from 0).
+    pub modes: Vec<(usize, f64)>,
+}
+
+/// Largest errors of what a simulation is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    /// Attitude of the frame in radians, at any time.
+    pub attitude: f64,
+    /// Deflection of watched points, relative to the largest of any of them.
+    pub deflection: f64,
+    /// Root of the elastic energy of the error relative to the largest of the motion: stresses, as far as a body without stress
+    /// recovery knows them.
+    pub stress: f64,
+    /// Force and torque that a prescribed spin takes, relative to their largest.
+    pub reaction: f64,
+}
+
+impl Default for Tolerance {
+    /// A thousandth of a radian and one per cent: below what material data and damping are known to.
+    fn default() -> Self {
+        Self { attitude: 1e-3, deflection: 0.01, stress: 0.01, reaction: 0.01 }
+    }
+}
