@@ -16,6 +16,7 @@ mod numbers;
 mod render;
 mod run_data;
 mod simulation;
+mod term_facts;
 mod text;
 
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
@@ -24,3 +25,4 @@ pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use simulation::{SimulationFacts, simulation_csv};
+pub use term_facts::dropped_text;
