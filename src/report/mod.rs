@@ -17,6 +17,7 @@ mod render;
 mod run_data;
 mod selection;
 mod simulation;
+mod term_facts;
 mod text;
 
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
@@ -26,3 +27,4 @@ pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
+pub use term_facts::dropped_text;
