@@ -87,6 +87,19 @@ pub struct Amplitude {
     pub energy_rate: f64,
 }
 
+/// Bounds of the error e of modal motion, over the duration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorBound {
+    /// |Lambda^(1/2) e|.
+    pub energy: f64,
+    /// |e|.
+    pub coordinate: f64,
+    /// |e'|.
+    pub rate: f64,
+    /// |e'' + Lambda e|.
+    pub acceleration_without_stiffness: f64,
+}
+
 /// How loads act on modes under the terms that are kept.
 struct Operator {
     /// Lambda - E >= margin Lambda.
@@ -208,45 +221,58 @@ impl Driven {
 
     /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads. `None` where the spin may take
     /// all stiffness of some motion.
-    pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<Amplitude> {
+    pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<ErrorBound> {
         let operator = Operator::new(Groups::ALL, norms, &self.rotation)?;
         let r = &self.rotation;
         let energy: f64 = residual.iter().map(|load| operator.response(load)).sum();
         let root = operator.margin.sqrt();
         let coordinate = energy / (root * norms.first);
         let of_loads: f64 = residual.iter().map(|load| load.largest * norms.last).sum();
-        Some(Amplitude {
+        Some(ErrorBound {
             energy: energy / root,
             coordinate,
             rate: energy,
-            acceleration: of_loads
-                + (norms.last + 2.0 * r.largest + self.damping) * energy / root
+            acceleration_without_stiffness: of_loads
+                + (2.0 * r.largest + self.damping) * energy
                 + (r.largest.powi(2) + r.acceleration) * coordinate,
-            energy_rate: f64::INFINITY,
         })
     }
 
-    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads; `own` is the motion without the
-    /// groups `dropped` and `error` how far it is from that of the whole body.
-    pub fn torque_error(&self, dropped: Groups, norms: &Norms, own: &Amplitude, error: &Amplitude) -> f64 {
+    /// What the torque lacks without the groups `dropped`, at motion within `own`.
+    pub fn lacking(&self, dropped: Groups, norms: &Norms, own: &Amplitude) -> Lacking {
+        let (w, turn) = (self.rotation.largest, self.rotation.acceleration + self.rotation.largest.powi(2));
+        let (q, v, a) = (own.coordinate, own.rate, own.acceleration);
+        let there = |group: bool, torque: f64| if group { torque } else { 0.0 };
+        let torque = there(dropped.w1, norms.inertia * (v * w + q * turn))
+            + there(dropped.w2, 2.0 * q * v * w + q * q * turn)
+            + there(dropped.w3, norms.coupling * (product(q, a) + w * q * v));
+        Lacking { torque, stiff: norms.coupling * norms.last * q }
+    }
+
+    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads: what it lacks, and what the whole
+    /// body makes of the `error` of a motion within `own`.
+    pub fn torque_error(&self, norms: &Norms, own: &Amplitude, error: &ErrorBound, lacking: &Lacking) -> f64 {
         let r = &self.rotation;
         let (w, turn) = (r.largest, r.acceleration + r.largest.powi(2));
-        // Of the whole body.
-        let (q, v) = (own.coordinate + error.coordinate, own.rate + error.rate);
-        let a = own.acceleration + error.acceleration;
-        // (q, q', q'') that each group sees: those of the whole body where it is dropped, else the error.
-        let of = |is_dropped: bool| match is_dropped {
-            true => (q, v, a),
-            false => (error.coordinate, error.rate, error.acceleration),
-        };
-        let (dq, dv, _) = of(dropped.w1);
+        let (dq, dv) = (error.coordinate, error.rate);
+        let (q, v) = (own.coordinate + dq, own.rate + dv);
         let linear = norms.inertia * (dv * w + dq * turn);
-        let (dq, dv, _) = of(dropped.w2);
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
-        let (dq, dv, da) = of(dropped.w3);
-        let coupled = norms.coupling * (product(q, da) + product(dq, a) + w * (q * dv + dq * v));
-        linear + quadratic + coupled
+        // q'W3 e'' with e'' of the equations of motion, whose part Lambda e meets W3'q in the norm of stiffness.
+        let stiff = (lacking.stiff + norms.coupling * norms.last * dq) * error.energy;
+        let rest = norms.coupling * q * error.acceleration_without_stiffness;
+        let coupled = stiff + rest + norms.coupling * (product(dq, own.acceleration) + w * (q * dv + dq * v));
+        lacking.torque + linear + quadratic + coupled
     }
+}
+
+/// What the balance of torques lacks without some groups.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lacking {
+    /// Largest torque.
+    pub torque: f64,
+    /// Largest |Lambda^(1/2) W3' q|.
+    pub stiff: f64,
 }
 
 /// What is zero is zero, however large the other.

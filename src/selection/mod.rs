@@ -1,5 +1,6 @@
 //! What a body needs in a scene: sizes of the terms, guaranteed bounds of what dropping them does, measured errors, and the decision.
 
+mod along;
 mod bounds;
 mod norms;
 mod rows;
@@ -10,7 +11,7 @@ mod trial;
 mod variation;
 mod warnings;
 
-pub use bounds::{Amplitude, Driven, LoadSizes, ModalLoad, Start};
+pub use bounds::{Amplitude, Driven, ErrorBound, Lacking, LoadSizes, ModalLoad, Start};
 pub use norms::Norms;
 pub use select::{Selection, ruled_out, select};
 pub use significance::{Significance, centrifugal_responses, significances};

@@ -5,13 +5,14 @@ use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
 use super::trial::{Bench, ModeShare, Trial, multiplications};
 use super::variation::Variation;
-use super::warnings::warnings;
+use super::warnings::{growth_of, phase_drifts, resonances};
 use crate::diagnostic::Diagnostic;
 use crate::dynamics::BodyPoint;
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Group, Groups, TermDecision};
 use crate::progress::{Event, Watch};
-use crate::scene::{Measure, Scene, damped, points_of};
+use crate::scene::{Measure, Range, Scene, damped, points_of};
+use nalgebra::Vector3;
 
 /// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
 const PART_OF_BOUNDS: f64 = 0.5;
@@ -100,15 +101,22 @@ fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     if scene.requirements.motion == own.requirements.motion || scene.run.duration.is_none() {
         return Ok(vec![scene.clone()]);
     }
-    // A run without rotation cannot be scaled: the bounds see the whole range.
-    if !factor.is_finite() {
-        return Ok(vec![scene.clone()]);
-    }
-    if factor <= SLACK_OF_RANGE {
+    if factor.is_nan() || factor <= SLACK_OF_RANGE {
         return Ok(vec![own]);
     }
     let mut scaled = own.clone();
-    scaled.initial.angular_velocity *= factor;
+    match (&scene.spin, &scene.requirements.motion.angular_velocity) {
+        (Some(_), _) if factor.is_infinite() => return Ok(vec![scene.clone()]),
+        // A free body that does not turn at first is given the rotation.
+        (None, Some(range)) if factor.is_infinite() => {
+            scaled.initial.angular_velocity = match range {
+                Range::Axes(components) => *components,
+                Range::Any(length) if body.dimension() == 2 => Vector3::z() * *length,
+                Range::Any(length) => Vector3::repeat(length / 3f64.sqrt()),
+            };
+        }
+        _ => scaled.initial.angular_velocity *= factor,
+    }
     if let Some(spin) = &mut scaled.spin {
         spin.rate = spin.rate.scaled(factor);
     }
@@ -262,12 +270,16 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
                 }
             };
             let mut chosen = Vec::new();
+            let mut growth = None;
             for (bench, measure) in &tried {
                 let (trial, history) =
                     bench.measured(measure, &choice.modes, choice.groups, search.budget())?;
-                diagnostics.extend(warnings(bench, measure, &choice.modes, history.as_ref()));
+                let own = history.and_then(|history| growth_of(bench, measure, &history));
+                growth = [growth, own].into_iter().flatten().reduce(f64::max);
+                diagnostics.extend(resonances(bench, measure, &choice.modes));
                 chosen.push(trial);
             }
+            diagnostics.extend(growth.map(phase_drifts));
             choice.chosen = Some(worst(chosen.into_iter()));
         }
     }

@@ -152,8 +152,11 @@ fn turning(
         }
     };
     let [(spin, spin_source), (acceleration, acceleration_source)] = run;
+    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what it is.
     let larger = |range: &Option<Range>, value: f64, source: String, key: &str| match range {
-        Some(range) if range.length() > value => (range.length(), format!("[motion] {key}")),
+        Some(range) if scene.spin.is_none() || range.length() > value => {
+            (range.length(), format!("[motion] {key}"))
+        }
         _ => (value, source),
     };
     let (spin, spin_source) = larger(&motion.angular_velocity, spin, spin_source, "angular_velocity");

@@ -1,19 +1,20 @@
 //! Models with fewer terms or modes, tried: by bounds, and by integration.
 
-use super::bounds::{Amplitude, LoadSizes};
+use super::along::Along;
+use super::bounds::Lacking;
 use super::norms::Norms;
 use super::rows::PointRows;
 use super::situation::Situation;
 use super::variation::Variation;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::dynamics::{BodyPoint, Configuration, EquationsOfMotion, Evaluation, Terms};
+use crate::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
 use crate::model::extents;
 use crate::scene::{
     ErrorHistory, LEAST_REACTION, Measure, OutputErrors, Recording, Resolution, Scene, simulate,
 };
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
 /// Instants per shortest period that bounds look at a motion, and how many they look at in all.
@@ -167,12 +168,17 @@ impl Bench<'_> {
         let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
         let softened = || "the spin may take the stiffness of some motion".to_owned();
-        let own = match run {
-            Some(run) => self.amplitude(run),
-            None => driven.amplitude(kept, norms).ok_or_else(softened)?,
+        let (own, residual, lacking) = match run {
+            Some(run) => {
+                let along = Along::new(self, run, kept, norms);
+                (along.amplitude, vec![along.load], Lacking { torque: along.torque, stiff: along.stiff })
+            }
+            None => {
+                let own = driven.amplitude(kept, norms).ok_or_else(softened)?;
+                let residual = driven.residual(dropped, norms, &own);
+                (own, residual, driven.lacking(dropped, norms, &own))
+            }
         };
-        let along = run.filter(|_| norms.tier > 0).map(|run| self.residual(run, kept));
-        let residual = along.map_or_else(|| driven.residual(dropped, norms, &own), |along| vec![along]);
         let error = driven.error(norms, &residual).ok_or_else(softened)?;
         // The levers of the loads deform with the body.
         let forces: f64 = self
@@ -182,7 +188,7 @@ impl Bench<'_> {
             .map(|load| Variation::of(&load.history, driven.rotation.duration).largest * load.force.norm())
             .sum();
         let levers = forces * self.reach_of_nodes() * error.energy;
-        let torque = driven.torque_error(dropped, norms, &own, &error) + levers;
+        let torque = driven.torque_error(norms, &own, &error, &lacking) + levers;
 
         // Relative to what is certain of the whole motion, or to the least that counts.
         let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
@@ -207,76 +213,6 @@ impl Bench<'_> {
             stress: Some(relative(error.energy / 2f64.sqrt(), &energies, least.root_energy)),
             reaction: self.scene.spin.is_some().then(|| relative(torque, &torques, least_torque)),
         })
-    }
-
-    /// How far the modes go in a motion.
-    fn amplitude(&self, run: &Recording) -> Amplitude {
-        let eigenvalues = &self.body.modes().eigenvalue;
-        let weighted = |x: &[f64]| x.iter().zip(eigenvalues).map(|(x, l)| l * x * x).sum::<f64>().sqrt();
-        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let most = |of: &dyn Fn(&Configuration) -> f64| run.states.iter().map(of).fold(0.0, f64::max);
-        let change = |pair: &[(f64, &Configuration)]| {
-            let ((before, a), (after, b)) = (pair[0], pair[1]);
-            let rates: Vec<f64> = a.qd.iter().zip(&b.qd).map(|(a, b)| (b - a) / (after - before)).collect();
-            norm(&rates)
-        };
-        let instants: Vec<(f64, &Configuration)> = run.time.iter().copied().zip(&run.states).collect();
-        Amplitude {
-            energy: most(&|state| weighted(&state.q)),
-            coordinate: most(&|state| norm(&state.q)),
-            rate: most(&|state| norm(&state.qd)),
-            acceleration: instants.windows(2).map(change).fold(0.0, f64::max),
-            energy_rate: most(&|state| weighted(&state.qd)),
-        }
-    }
-
-    /// The load that the terms beyond `kept` are to the error of a motion without them: what the balance of forces lacks at its instants.
-    fn residual(&self, run: &Recording, kept: Groups) -> LoadSizes {
-        let equations = [self.body.invariants().groups, kept]
-            .map(|groups| EquationsOfMotion::new(self.body, terms(groups)));
-        let mut evaluations = equations.each_ref().map(Evaluation::new);
-        let rigid = equations[0].n_rigid();
-        let axes: &[usize] = if rigid == 3 { &[2] } else { &[0, 1, 2] };
-        let root: Vec<f64> = self.body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
-        let mut velocity = vec![0.0; equations[0].n_velocities()];
-        let mut acceleration = velocity.clone();
-        let mut lacking = |time: f64, state: &Configuration| {
-            // Free-surface modes about the centre of mass do not feel how the frame moves along.
-            let first = rigid - axes.len();
-            let rate = self.scene.spin.as_ref().map_or(0.0, |spin| spin.rate.at(time).1);
-            let alpha = self.scene.spin.as_ref().map_or_else(Vector3::zeros, |spin| spin.axis * rate);
-            for (at, &axis) in axes.iter().enumerate() {
-                velocity[first + at] = state.omega[axis];
-                acceleration[first + at] = alpha[axis];
-            }
-            velocity[rigid..].copy_from_slice(&state.qd);
-            let mut forces = [velocity.clone(), velocity.clone()];
-            for (evaluation, forces) in evaluations.iter_mut().zip(&mut forces) {
-                evaluation.set(&state.q, &velocity);
-                evaluation.balance(&acceleration, forces);
-            }
-            let [whole, own] = forces;
-            whole[rigid..].iter().zip(&own[rigid..]).map(|(a, b)| a - b).collect::<Vec<f64>>()
-        };
-        let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
-        let mut sizes = LoadSizes::default();
-        let mut before: Option<(f64, Vec<f64>)> = None;
-        for (&time, state) in run.time.iter().zip(&run.states) {
-            let force = lacking(time, state);
-            let energy = norm(&mut force.iter().zip(&root).map(|(f, root)| f / root));
-            sizes.largest = sizes.largest.max(energy);
-            match &before {
-                None => sizes.begun = energy,
-                Some((then, earlier)) => {
-                    let both = norm(&mut force.iter().copied()) + norm(&mut earlier.iter().copied());
-                    sizes.impulse += 0.5 * both * (time - then);
-                    let step = force.iter().zip(earlier).zip(&root).map(|((a, b), root)| (a - b) / root);
-                    sizes.moved += norm(&mut { step });
-                }
-            }
-            before = Some((time, force));
-        }
-        sizes
     }
 
     /// Largest deflection of a watched point, or without any of a node, for |Lambda^(1/2) q| = 1.

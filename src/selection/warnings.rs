@@ -15,30 +15,36 @@ const MATTERS: f64 = 0.01;
 /// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths of its resonance.
 const NEAR: f64 = 0.1;
 
-/// Warnings about the model with `modes` whose errors are `history`.
-pub(super) fn warnings(
-    bench: &Bench<'_>,
-    measure: &Measure<'_>,
-    modes: &[usize],
-    history: Option<&ErrorHistory>,
-) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    let tolerance = &bench.scene.requirements.tolerance;
-    if let Some(history) = history
-        && let Some(growth) = history.growth().filter(|growth| *growth > GROWING)
-        && history.largest().worst(tolerance) > MATTERS
-    {
-        let message = format!(
-            "errors of the selected model are {growth:.1} times as large in the second half of the run as in the first"
-        );
-        found.push(Diagnostic::new(Code::PhaseDrifts, message));
-    }
-    found.extend(resonances(bench, measure, modes));
-    found
+/// How much more the errors of a model grow from the first half of the run to the second than the motion does, where that is worth a
+/// word: about 1 for errors that stay in step with the motion, more where phases run apart.
+pub(super) fn growth_of(bench: &Bench<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
+    let halves = |values: &[f64]| -> Option<f64> {
+        let (first, second) = values.split_at(values.len().div_ceil(2));
+        let most = |half: &[f64]| half.iter().copied().fold(0.0, f64::max);
+        (most(first) > 0.0).then(|| most(second) / most(first))
+    };
+    let energies = measure.recording().balances.iter().map(|balance| balance.elastic.max(0.0).sqrt());
+    let motion = halves(&energies.collect::<Vec<_>>())?;
+    let of_stress = errors.stress.as_ref().and_then(|stress| halves(stress)).map(|growth| growth / motion);
+    // The attitude has no amplitude: it grows when it grows.
+    let matters = |error: f64, allowed: f64| error > MATTERS * allowed;
+    let (largest, tolerance) = (errors.largest(), &bench.scene.requirements.tolerance);
+    let of_attitude = halves(&errors.attitude).filter(|_| matters(largest.attitude, tolerance.attitude));
+    let of_stress =
+        of_stress.filter(|_| largest.stress.is_some_and(|stress| matters(stress, tolerance.stress)));
+    [of_attitude, of_stress].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
+}
+
+/// The warning about it.
+pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
+    let message = format!(
+        "errors of the selected model grow {growth:.1} times more than the motion from the first half of the run to the second"
+    );
+    Diagnostic::new(Code::PhaseDrifts, message)
 }
 
 /// Modes that are dropped and that a load drives near their frequency.
-fn resonances(bench: &Bench<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
+pub(super) fn resonances(bench: &Bench<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
     let (body, scene) = (bench.body, bench.scene);
     let rows = PointRows::new(body);
     let spin = measure.recording().states.iter().map(|state| state.omega.norm()).fold(0.0, f64::max);
