@@ -7,12 +7,13 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes,
-    Parts, Source, Truncation,
+    Certificate, FlexBody, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
+    Modes, Parts, Source, TermDecision, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
-    choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, error_norms,
+    choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, condense_lumped_linear,
+    error_norms,
 };
 use crate::linalg::{SymmetricMatrix, gram, multiply};
 use crate::model::{Coupling, Damping, FeModel, Nodes, Reference, rigid_count};
@@ -83,6 +84,9 @@ pub struct LumpedPipeline {
     pub remark: String,
 }
 
+/// Decides about the groups of the kinetic energy of a body; what it does not name is kept.
+pub type Decide<'a> = &'a dyn Fn(&FlexBody) -> Result<Vec<TermDecision>>;
+
 /// A finished conversion.
 #[derive(Debug, Clone)]
 pub struct Conversion {
@@ -94,6 +98,8 @@ pub struct Conversion {
     pub lumped_modes: Vec<LumpedPipeline>,
     /// Work of the eigen-solver.
     pub counters: Counters,
+    /// Columns that the condensation multiplied by M, for the consistent mass.
+    pub condensed_columns: u64,
     /// Memory and precision as decided before the work; none on the dense path.
     pub plan: Option<Plan>,
     /// Warnings and notes.
@@ -106,16 +112,22 @@ pub struct Conversion {
 /// Those of [`free_surface`](crate::basis::free_surface) and [`choose_frame`]; [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not
 /// fit the nodes (found before any work).
 pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
-    convert_resumed(model, settings, Resume::default(), watch)
+    convert_for(model, settings, None, Resume::default(), watch)
 }
 
-/// The same with a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+/// The same with what `decide` leaves of the kinetic energy, and with a search for modes that starts where an earlier one stood, or that
+/// is kept (a checkpoint).
+///
+/// `decide` is asked when the modes are known, about a body that holds W1 but not W2 and W3. Without these, no product with M is formed but that of
+/// rigid motion, and no nf x nf array but K_ff and m_ff; lumped comparators hold the same groups. Accuracy `certified` condenses
+/// everything first: its digits are about the whole.
 ///
 /// # Errors
-/// As [`convert`].
-pub fn convert_resumed(
+/// As [`convert`], and those of `decide`.
+pub fn convert_for(
     model: &FeModel,
     settings: &ConvertSettings,
+    decide: Option<Decide<'_>>,
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<Conversion> {
@@ -138,10 +150,80 @@ pub fn convert_resumed(
     };
     let place = Place::new(model, frame);
     let modes = BodyModes::new(model, &place, &found.solution.vectors);
-    let modal_stiffness = || reduced(model.stiffness(), modes.vectors.as_ref());
-    let (invariants, guarantee) = match (&found.solution.bounds, model.scalar_mass()) {
-        (None, _) | (_, None) => (modes.condensed(model, &place, modal_stiffness()), None),
-        (Some(bounds), Some(mass)) => {
+    let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
+    let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+    let interfaces = interfaces(model, &frame, coupled);
+    let (eigenvalues, modal_stiffness) =
+        (&found.solution.eigenvalues, reduced(model.stiffness(), modes.vectors.as_ref()));
+    let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
+    let mut diagnostics = found.diagnostics.clone();
+    let coordinates = found.coordinates.as_ref().map(|own| {
+        let turned = own.clone().in_axes(&frame.axes, model.dimension(), &modes.signs);
+        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
+        InterfaceCoordinates { names, stiffness, mass, of_modes }
+    });
+    let truncation = found.truncation.iter().cloned();
+    // A body with these invariants. What is not computed yet is not there.
+    let of = |invariants: Invariants| -> Result<(Parts, Option<Diagnostic>)> {
+        let damping = modal_damping(model, modes.vectors.as_ref(), eigenvalues, &invariants)?;
+        let (damping_ratio, modal_damping, warning) = match damping {
+            Some(damping) => (damping.ratio, Some(damping.matrix), damping.warning),
+            None => (vec![0.0; eigenvalues.len()], None, None),
+        };
+        let parts = Parts {
+            source: Source {
+                name: model.name().to_owned(),
+                files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
+                number: model.number(),
+                n_dofs: model.stiffness().n(),
+                mass_structure: match model.scalar_mass() {
+                    None => MassStructure::General,
+                    Some(_) if model.has_diagonal_mass() => MassStructure::Diagonal,
+                    Some(_) => MassStructure::RotationInvariant,
+                },
+                settings: describe(settings, model),
+            },
+            dimension: model.dimension(),
+            units: model.units().clone(),
+            frame,
+            interfaces: interfaces.clone(),
+            coordinates: coordinates.clone(),
+            nodes: nodes.clone(),
+            modes: Modes {
+                damping_ratio,
+                modal_damping,
+                eigenvalue: eigenvalues.clone(),
+                residual: found.solution.residuals.clone(),
+                provenance: found.provenance.clone(),
+                truncation: truncation
+                    .clone()
+                    .map(|Lacking { load, before, after }| Truncation { load, before, after })
+                    .collect(),
+                shape: modes.of_nodes().to_owned(),
+                rotation: modes.rotations.clone(),
+                internal: modes.internal.clone(),
+            },
+            invariants,
+            geometric_stiffness: geometric_stiffness.clone(),
+            lumped: Vec::new(),
+            certificate: certificate(model, &found, None),
+            terms: Vec::new(),
+        };
+        Ok((parts, warning))
+    };
+
+    // Nothing but products of M with rigid motion is formed for a decision.
+    let linear = decide.map(|_| modes.condensed_linear(model, &place, modal_stiffness.clone()));
+    let mut condensed_columns = decide.map_or(0, |_| modes.condensed_columns(model, true));
+    let terms = match (decide, &linear) {
+        (Some(decide), Some(linear)) => decide(&FlexBody::new(of(linear.clone())?.0)?)?,
+        _ => Vec::new(),
+    };
+    let dropped = terms.iter().filter(|term| !term.kept);
+    let groups = dropped.fold(Groups::ALL, |groups, term| groups.and(Groups::without(term.group)));
+    let (invariants, guarantee) = match (&found.solution.bounds, model.scalar_mass(), linear) {
+        (Some(bounds), Some(mass), _) => {
+            condensed_columns += modes.condensed_columns(model, false);
             let shapes = modes.displacements.as_ref();
             let own = condense_certified(mass, &place.positions, shapes, model.stiffness(), &frame.axes);
             let guarantee = Guarantee {
@@ -154,22 +236,19 @@ pub fn convert_resumed(
             };
             (own.invariants, Some(guarantee))
         }
+        (_, _, Some(linear)) if !groups.w2 && !groups.w3 => (linear, None),
+        _ => {
+            condensed_columns += modes.condensed_columns(model, false);
+            (modes.condensed(model, &place, modal_stiffness), None)
+        }
     };
-    let eigenvalues = &found.solution.eigenvalues;
-    let damping = modal_damping(model, modes.vectors.as_ref(), eigenvalues, &invariants)?;
-    let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
-    let mut diagnostics = found.diagnostics.clone();
-    diagnostics.extend(damping.as_ref().and_then(|damping| damping.warning.clone()));
-    diagnostics.extend(geometric_stiffness::softening_warning(model, &settings.basis, &invariants));
+    let invariants = invariants.with_groups(groups);
     watch(Event::Phase("lumped comparison"));
     let lumped: Vec<LumpedBody> = schemes
         .iter()
         .map(|masses| {
             let modal_stiffness = invariants.modal_stiffness.clone();
-            let mut other = condense_lumped(masses, &place.positions, modes.of_nodes(), modal_stiffness);
-            if only_about_z(model) {
-                other = other.about_z();
-            }
+            let other = lumped_invariants(model, &place, masses, modes.of_nodes(), modal_stiffness, groups);
             LumpedBody {
                 scheme: masses.scheme().name().to_owned(),
                 comparison: error_norms(&invariants, &other),
@@ -187,67 +266,19 @@ pub fn convert_resumed(
     } else {
         Vec::new()
     };
-    let certificate = certificate(model, &found, guarantee);
-    let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
-    let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
-    let interfaces = interfaces(model, &frame, coupled);
+    let softening = geometric_stiffness::softening_warning(model, &settings.basis, &invariants);
+    let (parts, warning) = of(invariants)?;
     let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, &modes, model.dimension()));
-    diagnostics.extend(fits);
+    diagnostics.extend(warning.into_iter().chain(softening).chain(fits));
+    let body =
+        FlexBody::new(Parts { lumped, certificate: certificate(model, &found, guarantee), terms, ..parts })?;
     let solution = found.solution;
-    let coordinates = found.coordinates.map(|own| {
-        let turned = own.in_axes(&frame.axes, model.dimension(), &modes.signs);
-        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
-        InterfaceCoordinates { names, stiffness, mass, of_modes }
-    });
-    let (damping_ratio, modal_damping) = match damping {
-        Some(damping) => (damping.ratio, Some(damping.matrix)),
-        None => (vec![0.0; solution.eigenvalues.len()], None),
-    };
-    let body = FlexBody::new(Parts {
-        source: Source {
-            name: model.name().to_owned(),
-            files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
-            number: model.number(),
-            n_dofs: model.stiffness().n(),
-            mass_structure: match model.scalar_mass() {
-                None => MassStructure::General,
-                Some(_) if model.has_diagonal_mass() => MassStructure::Diagonal,
-                Some(_) => MassStructure::RotationInvariant,
-            },
-            settings: describe(settings, model),
-        },
-        dimension: model.dimension(),
-        units: model.units().clone(),
-        frame,
-        interfaces,
-        coordinates,
-        nodes,
-        modes: Modes {
-            damping_ratio,
-            modal_damping,
-            eigenvalue: solution.eigenvalues,
-            residual: solution.residuals,
-            provenance: found.provenance,
-            truncation: found
-                .truncation
-                .into_iter()
-                .map(|Lacking { load, before, after }| Truncation { load, before, after })
-                .collect(),
-            shape: modes.of_nodes().to_owned(),
-            rotation: modes.rotations,
-            internal: modes.internal,
-        },
-        invariants,
-        geometric_stiffness,
-        lumped,
-        certificate,
-        terms: Vec::new(),
-    })?;
     Ok(Conversion {
         body,
         mass_properties,
         lumped_modes,
         counters: solution.counters,
+        condensed_columns,
         plan: solution.plan,
         diagnostics,
     })
@@ -264,6 +295,20 @@ fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
 /// Whether nothing but the rotation about z is known of a body: lumped masses are compared in this alone then.
 fn only_about_z(model: &FeModel) -> bool {
     model.dimension() == 2 && model.scalar_mass().is_none()
+}
+
+/// What lumped masses make of the groups that the body holds.
+fn lumped_invariants(
+    model: &FeModel,
+    place: &Place,
+    masses: &LumpedMasses,
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+    groups: Groups,
+) -> Invariants {
+    let condense = if groups.w2 || groups.w3 { condense_lumped } else { condense_lumped_linear };
+    let own = condense(masses, &place.positions, shapes, modal_stiffness);
+    if only_about_z(model) { own.about_z() } else { own }.with_groups(groups)
 }
 
 fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
@@ -334,15 +379,9 @@ fn lumped_pipeline(
         gram(exact.modes.vectors.as_ref(), exact.model.pencil().apply_mass(modes.vectors.as_ref()).as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..nf)));
     let shapes = modes.of_nodes();
-    let mut own = condense_lumped(
-        masses,
-        &exact.place.positions,
-        shapes,
-        reduced(exact.model.stiffness(), modes.vectors.as_ref()),
-    );
-    if only_about_z(exact.model) {
-        own = own.about_z();
-    }
+    let stiffness = reduced(exact.model.stiffness(), modes.vectors.as_ref());
+    let groups = exact.invariants.groups;
+    let own = lumped_invariants(exact.model, exact.place, masses, shapes, stiffness, groups);
     Ok(LumpedPipeline {
         scheme,
         eigenvalues: found.eigenvalues,

@@ -101,7 +101,7 @@ fn the_gyroscope_senses_its_rate() {
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     let (drive, sense) = (1, 2);
     let [w1, w2] = [drive, sense].map(|j| body.modes().eigenvalue[j].sqrt());
-    let coupling = body.invariants().w3()[(2 * body.n_modes() + drive, sense)];
+    let coupling = body.invariants().w3().expect("held")[(2 * body.n_modes() + drive, sense)];
     assert!(coupling.abs() > 0.95, "both move the whole mass: {coupling}");
     let size = 2.0 * 8.7e-6 * coupling * 0.002 * w1 / (w2 * w2 - w1 * w1);
     for (t, state) in recording.time.iter().zip(&recording.states) {

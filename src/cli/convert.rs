@@ -9,7 +9,7 @@ use super::watcher::Watcher;
 use crate::basis::{
     BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
 };
-use crate::convert::{Conversion, ConvertSettings, Lumping, convert_resumed};
+use crate::convert::{Conversion, ConvertSettings, Lumping, convert_for};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::error::Result;
@@ -122,7 +122,7 @@ impl Job<'_> {
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
-        let conversion = convert_resumed(&model, &settings, resume, &|event| watcher.hear(event))
+        let conversion = convert_for(&model, &settings, None, resume, &|event| watcher.hear(event))
             .inspect_err(|_| {
                 watcher.clear();
                 tell(arguments.printing, &diagnostics);
@@ -389,6 +389,7 @@ fn run_data(
         ("solved_columns", work.solved_columns),
         ("stiffness_columns", work.stiffness_columns),
         ("mass_columns", work.mass_columns),
+        ("condensed_columns", conversion.condensed_columns),
         ("restarts", work.restarts),
         ("factor_len", work.factor_len),
         ("factor_flops", work.factor_flops),

@@ -70,6 +70,11 @@ impl Groups {
         Self { w1: !self.w1, w2: !self.w2, w3: !self.w3 }
     }
 
+    /// All but one.
+    pub fn without(group: Group) -> Self {
+        Self { w1: group != Group::W1, w2: group != Group::W2, w3: group != Group::W3 }
+    }
+
     /// Those that are in both.
     pub fn and(self, other: Self) -> Self {
         Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }
