@@ -27,5 +27,6 @@ pub mod report;
 pub mod scene;
 pub mod selection;
 pub mod store;
+pub mod tailoring;
 pub mod units;
 pub mod verification;

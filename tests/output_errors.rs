@@ -33,6 +33,7 @@ fn scene(duration: f64) -> Scene {
         spin: None,
         watched: Vec::new(),
         requirements: Default::default(),
+        source: None,
     }
 }
 

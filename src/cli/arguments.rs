@@ -46,12 +46,15 @@ pub enum Command {
 /// Arguments of `select`.
 #[derive(Debug, Args)]
 pub struct SelectArguments {
-    /// Flex-body file
-    #[arg(value_name = "BODY.flex.h5")]
+    /// Flex-body file with all that there is to select from, or manifest of a model
+    #[arg(value_name = "BODY.flex.h5|MODEL.toml")]
     pub body: PathBuf,
     /// What the body does and how accurate it has to be (see docs/select.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
+    /// Of a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub modes: Option<u32>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
@@ -143,6 +146,9 @@ pub struct ConvertArguments {
     /// Compute the modes of each lumped mass too, and compare after aligning the subspaces
     #[arg(long)]
     pub lumped_modes: bool,
+    /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose residual vectors and modes where nothing else does
+    #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
+    pub scene: Option<PathBuf>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

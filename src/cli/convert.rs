@@ -21,8 +21,11 @@ use crate::invariants::BodyFrame;
 use crate::model::{CheckedModel, FeModel};
 use crate::output::OutputSlot;
 use crate::progress::Event;
-use crate::report::{Facts, Format, LumpedModes, Phase, RunData, render};
+use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
+use crate::scene::{Scene, read_scene};
+use crate::selection::{WantedResponses, largest_eigenvalue};
 use crate::store;
+use crate::tailoring::convert_for_scene;
 use crate::units::UnitSystem;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
@@ -31,7 +34,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     // What the command line says replaces what the manifest says.
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let files = model_files(arguments)?;
-    let loads = asked.unwrap_or_else(|| files.residual_vectors.clone());
+    let scene = arguments.scene.as_ref().map(read_scene).transpose()?;
+    let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, scene.as_ref()));
     refuse_contradictions(arguments, &loads)?;
     // How many bodies there are is known after reading; that outputs can be written, before.
     let places = Places::of(arguments, arguments.split.then_some(1));
@@ -43,7 +47,9 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let lumped = schemes.iter().map(Scheme::read).collect::<Result<Vec<_>>>()?;
     let raw = read_model(&files)?;
     watcher.hear(Event::Phase("checks"));
-    let job = Job { arguments, files: &files, lumped: &lumped, loads: &loads, formats: &formats, threads };
+    let scene = scene.as_ref();
+    let job =
+        Job { arguments, files: &files, lumped: &lumped, loads: &loads, formats: &formats, scene, threads };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         tell(arguments.printing, &done.diagnostics);
@@ -86,6 +92,7 @@ struct Job<'a> {
     lumped: &'a [Lumping],
     loads: &'a [LoadSource],
     formats: &'a [Format],
+    scene: Option<&'a Scene>,
     threads: usize,
 }
 
@@ -122,11 +129,19 @@ impl Job<'_> {
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
-        let conversion = convert_for(&model, &settings, None, resume, &|event| watcher.hear(event))
-            .inspect_err(|_| {
-                watcher.clear();
-                tell(arguments.printing, &diagnostics);
-            })?;
+        let watch = |event: Event<'_>| watcher.hear(event);
+        let (mut conversion, selection) = match (self.scene, &arguments.scene) {
+            (Some(scene), Some(path)) => convert_for_scene(&model, &settings, scene, resume, &watch)
+                .map_err(|error| error.in_file(path))
+                .map(|(conversion, selection)| (conversion, Some(selection))),
+            _ => convert_for(&model, &settings, None, resume, &watch).map(|conversion| (conversion, None)),
+        }
+        .inspect_err(|_| {
+            watcher.clear();
+            tell(arguments.printing, &diagnostics);
+        })?;
+        let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
+        conversion.diagnostics.extend(selected.into_iter().flatten());
         watcher.hear(Event::Phase("writing"));
         store::fill_slot(&conversion.body, &reserved.body)?;
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
@@ -146,8 +161,12 @@ impl Job<'_> {
         for (slot, format) in reserved.reports.iter().zip(self.formats) {
             slot.fill(render(&facts, *format).as_bytes())?;
         }
-        let outcome =
-            Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true };
+        // What is to be said is said with the body.
+        let nothing = RunData::default();
+        let decided = selection.as_ref().map(|selection| SelectionFacts::new(selection, &nothing));
+        let text = render(&facts, Format::Text)
+            + &decided.map_or_else(String::new, |facts| facts.render(Format::Text));
+        let outcome = Outcome { text, json: render(&facts, Format::Json), passed: true };
         let slots = std::iter::once(reserved.body).chain(reserved.reports).collect();
         Ok(Done { slots, outcome, diagnostics })
     }
@@ -156,7 +175,7 @@ impl Job<'_> {
         let Self { arguments, .. } = *self;
         ConvertSettings {
             modes: ModeSettings {
-                wanted: wanted(arguments, model.units()),
+                wanted: wanted(arguments, model.units(), self.scene),
                 accuracy: match arguments.accuracy {
                     AccuracyName::Fast => Accuracy::Fast,
                     AccuracyName::Standard => Accuracy::Standard,
@@ -181,6 +200,27 @@ impl Job<'_> {
             lumped_modes: arguments.lumped_modes,
         }
     }
+}
+
+/// Loads of residual vectors where the command line names none: those of the manifest; without, those of the scene, of which free modes
+/// alone know nothing.
+fn residual_vectors(
+    arguments: &ConvertArguments,
+    files: &ModelFiles,
+    scene: Option<&Scene>,
+) -> Vec<LoadSource> {
+    let free = arguments.basis == BasisName::Free && arguments.accuracy != AccuracyName::Certified;
+    match scene.filter(|_| free && files.residual_vectors.is_empty() && !arguments.lumped_modes) {
+        Some(scene) => responses_to(scene),
+        None => files.residual_vectors.clone(),
+    }
+}
+
+/// The loads of a scene.
+pub(super) fn responses_to(scene: &Scene) -> Vec<LoadSource> {
+    let WantedResponses { centrifugal, interfaces } = WantedResponses::of(scene);
+    let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
+    loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
 }
 
 /// Loads of residual vectors as named on the command line.
@@ -253,21 +293,26 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
         }
         (BasisName::CraigBampton, _) => Ok(BasisChoice::CraigBampton(CraigBampton)),
         (name, _) => {
-            let read = |set: &LoadSource| match set {
-                LoadSource::Centrifugal => Ok(Loads::Centrifugal),
-                LoadSource::Interfaces => Ok(Loads::Interfaces),
-                LoadSource::File(location) => {
-                    let raw = read_shapes(location, model.stiffness().n(), "loads")?;
-                    UserLoads::new(model, raw).map(Loads::User)
-                }
-            };
-            let residual_vectors = loads.iter().map(read).collect::<Result<_>>()?;
+            let residual_vectors = read_loads(loads, model)?;
             Ok(match name {
                 BasisName::CraigChang => BasisChoice::CraigChang(CraigChang { residual_vectors }),
                 _ => BasisChoice::Free(FreeSurface { residual_vectors }),
             })
         }
     }
+}
+
+/// Loads of residual vectors, with the files read that they need.
+pub(super) fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
+    let read = |set: &LoadSource| match set {
+        LoadSource::Centrifugal => Ok(Loads::Centrifugal),
+        LoadSource::Interfaces => Ok(Loads::Interfaces),
+        LoadSource::File(location) => {
+            let raw = read_shapes(location, model.stiffness().n(), "loads")?;
+            UserLoads::new(model, raw).map(Loads::User)
+        }
+    };
+    loads.iter().map(read).collect()
 }
 
 /// A lumping scheme as named on the command line.
@@ -365,10 +410,12 @@ fn use_threads(asked: Option<u16>) -> usize {
     rayon::current_num_threads()
 }
 
-fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
-    match arguments.max_frequency {
-        Some(hertz) => Wanted::Below(units.eigenvalue_of(hertz)),
-        None => Wanted::Lowest(match (arguments.modes, arguments.basis) {
+fn wanted(arguments: &ConvertArguments, units: &UnitSystem, scene: Option<&Scene>) -> Wanted {
+    let of_scene = scene.and_then(largest_eigenvalue).filter(|_| arguments.basis == BasisName::Free);
+    match (arguments.max_frequency, arguments.modes, of_scene) {
+        (Some(hertz), ..) => Wanted::Below(units.eigenvalue_of(hertz)),
+        (None, None, Some(eigenvalue)) => Wanted::Below(eigenvalue),
+        _ => Wanted::Lowest(match (arguments.modes, arguments.basis) {
             (Some(modes), _) => modes as usize,
             (None, BasisName::Imported) => usize::MAX,
             (None, _) => ModeSettings::DEFAULT_COUNT,

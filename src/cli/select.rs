@@ -1,15 +1,24 @@
 //! `flexbody select`.
 
 use super::arguments::SelectArguments;
+use super::convert::{read_loads, responses_to};
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
 use super::resources::memory_left;
 use super::watcher::Watcher;
+use crate::basis::{BasisChoice, FreeSurface, ModeSettings};
+use crate::convert::{ConvertSettings, convert};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::eigen::Wanted;
 use crate::error::Result;
+use crate::flex_body::FlexBody;
+use crate::input::{read_manifest, read_model};
+use crate::model::{CheckedModel, FeModel};
 use crate::output::OutputSlot;
+use crate::progress::{Event, Watch};
 use crate::report::{Format, RunData, SelectionFacts};
-use crate::scene::read_scene;
-use crate::selection::select;
+use crate::scene::{Scene, read_scene};
+use crate::selection::{largest_eigenvalue, select};
 use crate::store;
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
@@ -19,10 +28,17 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
-    let body = store::read(&arguments.body)?;
-    let mut selection = select(&body, &scene, memory_left(None), &|event| watcher.hear(event))
-        .map_err(|error| error.in_file(&arguments.scene))?;
-    let diagnostics = std::mem::take(&mut selection.diagnostics);
+    let watch = |event: Event<'_>| watcher.hear(event);
+    let is_manifest = arguments.body.extension().is_some_and(|extension| extension == "toml");
+    let (body, mut diagnostics) = if is_manifest {
+        converted(arguments, &scene, &watch)?
+    } else {
+        refuse_modes(arguments)?;
+        (store::read(&arguments.body)?, Vec::new())
+    };
+    let selection =
+        select(&body, &scene, memory_left(None), &watch).map_err(|error| error.in_file(&arguments.scene))?;
+    diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, ..RunData::default() };
     tell(arguments.printing, &run.diagnostics);
     let facts = SelectionFacts::new(&selection, &run);
@@ -31,4 +47,41 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     }
     reports.into_iter().try_for_each(OutputSlot::commit)?;
     Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed: true })
+}
+
+/// The body of a model with everything that the scene may need.
+fn converted(
+    arguments: &SelectArguments,
+    scene: &Scene,
+    watch: Watch<'_>,
+) -> Result<(FlexBody, Vec<Diagnostic>)> {
+    let files = read_manifest(&arguments.body)?;
+    refuse_replacing(files.paths().into_iter(), arguments.report.iter())?;
+    let CheckedModel { model, mut diagnostics } = FeModel::from_raw(read_model(&files)?)?;
+    let loads = match files.residual_vectors.is_empty() {
+        true => responses_to(scene),
+        false => files.residual_vectors.clone(),
+    };
+    let wanted = match (arguments.modes, largest_eigenvalue(scene)) {
+        (Some(modes), _) => Wanted::Lowest(modes as usize),
+        (None, Some(eigenvalue)) => Wanted::Below(eigenvalue),
+        (None, None) => Wanted::Lowest(ModeSettings::DEFAULT_COUNT),
+    };
+    let settings = ConvertSettings {
+        modes: ModeSettings { wanted, memory: memory_left(None), ..ModeSettings::default() },
+        basis: BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),
+        lumped: Vec::new(),
+        ..ConvertSettings::default()
+    };
+    let conversion = convert(&model, &settings, watch)?;
+    diagnostics.extend(conversion.diagnostics);
+    Ok((conversion.body, diagnostics))
+}
+
+fn refuse_modes(arguments: &SelectArguments) -> Result<()> {
+    if arguments.modes.is_some() {
+        let message = "--modes is for a model: a file has the modes that it has";
+        return Err(Diagnostic::new(Code::Usage, message).into());
+    }
+    Ok(())
 }

@@ -3,6 +3,7 @@
 use super::bytes::InputFile;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
+use crate::provenance::Fingerprint;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -58,6 +59,13 @@ pub(crate) struct Walk<'a> {
 }
 
 impl Walk<'_> {
+    /// SHA-256 of the file.
+    pub fn fingerprint(&self) -> String {
+        let mut all = Fingerprint::default();
+        all.update(self.text.as_bytes());
+        all.hex()
+    }
+
     /// A finding about the text at `span`.
     pub fn at(&self, code: Code, span: Range<usize>, message: String) -> Diagnostic {
         let line = line_at(self.text.as_bytes(), span.start);

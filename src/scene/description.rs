@@ -2,6 +2,7 @@
 
 use super::{History, Requirements};
 use crate::dynamics::Terms;
+use crate::provenance::SourceFile;
 use nalgebra::Vector3;
 
 /// What a body is to do.
@@ -23,6 +24,8 @@ pub struct Scene {
     pub watched: Vec<Point>,
     /// What is demanded of the body.
     pub requirements: Requirements,
+    /// The file that it was read from.
+    pub source: Option<SourceFile>,
 }
 
 /// How a scene is simulated.

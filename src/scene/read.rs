@@ -6,6 +6,7 @@ use crate::diagnostic::Code;
 use crate::dynamics::Terms;
 use crate::error::Result;
 use crate::input::{Table, Value, Walk, integer, read_toml, real};
+use crate::provenance::SourceFile;
 use nalgebra::Vector3;
 use std::ops::Range;
 use std::path::Path;
@@ -77,6 +78,7 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         spin: transposed(spin)?,
         watched: watched?,
         requirements: requirements?,
+        source: Some(SourceFile::new("scene", walk.path, walk.fingerprint())),
     })
 }
 

@@ -1,6 +1,7 @@
 //! What a body needs in a scene: sizes of the terms, guaranteed bounds of what dropping them does, measured errors, and the decision.
 
 mod along;
+mod basis;
 mod bounds;
 mod norms;
 mod rows;
@@ -11,9 +12,10 @@ mod trial;
 mod variation;
 mod warnings;
 
+pub use basis::{BEYOND_BAND, WantedResponses, largest_eigenvalue};
 pub use bounds::{Amplitude, Driven, ErrorBound, Lacking, LoadSizes, ModalLoad, Start};
 pub use norms::Norms;
-pub use select::{Selection, ruled_out, select};
+pub use select::{Selection, rule_out, select};
 pub use significance::{Significance, centrifugal_responses, significances};
 pub use situation::{Input, Situation};
 pub use trial::{Bench, ModeShare, Trial, terms};

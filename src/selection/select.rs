@@ -1,5 +1,6 @@
 //! Decides which terms and modes a body needs in a scene.
 
+use super::basis::BEYOND_BAND;
 use super::norms::Norms;
 use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
@@ -65,17 +66,19 @@ fn sets() -> impl Iterator<Item = Groups> {
     (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
 }
 
-/// What I0 and the eigenvalues alone rule out (tier 0): the groups that a body in this scene has to hold. `body` needs to hold none.
+/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in this scene need not hold. `body` needs
+/// to hold none.
 ///
 /// # Errors
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::scene::simulate).
-pub fn ruled_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<(Groups, Vec<Trial>)> {
+pub fn rule_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<Vec<TermDecision>> {
     let body = &*damped(body, scene)?;
     let scenes = scenes(body, scene)?;
     let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
     let trials = bounded(&cases, false)?;
-    let kept = trials.iter().find(|trial| trial.passed()).map_or(Groups::ALL, |trial| trial.kept);
-    Ok((kept, trials))
+    let Some(passed) = trials.iter().find(|trial| trial.passed()) else { return Ok(Vec::new()) };
+    let rotation = &cases[0].situation.spin;
+    Ok(passed.kept.dropped().map(|group| decision(group, false, passed, scene, rotation)).collect())
 }
 
 /// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays behind that.
@@ -226,14 +229,16 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
                 let frequency = eigenvalues[j].sqrt() / std::f64::consts::TAU;
                 // Residual vectors are what makes up for the modes beyond the band.
                 let free = body.modes().provenance.get(j).is_none_or(|from| from == "free mode");
-                band.is_none_or(|band| !free || frequency <= 2.0 * band)
+                band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
             };
             let within: Vec<usize> = all.iter().copied().filter(within).collect();
             if !within.is_empty() {
                 choice.modes = within;
             }
             mode_reason = match band {
-                Some(band) => format!("free modes up to twice the highest frequency of interest, {band}"),
+                Some(band) => {
+                    format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
+                }
                 None => "the scene has neither a duration nor a band: all".to_owned(),
             };
         }
@@ -283,7 +288,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
             choice.chosen = Some(worst(chosen.into_iter()));
         }
     }
-    let terms = decisions(body, scene, &choice, &trials, short_of);
+    let terms = decisions(body, scene, &situation.spin, &choice, &trials, short_of);
     let tolerance = scene.requirements.tolerance;
     Ok(Selection {
         scene: scene.name.clone(),
@@ -461,77 +466,64 @@ impl Search<'_> {
 fn decisions(
     body: &FlexBody,
     scene: &Scene,
+    rotation: &Input,
     choice: &Choice,
     trials: &[Trial],
     short_of: Option<(f64, f64)>,
 ) -> Vec<TermDecision> {
-    let tolerance = &scene.requirements.tolerance;
     let held = body.invariants().groups;
     let all = body.n_modes();
     let of_groups = |kept: Groups| trials.iter().rfind(move |trial| trial.modes == all && trial.kept == kept);
-    let describe = |trial: &Trial| match &trial.errors {
-        Some(errors) => {
-            let (output, _, _) = errors.decisive(tolerance);
-            let how = match trial.tier {
-                2 => "measured over the run",
-                1 => "bound with the norms of the invariants",
-                _ => "bound from I0 and the frequencies",
-            };
-            format!("error of {output}, {how}")
-        }
-        None => trial.remark.clone(),
-    };
-    let numbers = |trial: &Trial| {
-        trial.errors.as_ref().map_or((f64::INFINITY, 0.0), |errors| {
-            let (_, error, allowed) = errors.decisive(tolerance);
-            (error, allowed * trial.budget)
-        })
-    };
     let decide = |group: Group| {
         let kept = choice.groups.has(group);
+        let undecided = |kept: bool, reason: &str| TermDecision {
+            group,
+            kept,
+            tier: 0,
+            bound: 0.0,
+            limit: 0.0,
+            reason: reason.to_owned(),
+        };
+        if !held.has(group) {
+            let earlier = body.terms().iter().find(|decision| decision.group == group);
+            return earlier.cloned().unwrap_or_else(|| undecided(false, "the body does not hold it"));
+        }
         let basis = if kept {
-            of_groups(choice.groups.and(Groups::NONE.with(group).complement()))
+            of_groups(choice.groups.and(Groups::without(group)))
         } else {
             of_groups(choice.groups).or(choice.chosen.as_ref())
         };
-        match basis {
-            _ if !held.has(group) => TermDecision {
-                group,
-                kept: false,
-                tier: 0,
-                bound: 0.0,
-                limit: 0.0,
-                reason: "the body does not hold it".to_owned(),
-            },
-            Some(trial) => {
-                let (bound, limit) = numbers(trial);
-                let limit = if bound.is_finite() { limit } else { 0.0 };
-                let mut reason = describe(trial);
-                if let Some((reached, allowed)) = short_of.filter(|_| kept) {
-                    reason = format!(
-                        "{reason}; the run turns with {reached:.3e} only where the scene allows {allowed:.3e}, so nothing was measured"
-                    );
-                }
-                TermDecision {
-                    group,
-                    kept,
-                    tier: trial.tier,
-                    bound: if bound.is_finite() { bound } else { 0.0 },
-                    limit,
-                    reason,
-                }
-            }
-            None => TermDecision {
-                group,
-                kept,
-                tier: 0,
-                bound: 0.0,
-                limit: 0.0,
-                reason: "nothing says that it may be dropped".to_owned(),
-            },
+        let mut decided = match basis {
+            Some(trial) => decision(group, kept, trial, scene, rotation),
+            None => undecided(kept, "nothing shows that it may be dropped"),
+        };
+        if let Some((reached, allowed)) = short_of.filter(|_| kept) {
+            decided.reason = format!(
+                "{}; the run turns with {reached:.3e} only where the scene allows {allowed:.3e}, so nothing was measured",
+                decided.reason
+            );
         }
+        decided
     };
     Group::ALL.into_iter().map(decide).collect()
+}
+
+/// The decision that a trial without `group` leads to.
+fn decision(group: Group, kept: bool, trial: &Trial, scene: &Scene, rotation: &Input) -> TermDecision {
+    let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite());
+    let decisive = errors.map(|errors| errors.decisive(&scene.requirements.tolerance));
+    let how = match trial.tier {
+        2 => "measured over the run",
+        1 => "bound with the norms of the invariants",
+        _ => "bound from I0 and the frequencies",
+    };
+    let reason = match (&decisive, trial.remark.as_str()) {
+        (Some((output, ..)), _) => format!("error of {output}, {how}; rotation from {}", rotation.source),
+        (None, "") => format!("no finite {how}"),
+        (None, remark) => remark.to_owned(),
+    };
+    let (bound, limit) = decisive.map_or((0.0, 0.0), |(_, error, allowed)| (error, allowed * trial.budget));
+    TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
 }
 
 /// The guideline of [WP19] section 8 that a set of groups is nearest to.
