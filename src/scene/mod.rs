@@ -1,6 +1,7 @@
 //! What a body is to do: the scene file, and its simulation.
 
 mod description;
+mod errors;
 mod history;
 mod read;
 mod read_requirements;
@@ -10,6 +11,7 @@ mod simulate;
 mod surroundings;
 
 pub use description::{Axes, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
+pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
 pub use history::History;
 pub use read::read_scene;
 pub use recording::{Drift, Path, Recording};

@@ -1,0 +1,320 @@
+//! How far a motion is from that of a reference: the errors that tolerances of a scene are about.
+
+use super::{Recording, Tolerance};
+use crate::dynamics::EulerParameters;
+use crate::flex_body::FlexBody;
+use faer::MatRef;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Deflections, relative to the radius of gyration, and elastic energies, relative to all energy, that are none: rounding.
+const NO_DEFLECTION: f64 = 1e-14;
+const NO_ENERGY: f64 = 1e-24;
+
+/// Torques, relative to the energy of the motion, that are none: rounding.
+const NO_TORQUE: f64 = 1e-10;
+
+/// Largest errors over time. `None`: the reference has nothing of it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct OutputErrors {
+    /// Angle between the frames, radians.
+    pub attitude: f64,
+    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of any of them. Without
+    /// watched points: of the nodes that move most in some mode along some axis.
+    pub deflection: Option<f64>,
+    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation.
+    pub stress: Option<f64>,
+    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or torque.
+    pub reaction: Option<f64>,
+}
+
+impl OutputErrors {
+    /// The largest ratio of error to tolerance.
+    pub fn worst(&self, tolerance: &Tolerance) -> f64 {
+        let ratio = |error: Option<f64>, allowed: f64| error.map_or(0.0, |error| error / allowed);
+        let ratios = [
+            self.attitude / tolerance.attitude,
+            ratio(self.deflection, tolerance.deflection),
+            ratio(self.stress, tolerance.stress),
+            ratio(self.reaction, tolerance.reaction),
+        ];
+        largest(ratios.iter())
+    }
+
+    /// Whether every error is within its tolerance.
+    pub fn within(&self, tolerance: &Tolerance) -> bool {
+        self.worst(tolerance) <= 1.0
+    }
+}
+
+/// The errors at every instant, as [`OutputErrors`] has the largest of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorHistory {
+    /// Of the attitude.
+    pub attitude: Vec<f64>,
+    /// Of deflections.
+    pub deflection: Option<Vec<f64>>,
+    /// Of the elastic energy.
+    pub stress: Option<Vec<f64>>,
+    /// Of force and torque.
+    pub reaction: Option<Vec<f64>>,
+}
+
+impl ErrorHistory {
+    /// The largest errors.
+    pub fn largest(&self) -> OutputErrors {
+        let of = |history: &Option<Vec<f64>>| history.as_ref().map(|history| largest(history.iter()));
+        OutputErrors {
+            attitude: largest(self.attitude.iter()),
+            deflection: of(&self.deflection),
+            stress: of(&self.stress),
+            reaction: of(&self.reaction),
+        }
+    }
+
+    /// The largest error in the second half of the instants relative to that in the first half, of the output where this is most; about 1
+    /// for errors that stay bounded, 2 and more for a phase that runs away. `None` without an error in the first half.
+    pub fn growth(&self) -> Option<f64> {
+        let of = |history: &Vec<f64>| {
+            let (first, second) = history.split_at(history.len().div_ceil(2));
+            let before = largest(first.iter());
+            (before > 0.0).then(|| largest(second.iter()) / before)
+        };
+        let others = [&self.deflection, &self.stress, &self.reaction];
+        let all = others.into_iter().flatten().chain([&self.attitude]);
+        all.filter_map(of).reduce(f64::max)
+    }
+}
+
+/// The largest of values that are not negative; not a number where one of them is not.
+fn largest<'v>(values: impl Iterator<Item = &'v f64>) -> f64 {
+    values.fold(0.0, |most, &value| if value > most || value.is_nan() { value } else { most })
+}
+
+/// How far apart the deformations of two motions are, at every instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Apart {
+    /// Elastic energy of the difference.
+    pub energy: Vec<f64>,
+    /// Largest difference of the deflections of any node that is looked at.
+    pub deflection: Vec<f64>,
+    /// Largest of their deflections in the reference.
+    pub largest_deflection: f64,
+}
+
+impl ErrorHistory {
+    /// The errors of `candidate`, whose deformation is `apart` from that of `reference`. What the nodes have to say counts where no points
+    /// are watched.
+    ///
+    /// # Panics
+    /// When the instants of the recordings are not the same.
+    pub fn new(reference: &Recording, candidate: &Recording, apart: &Apart) -> Self {
+        assert!(reference.time == candidate.time, "recordings of the same instants");
+        let (_, radius) = reference.size;
+        let largest_of = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let motion = largest_of(&mut reference.balances.iter().map(|b| b.kinetic - b.flight + b.elastic));
+        let relative = |values: Vec<f64>, scale: f64, none: f64| {
+            (scale > none).then(|| values.into_iter().map(|value| value / scale).collect::<Vec<_>>())
+        };
+
+        let states = reference.states.iter().zip(&candidate.states);
+        let attitude = states.map(|(a, b)| angle(&a.attitude, &b.attitude)).collect();
+        let (deflection, scale) = if reference.paths.is_empty() {
+            (apart.deflection.clone(), apart.largest_deflection)
+        } else {
+            let all = reference.paths.iter().flat_map(|path| &path.deflection);
+            let pairs = || reference.paths.iter().zip(&candidate.paths);
+            let at =
+                |i: usize| largest_of(&mut pairs().map(|(a, b)| (a.deflection[i] - b.deflection[i]).norm()));
+            ((0..reference.time.len()).map(at).collect(), largest_of(&mut all.map(|d| d.norm())))
+        };
+        let energy = largest_of(&mut reference.balances.iter().map(|balance| balance.elastic));
+        let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
+        let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
+            let of = |part: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>, none: f64| {
+                let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
+                relative(differences, largest_of(&mut a.iter().map(|a| part(a).norm())), none)
+            };
+            let force = of(|both| both.0, NO_TORQUE * motion / radius);
+            let torque = of(|both| both.1, NO_TORQUE * motion);
+            match (force, torque) {
+                (Some(force), Some(torque)) => {
+                    Some(force.into_iter().zip(torque).map(|(a, b)| a.max(b)).collect())
+                }
+                (force, torque) => force.or(torque),
+            }
+        });
+        Self {
+            attitude,
+            deflection: relative(deflection, scale, NO_DEFLECTION * radius),
+            stress: relative(stress, energy.sqrt(), (NO_ENERGY * motion).sqrt()),
+            reaction,
+        }
+    }
+}
+
+/// The angle between two attitudes.
+fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
+    let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a.0, b.0);
+    let (a, b) = (Vector3::new(a1, a2, a3), Vector3::new(b1, b2, b3));
+    let scalar = a0 * b0 + a.dot(&b);
+    let vector = b * a0 - a * b0 - a.cross(&b);
+    2.0 * vector.norm().atan2(scalar.abs())
+}
+
+/// The motion of a body that others are measured against.
+#[derive(Debug, Clone)]
+pub struct Measure<'r> {
+    body: &'r FlexBody,
+    recording: &'r Recording,
+    /// Nodes that are looked at where no points are watched.
+    nodes: Vec<usize>,
+    rows: Rows,
+    largest_deflection: f64,
+}
+
+impl<'r> Measure<'r> {
+    /// Measures against `recording`, a motion of `body`.
+    ///
+    /// # Panics
+    /// When the recording has another number of modes.
+    pub fn new(body: &'r FlexBody, recording: &'r Recording) -> Self {
+        assert!(recording.states.iter().all(|state| state.q.len() == body.n_modes()), "a motion of the body");
+        let nodes = if recording.paths.is_empty() { liveliest(body) } else { Vec::new() };
+        let rows = Rows::new(body, &nodes);
+        let deflections = recording.states.iter().map(|state| longest(rows.displacements(&state.q)));
+        let largest_deflection = deflections.fold(0.0, f64::max);
+        Self { body, recording, nodes, rows, largest_deflection }
+    }
+
+    /// The body.
+    pub fn body(&self) -> &'r FlexBody {
+        self.body
+    }
+
+    /// Its motion.
+    pub fn recording(&self) -> &'r Recording {
+        self.recording
+    }
+
+    /// Errors of the motion of a body that has the modes `kept` (from 0) of the reference, in this order.
+    ///
+    /// # Panics
+    /// When the reference has no such modes, or the instants are not the same.
+    pub fn of_subset(&self, candidate: &Recording, kept: &[usize]) -> ErrorHistory {
+        let energy = &self.body.invariants().modal_stiffness;
+        let apart = self.apart(candidate, |reference, own| {
+            let mut difference: Vec<f64> = reference.iter().map(|q| -q).collect();
+            kept.iter().zip(own).for_each(|(&mode, q)| difference[mode] += q);
+            let energy = 0.5 * quadratic(energy.as_ref(), &difference);
+            (energy, longest(self.rows.displacements(&difference)))
+        });
+        ErrorHistory::new(self.recording, candidate, &apart)
+    }
+
+    /// Errors of the motion of a body with other modes of the same model.
+    ///
+    /// # Panics
+    /// When the instants are not the same.
+    pub fn of_other(&self, candidate: &Recording, modes: &OtherModes<'_>) -> ErrorHistory {
+        let (energy, rows) = (&self.body.invariants().modal_stiffness, Rows::new(modes.body, &self.nodes));
+        let apart = self.apart(candidate, |reference, own| {
+            let q = DVector::from_column_slice(own);
+            let difference = &modes.map * &q - DVector::from_column_slice(reference);
+            let outside = (&modes.outside * &q).dot(&q).max(0.0);
+            let displacements = rows.displacements(own).zip(self.rows.displacements(reference));
+            let deflection = longest(displacements.map(|(own, reference)| own - reference));
+            (0.5 * (quadratic(energy.as_ref(), difference.as_slice()) + outside), deflection)
+        });
+        ErrorHistory::new(self.recording, candidate, &apart)
+    }
+
+    fn apart(&self, candidate: &Recording, of: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
+        let states = self.recording.states.iter().zip(&candidate.states);
+        let (energy, deflection) = states.map(|(a, b)| of(&a.q, &b.q)).unzip();
+        Apart { energy, deflection, largest_deflection: self.largest_deflection }
+    }
+}
+
+/// Modes of a candidate, seen from those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K Psi_r
+///
+/// ```text
+/// V(Psi_c q_c - Psi_r q_r) = d'L_r d / 2 + q_c'(L_c - G L_r^-1 G') q_c / 2,    d = L_r^-1 G' q_c - q_r
+/// ```
+///
+/// a part within the reference, and one outside of it, without the cancellation of the sum of squares.
+#[derive(Debug, Clone)]
+pub struct OtherModes<'c> {
+    body: &'c FlexBody,
+    /// L_r^-1 G' (nr x nc).
+    map: DMatrix<f64>,
+    /// L_c - G L_r^-1 G' (nc x nc).
+    outside: DMatrix<f64>,
+}
+
+impl<'c> OtherModes<'c> {
+    /// The modes of `candidate` seen from those of `reference`, with `shared` = G (nc x nr); `None` where the bodies are not of one model, or
+    /// the stiffness of the reference is not positive definite.
+    pub fn new(candidate: &'c FlexBody, reference: &FlexBody, shared: MatRef<'_, f64>) -> Option<Self> {
+        let (nc, nr) = (candidate.n_modes(), reference.n_modes());
+        let same = candidate.n_nodes() == reference.n_nodes() && candidate.frame() == reference.frame();
+        if !same || (shared.nrows(), shared.ncols()) != (nc, nr) {
+            return None;
+        }
+        let of = |body: &FlexBody| {
+            let k = &body.invariants().modal_stiffness;
+            DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+        };
+        let transposed = DMatrix::from_fn(nr, nc, |i, j| shared[(j, i)]);
+        let map = of(reference).cholesky()?.solve(&transposed);
+        let outside = of(candidate) - transposed.tr_mul(&map);
+        Some(Self { body: candidate, map, outside })
+    }
+}
+
+/// For every mode and axis the node that moves most along it, ascending, each once.
+fn liveliest(body: &FlexBody) -> Vec<usize> {
+    let shape = &body.modes().shape;
+    let most = |j: usize, axis: usize| {
+        let size = |i: usize| shape[(3 * i + axis, j)].abs();
+        (1..body.n_nodes()).fold(0, |best, i| if size(i) > size(best) { i } else { best })
+    };
+    let all = (0..body.n_modes()).flat_map(|j| (0..body.dimension()).map(move |axis| (j, axis)));
+    let mut nodes: Vec<usize> = all.map(|(j, axis)| most(j, axis)).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// Rows of the modes at some nodes, three per node, each of nf entries.
+#[derive(Debug, Clone)]
+struct Rows(Vec<f64>);
+
+impl Rows {
+    fn new(body: &FlexBody, nodes: &[usize]) -> Self {
+        let rows = nodes.iter().flat_map(|i| 3 * i..3 * i + 3);
+        let row = |row: usize| (0..body.n_modes()).map(move |j| body.modes().shape[(row, j)]);
+        Self(rows.flat_map(row).collect())
+    }
+
+    /// Displacements of the nodes.
+    fn displacements<'s>(&'s self, q: &'s [f64]) -> impl Iterator<Item = Vector3<f64>> + 's {
+        let product = move |row: &[f64]| row.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
+        let of_node = move |rows: &[f64]| {
+            let mut rows = rows.chunks_exact(q.len());
+            Vector3::from_fn(|_, _| rows.next().map_or(0.0, product))
+        };
+        self.0.chunks_exact(3 * q.len()).map(of_node)
+    }
+}
+
+/// The longest of displacements.
+fn longest(displacements: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    displacements.map(|d| d.norm()).fold(0.0, f64::max)
+}
+
+/// x'A x of a matrix that is not negative.
+fn quadratic(a: MatRef<'_, f64>, x: &[f64]) -> f64 {
+    let column =
+        |(j, xj): (usize, &f64)| xj * x.iter().enumerate().map(|(i, xi)| a[(i, j)] * xi).sum::<f64>();
+    x.iter().enumerate().map(column).sum::<f64>().max(0.0)
+}
