@@ -12,8 +12,8 @@ use flexbody::linalg::{gram, multiply};
 use flexbody::model::FeModel;
 use flexbody::progress::SILENT;
 use flexbody::scene::{
-    History, Initial, Measure, OtherModes, OutputErrors, Path, Recording, Run, Scene, Scheme, Spin,
-    Tolerance, simulate,
+    History, Initial, Measure, OtherModes, OutputErrors, Path, Recording, Resolution, Run, Scene, Scheme,
+    Spin, Tolerance, simulate,
 };
 use nalgebra::Vector3;
 use support::flexible::soft_block;
@@ -161,13 +161,17 @@ fn watched_points_and_reactions_count_relative_to_their_largest() {
 }
 
 #[test]
-fn nothing_is_measured_against_nothing() {
+fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let body = soft_block(4);
     let at_rest = Scene { initial: Initial::default(), ..scene(1.0) };
     let recording = motion(&body, &at_rest);
     let other = changed(&recording, |_, state| state.q[0] += 1e-20);
     let errors = Measure::new(&body, &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
-    assert_eq!((errors.deflection, errors.stress, errors.reaction), (None, None, None));
+    let least = Resolution::new(&body, None);
+    let lambda = body.modes().eigenvalue[0];
+    let expected = (0.5 * lambda).sqrt() * 1e-20 / least.root_energy;
+    assert!((errors.stress.expect("modes") / expected - 1.0).abs() < 1e-12);
+    assert!(errors.deflection.expect("nodes") < 1e-12 && errors.reaction.is_none());
 }
 
 #[test]

@@ -6,24 +6,25 @@ use crate::flex_body::FlexBody;
 use faer::MatRef;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Deflections, relative to the radius of gyration, and elastic energies, relative to all energy, that are none: rounding.
-const NO_DEFLECTION: f64 = 1e-14;
-const NO_ENERGY: f64 = 1e-24;
-
 /// Torques, relative to the energy of the motion, that are none: rounding.
 const NO_TORQUE: f64 = 1e-10;
+
+/// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
+const LEAST_REACTION: f64 = 1e-3;
 
 /// Largest errors over time. `None`: the reference has nothing of it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct OutputErrors {
     /// Angle between the frames, radians.
     pub attitude: f64,
-    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of any of them. Without
-    /// watched points: of the nodes that move most in some mode along some axis.
+    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of any of them or to the least
+    /// that counts ([`Resolution`](super::Resolution)). Without watched points: of the nodes that move most in some mode along some axis.
     pub deflection: Option<f64>,
-    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation.
+    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that counts instead of the
+    /// largest where that is less.
     pub stress: Option<f64>,
-    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or torque.
+    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or torque, or to a thousandth of
+    /// w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2.
     pub reaction: Option<f64>,
 }
 
@@ -109,9 +110,10 @@ impl ErrorHistory {
     /// When the instants of the recordings are not the same.
     pub fn new(reference: &Recording, candidate: &Recording, apart: &Apart) -> Self {
         assert!(reference.time == candidate.time, "recordings of the same instants");
-        let (_, radius) = reference.size;
+        let (mass, radius) = reference.size;
         let largest_of = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let motion = largest_of(&mut reference.balances.iter().map(|b| b.kinetic - b.flight + b.elastic));
+        let spin = largest_of(&mut reference.states.iter().map(|state| state.omega.norm()));
         let relative = |values: Vec<f64>, scale: f64, none: f64| {
             (scale > none).then(|| values.into_iter().map(|value| value / scale).collect::<Vec<_>>())
         };
@@ -130,12 +132,17 @@ impl ErrorHistory {
         let energy = largest_of(&mut reference.balances.iter().map(|balance| balance.elastic));
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
         let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
-            let of = |part: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>, none: f64| {
+            let of = |part: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>, lever: f64| {
                 let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
-                relative(differences, largest_of(&mut a.iter().map(|a| part(a).norm())), none)
+                let largest = largest_of(&mut a.iter().map(|a| part(a).norm()));
+                // Forces that are rounding are no forces, however small the least that counts.
+                let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
+                (largest > NO_TORQUE * motion / lever)
+                    .then(|| relative(differences, largest.max(least), 0.0))
+                    .flatten()
             };
-            let force = of(|both| both.0, NO_TORQUE * motion / radius);
-            let torque = of(|both| both.1, NO_TORQUE * motion);
+            let force = of(|both| both.0, radius);
+            let torque = of(|both| both.1, 1.0);
             match (force, torque) {
                 (Some(force), Some(torque)) => {
                     Some(force.into_iter().zip(torque).map(|(a, b)| a.max(b)).collect())
@@ -145,8 +152,8 @@ impl ErrorHistory {
         });
         Self {
             attitude,
-            deflection: relative(deflection, scale, NO_DEFLECTION * radius),
-            stress: relative(stress, energy.sqrt(), (NO_ENERGY * motion).sqrt()),
+            deflection: relative(deflection, scale.max(reference.resolution.deflection), 0.0),
+            stress: relative(stress, energy.sqrt().max(reference.resolution.root_energy), 0.0),
             reaction,
         }
     }

@@ -14,6 +14,6 @@ pub use description::{Axes, Initial, Load, ModeStart, Point, Run, Scene, Scheme,
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
 pub use history::History;
 pub use read::read_scene;
-pub use recording::{Drift, Path, Recording};
+pub use recording::{Drift, Path, Recording, Resolution};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 pub use simulate::simulate;

@@ -13,7 +13,7 @@ pub(super) const TABLES: [(&str, &[&str]); 7] = [
     ("limits", &["deflection", "stress", "mode_stress", "mode"]),
     ("band", &["frequency"]),
     ("damping", &["ratio"]),
-    ("tolerance", &["attitude", "deflection", "stress", "reaction"]),
+    ("tolerance", &["attitude", "deflection", "stress", "reaction", "least_deflection"]),
     ("cost", &["multiplications"]),
 ];
 
@@ -65,7 +65,7 @@ pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requireme
                     target.damping = Some(ratio);
                 }
                 "tolerance" => {
-                    let Tolerance { attitude, deflection, stress, reaction } = Tolerance::default();
+                    let Tolerance { attitude, deflection, stress, reaction, .. } = Tolerance::default();
                     let [a, d, s, r] = [
                         ("attitude", attitude),
                         ("deflection", deflection),
@@ -73,7 +73,14 @@ pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requireme
                         ("reaction", reaction),
                     ]
                     .map(|(key, default)| Some(optional(walk, key)?.unwrap_or(default)));
-                    target.tolerance = Tolerance { attitude: a?, deflection: d?, stress: s?, reaction: r? };
+                    let least_deflection = optional(walk, "least_deflection");
+                    target.tolerance = Tolerance {
+                        attitude: a?,
+                        deflection: d?,
+                        stress: s?,
+                        reaction: r?,
+                        least_deflection: least_deflection?,
+                    };
                 }
                 _ => {
                     let value = table.get("multiplications");

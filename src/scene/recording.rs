@@ -2,7 +2,9 @@
 
 use super::Scheme;
 use crate::dynamics::{Balance, Configuration};
+use crate::flex_body::FlexBody;
 use crate::integration::Work;
+use crate::model::extents;
 use nalgebra::Vector3;
 
 /// The motion of a body over time. Numbers are in the units of the body.
@@ -30,6 +32,38 @@ pub struct Recording {
     pub size: (f64, f64),
     /// Largest deflection of a node when the elastic energy is largest, relative to the largest extent of the body.
     pub deflection: f64,
+    /// What is small enough not to count.
+    pub resolution: Resolution,
+}
+
+/// The least deformation that counts: errors are relative to the largest of the motion, or to this where that is less.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resolution {
+    /// Deflection.
+    pub deflection: f64,
+    /// Root of the elastic energy: that of the mode which takes least of it for this deflection of some node.
+    pub root_energy: f64,
+}
+
+impl Resolution {
+    /// Part of the largest extent of a body that its least deflection is unless said: 10 micrometres per metre.
+    const LEAST: f64 = 1e-5;
+
+    /// For `body`; `least`: the deflection, where it is given.
+    pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
+        let extent = extents(&body.nodes().positions).into_iter().fold(0.0, f64::max);
+        let deflection = least.unwrap_or(Self::LEAST * extent);
+        let (shape, modes) = (&body.modes().shape, &body.modes().eigenvalue);
+        let root_energy = |(j, lambda): (usize, &f64)| {
+            let longest = (0..body.n_nodes())
+                .map(|i| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>())
+                .fold(0.0, f64::max)
+                .sqrt();
+            (0.5 * lambda).sqrt() * deflection / longest
+        };
+        let root_energy = modes.iter().enumerate().map(root_energy).fold(f64::INFINITY, f64::min);
+        Self { deflection, root_energy }
+    }
 }
 
 /// The path of a point.

@@ -106,11 +106,13 @@ pub struct Tolerance {
     pub stress: f64,
     /// Force and torque that a prescribed spin takes, relative to their largest.
     pub reaction: f64,
+    /// Least deflection that counts ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent of the body.
+    pub least_deflection: Option<f64>,
 }
 
 impl Default for Tolerance {
     /// A thousandth of a radian and one per cent: below what material data and damping are known to.
     fn default() -> Self {
-        Self { attitude: 1e-3, deflection: 0.01, stress: 0.01, reaction: 0.01 }
+        Self { attitude: 1e-3, deflection: 0.01, stress: 0.01, reaction: 0.01, least_deflection: None }
     }
 }

@@ -1,7 +1,7 @@
 //! The simulation of a scene.
 
 use super::surroundings::SceneForces;
-use super::{Path, Recording, Scene, Scheme};
+use super::{Path, Recording, Resolution, Scene, Scheme};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{Configuration, EquationsOfMotion, Evaluation, Motion, RotationVector, Surroundings};
 use crate::error::{Error, Result};
@@ -69,6 +69,7 @@ pub fn simulate(
         work: method.work(),
         size: motion.size(),
         deflection: 0.0,
+        resolution: Resolution::new(body, scene.requirements.tolerance.least_deflection),
     };
     let undeformed = Evaluation::new(&equations);
     let rest: Vec<Vector3<f64>> = points.iter().map(|point| point.place(&undeformed)).collect();
