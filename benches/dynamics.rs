@@ -79,6 +79,7 @@ fn main() {
                 ("all terms", Terms::ALL),
                 ("without W3", Terms { w3: false, ..Terms::ALL }),
                 ("W1 only", Terms { w1: true, ..Terms::NONE }),
+                ("I0 only", Terms::NONE),
             ] {
                 let equations = EquationsOfMotion::new(&body, terms);
                 let mut evaluation = Evaluation::new(&equations);

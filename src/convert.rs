@@ -241,6 +241,7 @@ pub fn convert_resumed(
         geometric_stiffness,
         lumped,
         certificate,
+        terms: Vec::new(),
     })?;
     Ok(Conversion {
         body,

@@ -5,7 +5,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{relative_residual, residual_scale, rounding_residual};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
-use crate::invariants::{IdentityCheck, Invariants, condense_certified, primary_differences};
+use crate::invariants::{DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences};
 use crate::linalg::{SymmetricMatrix, gram};
 use crate::model::{Damping, FeModel, GeometricStiffness, UnitLoad};
 use faer::Mat;
@@ -132,12 +132,11 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         let (stored, shapes) = (&body.nodes().positions, modes.displacements.as_ref());
         let own = condense_certified(mass, stored, shapes, model.stiffness(), &frame.axes);
         let excess =
-            primary_differences(body.invariants(), &own.invariants).iter().zip(&guarantee.digits).fold(
-                0.0f64,
-                |m, ((_, d), digits)| {
-                    if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * 10f64.powf(*digits)) }
-                },
-            );
+            primary_differences(body.invariants(), &own.invariants).iter().fold(0.0f64, |m, (name, d)| {
+                let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| *known == name);
+                let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
+                if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * scale) }
+            });
         // Stored modes are rounded: their quotients follow the eigenvalues to what any other check of modes allows.
         let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
         let modal_mass = own.invariants.modal_mass();

@@ -258,7 +258,7 @@ fn converted(name: &str, modes: usize) -> Conversion {
 fn signed(conversion: &Conversion, like: &GeneralBody) -> GeneralBody {
     let own = conversion.body.invariants();
     let nf = own.n_modes();
-    let w2 = own.w2();
+    let w2 = own.w2().expect("held");
     // Modes 0 and j: the sign of their largest product.
     let sign = |j: usize| {
         let products = (0..9).map(|ab| (ab / 3 * nf, ab % 3 * nf + j));

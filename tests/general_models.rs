@@ -269,7 +269,7 @@ fn certified_says_what_it_does_not_cover() {
 
 /// f'K^+ f of the load of a constant spin, from the invariants alone: sum_j (w' W1_j w / 2)^2 / lambda_j.
 fn spin_compliance(body: &FlexBody, spin: Vector3<f64>) -> f64 {
-    let (w1, nf) = (body.invariants().w1(), body.n_modes());
+    let (w1, nf) = (body.invariants().w1().expect("held"), body.n_modes());
     let load = |j: usize| {
         let block = Matrix3::from_fn(|k, b| w1[(k, b * nf + j)]);
         0.5 * spin.dot(&(block * spin))

@@ -331,7 +331,7 @@ fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_w
     let rates: Vec<f64> = (0..3).map(|k| invariants.softening_rate(k).expect("moves")).collect();
     for (axis, rate) in rates.iter().enumerate() {
         let nf = done.body.n_modes();
-        let block = invariants.w2();
+        let block = invariants.w2().expect("held");
         let taken = Mat::from_fn(nf, nf, |p, q| block[(axis * nf + p, axis * nf + q)]);
         for (part, lost) in [(0.0, false), (9.99, false), (10.01, true)] {
             let k = &invariants.modal_stiffness - &taken * Scale((part * rate).powi(2));

@@ -70,6 +70,7 @@ fn kinetic_energy_equals_that_of_the_nodes() {
         let invariants = body.invariants();
         let nf = invariants.n_modes();
         let (derived, i0) = (invariants.derived(), invariants.inertia());
+        let (w1, w3) = (derived.w1.expect("held"), derived.w3.expect("held"));
         let shape = &body.modes().shape;
         let x = &body.nodes().positions;
         let mut random = Random(11);
@@ -100,8 +101,8 @@ fn kinetic_energy_equals_that_of_the_nodes() {
             let s = [0, 1].map(|k| invariants.first_moment[k] + modal(&|j| invariants.c1[(k, j)], &q));
             let squared =
                 |a: &[f64], b: &[f64]| -> f64 { modal(&|i| modal(&|j| derived.modal_mass[(i, j)], b), a) };
-            let inertia = i0[(2, 2)] + modal(&|j| derived.w1[(2, 2 * nf + j)], &q) + squared(&q, &q);
-            let coupling = modal(&|j| derived.c2[(2, j)] + modal(&|i| derived.w3[(2 * nf + i, j)], &q), &qd);
+            let inertia = i0[(2, 2)] + modal(&|j| w1[(2, 2 * nf + j)], &q) + squared(&q, &q);
+            let coupling = modal(&|j| derived.c2[(2, j)] + modal(&|i| w3[(2 * nf + i, j)], &q), &qd);
             let drift = [0, 1].map(|k| modal(&|j| invariants.c1[(k, j)], &qd));
             let reduced = 0.5 * invariants.mass * v.norm_squared()
                 + 0.5 * inertia * spin * spin

@@ -84,7 +84,7 @@ pub struct EquationsOfMotion {
 }
 
 impl EquationsOfMotion {
-    /// The equations of `body` with the given terms.
+    /// The equations of `body` with those of the given terms that it holds.
     ///
     /// Taken as they are meant: m_ff that is the identity to 1e-12 is the identity; K_ff and D whose entries beside the diagonal are
     /// below 1e-10 of sqrt(a_ii a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
@@ -96,7 +96,9 @@ impl EquationsOfMotion {
         let turns = |a: usize| axes.contains(&a);
         let moves = |k: usize| rigid.contains(&k);
 
-        let (w0, w1, c2) = (invariants.w0(), invariants.w1(), invariants.c2());
+        let terms = terms.held(invariants.groups);
+        let (w0, c2) = (invariants.w0(), invariants.c2());
+        let w1 = invariants.w1().filter(|_| terms.w1);
         let of_row = |row: usize, j: usize| match row {
             row if row < W1 => {
                 let (k, b) = (row / 3, row % 3);
@@ -104,8 +106,8 @@ impl EquationsOfMotion {
             }
             row if row < C1 => {
                 let (a, b) = PAIRS[row - W1];
-                let mean = 0.5 * (w1[(a, b * nf + j)] + w1[(b, a * nf + j)]);
-                if terms.w1 && turns(a) && turns(b) { mean } else { 0.0 }
+                let mean = |w1: &Mat<f64>| 0.5 * (w1[(a, b * nf + j)] + w1[(b, a * nf + j)]);
+                w1.as_ref().filter(|_| turns(a) && turns(b)).map_or(0.0, mean)
             }
             row if row < C2 => f64::from(moves(row - C1)) * invariants.c1[(row - C1, j)],
             row => f64::from(turns(row - C2)) * c2[(row - C2, j)],
@@ -119,7 +121,7 @@ impl EquationsOfMotion {
             Panels::stacked(&(0..count).map(block).collect::<Vec<_>>())
         };
         let spin = geometric(LoadKind::Spin);
-        let w2 = terms.w2.then(|| invariants.w2());
+        let w2 = invariants.w2().filter(|_| terms.w2);
         let w2 = (w2.is_some() || spin.is_some()).then(|| {
             stacked(pairs.len(), &|at, i, j| {
                 let (a, b) = pairs[at];
@@ -134,7 +136,7 @@ impl EquationsOfMotion {
         });
         let turned = geometric(LoadKind::AngularAcceleration);
         let (w3, w3_skew) = if terms.w3 || turned.is_some() {
-            let w3 = terms.w3.then(|| invariants.w3());
+            let w3 = invariants.w3().filter(|_| terms.w3);
             // (W3_a)_ij and (W3_a)_ji.
             let entries = |at: usize, i: usize, j: usize| {
                 let a = axes[at];

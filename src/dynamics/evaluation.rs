@@ -257,8 +257,10 @@ impl<'a> Evaluation<'a> {
                 add_scaled(carried[k], product, modal);
             }
         }
-        for (pair, &(a, b)) in PAIRS.iter().enumerate() {
-            add_scaled(-0.5 * spin_product(&w, (a, b)), body.row(W1 + pair), modal);
+        if body.terms().w1 {
+            for (pair, &(a, b)) in PAIRS.iter().enumerate() {
+                add_scaled(-0.5 * spin_product(&w, (a, b)), body.row(W1 + pair), modal);
+            }
         }
         if body.w2.is_some() {
             for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {

@@ -2,6 +2,7 @@
 //! Forces, momenta, energies, accelerations and Jacobians, without an allocation per evaluation; and its motion as a system to integrate.
 
 mod accelerations;
+mod cost;
 mod equations;
 mod evaluation;
 mod geometric;

@@ -1,5 +1,7 @@
 //! Which terms of the kinetic energy an equation of motion has.
 
+use crate::flex_body::Groups;
+
 /// Terms by group of the kinetic energy (theory section 7).
 ///
 /// A group is there or not in every place where it acts: mass matrix, inertia forces, momenta and energy. What is left are the equations
@@ -23,6 +25,11 @@ impl Terms {
     pub const ALL: Self = Self { w1: true, w2: true, w3: true, geometric_stiffness: true };
     /// Nothing that depends on the deformation but the first moment c + C1 q.
     pub const NONE: Self = Self { w1: false, w2: false, w3: false, geometric_stiffness: false };
+
+    /// Those of a body that holds `groups`.
+    pub fn held(self, groups: Groups) -> Self {
+        Self { w1: self.w1 && groups.w1, w2: self.w2 && groups.w2, w3: self.w3 && groups.w3, ..self }
+    }
 }
 
 impl Default for Terms {

@@ -1,7 +1,9 @@
 //! The validated body.
 
 use super::validate::problems;
-use super::{Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source};
+use super::{
+    Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source, TermDecision,
+};
 use crate::error::{Error, Result};
 use crate::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
 use crate::model::{GeometricStiffness, Nodes};
@@ -23,6 +25,7 @@ impl FlexBody {
     /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty;
     /// loads of geometric stiffness are those of the dimension, each once; interfaces name existing nodes, those declared free have no
     /// reference point; matrices in interface coordinates are symmetric;
+    /// a group of the kinetic energy is dropped by a decision of [`Parts::terms`] or held, here and by the lumped comparators;
     /// no text contains a NUL character (no file could hold it).
     ///
     /// # Errors
@@ -116,6 +119,16 @@ impl FlexBody {
     /// K and M in interface coordinates, of a basis that has them.
     pub fn coordinates(&self) -> Option<&InterfaceCoordinates> {
         self.parts.coordinates.as_ref()
+    }
+
+    /// What was decided about the groups of the kinetic energy; empty where nobody asked.
+    pub fn terms(&self) -> &[TermDecision] {
+        &self.parts.terms
+    }
+
+    /// The groups of the kinetic energy that the body holds.
+    pub fn groups(&self) -> Groups {
+        self.parts.invariants.groups
     }
 
     /// Every identity that the file itself can be held to (theory section 10), those of the interface coordinates included; `frame` is what the

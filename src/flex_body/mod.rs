@@ -4,12 +4,15 @@ mod body;
 mod interface;
 mod model_rows;
 mod parts;
+mod reduced;
+mod terms;
 mod validate;
 
-pub use crate::invariants::Frame;
+pub use crate::invariants::{Frame, Group, Groups};
 pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 pub use body::FlexBody;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
 };
+pub use terms::TermDecision;

@@ -1,6 +1,6 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use super::{Interface, InterfaceCoordinates};
+use super::{Interface, InterfaceCoordinates, TermDecision};
 use crate::invariants::{DIGITS, Frame, Invariants};
 use crate::model::{BodyNumber, GeometricStiffness, Nodes};
 use crate::provenance::SourceFile;
@@ -160,4 +160,6 @@ pub struct Parts {
     pub interfaces: Vec<Interface>,
     /// K and M in interface coordinates, of a basis that has them (Craig-Bampton).
     pub coordinates: Option<InterfaceCoordinates>,
+    /// What was decided about the groups of the kinetic energy; empty where nobody asked, and then all are held.
+    pub terms: Vec<TermDecision>,
 }

@@ -1,6 +1,6 @@
 //! What must hold for the parts of a flexible body, checked once, all violations collected.
 
-use super::{MassStructure, Modes, Parts};
+use super::{Group, Groups, MassStructure, Modes, Parts};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::invariants::{DIGITS, Invariants};
 use crate::model::{Coupling, UnitLoad};
@@ -42,6 +42,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     let c = &parts.certificate;
     check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
     check.guarantee(parts, nf);
+    check.terms(parts);
     check.interfaces(parts, n);
     check.coordinates(parts, nf);
     check.text("source.name", &parts.source.name);
@@ -314,6 +315,52 @@ impl Check {
             if !(0.0..=16.0).contains(&digits) {
                 self.add(format!("guaranteed digits of `{name}` are {digits:e}, expected 0 to 16"));
             }
+        }
+    }
+
+    /// A group is dropped by a decision, or held.
+    fn terms(&mut self, parts: &Parts) {
+        let held = parts.invariants.groups;
+        for (at, term) in parts.terms.iter().enumerate() {
+            let name = term.group.name();
+            self.text(&format!("terms.{name}.reason"), &term.reason);
+            if parts.terms[..at].iter().any(|earlier| earlier.group == term.group) {
+                self.add(format!("`terms` has two decisions about {name}"));
+            }
+            if term.kept && !held.has(term.group) {
+                self.add(format!("`terms` keeps {name}, but `invariants` does not hold it"));
+            }
+            for (what, value) in [("bound", term.bound), ("limit", term.limit)] {
+                if value.is_nan() || value < 0.0 {
+                    self.add(format!(
+                        "`terms.{name}.{what}` is {value:e}, expected a number that is not negative"
+                    ));
+                }
+            }
+        }
+        let dropped = |group: Group| parts.terms.iter().any(|term| term.group == group && !term.kept);
+        for group in Group::ALL {
+            let name = group.name();
+            match (held.has(group), dropped(group)) {
+                (true, true) => self.add(format!("`terms` drops {name}, but `invariants` holds it")),
+                (false, false) => self
+                    .add(format!("`invariants` does not hold {name}, but no decision of `terms` drops it")),
+                _ => {}
+            }
+        }
+        for lumped in parts.lumped.iter().filter(|lumped| lumped.invariants.groups != held) {
+            self.add(format!(
+                "lumped `{}` holds other groups of the kinetic energy than `invariants`",
+                lumped.scheme
+            ));
+        }
+        // What follows takes the shapes of all arrays for granted.
+        if !self.problems.is_empty() || held == Groups::ALL {
+            return;
+        }
+        let all = std::iter::once(&parts.invariants).chain(parts.lumped.iter().map(|l| &l.invariants));
+        if !all.into_iter().all(Invariants::holds_its_groups_only) {
+            self.add("`invariants` has entries of groups that it does not hold".to_owned());
         }
     }
 

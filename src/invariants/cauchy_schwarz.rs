@@ -102,6 +102,8 @@ pub(super) fn scaled(difference: f64, bound: f64) -> f64 {
 /// `modal_stiffness` relative to sqrt(K_pp K_qq); `W0`, `W3` and `modal_mass` where M does not commute with rotations. NaN when a
 /// number is. J and Ibar of such a body have the bounds of I0, and of W1 and C2, which they stand for.
 ///
+/// What both hold is compared: C2 in place of Ibar where one does not hold W1, W3 and m_ff in place of S where one does not hold W2.
+///
 /// Two independent evaluations agree to 1e-12 in all of them.
 ///
 /// # Panics
@@ -110,6 +112,7 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
     let nf = a.n_modes();
     assert_eq!(nf, b.n_modes(), "modes of the two bodies");
     let bound = CauchySchwarz::of(a);
+    let groups = a.groups.and(b.groups);
     let axes = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
     let modes = || (0..nf).flat_map(|p| (0..nf).map(move |q| (p, q)));
     let first = |k: usize| scaled(a.first_moment[k] - b.first_moment[k], bound.first_moment(k));
@@ -138,20 +141,29 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
         let all = (0..x.nrows()).flat_map(|i| (0..x.ncols()).map(move |j| (i, j)));
         all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))).fold(0.0, worst)
     };
+    let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
+    let w3 = || Some(("W3", entries(a.w3()?, b.w3()?, &by_modes)));
+    let modal_mass = || ("modal_mass", entries(a.modal_mass(), b.modal_mass(), &by_modes));
     let mut table = vec![
         ("mass", scaled(a.mass - b.mass, a.mass.abs())),
         ("first_moment", (0..3).map(first).fold(0.0, worst)),
         ("second_moment", axes().map(second).fold(0.0, worst)),
         ("C1", (0..3).flat_map(|k| (0..nf).map(move |p| c1(k, p))).fold(0.0, worst)),
-        ("Ibar", axes().flat_map(|kl| (0..nf).map(move |p| ibar(kl, p))).fold(0.0, worst)),
-        ("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, worst)),
-        ("modal_stiffness", modes().map(k_ff).fold(0.0, worst)),
+        match groups.w1 {
+            true => ("Ibar", axes().flat_map(|kl| (0..nf).map(move |p| ibar(kl, p))).fold(0.0, worst)),
+            false => ("C2", entries(a.c2(), b.c2(), &|k, p| bound.c2(k, p))),
+        },
     ];
+    if groups.w2 {
+        table.push(("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, worst)));
+    }
+    table.push(("modal_stiffness", modes().map(k_ff).fold(0.0, worst)));
     if general {
-        let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
         table.push(("W0", entries(a.w0(), b.w0(), &|_, column| bound.c1(column % nf))));
-        table.push(("W3", entries(a.w3(), b.w3(), &by_modes)));
-        table.push(("modal_mass", entries(a.modal_mass(), b.modal_mass(), &by_modes)));
+    }
+    if general || !groups.w2 {
+        table.extend(w3());
+        table.push(modal_mass());
     }
     table.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }

@@ -6,7 +6,7 @@
 //! summed in order. The result is therefore the same to the last bit at any number of threads, and no sum is longer than a
 //! chunk, the chunks of a group or the groups: rounding does not grow with the model.
 
-use super::Invariants;
+use super::{Groups, Invariants};
 use crate::linalg::SymmetricMatrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -140,6 +140,7 @@ pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Inv
         s: array(|k| array(|l| Mat::from_fn(nf, nf, |p, q| gram[(psi(k, p), psi(l, q))]))),
         modal_stiffness,
         general: None,
+        groups: Groups::ALL,
     }
 }
 

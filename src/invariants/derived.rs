@@ -16,12 +16,12 @@ pub struct Derived {
     pub inertia: Matrix3<f64>,
     /// C2 (3 x nf).
     pub c2: Mat<f64>,
-    /// W1 (3 x 3nf).
-    pub w1: Mat<f64>,
+    /// W1 (3 x 3nf); `None` where the body does not hold it, as W2 and W3.
+    pub w1: Option<Mat<f64>>,
     /// W2 (3nf x 3nf).
-    pub w2: Mat<f64>,
+    pub w2: Option<Mat<f64>>,
     /// W3 (3nf x nf).
-    pub w3: Mat<f64>,
+    pub w3: Option<Mat<f64>>,
     /// m_ff (nf x nf).
     pub modal_mass: Mat<f64>,
 }
@@ -54,10 +54,11 @@ impl Invariants {
         })
     }
 
-    /// W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk).
-    pub fn w1(&self) -> Mat<f64> {
+    /// W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk). `None` where the body does not
+    /// hold it: dropped is not zero.
+    pub fn w1(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
-        Mat::from_fn(3, 3 * nf, |k, column| {
+        let w1 = |k: usize, column: usize| {
             let (l, p) = (column / nf, column % nf);
             if k == l {
                 let (_, a, b) = CYCLIC[k];
@@ -65,13 +66,14 @@ impl Invariants {
             } else {
                 -(self.ibar[k][l][p] + self.ibar[l][k][p])
             }
-        })
+        };
+        self.groups.w1.then(|| Mat::from_fn(3, 3 * nf, w1))
     }
 
-    /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk.
-    pub fn w2(&self) -> Mat<f64> {
+    /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk. `None` where the body does not hold it.
+    pub fn w2(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
-        Mat::from_fn(3 * nf, 3 * nf, |row, column| {
+        let w2 = |row: usize, column: usize| {
             let (k, p, l, q) = (row / nf, row % nf, column / nf, column % nf);
             if k == l {
                 let (_, a, b) = CYCLIC[k];
@@ -79,7 +81,8 @@ impl Invariants {
             } else {
                 -self.s[l][k][(p, q)]
             }
-        })
+        };
+        self.groups.w2.then(|| Mat::from_fn(3 * nf, 3 * nf, w2))
     }
 
     /// W0 (3 x 3nf): how modes move the coupling of translation and rotation, block b column j = -C1_j~ e_b or, for a mass that
@@ -102,15 +105,16 @@ impl Invariants {
     }
 
     /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew; B_i' M Psi for a mass that does not commute with
-    /// rotations.
-    pub fn w3(&self) -> Mat<f64> {
-        if let Some(general) = &self.general {
-            return general.w3.clone();
-        }
+    /// rotations. `None` where the body does not hold it.
+    pub fn w3(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
-        Mat::from_fn(3 * nf, nf, |row, q| {
+        let of_s = |row: usize, q: usize| {
             let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
             self.s[l][m][(p, q)] - self.s[m][l][(p, q)]
+        };
+        self.groups.w3.then(|| match &self.general {
+            Some(general) => general.w3.clone(),
+            None => Mat::from_fn(3 * nf, nf, of_s),
         })
     }
 

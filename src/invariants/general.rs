@@ -5,7 +5,7 @@
 //! displacements and zeros at the rotations in B_j, the body-frame velocities of all rows are (Phi_t, B_x + sum_j q_j B_j, Psi)
 //! times (V, omega, qd).
 
-use super::{GeneralTerms, Invariants};
+use super::{GeneralTerms, Groups, Invariants};
 use crate::linalg::{SymmetricMatrix, gram, multiply};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -186,6 +186,7 @@ impl Products {
                 modal_mass: self.modal_mass(),
                 plane: false,
             }),
+            groups: Groups::ALL,
         }
     }
 
@@ -217,6 +218,7 @@ impl Products {
                 modal_mass: self.modal_mass(),
                 plane: true,
             }),
+            groups: Groups::ALL,
         }
     }
 

@@ -87,14 +87,14 @@ pub(super) fn c2_ratio(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     over(3, body.n_modes(), |k, p| scaled(c2[(k, p)], bound.c2(k, p)))
 }
 
-pub(super) fn w3_symmetric_part(body: &Invariants, bound: &CauchySchwarz) -> f64 {
-    let (w3, nf) = (body.w3(), body.n_modes());
+pub(super) fn w3_symmetric_part(w3: &Mat<f64>, bound: &CauchySchwarz) -> f64 {
+    let nf = w3.ncols();
     over(3, 1, |k, _| over(nf, nf, |p, q| scaled(w3[(k * nf + p, q)] + w3[(k * nf + q, p)], bound.s(p, q))))
 }
 
-pub(super) fn w3_excess(body: &Invariants) -> f64 {
-    let (w3, nf) = (body.w3(), body.n_modes());
-    let scale = spectral_norm(body.modal_mass().as_ref());
+pub(super) fn w3_excess(w3: &Mat<f64>, modal_mass: &Mat<f64>) -> f64 {
+    let nf = w3.ncols();
+    let scale = spectral_norm(modal_mass.as_ref());
     over(3, 1, |k, _| scaled(spectral_norm(w3.as_ref().subrows(k * nf, nf)), scale) - 1.0)
 }
 
@@ -136,9 +136,14 @@ pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> 
 }
 
 /// Gram matrix of [Phi_t, B, Psi], the columns in units of their modes: kinetic energy is never negative, whatever the modes do.
-pub(super) fn velocity_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> f64 {
+pub(super) fn velocity_gram_negative(
+    body: &Invariants,
+    w2: &Mat<f64>,
+    w3: &Mat<f64>,
+    bound: &CauchySchwarz,
+) -> f64 {
     let nf = body.n_modes();
-    let (w0, w2, w3, modal_mass) = (body.w0(), body.w2(), body.w3(), body.modal_mass());
+    let (w0, modal_mass) = (body.w0(), body.modal_mass());
     // Not of its own size: a rotation about the direction in which a mode moves all nodes has none.
     let size = |i: usize| match i {
         0..3 => body.mass.sqrt(),

@@ -1,5 +1,6 @@
 //! The primary inertia data of a flexible body and the invariants that are linear in them.
 
+use super::Groups;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -17,14 +18,16 @@ pub struct Invariants {
     pub second_moment: Matrix3<f64>,
     /// C1 (3 x nf) = 1' Ms Psi_k.
     pub c1: Mat<f64>,
-    /// `Ibar[k][l]` (nf) = x_k' Ms Psi_l.
+    /// `Ibar[k][l]` (nf) = x_k' Ms Psi_l. Antisymmetric, no more than what gives C2, where W1 is not held.
     pub ibar: [[Vec<f64>; 3]; 3],
-    /// `S[k][l]` (nf x nf) = Psi_k' Ms Psi_l.
+    /// `S[k][l]` (nf x nf) = Psi_k' Ms Psi_l. No more than what gives m_ff and, where it is held, W3, where W2 is not held.
     pub s: [[Mat<f64>; 3]; 3],
     /// K_ff (nf x nf) = Psi' K Psi.
     pub modal_stiffness: Mat<f64>,
     /// What S and C1 do not determine when M does not commute with rotations.
     pub general: Option<GeneralTerms>,
+    /// The groups of the kinetic energy that are held; the arrays know nothing of others ([`Invariants::with_groups`]).
+    pub groups: Groups,
 }
 
 /// Terms of a mass matrix that does not commute with rotations (theory section 6), with Phi_t the unit translations and the
@@ -36,7 +39,7 @@ pub struct Invariants {
 pub struct GeneralTerms {
     /// W0 (3 x 3nf): Phi_t' M B_j, column b nf + j for axis b. -C1_j~ when M commutes with rotations.
     pub w0: Mat<f64>,
-    /// W3 (3nf x nf): B_i' M Psi, row b nf + i for axis b.
+    /// W3 (3nf x nf): B_i' M Psi, row b nf + i for axis b; zero where it is not held.
     pub w3: Mat<f64>,
     /// m_ff (nf x nf) = Psi' M Psi.
     pub modal_mass: Mat<f64>,

@@ -27,12 +27,12 @@ impl Invariants {
     /// The spin rate about frame axis `axis` at which the centrifugal term w^2 (W2)_kk takes 1 % of the stiffness K_ff of the
     /// motion that it softens most: w = sqrt(0.01 / mu), mu the largest eigenvalue of (W2)_kk v = mu K_ff v. The
     /// stiffness of that motion is lost at ten times this rate unless geometric stiffness makes up for it. `None` when nothing
-    /// moves across the axis, or when K_ff is not positive definite. Unit: 1/time.
+    /// moves across the axis, when K_ff is not positive definite, or when the body does not hold W2. Unit: 1/time.
     ///
     /// # Panics
     /// When `axis` is not below 3.
     pub fn softening_rate(&self, axis: usize) -> Option<f64> {
-        let (nf, w2) = (self.n_modes(), self.w2());
+        let (nf, w2) = (self.n_modes(), self.w2()?);
         let block = w2.as_ref().submatrix(axis * nf, axis * nf, nf, nf);
         let mu = relative_norm(block, self.modal_stiffness.as_ref())?;
         (mu > 0.0).then(|| (PART / mu).sqrt())

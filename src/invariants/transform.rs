@@ -36,7 +36,8 @@ impl Invariants {
                 }
             }
         }
-        shifted
+        // Of W1, C1 and the shift would make some: it is not held about the new origin either.
+        shifted.with_groups(self.groups)
     }
 
     /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same origin.
@@ -73,9 +74,10 @@ impl Invariants {
                 modal_mass: general.modal_mass.clone(),
                 plane: general.plane,
             }),
+            groups: self.groups,
         };
         symmetrise(&mut rotated.s);
-        rotated
+        rotated.with_groups(self.groups)
     }
 
     /// The same body in the basis Psi' = Psi T, with `t` (nf x nf'): S' = T' S T, Ibar' = Ibar T, C1' = C1 T,
@@ -113,8 +115,9 @@ impl Invariants {
                     plane: general.plane,
                 }
             }),
+            groups: self.groups,
         };
         symmetrise(&mut changed.s);
-        changed
+        changed.with_groups(self.groups)
     }
 }

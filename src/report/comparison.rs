@@ -6,7 +6,7 @@ use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com}
 use super::numbers::{plain, significant};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
-use crate::flex_body::FlexBody;
+use crate::flex_body::{FlexBody, Group};
 use crate::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -95,6 +95,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         Some(order) => comparison.mode_by_mode(&pair, &order, tolerances),
         None => comparison.norms_only(&pair, tolerances.invariants),
     }
+    comparison.say_what_is_dropped(a, b);
     if a.units().stated != b.units().stated {
         comparison
             .notes
@@ -233,6 +234,19 @@ impl BodyComparison {
         });
     }
 
+    /// A group of the kinetic energy that one body lacks is not compared, and not taken for zero.
+    fn say_what_is_dropped(&mut self, a: &FlexBody, b: &FlexBody) {
+        for group in Group::ALL {
+            let whose = match (a.groups().has(group), b.groups().has(group)) {
+                (true, true) => continue,
+                (false, true) => "the first body",
+                (true, false) => "the second body",
+                (false, false) => "both bodies",
+            };
+            self.notes.push(format!("{} was dropped from {whose}: it is not compared", group.name()));
+        }
+    }
+
     /// Mass, centre of mass, inertia about it, frequencies.
     fn rigid(&mut self, a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) {
         let (ia, ib) = (a.invariants(), b.invariants());
@@ -341,19 +355,28 @@ impl BodyComparison {
             }
         }
         self.row("norms of C1", "over groups of modes / sqrt(m) |psi|", c1, tolerance);
-        self.row("norms of Ibar", "over groups of modes / sqrt(J_kk) |psi|", ibar, tolerance);
-        self.row("norms of S", "over groups of modes / |psi_p| |psi_q|", s, tolerance);
+        let held = exact.groups.and(in_a.groups);
+        if held.w1 {
+            self.row("norms of Ibar", "over groups of modes / sqrt(J_kk) |psi|", ibar, tolerance);
+        }
+        if held.w2 {
+            self.row("norms of S", "over groups of modes / |psi_p| |psi_q|", s, tolerance);
+        }
     }
 }
 
 /// Names of `primary_differences`, of the rows, and what each is relative to.
-const PRIMARY: [(&str, &str, &str); 6] = [
+const PRIMARY: [(&str, &str, &str); 10] = [
     ("first_moment", "first moment", "about the frame origin of the first body / sqrt(m J_kk)"),
     ("second_moment", "second moment", "about the frame origin of the first body / sqrt(J_kk J_ll)"),
     ("C1", "C1", "largest entry / sqrt(m) |psi_p|"),
     ("Ibar", "Ibar (W1, C2)", "largest entry / sqrt(J_kk) |psi_p|"),
+    ("C2", "C2", "largest entry / sqrt(I0_kk) |psi_p|"),
     ("S", "S (W2, W3, m_ff)", "largest entry / |psi_p| |psi_q|"),
     ("modal_stiffness", "modal stiffness", "largest entry / sqrt(K_pp K_qq)"),
+    ("W0", "W0", "largest entry / sqrt(m) |psi_p|"),
+    ("W3", "W3", "largest entry / |psi_p| |psi_q|"),
+    ("modal_mass", "modal mass", "largest entry / |psi_p| |psi_q|"),
 ];
 
 /// A B on one thread: the same bits at any number of threads.

@@ -7,7 +7,7 @@ use crate::flex_body::{
     Certificate, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
     LumpedBody, Modes, Parts, Source, UnitLoad,
 };
-use crate::invariants::{DIGITS, GeneralTerms, Invariants};
+use crate::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use crate::model::{BodyNumber, Coupling, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -51,6 +51,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         certificate,
         interfaces,
         coordinates,
+        terms: Vec::new(),
     })
 }
 
@@ -222,6 +223,7 @@ impl Take<'_> {
             s: [0, 1, 2]
                 .map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| s[(block(k, l) * nf + i) * nf + j]))),
             modal_stiffness: self.matrix(&format!("{place}/modal_stiffness"), nf),
+            groups: Groups::ALL,
         }
     }
 

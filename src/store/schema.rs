@@ -337,15 +337,15 @@ const INVARIANTS: &[Item] = &[
     })
     .added(2),
     dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
-        matrix(v.invariants().w1().as_ref())
+        matrix(v.invariants().w1()?.as_ref())
     })
     .derived("Ibar"),
     dataset("W2", Floats(&[ThreeModes, ThreeModes]), ONE, "W2", "diagonal blocks S_ll + S_mm, block (k,l) = -S_lk; row and column b nf + j", |v| {
-        matrix(v.invariants().w2().as_ref())
+        matrix(v.invariants().w2()?.as_ref())
     })
     .derived("S"),
     dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general`: B_j' M Psi, information of its own", |v| {
-        matrix(v.invariants().w3().as_ref())
+        matrix(v.invariants().w3()?.as_ref())
     })
     .derived("S"),
     dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]", |v| {

@@ -11,7 +11,7 @@ use flexbody::diagnostic::{Code, Diagnostic};
 use flexbody::flex_body::{
     Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
 };
-use flexbody::invariants::{BodyFrame, ERROR_NORMS, Frame, Invariants, choose_frame, condense};
+use flexbody::invariants::{BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, choose_frame, condense};
 use flexbody::linalg::SymmetricMatrix;
 use flexbody::model::{Coupling, Nodes};
 use flexbody::provenance::SourceFile;
@@ -41,6 +41,7 @@ pub fn engine_mount() -> FlexBody {
         }),
         modal_stiffness: Mat::from_fn(nf, nf, |p, q| if p == q { eigenvalue(hz[p]) } else { 0.0 }),
         general: None,
+        groups: Groups::ALL,
     };
     let lumped = |scheme: &str, negative_masses: usize, factor: f64| LumpedBody {
         scheme: scheme.to_owned(),
@@ -121,6 +122,7 @@ pub fn engine_mount() -> FlexBody {
             reference: Some([0.0, 0.0, 0.0]),
         }],
         coordinates: None,
+        terms: Vec::new(),
     })
     .unwrap_or_else(|e| panic!("{e}"))
 }
@@ -261,6 +263,7 @@ pub fn condensed(
         },
         interfaces: vec![],
         coordinates: None,
+        terms: Vec::new(),
     })
     .unwrap_or_else(|e| panic!("{e}"))
 }

@@ -6,7 +6,7 @@ use flexbody::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
     InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Truncation, UnitLoad,
 };
-use flexbody::invariants::{DIGITS, GeneralTerms, Invariants};
+use flexbody::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
 use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
@@ -78,6 +78,7 @@ impl Random {
             s: [(); 3].map(|()| [(); 3].map(|()| self.matrix(nf, nf))),
             modal_stiffness: self.matrix(nf, nf),
             general: None,
+            groups: Groups::ALL,
         }
     }
 
@@ -225,6 +226,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             })
             .collect(),
         coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
+        terms: Vec::new(),
     }
 }
 

@@ -13,7 +13,7 @@ use flexbody::dynamics::{EquationsOfMotion, Evaluation};
 use flexbody::eigen::Wanted;
 use flexbody::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source};
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::{BodyFrame, GeneralTerms, Invariants};
+use flexbody::invariants::{BodyFrame, GeneralTerms, Groups, Invariants};
 use flexbody::model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
 use flexbody::progress::SILENT;
 use flexbody::units::UnitSystem;
@@ -85,6 +85,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
             modal_mass: faer(&reduced.modal_mass),
             plane: false,
         }),
+        groups: Groups::ALL,
     }
 }
 
@@ -136,6 +137,7 @@ pub fn made_of(
         },
         interfaces: Vec::new(),
         coordinates: None,
+        terms: Vec::new(),
     })
     .expect("valid parts")
 }

@@ -3,7 +3,7 @@
 use super::equations::{ReducedBody, State};
 use super::random::Random;
 use faer::Mat;
-use flexbody::invariants::Invariants;
+use flexbody::invariants::{Groups, Invariants};
 use flexbody::linalg::SymmetricMatrix;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -82,6 +82,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
         }),
         modal_stiffness: Mat::zeros(nf, nf),
         general: None,
+        groups: Groups::ALL,
     }
 }
 
@@ -141,9 +142,9 @@ pub fn reduced(body: &Invariants) -> ReducedBody {
         inertia: body.inertia(),
         c1: dense(body.c1.clone()),
         c2: dense(body.c2()),
-        w1: dense(body.w1()),
-        w2: dense(body.w2()),
-        w3: dense(body.w3()),
+        w1: dense(body.w1().expect("held")),
+        w2: dense(body.w2().expect("held")),
+        w3: dense(body.w3().expect("held")),
         modal_mass: dense(body.modal_mass()),
         modal_stiffness: dense(body.modal_stiffness.clone()),
     }

@@ -1,0 +1,157 @@
+//! Groups of the kinetic energy that a body holds (theory section 7).
+
+use super::Invariants;
+use super::derived::CYCLIC;
+use faer::Mat;
+
+/// A group of the kinetic energy: the terms that one invariant makes, in every place where they act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Group {
+    /// Inertia linear in q, and the constant centrifugal load of the modes.
+    W1,
+    /// Inertia quadratic in q, and the centrifugal load that grows with q.
+    W2,
+    /// Coupling of rotation and modes through q, and the Coriolis force among modes.
+    W3,
+}
+
+impl Group {
+    /// Every group, in the order of the documentation.
+    pub const ALL: [Group; 3] = [Self::W1, Self::W2, Self::W3];
+
+    /// Name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::W1 => "W1",
+            Self::W2 => "W2",
+            Self::W3 => "W3",
+        }
+    }
+}
+
+/// Which groups of the kinetic energy there are. What does not depend on q, and W0, always is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Groups {
+    /// [`Group::W1`].
+    pub w1: bool,
+    /// [`Group::W2`].
+    pub w2: bool,
+    /// [`Group::W3`].
+    pub w3: bool,
+}
+
+impl Groups {
+    /// The exact kinetic energy.
+    pub const ALL: Self = Self { w1: true, w2: true, w3: true };
+    /// That of a body whose inertia does not depend on its deformation.
+    pub const NONE: Self = Self { w1: false, w2: false, w3: false };
+
+    /// Whether `group` is there.
+    pub fn has(self, group: Group) -> bool {
+        match group {
+            Group::W1 => self.w1,
+            Group::W2 => self.w2,
+            Group::W3 => self.w3,
+        }
+    }
+
+    /// Those that are in both.
+    pub fn and(self, other: Self) -> Self {
+        Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }
+    }
+
+    /// Those that are not there.
+    pub fn dropped(self) -> impl Iterator<Item = Group> {
+        Group::ALL.into_iter().filter(move |group| !self.has(*group))
+    }
+}
+
+impl Default for Groups {
+    /// [`Groups::ALL`]: nothing is dropped unless asked for.
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
+impl Invariants {
+    /// The same body with those of its groups only that are in `groups`: a kinetic energy of its own, which keeps itself and both
+    /// momenta. m, c, J, C1, C2, W0, m_ff and K_ff stay what they are.
+    pub fn with_groups(mut self, groups: Groups) -> Self {
+        let groups = self.groups.and(groups);
+        let nf = self.n_modes();
+        if !groups.w1 {
+            let c2 = self.c2();
+            for (k, l, m) in CYCLIC {
+                self.ibar[k][k].fill(0.0);
+                self.ibar[l][m] = (0..nf).map(|p| 0.5 * c2[(k, p)]).collect();
+                self.ibar[m][l] = (0..nf).map(|p| -0.5 * c2[(k, p)]).collect();
+            }
+        }
+        if !groups.w2 {
+            let (modal_mass, w3) = (self.modal_mass(), self.w3().filter(|_| groups.w3));
+            let solid = self.general.is_none();
+            self.s = s_without_w2(nf, solid.then_some(&modal_mass), w3.filter(|_| solid).as_ref());
+        }
+        if let Some(general) = self.general.as_mut().filter(|_| !groups.w3) {
+            general.w3.fill(0.0);
+        }
+        self.groups = groups;
+        self
+    }
+
+    /// The same body with some of its modes, in the order of `modes`.
+    ///
+    /// # Panics
+    /// When an index is not below the number of modes.
+    pub fn with_modes(&self, modes: &[usize]) -> Self {
+        let (nf, kept) = (self.n_modes(), modes.len());
+        let square = |a: &Mat<f64>| Mat::from_fn(kept, kept, |i, j| a[(modes[i], modes[j])]);
+        // Index among blocks of all modes of one among blocks of those that are kept.
+        let at = |index: usize| index / kept * nf + modes[index % kept];
+        Self {
+            mass: self.mass,
+            first_moment: self.first_moment,
+            second_moment: self.second_moment,
+            c1: Mat::from_fn(3, kept, |k, j| self.c1[(k, modes[j])]),
+            ibar: self
+                .ibar
+                .each_ref()
+                .map(|row| row.each_ref().map(|entries| modes.iter().map(|&j| entries[j]).collect())),
+            s: self.s.each_ref().map(|row| row.each_ref().map(square)),
+            modal_stiffness: square(&self.modal_stiffness),
+            general: self.general.as_ref().map(|general| super::GeneralTerms {
+                w0: Mat::from_fn(3, 3 * kept, |k, column| general.w0[(k, at(column))]),
+                w3: Mat::from_fn(3 * kept, kept, |row, j| general.w3[(at(row), modes[j])]),
+                modal_mass: square(&general.modal_mass),
+                plane: general.plane,
+            }),
+            groups: self.groups,
+        }
+    }
+
+    /// Whether nothing is there of the groups that are not held.
+    pub(crate) fn holds_its_groups_only(&self) -> bool {
+        *self == self.clone().with_groups(self.groups)
+    }
+}
+
+/// S of a body that lacks W2: what gives m_ff and W3 by their formulas, halves so that sums restore them to the last bit. Zero where
+/// these are information of their own.
+pub(super) fn s_without_w2(
+    nf: usize,
+    modal_mass: Option<&Mat<f64>>,
+    w3: Option<&Mat<f64>>,
+) -> [[Mat<f64>; 3]; 3] {
+    let mut s = [(); 3].map(|()| [(); 3].map(|()| Mat::zeros(nf, nf)));
+    if let Some(m) = modal_mass {
+        s[0][0] = Mat::from_fn(nf, nf, |i, j| 0.5 * m[(i, j)]);
+        s[1][1] = s[0][0].clone();
+    }
+    if let Some(w3) = w3 {
+        for (k, l, m) in CYCLIC {
+            s[l][m] = Mat::from_fn(nf, nf, |i, j| 0.5 * w3[(k * nf + i, j)]);
+            s[m][l] = Mat::from_fn(nf, nf, |i, j| -0.5 * w3[(k * nf + i, j)]);
+        }
+    }
+    s
+}
