@@ -26,5 +26,6 @@ pub mod provenance;
 pub mod report;
 pub mod scene;
 pub mod store;
+pub mod trade;
 pub mod units;
 pub mod verification;

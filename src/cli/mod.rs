@@ -10,6 +10,7 @@ mod output;
 mod places;
 mod resources;
 mod simulate;
+mod trade;
 mod watcher;
 
 pub use arguments::Arguments;

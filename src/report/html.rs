@@ -65,7 +65,7 @@ pub(super) fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a 
 }
 
 /// A table: head cells, then rows whose first cell is their head; cells are markup, `text` columns are left-aligned.
-fn table(html: &mut String, caption: &str, head: &[String], text: &[usize], rows: &[Vec<String>]) {
+pub(super) fn table(html: &mut String, caption: &str, head: &[String], text: &[usize], rows: &[Vec<String>]) {
     let class = |column: usize| if text.contains(&column) { " class=\"text\"" } else { "" };
     html.push_str(&format!("<div class=\"scroll\"><table>\n<caption>{caption}</caption>\n<thead><tr>"));
     for (i, cell) in head.iter().enumerate() {

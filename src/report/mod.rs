@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; trade studies.
 
 mod bar_chart;
 mod clusters;
@@ -15,8 +15,10 @@ mod mass_properties;
 mod numbers;
 mod render;
 mod run_data;
+mod scatter_chart;
 mod simulation;
 mod text;
+mod trade;
 
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
 pub use facts::Facts;
@@ -24,3 +26,4 @@ pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use simulation::{SimulationFacts, simulation_csv};
+pub use trade::{TradeFacts, trade_csv};

@@ -25,6 +25,18 @@ pub struct Scene {
     pub requirements: Requirements,
 }
 
+impl Scene {
+    /// Times at which something is not smooth, ascending.
+    pub fn breaks(&self) -> Vec<f64> {
+        let loads = self.loads.iter().map(|load| &load.history);
+        let histories = loads.chain(self.spin.iter().map(|spin| &spin.rate));
+        let mut times: Vec<f64> = histories.flat_map(History::breaks).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+}
+
 /// How a scene is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
