@@ -158,6 +158,8 @@ codes! {
     SimulationStopped = "FB540", Error, Untrustworthy, "simulation cannot go on", "look at spin, loads and dropped terms: the motion leaves the range of the model";
     LinearRangeLeft = "FB541", Warning, Done, "deflections beyond the range of linear elasticity", "trust the result as a trend only; a body of several flexible parts carries larger deflections";
     SpinSoftens = "FB542", Warning, Done, "spin at which a body without geometric stiffness is too soft", "convert the model with [[geometric_stiffness]] for spin";
+    PhaseDrifts = "FB543", Warning, Done, "errors that grow with time although amplitudes are bounded", "check a run as long as the longest that the model is for: phases run apart with angular velocity times duration";
+    ResonanceDropped = "FB544", Warning, Done, "a dropped mode near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -25,6 +25,7 @@ pub mod progress;
 pub mod provenance;
 pub mod report;
 pub mod scene;
+pub mod selection;
 pub mod store;
 pub mod trade;
 pub mod units;

@@ -60,7 +60,8 @@ fn a_body_that_stays_rigid_needs_one_mode_and_no_group() {
     let scene = tumble(1e-6 * first_rate(&body), 0.5);
     let mut scene = scene;
     // Steps that no vibration shortens: six million periods are not followed.
-    scene.run.scheme = Scheme::Conserving { order: 4, step: scene.run.duration.map(|duration| duration / 60.0) };
+    scene.run.scheme =
+        Scheme::Conserving { order: 4, step: scene.run.duration.map(|duration| duration / 60.0) };
     let found = study(body, &scene);
     let row = recommended(&found);
     assert_eq!(row.candidate.groups, Groups::NONE, "{row:?}");
@@ -95,7 +96,8 @@ fn the_reference_is_no_distance_from_itself_and_everything_else_is_some() {
     let whole = found.rows.iter().filter(|row| row.candidate.modes.len() == 5);
     let of_kind = |kind: Kind| whole.clone().filter(|row| row.candidate.kind() == kind).count();
     assert_eq!([Kind::Modes, Kind::Groups, Kind::Lumped, Kind::Single].map(of_kind), [1, 7, 2, 1]);
-    let single = found.rows.iter().find(|row| row.candidate.storage == Storage::F32).expect("single precision");
+    let single =
+        found.rows.iter().find(|row| row.candidate.storage == Storage::F32).expect("single precision");
     assert!((1e-9..1e-2).contains(&worst(single)), "{}", worst(single));
     // Rows of the front get better as they get dearer.
     let cost = |row: usize| found.rows[row].outcome.as_ref().expect("a motion").multiplications;
@@ -109,7 +111,8 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let body = soft_block(5);
     let scene = tumble(0.1 * first_rate(&body), 1.0);
     let found = study(body.clone(), &scene);
-    let lumped = body.lumped().iter().find(|lumped| lumped.scheme == "diagonal-scaling").expect("a scheme").clone();
+    let lumped =
+        body.lumped().iter().find(|lumped| lumped.scheme == "diagonal-scaling").expect("a scheme").clone();
     let mut parts = body.clone().into_parts();
     parts.invariants = lumped.invariants;
     let other = FlexBody::new(parts).expect("a body");
@@ -117,7 +120,8 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let energy = |q: &mut dyn Iterator<Item = f64>| -> f64 {
         q.zip(&body.modes().eigenvalue).map(|(q, lambda)| 0.5 * lambda * q * q).sum()
     };
-    let apart = a.states.iter().zip(&b.states).map(|(a, b)| energy(&mut a.q.iter().zip(&b.q).map(|(a, b)| a - b)));
+    let apart =
+        a.states.iter().zip(&b.states).map(|(a, b)| energy(&mut a.q.iter().zip(&b.q).map(|(a, b)| a - b)));
     let largest = a.states.iter().map(|a| energy(&mut a.q.iter().copied())).fold(0.0, f64::max);
     let stress = (apart.fold(0.0, f64::max) / largest).sqrt();
     let dots = a.states.iter().zip(&b.states).map(|(a, b)| {
@@ -205,19 +209,20 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
     assert_eq!(found.reference, ReferenceKind::Nodal);
     let stress = |row: &Row| row.outcome.as_ref().expect("a motion").errors.stress.expect("a deformed body");
-    // Eight modes with residual vectors are near the truth, one mode is not, and lacking W1 nothing is.
+    // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not, and lacking W1 nothing is.
     let of = |source: &str, groups: Groups| {
         let row = found.rows.iter().find(|row| {
             row.source == source && row.candidate.groups == groups && row.candidate.kind() != Kind::Lumped
         });
         stress(row.expect("a row"))
     };
-    let (whole, one) = (of(sources[0].name(), Groups::ALL), of("1 free modes", Groups::ALL));
-    assert!(whole > 0.0 && whole < 0.02 && one > 0.2, "{whole} {one}");
+    let (whole, one) = (of(sources[0].name(), Groups::ALL), of("1 free mode", Groups::ALL));
+    assert!(whole > 0.0 && whole < 0.1 && one > 0.9, "{whole} {one}");
     assert!(of(sources[0].name(), Groups::NONE) > 0.5);
     // Residual vectors have what modes lack of the response to spin.
-    let (with, without) = (of("4 free modes, residual vectors", Groups::ALL), of("4 free modes", Groups::ALL));
-    assert!(with < 0.5 * without, "{with} {without}");
+    let (with, without) =
+        (of("4 free modes, residual vectors", Groups::ALL), of("4 free modes", Groups::ALL));
+    assert!(whole < with && with < without && without < one, "{whole} {with} {without} {one}");
     // The same against the largest body: apart by no more than that is from the truth.
     let reduced = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
     for (a, b) in found.rows.iter().zip(&reduced.rows) {
@@ -265,7 +270,11 @@ fn fixtures() -> PathBuf {
 }
 
 fn flexbody(folder: &Path, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flexbody")).args(words).current_dir(folder).output().expect("the program runs")
+    Command::new(env!("CARGO_BIN_EXE_flexbody"))
+        .args(words)
+        .current_dir(folder)
+        .output()
+        .expect("the program runs")
 }
 
 #[test]

@@ -31,6 +31,11 @@ pub enum Command {
     Check(CheckArguments),
     /// Compare two flex-body files, whatever the signs and bases of their modes
     Compare(CompareArguments),
+    /// Decide which terms and modes a body needs in a scene, with the bound or the measurement behind each
+    #[command(
+        after_help = "Example:\n  flexbody select rod.flex.h5 --scene crank.toml --report selection.html"
+    )]
+    Select(SelectArguments),
     /// Simulate a body in a scene: free or loaded, from initial conditions
     #[command(
         after_help = "Example:\n  flexbody simulate rod.flex.h5 --scene tumble.toml -o tumble.h5 --csv tumble.csv --report tumble.html"
@@ -82,6 +87,23 @@ pub enum ReferenceName {
     Full,
     /// The unreduced equations of all nodes
     Nodal,
+}
+
+/// Arguments of `select`.
+#[derive(Debug, Args)]
+pub struct SelectArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// What the body does and how accurate it has to be (see docs/select.md)
+    #[arg(long, value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
 }
 
 /// Arguments of `simulate`.

@@ -9,6 +9,7 @@ mod inspect;
 mod output;
 mod places;
 mod resources;
+mod select;
 mod simulate;
 mod trade;
 mod watcher;

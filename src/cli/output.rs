@@ -1,7 +1,7 @@
 //! Printing of results and diagnostics, and the exit code.
 
 use super::arguments::{Arguments, Command, Printing};
-use super::{check, compare, convert, inspect, simulate, trade};
+use super::{check, compare, convert, inspect, select, simulate, trade};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{ExitCode, Result};
 use crate::report::diagnostics_json;
@@ -46,6 +46,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Inspect(arguments) => (arguments.printing, inspect::run(arguments)),
         Command::Check(arguments) => (arguments.printing, check::run(arguments)),
         Command::Compare(arguments) => (arguments.printing, compare::run(arguments)),
+        Command::Select(arguments) => (arguments.printing, select::run(arguments)),
         Command::Simulate(arguments) => (arguments.printing, simulate::run(arguments)),
         Command::Trade(arguments) => (arguments.printing, trade::run(arguments)),
     };

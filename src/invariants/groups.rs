@@ -55,6 +55,21 @@ impl Groups {
         }
     }
 
+    /// These and `group`.
+    pub fn with(mut self, group: Group) -> Self {
+        match group {
+            Group::W1 => self.w1 = true,
+            Group::W2 => self.w2 = true,
+            Group::W3 => self.w3 = true,
+        }
+        self
+    }
+
+    /// Those that are not in these.
+    pub fn complement(self) -> Self {
+        Self { w1: !self.w1, w2: !self.w2, w3: !self.w3 }
+    }
+
     /// Those that are in both.
     pub fn and(self, other: Self) -> Self {
         Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }

@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; trade studies.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies.
 
 mod bar_chart;
 mod clusters;
@@ -16,6 +16,7 @@ mod numbers;
 mod render;
 mod run_data;
 mod scatter_chart;
+mod selection;
 mod simulation;
 mod text;
 mod trade;
@@ -25,5 +26,6 @@ pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
+pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
 pub use trade::{TradeFacts, trade_csv};

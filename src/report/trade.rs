@@ -65,7 +65,7 @@ struct MeasuredFacts {
     worst: f64,
     growth: Option<f64>,
     multiplications: usize,
-    file_bytes: u64,
+    file_bytes: Option<u64>,
     steps: u64,
     rejected_steps: u64,
     evaluations: u64,
@@ -216,7 +216,7 @@ impl<'a> TradeFacts<'a> {
                 measured.multiplications,
                 short(measured.seconds.evaluation),
                 duration(measured.seconds.integration),
-                bytes(measured.file_bytes),
+                measured.file_bytes.map_or_else(|| "-".to_owned(), bytes),
                 significant(measured.worst, 3),
                 row.in_words()
             );
@@ -338,7 +338,7 @@ impl<'a> TradeFacts<'a> {
                     short(m.seconds.evaluation),
                     duration(m.seconds.integration),
                     m.steps.to_string(),
-                    bytes(m.file_bytes),
+                    m.file_bytes.map_or_else(|| "&ndash;".to_owned(), bytes),
                     m.seconds.preprocessing.map_or_else(|| "&ndash;".to_owned(), duration),
                     significant(m.errors.attitude, 3),
                     optional(m.errors.deflection),
@@ -434,7 +434,9 @@ pub fn trade_csv(trade: &Trade) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
         let errors = m.map(|m| m.errors);
-        let count = |of: fn(&MeasuredFacts) -> u64| m.map_or_else(String::new, |m| of(m).to_string());
+        let count = |of: fn(&MeasuredFacts) -> Option<u64>| {
+            m.and_then(of).map_or_else(String::new, |n| n.to_string())
+        };
         let cells = [
             facts.number.to_string(),
             text(facts.source),
@@ -444,11 +446,11 @@ pub fn trade_csv(trade: &Trade) -> String {
             facts.groups.join(" "),
             text(facts.lumped.unwrap_or_default()),
             if facts.storage == Storage::F32 { "f32" } else { "f64" }.to_owned(),
-            count(|m| m.multiplications as u64),
+            count(|m| Some(m.multiplications as u64)),
             number(m.map(|m| m.seconds.evaluation)),
             number(m.map(|m| m.seconds.integration)),
             number(m.and_then(|m| m.seconds.preprocessing)),
-            count(|m| m.steps),
+            count(|m| Some(m.steps)),
             count(|m| m.file_bytes),
             number(errors.map(|e| e.attitude)),
             number(errors.and_then(|e| e.deflection)),

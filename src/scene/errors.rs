@@ -41,6 +41,20 @@ impl OutputErrors {
         largest(ratios.iter())
     }
 
+    /// The output whose error is largest beside its tolerance: its name, the error, and the tolerance.
+    pub fn decisive(&self, tolerance: &Tolerance) -> (&'static str, f64, f64) {
+        let all = [
+            ("attitude", Some(self.attitude), tolerance.attitude),
+            ("deflection", self.deflection, tolerance.deflection),
+            ("stress", self.stress, tolerance.stress),
+            ("reaction", self.reaction, tolerance.reaction),
+        ];
+        let there = all.into_iter().filter_map(|(name, error, allowed)| Some((name, error?, allowed)));
+        // NaN is the largest of all.
+        let ratio = |(_, error, allowed): &(&str, f64, f64)| error / allowed;
+        there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
+    }
+
     /// Whether every error is within its tolerance.
     pub fn within(&self, tolerance: &Tolerance) -> bool {
         self.worst(tolerance) <= 1.0

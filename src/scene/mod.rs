@@ -16,4 +16,6 @@ pub use history::History;
 pub use read::read_scene;
 pub use recording::{Drift, Path, Recording, Resolution};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+pub(crate) use simulate::damped;
 pub use simulate::simulate;
+pub(crate) use surroundings::points_of;

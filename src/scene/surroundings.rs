@@ -52,6 +52,15 @@ impl<'a> SceneForces<'a> {
     }
 }
 
+/// Where the loads of a scene act on `body`, and the points that it watches.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body.
+pub(crate) fn points_of(body: &FlexBody, scene: &Scene) -> Result<(Vec<BodyPoint>, Vec<BodyPoint>)> {
+    let (forces, watched) = SceneForces::new(body, scene)?;
+    Ok((forces.loads.into_iter().map(|(point, _)| point).collect(), watched))
+}
+
 fn point(body: &FlexBody, scene: &Scene, place: &Point) -> std::result::Result<BodyPoint, String> {
     match place {
         Point::Node(number) => {

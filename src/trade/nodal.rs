@@ -11,7 +11,7 @@ use crate::integration::{Explicit, Failure, Method, integrate};
 use crate::linalg::{combine, multiply};
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
-use crate::scene::{Apart, Axes, ErrorHistory, Path, Point, Recording, Scene, Scheme};
+use crate::scene::{Apart, Axes, ErrorHistory, Load, Path, Point, Recording, Scene, Scheme};
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -35,11 +35,41 @@ pub struct NodalReference<'m> {
 }
 
 impl<'m> NodalReference<'m> {
+    /// Refuses, before any work, what the nodal equations do not have, and more work than is affordable; loads with the nodes that they act
+    /// at.
+    ///
+    /// # Errors
+    /// FB801.
+    pub fn refuse<'s>(model: &FeModel, scene: &'s Scene) -> Result<Vec<(usize, &'s Load)>> {
+        if scene.spin.is_some() {
+            return Err(refused("the nodal equations know no prescribed spin"));
+        }
+        if scene.requirements.damping.is_some() && model.damping().is_none() {
+            return Err(refused(NodalError::DampingOfModes));
+        }
+        let mut loads = Vec::new();
+        for load in &scene.loads {
+            let Point::Node(number) = &load.at else {
+                return Err(refused(format!("loads act at nodes, not at {}", load.at)));
+            };
+            let node = model.nodes().ids.iter().position(|id| id == number);
+            loads.push((node.ok_or_else(|| refused(format!("the model has no {}", load.at)))?, load));
+        }
+        let periods = scene.run.duration.unwrap_or(0.0) * fastest(model) / std::f64::consts::TAU;
+        let work = EVALUATIONS * periods * entries_of(model);
+        if work.is_nan() || work > AFFORDABLE {
+            return Err(refused(format!(
+                "some {work:.0e} multiplications with K to follow the fastest motion of {} rows, {AFFORDABLE:.0e} are affordable",
+                model.rows().len()
+            )));
+        }
+        Ok(loads)
+    }
+
     /// Integrates the unreduced equations of `model` in `scene` from where `motion`, that of a body of the model, starts.
     ///
     /// # Errors
-    /// FB801 for what the nodal equations do not have: prescribed spin, loads at interfaces, damping ratios, more work than is
-    /// affordable, models without nodal equations; FB540 when the integration cannot go on.
+    /// Those of [`NodalReference::refuse`], and FB801 for models without nodal equations; FB540 when the integration cannot go on.
     pub fn new(
         model: &'m FeModel,
         body: &FlexBody,
@@ -47,40 +77,13 @@ impl<'m> NodalReference<'m> {
         motion: &Recording,
         watch: Watch<'_>,
     ) -> Result<Self> {
-        let refuse = |message: String| -> Error {
-            Diagnostic::new(Code::Usage, format!("--reference nodal: {message}"))
-                .with_help("take --reference full")
-                .into()
-        };
-        let without = |error: NodalError| refuse(error.to_string());
-        if scene.spin.is_some() {
-            return Err(refuse("the nodal equations know no prescribed spin".to_owned()));
-        }
-        if scene.requirements.damping.is_some() && model.damping().is_none() {
-            return Err(without(NodalError::DampingOfModes));
-        }
-        let mut loads = Vec::new();
-        for load in &scene.loads {
-            let Point::Node(number) = &load.at else {
-                return Err(refuse(format!("loads act at nodes, not at {}", load.at)));
-            };
-            let node = model.nodes().ids.iter().position(|id| id == number);
-            loads.push((node.ok_or_else(|| refuse(format!("the model has no {}", load.at)))?, load));
-        }
-        let (end, entries) = (motion.time.last().copied().unwrap_or(0.0), entries_of(model));
-        let work = EVALUATIONS * end * fastest(model) / std::f64::consts::TAU * entries;
-        if work.is_nan() || work > AFFORDABLE {
-            return Err(refuse(format!(
-                "some {work:.0e} multiplications with K to follow the fastest motion of {} rows, {AFFORDABLE:.0e} are affordable",
-                model.rows().len()
-            )));
-        }
+        let loads = Self::refuse(model, scene)?;
+        let end = motion.time.last().copied().unwrap_or(0.0);
         let equations =
-            NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes).map_err(without)?;
-        let modes =
-            NodalModes::new(&equations, body).ok_or_else(|| refuse("the body has other rows".to_owned()))?;
+            NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes).map_err(refused)?;
+        let modes = NodalModes::new(&equations, body).ok_or_else(|| refused("the body has other rows"))?;
         let start = modes.lift(&motion.states[0]);
-        let mut state = equations.state(&start).map_err(without)?;
+        let mut state = equations.state(&start).map_err(refused)?;
         let act = |time: f64, evaluation: &mut NodalEvaluation<'_>| {
             if let Some(gravity) = &scene.gravity {
                 evaluation.add_gravity(gravity);
@@ -176,6 +179,12 @@ impl<'m> NodalReference<'m> {
         };
         Some(ErrorHistory::new(&self.recording, candidate, &apart))
     }
+}
+
+/// What the reference cannot be.
+fn refused(what: impl std::fmt::Display) -> Error {
+    let diagnostic = Diagnostic::new(Code::Usage, format!("--reference nodal: {what}"));
+    diagnostic.with_help("take --reference full").into()
 }
 
 /// An estimate of the largest circular frequency: sqrt(3 max K_ii / M_ii), an element of three dimensions with consistent mass.

@@ -7,7 +7,7 @@ use crate::linalg::{gram, multiply};
 use crate::model::FeModel;
 use crate::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Recording, Scene};
 use faer::Mat;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A body, and how its modes are seen from those of the reference.
 #[derive(Debug, Clone)]
@@ -82,34 +82,22 @@ impl Source {
         modes: &[usize],
         start: &Configuration,
     ) -> Scene {
+        let Some(shared) = &self.shared else { return scene.of_modes(modes) };
         let mut own = scene.clone();
-        let by_number = |mode: usize| modes.iter().position(|&kept| kept == mode);
-        own.initial.modes = match &self.shared {
-            _ if scene.initial.modes.is_empty() => Vec::new(),
-            None => {
-                let starts = scene.initial.modes.iter();
-                starts.filter_map(|one| Some(ModeStart { mode: by_number(one.mode)?, ..*one })).collect()
-            }
-            Some(shared) => {
-                let k = &body.invariants().modal_stiffness;
-                let stiffness = DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]));
-                let part = |q: &[f64]| {
-                    let product =
-                        |&mode: &usize| q.iter().enumerate().map(|(j, q)| shared[(mode, j)] * q).sum();
-                    let sides: Vec<f64> = modes.iter().map(product).collect();
-                    stiffness
-                        .clone()
-                        .cholesky()
-                        .map(|factor| factor.solve(&nalgebra::DVector::from_vec(sides)))
-                };
-                match (part(&start.q), part(&start.qd)) {
-                    (Some(q), Some(qd)) => (0..modes.len())
-                        .map(|mode| ModeStart { mode, amplitude: q[mode], rate: qd[mode] })
-                        .collect(),
-                    _ => Vec::new(),
-                }
-            }
+        if own.initial.modes.is_empty() {
+            return own;
+        }
+        let k = &body.invariants().modal_stiffness;
+        let stiffness =
+            DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)])).cholesky();
+        let part = |q: &[f64]| {
+            let product = |&mode: &usize| q.iter().enumerate().map(|(j, q)| shared[(mode, j)] * q).sum();
+            let sides = DVector::from_iterator(modes.len(), modes.iter().map(product));
+            stiffness.as_ref().map_or_else(|| DVector::zeros(modes.len()), |factor| factor.solve(&sides))
         };
+        let (q, qd) = (part(&start.q), part(&start.qd));
+        let of = |mode: usize| ModeStart { mode, amplitude: q[mode], rate: qd[mode] };
+        own.initial.modes = (0..modes.len()).map(of).collect();
         own
     }
 

@@ -1,7 +1,7 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
 use super::candidate::candidates;
-use super::{Candidate, NodalReference, Recommendation, Source, front, timing};
+use super::{Candidate, NodalReference, Recommendation, Source, Storage, front, timing};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{EquationsOfMotion, Terms};
 use crate::error::{Error, Result};
@@ -65,8 +65,8 @@ pub struct Measured {
     pub growth: Option<f64>,
     /// Multiplications of one evaluation of the equations.
     pub multiplications: usize,
-    /// Size of its file. Unit: bytes.
-    pub bytes: u64,
+    /// Size of its file; none of single precision, which no file holds. Unit: bytes.
+    pub bytes: Option<u64>,
     /// Work of its simulation, with the steps that a scene without a given step takes for it.
     pub work: Work,
     /// Times.
@@ -138,6 +138,7 @@ pub fn trade(
     scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
     watch(Event::Phase("reference"));
     refuse_too_much(sources, &scene, settings.memory)?;
+    nodal.map(|model| NodalReference::refuse(model, &scene)).transpose()?;
     let full = |part| watch(Event::Fraction(part));
     let (motion, diagnostics) = simulate(source.body(), &scene, settings.memory, full)?;
     let nodal = match nodal {
@@ -236,7 +237,7 @@ impl Job<'_> {
             worst: errors.worst(&scene.requirements.tolerance),
             growth: history.growth(),
             multiplications: EquationsOfMotion::new(&body, scene.run.terms).multiplications(),
-            bytes: file_size(&body)?,
+            bytes: if candidate.storage == Storage::F64 { Some(file_size(&body)?) } else { None },
             work: motion.work,
             times: Times { preprocessing: source.preprocessing(), evaluation: 0.0, integration: 0.0 },
         })

@@ -1,0 +1,403 @@
+//! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
+
+use super::Format;
+use super::html::{diagnostics_table, escape, page, section, table, terms};
+use super::numbers::{counted, significant};
+use super::run_data::RunData;
+use super::text::{Page, diagnostics_lines};
+use crate::diagnostic::Diagnostic;
+use crate::flex_body::{Group, TermDecision};
+use crate::provenance::generator;
+use crate::scene::OutputErrors;
+use crate::selection::{Selection, Trial};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Rows of modes that a summary shows.
+const MODES_SHOWN: usize = 12;
+
+/// Facts of a selection.
+#[derive(Debug, Clone, Serialize)]
+pub struct SelectionFacts<'a> {
+    generator: String,
+    scene: &'a str,
+    body: &'a str,
+    inputs: Vec<InputFacts<'a>>,
+    tolerance: ToleranceFacts,
+    terms: Vec<TermFacts<'a>>,
+    guideline: &'a str,
+    modes: ModesFacts<'a>,
+    chosen: Option<TrialFacts<'a>>,
+    multiplications_before: usize,
+    significance: Vec<SignificanceFacts>,
+    trials: Vec<TrialFacts<'a>>,
+    diagnostics: &'a [Diagnostic],
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct InputFacts<'a> {
+    name: &'a str,
+    value: f64,
+    source: &'a str,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct ToleranceFacts {
+    attitude: f64,
+    deflection: f64,
+    stress: f64,
+    reaction: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct TermFacts<'a> {
+    group: &'a str,
+    kept: bool,
+    tier: u8,
+    bound: f64,
+    limit: f64,
+    /// limit / bound.
+    slack: f64,
+    reason: &'a str,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ModesFacts<'a> {
+    of: usize,
+    /// Numbers from 1.
+    kept: Vec<usize>,
+    reason: &'a str,
+    shares: Vec<ShareFacts>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct ShareFacts {
+    number: usize,
+    kept: bool,
+    amplitude: f64,
+    deflection: f64,
+    stress: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct SignificanceFacts {
+    term: &'static str,
+    beside: &'static str,
+    group: &'static str,
+    guideline: &'static str,
+    formula: &'static str,
+    tier_0: f64,
+    tier_1: Option<f64>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct TrialFacts<'a> {
+    kept: Vec<&'static str>,
+    modes: usize,
+    multiplications: usize,
+    tier: u8,
+    errors: Option<OutputErrors>,
+    worst: Option<f64>,
+    budget: f64,
+    passed: bool,
+    remark: &'a str,
+}
+
+impl<'a> TrialFacts<'a> {
+    fn new(trial: &'a Trial) -> Self {
+        Self {
+            kept: Group::ALL.into_iter().filter(|group| trial.kept.has(*group)).map(Group::name).collect(),
+            modes: trial.modes,
+            multiplications: trial.multiplications,
+            tier: trial.tier,
+            errors: trial.errors,
+            worst: trial.worst.is_finite().then_some(trial.worst),
+            budget: trial.budget,
+            passed: trial.passed(),
+            remark: &trial.remark,
+        }
+    }
+
+    /// The groups as text.
+    fn groups(&self) -> String {
+        if self.kept.is_empty() { "I0 only".to_owned() } else { format!("I0 {}", self.kept.join(" ")) }
+    }
+}
+
+impl<'a> SelectionFacts<'a> {
+    /// Facts of `selection`, and of the run that made it.
+    pub fn new(selection: &'a Selection, run: &'a RunData) -> Self {
+        let [attitude, deflection, stress, reaction] = selection.tolerance;
+        let term = |decision: &'a TermDecision| TermFacts {
+            group: decision.group.name(),
+            kept: decision.kept,
+            tier: decision.tier,
+            bound: decision.bound,
+            limit: decision.limit,
+            slack: decision.limit / decision.bound,
+            reason: &decision.reason,
+        };
+        let shares = selection.shares.iter().enumerate().map(|(j, share)| ShareFacts {
+            number: j + 1,
+            kept: share.kept,
+            amplitude: share.amplitude,
+            deflection: share.deflection,
+            stress: share.stress,
+        });
+        let significance = selection.significances.iter().map(|one| SignificanceFacts {
+            term: one.term,
+            beside: one.beside,
+            group: one.group.name(),
+            guideline: one.guideline,
+            formula: one.formula,
+            tier_0: one.bound,
+            tier_1: one.of_body,
+        });
+        Self {
+            generator: generator(),
+            scene: &selection.scene,
+            body: &selection.body,
+            inputs: selection
+                .inputs
+                .iter()
+                .map(|input| InputFacts { name: input.name, value: input.value, source: &input.source })
+                .collect(),
+            tolerance: ToleranceFacts { attitude, deflection, stress, reaction },
+            terms: selection.terms.iter().map(term).collect(),
+            guideline: selection.guideline,
+            modes: ModesFacts {
+                of: selection.n_modes,
+                kept: selection.modes.iter().map(|j| j + 1).collect(),
+                reason: &selection.mode_reason,
+                shares: shares.collect(),
+            },
+            chosen: selection.chosen.as_ref().map(TrialFacts::new),
+            multiplications_before: selection.multiplications,
+            significance: significance.collect(),
+            trials: selection.trials.iter().map(TrialFacts::new).collect(),
+            diagnostics: &run.diagnostics,
+        }
+    }
+
+    /// The facts in a format, ending with a line break.
+    pub fn render(&self, format: Format) -> String {
+        match format {
+            Format::Json => {
+                let json = serde_json::to_string_pretty(self);
+                json.expect("keys are strings and numbers that are not finite become null") + "\n"
+            }
+            Format::Text => self.text(),
+            Format::Html => self.html(),
+        }
+    }
+
+    /// What was decided about a term, in words.
+    fn verdict(term: &TermFacts<'_>) -> String {
+        let verdict = if term.kept { "keep" } else { "drop" };
+        if term.limit > 0.0 {
+            let (bound, limit) = (significant(term.bound, 3), significant(term.limit, 3));
+            let reach = if term.kept { "without it" } else { "at most" };
+            format!("{verdict} (tier {}): {}: {reach} {bound}, allowed {limit}", term.tier, term.reason)
+        } else {
+            format!("{verdict}: {}", term.reason)
+        }
+    }
+
+    fn errors_in_words(errors: &OutputErrors) -> String {
+        let relative = |name: &str, error: Option<f64>| {
+            error.map(|error| format!("{name} {} %", significant(100.0 * error, 3)))
+        };
+        let all = [
+            Some(format!("attitude {} rad", significant(errors.attitude, 3))),
+            relative("deflection", errors.deflection),
+            relative("stress", errors.stress),
+            relative("reaction", errors.reaction),
+        ];
+        all.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    fn cost_in_words(&self) -> Option<String> {
+        let chosen = self.chosen.as_ref()?;
+        let ratio = self.multiplications_before as f64 / chosen.multiplications as f64;
+        Some(format!(
+            "{} multiplications per evaluation of {} ({} times fewer)",
+            chosen.multiplications,
+            self.multiplications_before,
+            significant(ratio, 3)
+        ))
+    }
+
+    fn modes_in_words(&self) -> String {
+        format!("{} of {}: {}", self.modes.kept.len(), self.modes.of, self.modes.reason)
+    }
+
+    fn text(&self) -> String {
+        let mut page = Page(String::new());
+        page.entry("Selection", &format!("{}: {}", self.scene, self.body));
+        for term in &self.terms {
+            page.entry(term.group, &Self::verdict(term));
+        }
+        page.entry("Guideline", self.guideline);
+        page.entry("Modes", &self.modes_in_words());
+        if self.modes.kept.len() < self.modes.of {
+            page.entry("", &format!("kept: {}", ranges(&self.modes.kept)));
+        }
+        if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
+            page.entry("Errors", &format!("{}, measured against everything", Self::errors_in_words(errors)));
+        }
+        if let Some(cost) = self.cost_in_words() {
+            page.entry("Cost", &cost);
+        }
+        for (i, input) in self.inputs.iter().enumerate() {
+            let label = if i == 0 { "Inputs" } else { "" };
+            page.entry(label, &format!("{} {}: {}", input.name, significant(input.value, 4), input.source));
+        }
+        diagnostics_lines(&mut page, self.diagnostics);
+        page.0
+    }
+
+    fn html(&self) -> String {
+        let mut html = String::new();
+        let kept: Vec<&str> = self.terms.iter().filter(|term| term.kept).map(|term| term.group).collect();
+        let groups =
+            if kept.is_empty() { "I0 only".to_owned() } else { format!("I0 and {}", kept.join(", ")) };
+        let _ = writeln!(
+            html,
+            "<p class=\"verdict\"><strong>{groups}, {}.</strong> {}</p>",
+            counted(self.modes.kept.len(), "mode"),
+            self.cost_in_words().map_or_else(String::new, |cost| format!("{cost}."))
+        );
+        section(&mut html, "Decision");
+        let decided = self.terms.iter().map(|term| (term.group, escape(&Self::verdict(term))));
+        let mut items: Vec<(&str, String)> = decided.collect();
+        items.push(("Guideline", escape(self.guideline)));
+        items.push(("Modes", escape(&self.modes_in_words())));
+        items.push(("Kept", ranges(&self.modes.kept)));
+        if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
+            items.push(("Errors", format!("{}, measured", Self::errors_in_words(errors))));
+        }
+        terms(&mut html, items);
+        section(&mut html, "Inputs");
+        let inputs = self
+            .inputs
+            .iter()
+            .map(|input| (input.name, format!("{}: {}", significant(input.value, 5), escape(input.source))));
+        terms(&mut html, inputs);
+        section(&mut html, "Sizes of the terms");
+        let head = ["Term", "beside", "Group", "Guideline", "Formula", "Tier 0", "Tier 1", "Slack"];
+        let rows: Vec<Vec<String>> = self
+            .significance
+            .iter()
+            .map(|one| {
+                let own = one.tier_1.map_or_else(String::new, |own| significant(own, 3));
+                let slack = one.tier_1.map_or_else(String::new, |own| significant(one.tier_0 / own, 3));
+                let (bound, texts) = (significant(one.tier_0, 3), [one.term, one.beside, one.group]);
+                let mut row: Vec<String> = texts.map(escape).to_vec();
+                row.extend([escape(one.guideline), escape(one.formula), bound, own, slack]);
+                row
+            })
+            .collect();
+        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 has the norms of the invariants; slack is their ratio.";
+        table(&mut html, caption, &head.map(str::to_owned), &[1, 2, 3, 4], &rows);
+        section(&mut html, "Trials");
+        self.trials_table(&mut html);
+        if !self.modes.shares.is_empty() {
+            section(&mut html, "Modes");
+            self.modes_table(&mut html);
+        }
+        diagnostics_table(&mut html, self.diagnostics);
+        page(self.scene, "Terms and modes that a scene needs", &self.generator, &html)
+    }
+
+    fn trials_table(&self, html: &mut String) {
+        let head = [
+            "Terms",
+            "Modes",
+            "Tier",
+            "Multiplications",
+            "Attitude",
+            "Deflection",
+            "Stress",
+            "Reaction",
+            "Verdict",
+        ];
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| significant(value, 3));
+        let rows: Vec<Vec<String>> = self
+            .trials
+            .iter()
+            .chain(&self.chosen)
+            .map(|trial| {
+                let of =
+                    |error: fn(&OutputErrors) -> Option<f64>| number(trial.errors.as_ref().and_then(error));
+                let verdict = match (trial.passed, trial.remark) {
+                    (true, _) => "within".to_owned(),
+                    (false, "") => "beyond".to_owned(),
+                    (false, remark) => escape(remark),
+                };
+                vec![
+                    trial.groups(),
+                    trial.modes.to_string(),
+                    trial.tier.to_string(),
+                    trial.multiplications.to_string(),
+                    of(|errors| Some(errors.attitude)),
+                    of(|errors| errors.deflection),
+                    of(|errors| errors.stress),
+                    of(|errors| errors.reaction),
+                    verdict,
+                ]
+            })
+            .collect();
+        let caption = "Errors of models with fewer terms or modes: guaranteed bounds (tiers 0 and 1) or measured (tier 2). The last row is the selection.";
+        table(html, caption, &head.map(str::to_owned), &[8], &rows);
+    }
+
+    fn modes_table(&self, html: &mut String) {
+        let mut shares = self.modes.shares.clone();
+        shares.sort_by(|a, b| b.stress.max(b.deflection).total_cmp(&a.stress.max(a.deflection)));
+        let rows: Vec<Vec<String>> = shares
+            .iter()
+            .take(MODES_SHOWN)
+            .map(|share| {
+                vec![
+                    share.number.to_string(),
+                    significant(share.amplitude, 3),
+                    significant(100.0 * share.deflection, 3),
+                    significant(100.0 * share.stress, 3),
+                    if share.kept { "kept" } else { "dropped" }.to_owned(),
+                ]
+            })
+            .collect();
+        let head = ["Mode", "Amplitude", "Deflection, %", "Stress, %", "Verdict"];
+        let caption = format!(
+            "Largest amplitude of the modes that do most, and what each does alone relative to all together ({} of {}).",
+            rows.len(),
+            self.modes.of
+        );
+        table(html, &caption, &head.map(str::to_owned), &[4], &rows);
+    }
+}
+
+/// Ascending numbers with runs drawn together: 1-4, 7, 9-10.
+fn ranges(numbers: &[usize]) -> String {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for &number in numbers {
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == number => *last = number,
+            _ => runs.push((number, number)),
+        }
+    }
+    let run = |(first, last): &(usize, usize)| match last - first {
+        0 => first.to_string(),
+        _ => format!("{first}-{last}"),
+    };
+    runs.iter().map(run).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn runs_of_numbers_are_drawn_together() {
+        assert_eq!(super::ranges(&[1, 2, 3, 5, 7, 8]), "1-3, 5, 7-8");
+        assert_eq!(super::ranges(&[]), "");
+    }
+}

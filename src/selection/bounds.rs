@@ -1,0 +1,226 @@
+//! Guaranteed bounds of what dropped terms change of the motion of a body whose rotation is given (theory section 7).
+//!
+//! With the angular velocity w(t) of the frame given, the modes move by linear equations,
+//!
+//! ```text
+//! q'' + D q' + 2 G(w) q' + (Lambda - E(w, w) + G(w')) q = Q(t) + W1'w w / 2,    G skew, E symmetric, 0 <= E <= |w|^2
+//! ```
+//!
+//! and the error of a model without some of the terms obeys the same equations with these terms of its own motion as load. The energy
+//! H = (|q'|^2 + q'(Lambda - E) q) / 2 bounds the response to a load F twice: sqrt(2 H) grows by no more than |F|; and against the static
+//! response, by no more than the total variation of that. Damping only helps, and is not counted on.
+
+use super::norms::Norms;
+use super::variation::{Rotation, Variation};
+use crate::flex_body::Groups;
+
+/// A load on the modes that is a direction times a function of time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModalLoad {
+    /// |Q|.
+    pub force: f64,
+    /// |Lambda^(-1/2) Q|.
+    pub energy: f64,
+    /// What it is multiplied by.
+    pub factor: Variation,
+}
+
+/// The motion of a body of given rotation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Driven {
+    /// Its rotation.
+    pub rotation: Rotation,
+    /// Loads on the modes.
+    pub loads: Vec<ModalLoad>,
+    /// Modes at the start.
+    pub start: Start,
+    /// |D|.
+    pub damping: f64,
+}
+
+/// Modes at time zero.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Start {
+    /// sqrt(|q'|^2 + q'Lambda q).
+    pub energy: f64,
+    /// The same of the rates (q', q'') without loads.
+    pub rate_energy: f64,
+}
+
+/// Bounds of modal motion, over the duration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Amplitude {
+    /// |Lambda^(1/2) q|: the root of twice the elastic energy.
+    pub energy: f64,
+    /// |q|.
+    pub coordinate: f64,
+    /// |q'|.
+    pub rate: f64,
+    /// |q''|; infinite where it is not known.
+    pub acceleration: f64,
+    /// |Lambda^(1/2) q'|; likewise.
+    pub energy_rate: f64,
+}
+
+/// How loads act on modes under the terms that are kept.
+struct Operator {
+    /// Lambda - E >= margin Lambda.
+    margin: f64,
+    /// exp of how much motion may grow by itself because the rotation changes.
+    growth: f64,
+    softening: f64,
+    coupling: f64,
+    first: f64,
+    rotation: Rotation,
+}
+
+impl Operator {
+    /// `None` where the spin takes all stiffness of some motion.
+    fn new(kept: Groups, norms: &Norms, rotation: &Rotation) -> Option<Self> {
+        let softening = if kept.w2 { norms.softening } else { 0.0 };
+        let coupling = if kept.w3 { norms.coupling } else { 0.0 };
+        let margin = 1.0 - rotation.largest.powi(2) * softening;
+        if margin.is_nan() || margin <= 0.0 {
+            return None;
+        }
+        let growth = coupling / (margin.sqrt() * norms.first) + rotation.largest * softening / margin;
+        let growth = (rotation.variation * growth).exp();
+        Some(Self { margin, growth, softening, coupling, first: norms.first, rotation: *rotation })
+    }
+
+    /// sqrt(2 H) of the response to a load, from rest without deformation.
+    fn response(&self, load: &ModalLoad) -> f64 {
+        let ModalLoad { force, energy, factor } = load;
+        let impulse = self.growth * product(force * factor.largest, self.rotation.duration);
+        let (m, r) = (self.margin, &self.rotation);
+        let largest = energy * factor.largest;
+        // The static response (Lambda - E)^-1 F moves with the load and with E.
+        let moved = energy * factor.total + 2.0 * r.largest * r.variation * self.softening * largest / m;
+        let turned = r.variation * self.coupling * largest / (m * self.first);
+        let begun = energy * factor.start;
+        let varied = self.growth * ((begun + moved) / m.sqrt() + turned) + largest / m.sqrt();
+        // NaN where both a size is zero and its variation unknown.
+        if varied.is_nan() { impulse } else { impulse.min(varied) }
+    }
+}
+
+impl Driven {
+    /// The centrifugal load of W1.
+    fn centrifugal(&self, norms: &Norms) -> ModalLoad {
+        let rate = self.rotation.rate();
+        ModalLoad { force: norms.centrifugal, energy: norms.centrifugal_energy, factor: rate.times(&rate) }
+    }
+
+    /// Bounds of the motion of the body with the groups that are kept. `None` where the spin takes all stiffness of some motion.
+    pub fn amplitude(&self, kept: Groups, norms: &Norms) -> Option<Amplitude> {
+        let operator = Operator::new(kept, norms, &self.rotation)?;
+        let mut loads = self.loads.clone();
+        if kept.w1 {
+            loads.push(self.centrifugal(norms));
+        }
+        let sum = |start: f64, loads: &mut dyn Iterator<Item = ModalLoad>| {
+            operator.growth * start + loads.map(|load| operator.response(&load)).sum::<f64>()
+        };
+        let energy = sum(self.start.energy, &mut loads.iter().copied());
+        let root = operator.margin.sqrt();
+        let coordinate = energy / (root * norms.first);
+        let (rate, acceleration, energy_rate) = if kept.w2 || kept.w3 {
+            (energy, f64::INFINITY, f64::INFINITY)
+        } else {
+            // The rates are moved by the rates of the loads, and start with the loads.
+            let begun: f64 = loads.iter().map(|load| load.force * load.factor.start).sum();
+            let rates = sum(
+                self.start.rate_energy + begun,
+                &mut loads.iter().map(|load| {
+                    let Variation { rate, rate_total, .. } = load.factor;
+                    let factor = Variation {
+                        start: rate,
+                        largest: rate,
+                        total: rate_total,
+                        rate: 0.0,
+                        rate_total: 0.0,
+                    };
+                    ModalLoad { factor, ..*load }
+                }),
+            );
+            (energy.min(rates / norms.first), rates, rates)
+        };
+        Some(Amplitude { energy: energy / root, coordinate, rate, acceleration, energy_rate })
+    }
+
+    /// Bounds of how far the body without the groups `dropped` moves from the whole one. `None` where there is no bound.
+    pub fn error(&self, dropped: Groups, norms: &Norms) -> Option<Amplitude> {
+        let kept = dropped.complement();
+        let own = self.amplitude(kept, norms)?;
+        let operator = Operator::new(Groups::ALL, norms, &self.rotation)?;
+        let r = &self.rotation;
+        let mut loads = Vec::new();
+        if dropped.w1 {
+            loads.push(self.centrifugal(norms));
+        }
+        if dropped.w2 {
+            // E(w, w) q.
+            let (w2, moved) = (r.largest.powi(2), 2.0 * r.largest * r.variation);
+            let largest = norms.softening * w2 * own.energy;
+            let total = norms.softening * (product(w2 * r.duration, own.energy_rate) + moved * own.energy);
+            loads.push(unit_load(norms.spin * w2 * own.coordinate, largest, total));
+        }
+        if dropped.w3 {
+            // 2 G(w) q', and G(w') q.
+            let of_rate = norms.coupling / norms.first;
+            let total =
+                2.0 * of_rate * (product(r.largest * r.duration, own.acceleration) + r.variation * own.rate);
+            let force = 2.0 * norms.coupling * r.largest * own.rate;
+            loads.push(unit_load(force, force / norms.first, total));
+            let total = of_rate * (product(r.jerk, own.coordinate) + r.variation * own.rate);
+            let force = norms.coupling * r.acceleration * own.coordinate;
+            loads.push(unit_load(force, force / norms.first, total));
+        }
+        let energy: f64 = loads.iter().map(|load| operator.response(load)).sum();
+        let root = operator.margin.sqrt();
+        let coordinate = energy / (root * norms.first);
+        Some(Amplitude {
+            energy: energy / root,
+            coordinate,
+            rate: energy,
+            acceleration: loads.iter().map(|load| load.force * load.factor.largest).sum::<f64>()
+                + (norms.last + 2.0 * r.largest + self.damping) * energy / root
+                + (r.largest.powi(2) + r.acceleration) * coordinate,
+            energy_rate: f64::INFINITY,
+        })
+    }
+
+    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads.
+    pub fn torque_error(&self, dropped: Groups, norms: &Norms) -> Option<f64> {
+        let (own, error) = (self.amplitude(dropped.complement(), norms)?, self.error(dropped, norms)?);
+        let r = &self.rotation;
+        let (w, turn) = (r.largest, r.acceleration + r.largest.powi(2));
+        // Of the whole body.
+        let (q, v) = (own.coordinate + error.coordinate, own.rate + error.rate);
+        let a = own.acceleration + error.acceleration;
+        // (q, q', q'') that each group sees: those of the whole body where it is dropped, else the error.
+        let of = |is_dropped: bool| match is_dropped {
+            true => (q, v, a),
+            false => (error.coordinate, error.rate, error.acceleration),
+        };
+        let (dq, dv, _) = of(dropped.w1);
+        let linear = norms.inertia * (dv * w + dq * turn);
+        let (dq, dv, _) = of(dropped.w2);
+        let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
+        let (dq, dv, da) = of(dropped.w3);
+        let coupled = norms.coupling * (product(q, da) + product(dq, a) + w * (q * dv + dq * v));
+        Some(linear + quadratic + coupled)
+    }
+}
+
+/// A load of given size that varies by `total`.
+fn unit_load(force: f64, energy: f64, total: f64) -> ModalLoad {
+    let relative = if energy > 0.0 { total / energy } else { 0.0 };
+    let factor = Variation { start: 1.0, largest: 1.0, total: relative, rate: 0.0, rate_total: 0.0 };
+    ModalLoad { force, energy, factor }
+}
+
+/// What is zero is zero, however large the other.
+fn product(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
+}
