@@ -80,6 +80,28 @@ fn frames_of_beams_agree_with_their_references() {
     }
 }
 
+/// A larger frame of the project, with masses on its nodes; its reference is scipy's in extended precision.
+#[test]
+fn the_car_frame_agrees_with_its_reference() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/car_frame/expected.json");
+    let reference: Value =
+        serde_json::from_str(&std::fs::read_to_string(path).expect("reference")).expect("JSON");
+    let lambda = reference["flexible_eigenvalues"].as_array().expect("a list");
+    let conversion = converted(raw("car_frame"), lambda.len(), Method::Lanczos);
+    assert_eq!(conversion.body.source().mass_structure, MassStructure::General);
+    let mass = reference["rigid_body"]["mass"].as_f64().expect("mass");
+    assert!((conversion.mass_properties.mass / mass - 1.0).abs() < 1e-13);
+    let principal = reference["rigid_body"]["principal_inertia"].as_array().expect("a list");
+    for (found, expected) in conversion.mass_properties.principal_moments.iter().zip(principal) {
+        assert!((found / expected.as_f64().expect("a number") - 1.0).abs() < 1e-12);
+    }
+    for (found, expected) in conversion.body.modes().eigenvalue.iter().zip(lambda) {
+        let error = (found / expected.as_f64().expect("a number") - 1.0).abs();
+        assert!(error < 1e-11, "{found} {expected} {error:e}");
+    }
+    assert_eq!(conversion.body.certificate().proved_modes, Some(lambda.len()));
+}
+
 #[test]
 fn dense_and_iterative_searches_give_the_same_body() {
     for name in FIXTURES {

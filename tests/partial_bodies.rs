@@ -12,31 +12,9 @@ use nalgebra::Vector3;
 use support::flexible::{body_of, fixture, lively_state, soft_block};
 use support::general::quasi_velocities;
 use support::motion::{conserving, run};
+use support::partial::{combinations, decisions, with_groups};
 use support::plane::rectangle;
 use support::random::Random;
-
-/// Every combination of groups.
-fn combinations() -> impl Iterator<Item = Groups> {
-    (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
-}
-
-/// Decisions that say so.
-fn decisions(groups: Groups) -> Vec<TermDecision> {
-    let decision = |group: Group| TermDecision {
-        group,
-        kept: groups.has(group),
-        tier: 0,
-        bound: 1e-4,
-        limit: 1e-3,
-        reason: "a test wants it so".to_owned(),
-    };
-    Group::ALL.map(decision).to_vec()
-}
-
-fn with_groups(body: &FlexBody, groups: Groups) -> FlexBody {
-    let all: Vec<usize> = (0..body.n_modes()).collect();
-    body.reduced(&all, groups, decisions(groups)).expect("a body")
-}
 
 /// Solids, a general mass, and both in the plane.
 fn bodies() -> [FlexBody; 4] {

@@ -8,7 +8,7 @@ use crate::flex_body::FlexBody;
 use crate::input::{read_manifest, read_model};
 use crate::invariants::BodyFrame;
 use crate::model::{FeModel, RawModel};
-use crate::report::{identities_json, identities_text};
+use crate::report::{dropped_text, identities_json, identities_text};
 use crate::store;
 use crate::verification::{changed_sources, verify};
 
@@ -21,7 +21,8 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
         checks.extend(verify(&body, &model)?);
     }
     let passed = checks.iter().all(|check| check.passed);
-    Ok(Outcome { text: identities_text(&checks), json: format!("{:#}", identities_json(&checks)), passed })
+    let text = identities_text(&checks) + &dropped_text(&body);
+    Ok(Outcome { text, json: format!("{:#}", identities_json(&checks)), passed })
 }
 
 /// The model that `body` was made of: all of `raw`, or one of the bodies in it.

@@ -330,6 +330,9 @@ impl Check {
             if term.kept && !held.has(term.group) {
                 self.add(format!("`terms` keeps {name}, but `invariants` does not hold it"));
             }
+            if term.tier > 2 {
+                self.add(format!("`terms.{name}.tier` is {}, expected 0, 1 or 2", term.tier));
+            }
             for (what, value) in [("bound", term.bound), ("limit", term.limit)] {
                 if value.is_nan() || value < 0.0 {
                     self.add(format!(

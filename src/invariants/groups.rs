@@ -95,17 +95,12 @@ impl Invariants {
         let groups = self.groups.and(groups);
         let nf = self.n_modes();
         if !groups.w1 {
-            let c2 = self.c2();
-            for (k, l, m) in CYCLIC {
-                self.ibar[k][k].fill(0.0);
-                self.ibar[l][m] = (0..nf).map(|p| 0.5 * c2[(k, p)]).collect();
-                self.ibar[m][l] = (0..nf).map(|p| -0.5 * c2[(k, p)]).collect();
-            }
+            self.ibar = ibar_of_c2(&self.c2());
         }
         if !groups.w2 {
             let (modal_mass, w3) = (self.modal_mass(), self.w3().filter(|_| groups.w3));
             let solid = self.general.is_none();
-            self.s = s_without_w2(nf, solid.then_some(&modal_mass), w3.filter(|_| solid).as_ref());
+            self.s = s_of_modal_mass(nf, solid.then_some(&modal_mass), w3.filter(|_| solid).as_ref());
         }
         if let Some(general) = self.general.as_mut().filter(|_| !groups.w3) {
             general.w3.fill(0.0);
@@ -150,9 +145,19 @@ impl Invariants {
     }
 }
 
-/// S of a body that lacks W2: what gives m_ff and W3 by their formulas, halves so that sums restore them to the last bit. Zero where
-/// these are information of their own.
-pub(super) fn s_without_w2(
+/// Ibar of a body that lacks W1: what gives C2 (3 x nf), to the last bit.
+pub(crate) fn ibar_of_c2(c2: &Mat<f64>) -> [[Vec<f64>; 3]; 3] {
+    let half = |k: usize, sign: f64| (0..c2.ncols()).map(|p| sign * 0.5 * c2[(k, p)]).collect();
+    let mut ibar = [(); 3].map(|()| [(); 3].map(|()| vec![0.0; c2.ncols()]));
+    for (k, l, m) in CYCLIC {
+        (ibar[l][m], ibar[m][l]) = (half(k, 1.0), half(k, -1.0));
+    }
+    ibar
+}
+
+/// S of a body that lacks W2: what gives m_ff and W3 by their formulas, halves so that sums restore them to the last bit; zero where
+/// these are information of their own, or not held.
+pub(crate) fn s_of_modal_mass(
     nf: usize,
     modal_mass: Option<&Mat<f64>>,
     w3: Option<&Mat<f64>>,

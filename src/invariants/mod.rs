@@ -28,6 +28,7 @@ pub use derived::Derived;
 pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_general_frame, choose_plane_frame};
 pub use general::{GENERAL_REMARK, RigidMotion, condense_general};
 pub use groups::{Group, Groups};
+pub(crate) use groups::{ibar_of_c2, s_of_modal_mass};
 pub use identities::{Expected, IdentityCheck, derived_identities, identities};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use primary::{GeneralTerms, Invariants};

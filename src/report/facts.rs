@@ -7,6 +7,7 @@ use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
 use super::numbers::{counted, percent, significant};
 use super::run_data::{Phase, RunData};
+use super::term_facts::TermFacts;
 use crate::diagnostic::Diagnostic;
 use crate::flex_body::{FlexBody, Interface, MassStructure, Truncation};
 use crate::invariants::GENERAL_REMARK;
@@ -16,7 +17,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 2;
+const MINOR: u32 = 3;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -31,6 +32,8 @@ pub struct Facts {
     pub(super) model: ModelFacts,
     pub(super) body: MassProperties,
     pub(super) modes: ModeFacts,
+    /// For each group of the kinetic energy.
+    pub(super) terms: Vec<TermFacts>,
     pub(super) completeness: Completeness,
     /// At accuracy `certified`.
     pub(super) guarantee: Option<GuaranteeFacts>,
@@ -129,7 +132,7 @@ pub(super) struct ModeFacts {
     pub damping: Option<DampingFacts>,
     /// For each unit load.
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
-    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where there is no geometric stiffness for spin.
+    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where W2 is held without geometric stiffness for spin.
     pub softening_hz: Option<[Option<f64>; 3]>,
 }
 
@@ -226,6 +229,7 @@ impl Facts {
                 softening_hz: softening_hz(body),
                 worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
             },
+            terms: TermFacts::of(body),
             completeness: Completeness::of(body),
             guarantee: GuaranteeFacts::of(body),
             lumped: body.lumped().iter().map(LumpedFacts::of).collect(),

@@ -197,6 +197,8 @@ fn modes(html: &mut String, facts: &Facts) {
     if let Some(hertz) = &modes.softening_hz {
         items.push(("Spin", escape(&sentence(&softening_in_words(hertz)))));
     }
+    let decided = facts.terms.iter().filter(|term| !term.kept || term.decision.is_some());
+    items.extend(decided.map(|term| ("Kinetic energy", escape(&term.in_words()))));
     terms(html, items);
     section(html, "Frequencies");
     // Without damping a column of zeros would say nothing.

@@ -18,6 +18,7 @@ mod run_data;
 mod scatter_chart;
 mod selection;
 mod simulation;
+mod term_facts;
 mod text;
 mod trade;
 
@@ -28,4 +29,5 @@ pub use render::{Format, render};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
+pub use term_facts::dropped_text;
 pub use trade::{TradeFacts, trade_csv};

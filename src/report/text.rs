@@ -156,6 +156,8 @@ fn modes(page: &mut Page, facts: &Facts) {
     if let Some(hertz) = &modes.softening_hz {
         page.entry("spin", &softening_in_words(hertz));
     }
+    let decided: Vec<_> = facts.terms.iter().filter(|term| !term.kept || term.decision.is_some()).collect();
+    page.list("terms", &decided, |term| term.in_words());
     let completeness = &facts.completeness;
     page.entry("complete", &completeness.sentence);
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 const NO_TORQUE: f64 = 1e-10;
 
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
-const LEAST_REACTION: f64 = 1e-3;
+pub(crate) const LEAST_REACTION: f64 = 1e-3;
 
 /// Largest errors over time. `None`: the reference has nothing of it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

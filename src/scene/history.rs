@@ -65,6 +65,23 @@ impl History {
         }
     }
 
+    /// The history times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(factor * value),
+            Self::Table { times, values } => Self::Table {
+                times: times.clone(),
+                values: values.iter().map(|value| factor * value).collect(),
+            },
+            Self::Sine { amplitude, frequency, phase } => {
+                Self::Sine { amplitude: factor * amplitude, frequency: *frequency, phase: *phase }
+            }
+            Self::Ramp { from, to, start, duration } => {
+                Self::Ramp { from: factor * from, to: factor * to, start: *start, duration: *duration }
+            }
+        }
+    }
+
     /// Times at which it is not smooth.
     pub fn breaks(&self) -> Vec<f64> {
         match self {

@@ -11,6 +11,7 @@ mod simulate;
 mod surroundings;
 
 pub use description::{Axes, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
+pub(crate) use errors::LEAST_REACTION;
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
 pub use history::History;
 pub use read::read_scene;

@@ -25,6 +25,31 @@ pub struct ModalLoad {
     pub factor: Variation,
 }
 
+impl ModalLoad {
+    fn sizes(&self, duration: f64) -> LoadSizes {
+        let ModalLoad { force, energy, factor } = self;
+        LoadSizes {
+            impulse: product(force * factor.largest, duration),
+            begun: energy * factor.start,
+            moved: product(*energy, factor.total),
+            largest: energy * factor.largest,
+        }
+    }
+}
+
+/// What bounds need to know of a load on the modes, over the duration.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LoadSizes {
+    /// Integral of |F|.
+    pub impulse: f64,
+    /// |Lambda^(-1/2) F| at the start.
+    pub begun: f64,
+    /// Total variation of Lambda^(-1/2) F.
+    pub moved: f64,
+    /// Largest |Lambda^(-1/2) F|.
+    pub largest: f64,
+}
+
 /// The motion of a body of given rotation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driven {
@@ -89,18 +114,14 @@ impl Operator {
     }
 
     /// sqrt(2 H) of the response to a load, from rest without deformation.
-    fn response(&self, load: &ModalLoad) -> f64 {
-        let ModalLoad { force, energy, factor } = load;
-        let impulse = self.growth * product(force * factor.largest, self.rotation.duration);
+    fn response(&self, load: &LoadSizes) -> f64 {
         let (m, r) = (self.margin, &self.rotation);
-        let largest = energy * factor.largest;
+        let impulse = self.growth * load.impulse;
         // The static response (Lambda - E)^-1 F moves with the load and with E.
-        let moved = energy * factor.total + 2.0 * r.largest * r.variation * self.softening * largest / m;
-        let turned = r.variation * self.coupling * largest / (m * self.first);
-        let begun = energy * factor.start;
-        let varied = self.growth * ((begun + moved) / m.sqrt() + turned) + largest / m.sqrt();
-        // NaN where both a size is zero and its variation unknown.
-        if varied.is_nan() { impulse } else { impulse.min(varied) }
+        let moved = load.moved + 2.0 * r.largest * r.variation * self.softening * load.largest / m;
+        let turned = r.variation * self.coupling * load.largest / (m * self.first);
+        let varied = self.growth * ((load.begun + moved) / m.sqrt() + turned) + load.largest / m.sqrt();
+        impulse.min(varied)
     }
 }
 
@@ -119,7 +140,8 @@ impl Driven {
             loads.push(self.centrifugal(norms));
         }
         let sum = |start: f64, loads: &mut dyn Iterator<Item = ModalLoad>| {
-            operator.growth * start + loads.map(|load| operator.response(&load)).sum::<f64>()
+            operator.growth * start
+                + loads.map(|load| operator.response(&load.sizes(self.rotation.duration))).sum::<f64>()
         };
         let energy = sum(self.start.energy, &mut loads.iter().copied());
         let root = operator.margin.sqrt();
@@ -148,51 +170,65 @@ impl Driven {
         Some(Amplitude { energy: energy / root, coordinate, rate, acceleration, energy_rate })
     }
 
-    /// Bounds of how far the body without the groups `dropped` moves from the whole one. `None` where there is no bound.
-    pub fn error(&self, dropped: Groups, norms: &Norms) -> Option<Amplitude> {
-        let kept = dropped.complement();
-        let own = self.amplitude(kept, norms)?;
-        let operator = Operator::new(Groups::ALL, norms, &self.rotation)?;
+    /// The load that the groups `dropped` are to the error, at motion within `own`.
+    pub fn residual(&self, dropped: Groups, norms: &Norms, own: &Amplitude) -> Vec<LoadSizes> {
         let r = &self.rotation;
         let mut loads = Vec::new();
         if dropped.w1 {
-            loads.push(self.centrifugal(norms));
+            loads.push(self.centrifugal(norms).sizes(r.duration));
         }
+        // A force that may be anywhere between zero and `force`.
+        let mut push = |force: f64, energy: f64, moved: f64| {
+            loads.push(LoadSizes {
+                impulse: product(force, r.duration),
+                begun: energy,
+                moved,
+                largest: energy,
+            });
+        };
         if dropped.w2 {
             // E(w, w) q.
-            let (w2, moved) = (r.largest.powi(2), 2.0 * r.largest * r.variation);
-            let largest = norms.softening * w2 * own.energy;
-            let total = norms.softening * (product(w2 * r.duration, own.energy_rate) + moved * own.energy);
-            loads.push(unit_load(norms.spin * w2 * own.coordinate, largest, total));
+            let (w2, turned) = (r.largest.powi(2), 2.0 * r.largest * r.variation);
+            let moved = product(w2 * r.duration, own.energy_rate) + turned * own.energy;
+            let energy = norms.softening * w2 * own.energy;
+            push(norms.spin * w2 * own.coordinate, energy, norms.softening * moved);
         }
         if dropped.w3 {
             // 2 G(w) q', and G(w') q.
             let of_rate = norms.coupling / norms.first;
-            let total =
-                2.0 * of_rate * (product(r.largest * r.duration, own.acceleration) + r.variation * own.rate);
+            let moved = product(r.largest * r.duration, own.acceleration) + r.variation * own.rate;
             let force = 2.0 * norms.coupling * r.largest * own.rate;
-            loads.push(unit_load(force, force / norms.first, total));
-            let total = of_rate * (product(r.jerk, own.coordinate) + r.variation * own.rate);
+            push(force, force / norms.first, 2.0 * of_rate * moved);
+            let moved = product(r.jerk, own.coordinate) + r.variation * own.rate;
             let force = norms.coupling * r.acceleration * own.coordinate;
-            loads.push(unit_load(force, force / norms.first, total));
+            push(force, force / norms.first, of_rate * moved);
         }
-        let energy: f64 = loads.iter().map(|load| operator.response(load)).sum();
+        loads
+    }
+
+    /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads. `None` where the spin may take
+    /// all stiffness of some motion.
+    pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<Amplitude> {
+        let operator = Operator::new(Groups::ALL, norms, &self.rotation)?;
+        let r = &self.rotation;
+        let energy: f64 = residual.iter().map(|load| operator.response(load)).sum();
         let root = operator.margin.sqrt();
         let coordinate = energy / (root * norms.first);
+        let of_loads: f64 = residual.iter().map(|load| load.largest * norms.last).sum();
         Some(Amplitude {
             energy: energy / root,
             coordinate,
             rate: energy,
-            acceleration: loads.iter().map(|load| load.force * load.factor.largest).sum::<f64>()
+            acceleration: of_loads
                 + (norms.last + 2.0 * r.largest + self.damping) * energy / root
                 + (r.largest.powi(2) + r.acceleration) * coordinate,
             energy_rate: f64::INFINITY,
         })
     }
 
-    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads.
-    pub fn torque_error(&self, dropped: Groups, norms: &Norms) -> Option<f64> {
-        let (own, error) = (self.amplitude(dropped.complement(), norms)?, self.error(dropped, norms)?);
+    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads; `own` is the motion without the
+    /// groups `dropped` and `error` how far it is from that of the whole body.
+    pub fn torque_error(&self, dropped: Groups, norms: &Norms, own: &Amplitude, error: &Amplitude) -> f64 {
         let r = &self.rotation;
         let (w, turn) = (r.largest, r.acceleration + r.largest.powi(2));
         // Of the whole body.
@@ -209,15 +245,8 @@ impl Driven {
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
         let (dq, dv, da) = of(dropped.w3);
         let coupled = norms.coupling * (product(q, da) + product(dq, a) + w * (q * dv + dq * v));
-        Some(linear + quadratic + coupled)
+        linear + quadratic + coupled
     }
-}
-
-/// A load of given size that varies by `total`.
-fn unit_load(force: f64, energy: f64, total: f64) -> ModalLoad {
-    let relative = if energy > 0.0 { total / energy } else { 0.0 };
-    let factor = Variation { start: 1.0, largest: 1.0, total: relative, rate: 0.0, rate_total: 0.0 };
-    ModalLoad { force, energy, factor }
 }
 
 /// What is zero is zero, however large the other.

@@ -10,7 +10,7 @@ mod trial;
 mod variation;
 mod warnings;
 
-pub use bounds::{Amplitude, Driven, ModalLoad, Start};
+pub use bounds::{Amplitude, Driven, LoadSizes, ModalLoad, Start};
 pub use norms::Norms;
 pub use select::{Selection, ruled_out, select};
 pub use significance::{Significance, centrifugal_responses, significances};

@@ -3,13 +3,15 @@
 use super::norms::Norms;
 use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
-use super::trial::{Bench, ModeShare, Trial};
+use super::trial::{Bench, ModeShare, Trial, multiplications};
+use super::variation::Variation;
 use super::warnings::warnings;
 use crate::diagnostic::Diagnostic;
+use crate::dynamics::BodyPoint;
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Group, Groups, TermDecision};
 use crate::progress::{Event, Watch};
-use crate::scene::{ErrorHistory, Measure, Recording, Scene, damped, points_of};
+use crate::scene::{Measure, Scene, damped, points_of};
 
 /// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
 const PART_OF_BOUNDS: f64 = 0.5;
@@ -57,17 +59,9 @@ pub struct Selection {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Every set of groups.
+/// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size of K_ff, W3 two times three.
 fn sets() -> impl Iterator<Item = Groups> {
     (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
-}
-
-/// Sets of groups, cheapest first.
-fn by_cost(bench: &Bench<'_>) -> Vec<Groups> {
-    let held = bench.body.invariants().groups;
-    let mut all: Vec<Groups> = sets().filter(|set| set.and(held) == *set).collect();
-    all.sort_by_key(|&set| bench.multiplications(bench.body, set));
-    all
 }
 
 /// What I0 and the eigenvalues alone rule out (tier 0): the groups that a body in this scene has to hold. `body` needs to hold none.
@@ -76,66 +70,142 @@ fn by_cost(bench: &Bench<'_>) -> Vec<Groups> {
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::scene::simulate).
 pub fn ruled_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<(Groups, Vec<Trial>)> {
     let body = &*damped(body, scene)?;
-    let (loads, watched) = points_of(body, scene)?;
-    let situation = Situation::new(body, scene, &loads);
-    let bench = Bench { body, scene, situation: &situation, loads: &loads, watched: &watched, memory };
-    let (trials, _) = bounded(&bench, false)?;
+    let scenes = scenes(body, scene)?;
+    let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
+    let trials = bounded(&cases, false)?;
     let kept = trials.iter().find(|trial| trial.passed()).map_or(Groups::ALL, |trial| trial.kept);
     Ok((kept, trials))
 }
 
-/// Trials by bounds, up to the first that passes; the motion without any group.
-fn bounded(bench: &Bench<'_>, tier_1: bool) -> Result<(Vec<Trial>, Option<Recording>)> {
-    let Bench { body, scene, situation, .. } = bench;
-    let axis = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
-    let rigid = Norms::of_rigid(&body.invariants().inertia(), &body.modes().eigenvalue, axis.as_ref());
-    let own = Norms::of_invariants(body.invariants(), &body.modes().eigenvalue, axis.as_ref());
-    let simplest = match scene.run.duration {
-        Some(_) if situation.driven.is_ok() => Some(bench.motion(body, Groups::NONE)?.0),
-        _ => None,
+/// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays behind that.
+fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
+    let (loads, _) = points_of(body, scene)?;
+    let allowed = Situation::new(body, scene, &loads);
+    let mut own = scene.clone();
+    own.requirements.motion = Default::default();
+    let (spin, acceleration) = match &scene.spin {
+        Some(spin) => {
+            let rate = Variation::of(&spin.rate, allowed.duration.value);
+            (rate.largest, rate.rate)
+        }
+        // The accelerations of a free body grow like the square of its angular velocity.
+        None => (scene.initial.angular_velocity.norm(), f64::INFINITY),
     };
+    let velocity = allowed.spin.value / spin;
+    let acceleration = match scene.requirements.motion.angular_acceleration {
+        Some(_) => allowed.acceleration.value / acceleration,
+        None => 0.0,
+    };
+    let factor = velocity.max(acceleration);
+    if scene.requirements.motion == own.requirements.motion || scene.run.duration.is_none() {
+        return Ok(vec![scene.clone()]);
+    }
+    // A run without rotation cannot be scaled: the bounds see the whole range.
+    if !factor.is_finite() {
+        return Ok(vec![scene.clone()]);
+    }
+    if factor <= SLACK_OF_RANGE {
+        return Ok(vec![own]);
+    }
+    let mut scaled = own.clone();
+    scaled.initial.angular_velocity *= factor;
+    if let Some(spin) = &mut scaled.spin {
+        spin.rate = spin.rate.scaled(factor);
+    }
+    Ok(vec![own, scaled])
+}
+
+/// A scene to try models in.
+struct Case<'c> {
+    body: &'c FlexBody,
+    scene: &'c Scene,
+    situation: Situation,
+    loads: Vec<BodyPoint>,
+    watched: Vec<BodyPoint>,
+    memory: Option<u64>,
+}
+
+impl<'c> Case<'c> {
+    fn new(body: &'c FlexBody, scene: &'c Scene, memory: Option<u64>) -> Result<Self> {
+        let (loads, watched) = points_of(body, scene)?;
+        let situation = Situation::new(body, scene, &loads);
+        Ok(Self { body, scene, situation, loads, watched, memory })
+    }
+
+    fn bench(&self) -> Bench<'_> {
+        let Self { body, scene, situation, loads, watched, memory } = self;
+        Bench { body, scene, situation, loads, watched, memory: *memory }
+    }
+}
+
+/// Trials by bounds, up to the first set of groups that passes. Where the rotation is that of a run, the models that cost a multiple of nf
+/// only are run; others are as dear as a measurement.
+fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
-    let mut order: Vec<Groups> = sets().filter(|set| *set != Groups::ALL).collect();
-    // W1 costs a multiple of nf, W2 six panels, W3 two times three.
-    order.sort_by_key(|set| usize::from(set.w1) + 10 * usize::from(set.w2) + 11 * usize::from(set.w3));
-    for kept in order {
-        let tiers = [Some(&rigid), own.as_ref().filter(|_| tier_1)];
-        for norms in tiers.into_iter().flatten() {
-            let trial = bench.bounded(norms, simplest.as_ref(), kept, PART_OF_BOUNDS);
+    let only_w1 = Groups::NONE.with(Group::W1);
+    for kept in sets().filter(|set| *set != Groups::ALL) {
+        let by_tier = cases.iter().map(|case| -> Result<Vec<Trial>> {
+            let bench = case.bench();
+            let Bench { body, scene, situation, .. } = bench;
+            let (inertia, eigenvalues) = (body.invariants().inertia(), &body.modes().eigenvalue);
+            let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
+            let axis = driven.rotation.axis.as_ref();
+            let of_run = scene.spin.is_some() && scene.run.duration.is_some() && axis.is_some();
+            let held = body.invariants().groups;
+            let runs = kept == Groups::NONE || kept == only_w1 && held.w1;
+            if of_run && !runs {
+                return Ok(Vec::new());
+            }
+            let run = if of_run { Some(bench.fine_motion(kept)?) } else { None };
+            let rigid = Norms::of_rigid(&inertia, eigenvalues, axis);
+            let own = Norms::of_invariants(body.invariants(), eigenvalues, axis).filter(|_| tier_1);
+            let tiers = [Some(rigid), own].into_iter().flatten();
+            Ok(tiers.map(|norms| bench.bounded(&norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
+        });
+        let by_case: Vec<Vec<Trial>> = by_tier.collect::<Result<_>>()?;
+        let tiers = by_case.iter().map(Vec::len).min().unwrap_or(0);
+        for tier in 0..tiers {
+            let trial = worst(by_case.iter().map(|trials| trials[tier].clone()));
             let passed = trial.passed();
             trials.push(trial);
             if passed {
-                return Ok((trials, simplest));
+                return Ok(trials);
             }
         }
     }
-    Ok((trials, simplest))
+    Ok(trials)
+}
+
+/// The trial with the largest errors, one at least.
+fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
+    trials.max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in")
 }
 
 /// The terms and modes of `body` that `scene` needs.
 ///
 /// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 where these leave half of the tolerances, else by
-/// the error of a motion that is integrated (tier 2), if the scene says how long it lasts and does what it may do. Modes are ranked
-/// by what they do in the motion, and the fewest are kept whose motion, with the kept groups, is within the tolerances.
+/// the error of a motion that is integrated (tier 2), if the scene says how long it lasts. Where the scene allows faster rotation than
+/// its run has, everything holds for the run and for the run with the rotation scaled to that. Modes are ranked by what
+/// they do in the motion, and the fewest are kept whose motion, with the kept groups, is within the tolerances.
 ///
 /// # Errors
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::scene::simulate).
 pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<'_>) -> Result<Selection> {
     let body = &*damped(body, scene)?;
-    let (loads, watched) = points_of(body, scene)?;
+    let (loads, _) = points_of(body, scene)?;
     let situation = Situation::new(body, scene, &loads);
-    let bench = Bench { body, scene, situation: &situation, loads: &loads, watched: &watched, memory };
+    let scenes = scenes(body, scene)?;
+    let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
     let held = body.invariants().groups;
-    let inertia = body.invariants().inertia();
     let eigenvalues = &body.modes().eigenvalue;
-    let rigid = Norms::of_rigid(&inertia, eigenvalues, None);
+    let rigid = Norms::of_rigid(&body.invariants().inertia(), eigenvalues, None);
     let own = Norms::of_invariants(body.invariants(), eigenvalues, None);
-    let significances = significances(&situation, &rigid, own.as_ref(), held);
+    let significances = significances(&situation, &rigid, own.as_ref());
 
     watch(Event::Phase("bounds"));
-    let (mut trials, _) = bounded(&bench, true)?;
-    let by_bounds = trials.iter().find(|trial| trial.passed()).cloned();
-    let whole = by_bounds.as_ref().map_or(held, |trial| trial.kept.and(held));
+    let mut trials = bounded(&cases, true)?;
+    let by_bounds = trials.iter().find(|trial| trial.passed()).map(|trial| trial.kept);
+    let whole = by_bounds.map_or(held, |kept| kept.and(held));
     let all: Vec<usize> = (0..body.n_modes()).collect();
     let mut choice = Choice { groups: whole, modes: all.clone(), shares: Vec::new(), chosen: None };
     let mut diagnostics = Vec::new();
@@ -161,17 +231,24 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         }
         Some(_) => {
             watch(Event::Phase("reference motion"));
-            let (reference, said) = bench.motion(body, whole)?;
-            diagnostics.extend(said);
-            let measure = Measure::new(body, &reference);
-            let largest = reference.states.iter().map(|state| state.omega.norm()).fold(0.0, f64::max);
-            if situation.spin.value > SLACK_OF_RANGE * largest {
+            let mut references = Vec::new();
+            for case in &cases {
+                let (reference, said) = case.bench().motion(body, whole)?;
+                diagnostics.extend(said);
+                references.push(reference);
+            }
+            let measures = references.iter().map(|reference| Measure::new(body, reference));
+            let tried: Vec<_> = cases.iter().map(Case::bench).zip(measures).collect();
+            let speeds = references.iter().flat_map(|one| one.states.iter().map(|state| state.omega.norm()));
+            let largest = speeds.fold(0.0, f64::max);
+            if situation.spin.value > SLACK_OF_RANGE * largest
+                && scene.requirements.motion.angular_velocity.is_some()
+            {
                 short_of = Some((largest, situation.spin.value));
             }
             watch(Event::Phase("trials"));
-            let target = scene.requirements.multiplications;
-            let search = Search { bench: &bench, measure: &measure, by_bounds: by_bounds.is_some() };
-            mode_reason = match target {
+            let search = Search { cases: &tried, by_bounds: by_bounds.is_some() };
+            mode_reason = match scene.requirements.multiplications {
                 Some(most) => {
                     search.within_cost(most, &mut choice, &mut trials)?;
                     format!("the most accurate of at most {most} multiplications")
@@ -184,12 +261,17 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
                     "the fewest whose motion is within the tolerances".to_owned()
                 }
             };
-            let (chosen, history) = search.measured(&choice.modes, choice.groups)?;
-            diagnostics.extend(warnings(&bench, &measure, &choice.modes, history.as_ref()));
-            choice.chosen = Some(chosen);
+            let mut chosen = Vec::new();
+            for (bench, measure) in &tried {
+                let (trial, history) =
+                    bench.measured(measure, &choice.modes, choice.groups, search.budget())?;
+                diagnostics.extend(warnings(bench, measure, &choice.modes, history.as_ref()));
+                chosen.push(trial);
+            }
+            choice.chosen = Some(worst(chosen.into_iter()));
         }
     }
-    let terms = decisions(&bench, &choice, &trials, short_of);
+    let terms = decisions(body, scene, &choice, &trials, short_of);
     let tolerance = scene.requirements.tolerance;
     Ok(Selection {
         scene: scene.name.clone(),
@@ -197,7 +279,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         inputs: situation.inputs().into_iter().cloned().collect(),
         tolerance: [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction],
         significances,
-        multiplications: bench.multiplications(body, held),
+        multiplications: multiplications(body, held),
         terms,
         guideline: guideline(choice.groups),
         groups: choice.groups,
@@ -207,8 +289,19 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         mode_reason,
         chosen: choice.chosen,
         trials,
-        diagnostics,
+        diagnostics: once(diagnostics),
     })
+}
+
+/// Each diagnostic once.
+fn once(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let mut kept: Vec<Diagnostic> = Vec::new();
+    for diagnostic in diagnostics {
+        if !kept.contains(&diagnostic) {
+            kept.push(diagnostic);
+        }
+    }
+    kept
 }
 
 /// What is decided so far.
@@ -221,8 +314,7 @@ struct Choice {
 
 /// The search for a cheaper model, by measured motion.
 struct Search<'s> {
-    bench: &'s Bench<'s>,
-    measure: &'s Measure<'s>,
+    cases: &'s [(Bench<'s>, Measure<'s>)],
     /// Whether terms were dropped by bounds already.
     by_bounds: bool,
 }
@@ -232,21 +324,26 @@ impl Search<'_> {
         if self.by_bounds { 1.0 - PART_OF_BOUNDS } else { 1.0 }
     }
 
-    fn measured(&self, modes: &[usize], groups: Groups) -> Result<(Trial, Option<ErrorHistory>)> {
-        self.bench.measured(self.measure, modes, groups, self.budget())
+    fn body(&self) -> &FlexBody {
+        self.cases[0].0.body
+    }
+
+    fn measured(&self, modes: &[usize], groups: Groups, budget: f64) -> Result<Trial> {
+        let of_case = |(bench, measure): &(Bench<'_>, Measure<'_>)| -> Result<Trial> {
+            Ok(bench.measured(measure, modes, groups, budget)?.0)
+        };
+        Ok(worst(self.cases.iter().map(of_case).collect::<Result<Vec<_>>>()?.into_iter()))
     }
 
     /// The cheapest groups.
     fn terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
-        let all = choice.modes.clone();
-        let now = self.bench.multiplications(self.bench.body, choice.groups);
-        for groups in by_cost(self.bench) {
-            let cheaper = self.bench.multiplications(self.bench.body, groups) < now;
+        let now = multiplications(self.body(), choice.groups);
+        for groups in sets() {
+            let cheaper = multiplications(self.body(), groups) < now;
             if !cheaper || groups.and(choice.groups) != groups {
                 continue;
             }
-            let budget = PART_OF_TERMS * self.budget();
-            let (trial, _) = self.bench.measured(self.measure, &all, groups, budget)?;
+            let trial = self.measured(&choice.modes, groups, PART_OF_TERMS * self.budget())?;
             let passed = trial.passed();
             trials.push(trial);
             if passed {
@@ -259,8 +356,16 @@ impl Search<'_> {
 
     /// Modes by what they do, most first.
     fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
-        choice.shares = self.bench.shares(self.measure.recording());
-        let tolerance = &self.bench.scene.requirements.tolerance;
+        let mut of_cases = self.cases.iter().map(|(bench, measure)| bench.shares(measure.recording()));
+        choice.shares = of_cases.next().unwrap_or_default();
+        for other in of_cases {
+            for (share, other) in choice.shares.iter_mut().zip(other) {
+                share.amplitude = share.amplitude.max(other.amplitude);
+                share.deflection = share.deflection.max(other.deflection);
+                share.stress = share.stress.max(other.stress);
+            }
+        }
+        let tolerance = &self.cases[0].0.scene.requirements.tolerance;
         let weight = |j: &usize| {
             let share = &choice.shares[*j];
             (share.deflection / tolerance.deflection).max(share.stress / tolerance.stress)
@@ -285,7 +390,7 @@ impl Search<'_> {
                 0 if enough > 8 => enough / 2,
                 _ => too_few.midpoint(enough),
             };
-            let (trial, _) = self.measured(&first(count), choice.groups)?;
+            let trial = self.measured(&first(count), choice.groups, self.budget())?;
             if trial.passed() {
                 enough = count;
             } else {
@@ -304,15 +409,14 @@ impl Search<'_> {
     fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
         let ranked = self.ranked(choice);
         let mut best: Option<(f64, Groups, Vec<usize>)> = None;
-        for groups in by_cost(self.bench) {
+        for groups in sets() {
             if groups.and(choice.groups) != groups {
                 continue;
             }
             let cost = |count: usize| -> Result<usize> {
                 let modes: Vec<usize> = (0..count).collect();
-                let body =
-                    self.bench.body.reduced(&modes, self.bench.body.invariants().groups, Vec::new())?;
-                Ok(self.bench.multiplications(&body, groups))
+                let body = self.body().reduced(&modes, self.body().invariants().groups, Vec::new())?;
+                Ok(multiplications(&body, groups))
             };
             // The cost grows with the number of modes.
             let (mut fits, mut exceeds) = (0, ranked.len() + 1);
@@ -325,7 +429,7 @@ impl Search<'_> {
             }
             let mut modes = ranked[..fits].to_vec();
             modes.sort_unstable();
-            let (trial, _) = self.measured(&modes, groups)?;
+            let trial = self.measured(&modes, groups, self.budget())?;
             if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst) {
                 best = Some((trial.worst, groups, modes));
             }
@@ -343,14 +447,15 @@ impl Search<'_> {
 
 /// The decision about every group, and the trial that it rests on.
 fn decisions(
-    bench: &Bench<'_>,
+    body: &FlexBody,
+    scene: &Scene,
     choice: &Choice,
     trials: &[Trial],
     short_of: Option<(f64, f64)>,
 ) -> Vec<TermDecision> {
-    let tolerance = &bench.scene.requirements.tolerance;
-    let held = bench.body.invariants().groups;
-    let all = bench.body.n_modes();
+    let tolerance = &scene.requirements.tolerance;
+    let held = body.invariants().groups;
+    let all = body.n_modes();
     let of_groups = |kept: Groups| trials.iter().rfind(move |trial| trial.modes == all && trial.kept == kept);
     let describe = |trial: &Trial| match &trial.errors {
         Some(errors) => {

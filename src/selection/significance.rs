@@ -3,7 +3,7 @@
 
 use super::norms::Norms;
 use super::situation::Situation;
-use crate::flex_body::{Group, Groups};
+use crate::flex_body::Group;
 use nalgebra::Vector3;
 
 /// How large a term is beside what it stands next to.
@@ -29,12 +29,7 @@ pub struct Significance {
 ///
 /// With eta = |q| / sqrt(I_min), I_min the least principal inertia, Omega_1 the first circular frequency of the body (of the
 /// assembly for Coriolis forces), w and alpha the largest angular velocity and acceleration.
-pub fn significances(
-    situation: &Situation,
-    rigid: &Norms,
-    own: Option<&Norms>,
-    held: Groups,
-) -> Vec<Significance> {
+pub fn significances(situation: &Situation, rigid: &Norms, own: Option<&Norms>) -> Vec<Significance> {
     let least = situation.inertia.symmetric_eigenvalues().min();
     let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
     let first = rigid.first;
@@ -91,7 +86,7 @@ pub fn significances(
             "III",
         ),
     ];
-    let own = own.filter(|_| held == Groups::ALL).map(of);
+    let own = own.map(of);
     rows.into_iter()
         .enumerate()
         .map(|(i, (term, beside, formula, group, guideline))| Significance {

@@ -1,15 +1,24 @@
 //! Models with fewer terms or modes, tried: by bounds, and by integration.
 
+use super::bounds::{Amplitude, LoadSizes};
 use super::norms::Norms;
 use super::rows::PointRows;
 use super::situation::Situation;
+use super::variation::Variation;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::dynamics::{BodyPoint, EquationsOfMotion, Terms};
+use crate::dynamics::{BodyPoint, Configuration, EquationsOfMotion, Evaluation, Terms};
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
 use crate::model::extents;
-use crate::scene::{ErrorHistory, Measure, OutputErrors, Recording, Resolution, Scene, simulate};
-use nalgebra::DMatrix;
+use crate::scene::{
+    ErrorHistory, LEAST_REACTION, Measure, OutputErrors, Recording, Resolution, Scene, simulate,
+};
+use nalgebra::{DMatrix, Vector3};
+use std::f64::consts::TAU;
+
+/// Instants per shortest period that bounds look at a motion, and how many they look at in all.
+const INSTANTS_PER_PERIOD: f64 = 20.0;
+const MOST_INSTANTS: usize = 20_000;
 
 /// A model with fewer terms or modes and the error that it makes.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,11 +65,6 @@ pub struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// Multiplications of the equations of a body with `groups`.
-    pub fn multiplications(&self, body: &FlexBody, groups: Groups) -> usize {
-        EquationsOfMotion::new(body, terms(groups)).multiplications()
-    }
-
     /// The motion of `body` with the groups `kept`.
     ///
     /// # Errors
@@ -69,6 +73,19 @@ impl Bench<'_> {
         let mut scene = self.scene.clone();
         scene.run.terms = terms(kept);
         simulate(body, &scene, self.memory, |_| ())
+    }
+
+    /// The motion of the body with the groups `kept`, at instants that follow its fastest mode.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    pub fn fine_motion(&self, kept: Groups) -> Result<Recording> {
+        let mut scene = self.scene.clone();
+        let fastest = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+        let wanted = self.situation.duration.value * fastest / TAU * INSTANTS_PER_PERIOD;
+        scene.run.outputs = scene.run.outputs.max((wanted as usize).min(MOST_INSTANTS));
+        scene.run.terms = terms(kept);
+        Ok(simulate(self.body, &scene, self.memory, |_| ())?.0)
     }
 
     /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure` holds; and how its errors grow.
@@ -108,7 +125,7 @@ impl Bench<'_> {
         let trial = Trial {
             kept,
             modes: modes.len(),
-            multiplications: self.multiplications(body, kept),
+            multiplications: multiplications(body, kept),
             tier: 2,
             errors,
             budget,
@@ -118,74 +135,148 @@ impl Bench<'_> {
         Ok((trial, history.ok()))
     }
 
-    /// The trial by bounds of a model with the groups `kept`. Errors are relative to the largest of the motion: that is no less than the
-    /// largest of `simplest`, the motion of the model without any group, less the bound of how far that is from the whole.
-    pub fn bounded(&self, norms: &Norms, simplest: Option<&Recording>, kept: Groups, budget: f64) -> Trial {
+    /// The trial by bounds of a model with the groups `kept`. With its motion `run`, the load that the dropped terms are to its error is taken
+    /// along that, at its instants; without, at the largest motion that loads and rotation allow.
+    pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: Groups, budget: f64) -> Trial {
         let mut trial = Trial {
             kept,
             modes: self.body.n_modes(),
-            multiplications: self.multiplications(self.body, kept),
+            multiplications: multiplications(self.body, kept),
             tier: norms.tier,
             errors: None,
             budget,
             worst: f64::INFINITY,
             remark: String::new(),
         };
-        let driven = match &self.situation.driven {
-            Ok(driven) => driven,
-            Err(reason) => {
-                trial.remark.clone_from(reason);
-                return trial;
+        match self.bounds(norms, run, kept) {
+            Ok(errors) => {
+                trial.worst = errors.worst(&self.scene.requirements.tolerance);
+                trial.errors = Some(errors);
             }
-        };
+            Err(reason) => trial.remark = reason,
+        }
+        trial
+    }
+
+    fn bounds(
+        &self,
+        norms: &Norms,
+        run: Option<&Recording>,
+        kept: Groups,
+    ) -> std::result::Result<OutputErrors, String> {
+        let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
-        let all = driven.error(Groups::ALL, norms);
-        let (Some(error), Some(torque)) = (driven.error(dropped, norms), driven.torque_error(dropped, norms))
-        else {
-            trial.remark = "the spin may take the stiffness of some motion".to_owned();
-            return trial;
+        let softened = || "the spin may take the stiffness of some motion".to_owned();
+        let own = match run {
+            Some(run) => self.amplitude(run),
+            None => driven.amplitude(kept, norms).ok_or_else(softened)?,
         };
+        let along = run.filter(|_| norms.tier > 0).map(|run| self.residual(run, kept));
+        let residual = along.map_or_else(|| driven.residual(dropped, norms, &own), |along| vec![along]);
+        let error = driven.error(norms, &residual).ok_or_else(softened)?;
+        // The levers of the loads deform with the body.
+        let forces: f64 = self
+            .scene
+            .loads
+            .iter()
+            .map(|load| Variation::of(&load.history, driven.rotation.duration).largest * load.force.norm())
+            .sum();
+        let levers = forces * self.reach_of_nodes() * error.energy;
+        let torque = driven.torque_error(dropped, norms, &own, &error) + levers;
+
+        // Relative to what is certain of the whole motion, or to the least that counts.
         let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
-        let reach = self.reach();
-        // What is certain of the whole motion.
-        let surely = |of_simplest: &dyn Fn(&Recording) -> f64, error: &dyn Fn(f64) -> f64, least: f64| {
-            let far = all.map_or(f64::INFINITY, |all| error(all.energy));
-            (simplest.map_or(0.0, of_simplest) - far).max(least)
+        let relative = |error: f64, of_run: &dyn Fn(&Recording) -> f64, least: f64| {
+            error / (run.map_or(0.0, of_run) - error).max(least)
         };
-        let deflection = |energy: f64| reach * energy;
-        let largest_path = |recording: &Recording| {
-            let all = recording.paths.iter().flat_map(|path| &path.deflection);
+        let paths = |run: &Recording| {
+            let all = run.paths.iter().flat_map(|path| &path.deflection);
             all.map(|d| d.norm()).fold(0.0, f64::max)
         };
-        let root_energy = |energy: f64| energy / 2f64.sqrt();
-        let largest_energy = |recording: &Recording| {
-            recording.balances.iter().map(|balance| balance.elastic).fold(0.0, f64::max).sqrt()
+        let energies =
+            |run: &Recording| run.balances.iter().map(|balance| balance.elastic).fold(0.0, f64::max).sqrt();
+        let torques = |run: &Recording| {
+            let all = run.reactions.iter().flatten();
+            all.map(|(_, torque)| torque.norm()).fold(0.0, f64::max)
         };
-        // The levers of the loads deform with the body.
-        let levers: f64 = driven.loads.len() as f64
-            * self.scene.loads.iter().map(|load| load.force.norm()).fold(0.0, f64::max)
-            * self.reach_of_nodes()
-            * error.energy;
-        let reaction = self.scene.spin.is_some().then(|| {
-            let inertia = 0.5 * self.body.invariants().inertia().trace();
-            let largest = simplest
-                .and_then(|recording| recording.reactions.as_ref())
-                .map_or(0.0, |all| all.iter().map(|(_, torque)| torque.norm()).fold(0.0, f64::max));
-            let whole = driven.torque_error(Groups::ALL, norms).unwrap_or(f64::INFINITY) + levers;
-            let least = 1e-3 * inertia * driven.rotation.largest.powi(2);
-            (torque + levers) / (largest - whole).max(least)
-        });
-        let errors = OutputErrors {
+        let inertia = 0.5 * self.body.invariants().inertia().trace();
+        let least_torque = LEAST_REACTION * inertia * driven.rotation.largest.powi(2);
+        Ok(OutputErrors {
             attitude: 0.0,
-            deflection: Some(deflection(error.energy) / surely(&largest_path, &deflection, least.deflection)),
-            stress: Some(
-                root_energy(error.energy) / surely(&largest_energy, &root_energy, least.root_energy),
-            ),
-            reaction,
+            deflection: Some(relative(self.reach() * error.energy, &paths, least.deflection)),
+            stress: Some(relative(error.energy / 2f64.sqrt(), &energies, least.root_energy)),
+            reaction: self.scene.spin.is_some().then(|| relative(torque, &torques, least_torque)),
+        })
+    }
+
+    /// How far the modes go in a motion.
+    fn amplitude(&self, run: &Recording) -> Amplitude {
+        let eigenvalues = &self.body.modes().eigenvalue;
+        let weighted = |x: &[f64]| x.iter().zip(eigenvalues).map(|(x, l)| l * x * x).sum::<f64>().sqrt();
+        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let most = |of: &dyn Fn(&Configuration) -> f64| run.states.iter().map(of).fold(0.0, f64::max);
+        let change = |pair: &[(f64, &Configuration)]| {
+            let ((before, a), (after, b)) = (pair[0], pair[1]);
+            let rates: Vec<f64> = a.qd.iter().zip(&b.qd).map(|(a, b)| (b - a) / (after - before)).collect();
+            norm(&rates)
         };
-        trial.worst = errors.worst(&self.scene.requirements.tolerance);
-        trial.errors = Some(errors);
-        trial
+        let instants: Vec<(f64, &Configuration)> = run.time.iter().copied().zip(&run.states).collect();
+        Amplitude {
+            energy: most(&|state| weighted(&state.q)),
+            coordinate: most(&|state| norm(&state.q)),
+            rate: most(&|state| norm(&state.qd)),
+            acceleration: instants.windows(2).map(change).fold(0.0, f64::max),
+            energy_rate: most(&|state| weighted(&state.qd)),
+        }
+    }
+
+    /// The load that the terms beyond `kept` are to the error of a motion without them: what the balance of forces lacks at its instants.
+    fn residual(&self, run: &Recording, kept: Groups) -> LoadSizes {
+        let equations = [self.body.invariants().groups, kept]
+            .map(|groups| EquationsOfMotion::new(self.body, terms(groups)));
+        let mut evaluations = equations.each_ref().map(Evaluation::new);
+        let rigid = equations[0].n_rigid();
+        let axes: &[usize] = if rigid == 3 { &[2] } else { &[0, 1, 2] };
+        let root: Vec<f64> = self.body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
+        let mut velocity = vec![0.0; equations[0].n_velocities()];
+        let mut acceleration = velocity.clone();
+        let mut lacking = |time: f64, state: &Configuration| {
+            // Free-surface modes about the centre of mass do not feel how the frame moves along.
+            let first = rigid - axes.len();
+            let rate = self.scene.spin.as_ref().map_or(0.0, |spin| spin.rate.at(time).1);
+            let alpha = self.scene.spin.as_ref().map_or_else(Vector3::zeros, |spin| spin.axis * rate);
+            for (at, &axis) in axes.iter().enumerate() {
+                velocity[first + at] = state.omega[axis];
+                acceleration[first + at] = alpha[axis];
+            }
+            velocity[rigid..].copy_from_slice(&state.qd);
+            let mut forces = [velocity.clone(), velocity.clone()];
+            for (evaluation, forces) in evaluations.iter_mut().zip(&mut forces) {
+                evaluation.set(&state.q, &velocity);
+                evaluation.balance(&acceleration, forces);
+            }
+            let [whole, own] = forces;
+            whole[rigid..].iter().zip(&own[rigid..]).map(|(a, b)| a - b).collect::<Vec<f64>>()
+        };
+        let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
+        let mut sizes = LoadSizes::default();
+        let mut before: Option<(f64, Vec<f64>)> = None;
+        for (&time, state) in run.time.iter().zip(&run.states) {
+            let force = lacking(time, state);
+            let energy = norm(&mut force.iter().zip(&root).map(|(f, root)| f / root));
+            sizes.largest = sizes.largest.max(energy);
+            match &before {
+                None => sizes.begun = energy,
+                Some((then, earlier)) => {
+                    let both = norm(&mut force.iter().copied()) + norm(&mut earlier.iter().copied());
+                    sizes.impulse += 0.5 * both * (time - then);
+                    let step = force.iter().zip(earlier).zip(&root).map(|((a, b), root)| (a - b) / root);
+                    sizes.moved += norm(&mut { step });
+                }
+            }
+            before = Some((time, force));
+        }
+        sizes
     }
 
     /// Largest deflection of a watched point, or without any of a node, for |Lambda^(1/2) q| = 1.
@@ -252,6 +343,11 @@ pub struct ModeShare {
     pub stress: f64,
     /// Whether the mode is kept.
     pub kept: bool,
+}
+
+/// Multiplications of an evaluation of the equations of `body` with `groups`.
+pub fn multiplications(body: &FlexBody, groups: Groups) -> usize {
+    EquationsOfMotion::new(body, terms(groups)).multiplications()
 }
 
 /// Terms of equations with `groups`.

@@ -2,12 +2,13 @@
 
 use super::scan::Scan;
 use super::schema::MASS_STRUCTURES;
+use super::schema::terms::KEPT;
 use super::value::Value;
 use crate::flex_body::{
-    Certificate, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
-    LumpedBody, Modes, Parts, Source, UnitLoad,
+    Certificate, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface, InterfaceCoordinates,
+    InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
 };
-use crate::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
+use crate::invariants::{DIGITS, GeneralTerms, Invariants, ibar_of_c2, s_of_modal_mass};
 use crate::model::{BodyNumber, Coupling, Nodes};
 use crate::units::UnitSystem;
 use faer::Mat;
@@ -31,9 +32,11 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     };
     let modes = take.modes(nodes.len());
     let nf = modes.eigenvalue.len();
-    let invariants = take.invariants("/invariants", nf, dimension == 2);
+    let groups = take.scan.held()?;
+    let invariants = take.invariants("/invariants", nf, dimension == 2, groups);
     let geometric_stiffness = take.geometric_stiffness(nf);
-    let lumped = take.lumped(nf, dimension == 2);
+    let lumped = take.lumped(nf, dimension == 2, groups);
+    let terms = take.terms();
     let certificate = take.certificate();
     let interfaces = take.interfaces(&nodes);
     let coordinates = take.coordinates(nf);
@@ -51,7 +54,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         certificate,
         interfaces,
         coordinates,
-        terms: Vec::new(),
+        terms,
     })
 }
 
@@ -201,29 +204,47 @@ impl Take<'_> {
         Some(InternalRows { dofs, shape: self.matrix(values, nf) })
     }
 
-    fn invariants(&mut self, place: &str, nf: usize, plane: bool) -> Invariants {
-        let ibar = self.floats(&format!("{place}/Ibar"));
-        let s = self.floats(&format!("{place}/S"));
+    fn invariants(&mut self, place: &str, nf: usize, plane: bool, groups: Groups) -> Invariants {
+        let path = |name: &str| format!("{place}/{name}");
         let block = |k: usize, l: usize| 3 * k + l;
-        // Elsewhere W3 and m_ff follow from S, and are compared with it.
-        let w0 = format!("{place}/W0");
+        let w0 = path("W0");
+        // Elsewhere W3 and m_ff follow from S, and C2 from Ibar, and are compared with them.
         let general = self.scan.values.contains_key(&w0).then(|| GeneralTerms {
             w0: self.matrix(&w0, 3 * nf),
-            w3: self.matrix(&format!("{place}/W3"), nf),
-            modal_mass: self.matrix(&format!("{place}/modal_mass"), nf),
+            w3: if groups.w3 { self.matrix(&path("W3"), nf) } else { Mat::zeros(3 * nf, nf) },
+            modal_mass: self.matrix(&path("modal_mass"), nf),
             plane,
         });
+        let ibar = match groups.w1 {
+            true => {
+                let ibar = self.floats(&path("Ibar"));
+                [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar[block(k, l) * nf..][..nf].to_vec()))
+            }
+            false => ibar_of_c2(&self.matrix(&path("C2"), nf)),
+        };
+        let s = match (groups.w2, &general) {
+            (true, _) => {
+                let s = self.floats(&path("S"));
+                let entry = |k, l, i, j| s[(block(k, l) * nf + i) * nf + j];
+                [0, 1, 2].map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| entry(k, l, i, j))))
+            }
+            (false, Some(_)) => s_of_modal_mass(nf, None, None),
+            (false, None) => {
+                let modal_mass = self.matrix(&path("modal_mass"), nf);
+                let w3 = groups.w3.then(|| self.matrix(&path("W3"), nf));
+                s_of_modal_mass(nf, Some(&modal_mass), w3.as_ref())
+            }
+        };
         Invariants {
             general,
-            mass: self.floats(&format!("{place}/mass"))[0],
-            first_moment: Vector3::from_column_slice(&self.floats(&format!("{place}/first_moment"))),
-            second_moment: Matrix3::from_row_slice(&self.floats(&format!("{place}/second_moment"))),
-            c1: self.matrix(&format!("{place}/C1"), nf),
-            ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar[block(k, l) * nf..][..nf].to_vec())),
-            s: [0, 1, 2]
-                .map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| s[(block(k, l) * nf + i) * nf + j]))),
-            modal_stiffness: self.matrix(&format!("{place}/modal_stiffness"), nf),
-            groups: Groups::ALL,
+            mass: self.floats(&path("mass"))[0],
+            first_moment: Vector3::from_column_slice(&self.floats(&path("first_moment"))),
+            second_moment: Matrix3::from_row_slice(&self.floats(&path("second_moment"))),
+            c1: self.matrix(&path("C1"), nf),
+            ibar,
+            s,
+            modal_stiffness: self.matrix(&path("modal_stiffness"), nf),
+            groups,
         }
     }
 
@@ -240,7 +261,42 @@ impl Take<'_> {
         out
     }
 
-    fn lumped(&mut self, nf: usize, plane: bool) -> Vec<LumpedBody> {
+    /// What was decided about each group, where it was.
+    fn terms(&mut self) -> Vec<TermDecision> {
+        Group::ALL.into_iter().filter_map(|group| self.term(group)).collect()
+    }
+
+    fn term(&mut self, group: Group) -> Option<TermDecision> {
+        let path = |name: &str| format!("/terms@{}_{name}", group.name());
+        let [reason, tier, bound, limit] = ["reason", "tier", "bound", "limit"].map(path);
+        let there = |path: &String| self.scan.values.contains_key(path);
+        if !there(&reason) || !there(&tier) {
+            if let Some(first) = [&reason, &tier, &bound, &limit].into_iter().find(|path| there(path)) {
+                self.scan.add(format!("{first}: expected with {reason} and {tier}, one of which is missing"));
+            }
+            return None;
+        }
+        let kept = self.text(&format!("/terms@{}", group.name())) == KEPT;
+        let number = self.optional_count(&tier)?;
+        let Ok(tier) = u8::try_from(number) else {
+            self.scan.add(format!("{tier}: expected 0, 1 or 2, found {number}"));
+            return None;
+        };
+        let mut size = |path: &str| match self.scan.values.remove(path) {
+            Some(Value::Float(value)) => value,
+            _ => f64::INFINITY,
+        };
+        Some(TermDecision {
+            group,
+            kept,
+            tier,
+            bound: size(&bound),
+            limit: size(&limit),
+            reason: self.text(&reason),
+        })
+    }
+
+    fn lumped(&mut self, nf: usize, plane: bool, groups: Groups) -> Vec<LumpedBody> {
         let mut out = Vec::new();
         for (scheme, link) in self.scan.instances("/lumped") {
             let place = format!("/lumped/{link}");
@@ -249,7 +305,7 @@ impl Take<'_> {
                 other => unreachable!("scan without problems has {other:?} as norms of {link}"),
             };
             let negative_masses = self.count(&format!("{place}@negative_masses"));
-            let invariants = self.invariants(&place, nf, plane);
+            let invariants = self.invariants(&place, nf, plane, groups);
             out.push(LumpedBody { scheme, invariants, negative_masses, comparison });
         }
         out

@@ -1,8 +1,10 @@
 //! The table as documentation: `docs/format.md` and `schemas/flexbody-file.schema.json` are generated here.
 
 use super::item::{DERIVED_TOLERANCE, Extent, Group, Item, Kind, Origin};
+use super::schema::terms::KEPT;
 use super::schema::{FORMAT, MAJOR, MINOR, TABLE};
 use super::value::Units;
+use crate::flex_body::Group as TermGroup;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -37,7 +39,8 @@ psi = h5read('body.flex.h5', '/modes/shape', [1 1 1], [3 Inf 1])';  % first mode
 
 const RULES: &str = "\
 A reader refuses a newer `format_major` and names the `generator`; a newer `format_minor` only adds entries, which older
-readers ignore. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
+readers ignore. A body that lacks groups of the kinetic energy (`/terms`, since 1.3) lacks datasets that readers up to 1.2 require: these
+refuse it by the names of the datasets. Names that are data (lumping schemes, interfaces, loads) are percent-encoded where they hold `/`, `%`, control
 characters or a leading dot, and keep their order by HDF5 creation order. Nothing in the file depends on the clock, on the
 number of threads or on its path: equal bodies are equal bytes.
 ";
@@ -84,6 +87,9 @@ fn content(item: &Item) -> String {
         Origin::Derived(..) => text.push_str(" (*derived*)"),
         Origin::Primary(_) => {}
     }
+    if let Some(group) = item.of {
+        write!(text, " (where {} is kept)", group.name()).expect("a String");
+    }
     if !item.required {
         text.push_str(" (optional)");
     }
@@ -128,6 +134,7 @@ pub fn format_schema() -> String {
         }
         fill(target, group);
     }
+    root["allOf"] = TermGroup::ALL.into_iter().map(of_group).collect();
     root["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     root["title"] = json!(format!("{FORMAT} file, format version {MAJOR}.{MINOR}"));
     root["description"] = json!(
@@ -137,6 +144,36 @@ pub fn format_schema() -> String {
     let mut text = serde_json::to_string_pretty(&root).expect("a tree of maps is valid JSON");
     text.push('\n');
     text
+}
+
+/// The datasets of a group of the kinetic energy are there where it is kept, and only there.
+fn of_group(held: TermGroup) -> Value {
+    let within = |path: &str, part: &str, inner: Value| {
+        path.split('/').filter(|name| !name.is_empty()).rev().fold(
+            json!({ "properties": { part: inner } }),
+            |inner, name| match name.starts_with('<') {
+                true => json!({ "properties": { "groups": { "additionalProperties": inner } } }),
+                false => json!({ "properties": { "groups": { "properties": { name: inner } } } }),
+            },
+        )
+    };
+    let groups = || TABLE.iter().filter(|group| group.entries().any(|item| item.of == Some(held)));
+    let all = |inner: &dyn Fn(&[&str]) -> Value| -> Value {
+        let of = |group: &Group| {
+            let items = group.entries().filter(|item| item.of == Some(held));
+            within(group.path, "datasets", inner(&items.map(|item| item.name).collect::<Vec<_>>()))
+        };
+        json!({ "allOf": groups().map(of).collect::<Vec<_>>() })
+    };
+    let none = |names: &[&str]| {
+        let never: Map<String, Value> = names.iter().map(|name| ((*name).to_owned(), json!(false))).collect();
+        json!({ "properties": never })
+    };
+    json!({
+        "if": within("/terms", "attributes", json!({ "properties": { held.name(): { "const": KEPT } } })),
+        "then": all(&|names| json!({ "required": names })),
+        "else": all(&none),
+    })
 }
 
 /// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those that are not
@@ -179,7 +216,7 @@ fn fill(target: &mut Value, group: &Group) {
             part["additionalProperties"] = json!({ "type": "number", "description": item.description });
         }
         let listed = || items().filter(|i| i.kind != Kind::Named);
-        let required: Vec<_> = listed().filter(|i| i.required).map(|i| i.name).collect();
+        let required: Vec<_> = listed().filter(|i| i.required && i.of.is_none()).map(|i| i.name).collect();
         if !required.is_empty() {
             part["required"] = json!(required);
         }

@@ -1,7 +1,7 @@
 //! What the table of the flex-body file is made of: entries, their shapes, and where their values come from.
 
 use super::value::{Units, Value, View, text};
-use crate::flex_body::{Interface, LumpedBody, Parts};
+use crate::flex_body::{Group as TermGroup, Interface, LumpedBody, Parts};
 
 /// One extent of a dataset's shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,6 +82,8 @@ pub(super) struct Item {
     /// Minor version of the format that brought it.
     pub since: i64,
     pub origin: Origin,
+    /// The group of the kinetic energy that the entry belongs to: there where the body holds it, required or not there at all.
+    pub of: Option<TermGroup>,
 }
 
 /// A group with its entries. `<scheme>` and `<name>` stand for names that are data.
@@ -97,6 +99,12 @@ impl Item {
         if let Primary(get) = self.origin {
             self.origin = Derived(get, from);
         }
+        self
+    }
+
+    /// Of a group of the kinetic energy.
+    pub const fn of(mut self, group: TermGroup) -> Self {
+        self.of = Some(group);
         self
     }
 

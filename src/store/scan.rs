@@ -5,8 +5,10 @@ use super::hdf5_value::{self as hdf5_value, Sizes, Stored};
 use super::item::{Group, Item, Kind, Origin, Per};
 use super::names;
 use super::schema::TABLE;
+use super::schema::terms::{DROPPED, KEPT};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::flex_body::{Group as TermGroup, Groups};
 use crate::units::UnitSystem;
 use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -27,6 +29,8 @@ pub(super) struct Scan {
     sizes: Sizes,
     stored: Stored,
     units: Option<UnitSystem>,
+    /// Entries of groups of the kinetic energy, and whether they are there.
+    of_groups: Vec<(String, &'static Item, bool)>,
 }
 
 /// Key of an entry in [`Scan::values`].
@@ -60,6 +64,7 @@ impl Scan {
             sizes: Sizes::default(),
             stored: Stored::new(bytes),
             units: None,
+            of_groups: Vec::new(),
         };
         for group in TABLE {
             match group.per {
@@ -76,6 +81,7 @@ impl Scan {
                 }
             }
         }
+        scan.groups();
         scan
     }
 
@@ -141,12 +147,16 @@ impl Scan {
         for item in group.entries() {
             let name = key(&path, item);
             self.texts(&opened, &name, item);
-            match self.entry(&opened, item, &mut sizes) {
+            let entry = self.entry(&opened, item, &mut sizes);
+            if let (Ok(value), Some(_)) = (&entry, item.of) {
+                self.of_groups.push((name.clone(), item, value.is_some()));
+            }
+            match entry {
                 Ok(Some(value)) => {
                     self.constant(&name, item, &value);
                     self.values.insert(name, value);
                 }
-                Ok(None) if item.required => {
+                Ok(None) if item.required && item.of.is_none() => {
                     self.add(format!("{name}: expected {}, found nothing", kind(item)))
                 }
                 Ok(None) => {}
@@ -200,6 +210,40 @@ impl Scan {
                 Ok(Some(Value::Named(values)))
             }
         }
+    }
+
+    /// What belongs to a group of the kinetic energy is there where `/terms` says that the group is kept, and only there.
+    fn groups(&mut self) {
+        let Some(held) = self.held() else { return };
+        for (name, item, there) in std::mem::take(&mut self.of_groups) {
+            let Some(group) = item.of else { continue };
+            match (held.has(group), there) {
+                (true, false) => self.add(format!("{name}: expected {}, found nothing", kind(item))),
+                (false, true) => {
+                    let said = format!("/terms@{} says `{DROPPED}`", group.name());
+                    self.add(format!("{name}: expected nothing, since {said}, found a dataset"));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The groups of the kinetic energy that the file says the body holds; `None` when it says something else.
+    pub fn held(&mut self) -> Option<Groups> {
+        let mut says = |group: TermGroup| match self.values.get(&format!("/terms@{}", group.name())) {
+            Some(Value::Text(text)) if text == KEPT => Some(true),
+            Some(Value::Text(text)) if text == DROPPED => Some(false),
+            Some(Value::Text(found)) => {
+                let message =
+                    format!("/terms@{}: expected `{KEPT}` or `{DROPPED}`, found {found:?}", group.name());
+                self.add(message);
+                None
+            }
+            // What is missing is among the problems.
+            _ => Some(true),
+        };
+        let [w1, w2, w3] = TermGroup::ALL.map(&mut says);
+        Some(Groups { w1: w1?, w2: w2?, w3: w3? })
     }
 
     fn constant(&mut self, name: &str, item: &Item, value: &Value) {

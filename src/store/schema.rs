@@ -5,21 +5,23 @@ use super::item::Kind::{Floats, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
 use super::item::{Get, Group, Item, Kind, Origin, Per};
 use super::value::{Units, Value, count, matrix, rows, shape_rows, small, text};
-use crate::flex_body::MassStructure;
+use crate::flex_body::{Group as TermGroup, MassStructure};
 use crate::invariants::GENERAL_REMARK;
 use crate::provenance;
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, guarantee};
 use geometric_stiffness::GEOMETRIC_STIFFNESS;
 use interfaces::{COORDINATES, INTERFACES};
+use terms::TERMS;
 
 mod certificate;
 mod geometric_stiffness;
 mod interfaces;
+pub(super) mod terms;
 
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// See [`MAJOR`].
-pub(super) const MINOR: i64 = 2;
+pub(super) const MINOR: i64 = 3;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
@@ -44,7 +46,7 @@ const fn dataset(
     description: &'static str,
     get: Get,
 ) -> Item {
-    Item { name, kind, units, symbol, description, required: true, since: 0, origin: Primary(get) }
+    Item { name, kind, units, symbol, description, required: true, since: 0, origin: Primary(get), of: None }
 }
 
 /// A required attribute of version 1.0.
@@ -60,7 +62,7 @@ const fn attribute(
 
 /// A required attribute of version 1.0 with one value for every file.
 const fn constant(name: &'static str, kind: Kind, origin: Origin, description: &'static str) -> Item {
-    Item { name, kind, units: ONE, symbol: "", description, required: true, since: 0, origin }
+    Item { name, kind, units: ONE, symbol: "", description, required: true, since: 0, origin, of: None }
 }
 
 const ROOT: &[Item] = &[
@@ -320,11 +322,15 @@ const INVARIANTS: &[Item] = &[
         matrix(v.invariants().c1.as_ref())
     }),
     dataset("Ibar", Floats(&[Fixed(3), Fixed(3), Modes]), ROOT_MASS_LENGTH, "Ibar", "Ibar_kl = x_k' Ms Psi_l", |v| {
-        Some(Value::Floats(v.invariants().ibar.as_flattened().iter().flatten().copied().collect()))
-    }),
+        let own = v.invariants();
+        own.groups.w1.then(|| Value::Floats(own.ibar.as_flattened().iter().flatten().copied().collect()))
+    })
+    .of(TermGroup::W1),
     dataset("S", Floats(&[Fixed(3), Fixed(3), Modes, Modes]), ONE, "S", "S_kl = Psi_k' Ms Psi_l", |v| {
-        Some(Value::Floats(v.invariants().s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
-    }),
+        let own = v.invariants();
+        own.groups.w2.then(|| Value::Floats(own.s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
+    })
+    .of(TermGroup::W2),
     dataset("modal_stiffness", Floats(&[Modes, Modes]), PER_TIME2, "K_ff", "Psi' K Psi", |v| {
         matrix(v.invariants().modal_stiffness.as_ref())
     }),
@@ -339,20 +345,23 @@ const INVARIANTS: &[Item] = &[
     dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
         matrix(v.invariants().w1()?.as_ref())
     })
-    .derived("Ibar"),
+    .derived("Ibar")
+    .of(TermGroup::W1),
     dataset("W2", Floats(&[ThreeModes, ThreeModes]), ONE, "W2", "diagonal blocks S_ll + S_mm, block (k,l) = -S_lk; row and column b nf + j", |v| {
         matrix(v.invariants().w2()?.as_ref())
     })
-    .derived("S"),
-    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general`: B_j' M Psi, information of its own", |v| {
+    .derived("S")
+    .of(TermGroup::W2),
+    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general` (B_j' M Psi) and without W2: information of its own", |v| {
         matrix(v.invariants().w3()?.as_ref())
     })
-    .derived("S"),
-    dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]", |v| {
+    .derived("S")
+    .of(TermGroup::W3),
+    dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]; without W1: information of its own", |v| {
         matrix(v.invariants().c2().as_ref())
     })
     .derived("Ibar"),
-    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33 = Psi' M Psi; mass structure `general`: information of its own", |v| matrix(v.invariants().modal_mass().as_ref()))
+    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33 = Psi' M Psi; mass structure `general` and without W2: information of its own", |v| matrix(v.invariants().modal_mass().as_ref()))
         .derived("S"),
 ];
 
@@ -375,13 +384,6 @@ const COMPARISON: &[Item] =
     &[attribute("<norm>", Named, ONE, "one attribute per error norm, in creation order", |v| {
         Some(Value::Named(v.lumped?.comparison.clone()))
     })];
-
-const TERMS: &[Item] = &[
-    constant("W1", Text, ConstantText("kept"), "kinetic-energy group W1 in this version"),
-    constant("W2", Text, ConstantText("kept"), "kinetic-energy group W2 in this version"),
-    constant("W3", Text, ConstantText("kept"), "kinetic-energy group W3 in this version"),
-    attribute("reason", Text, ONE, "why", |_| text("no scene was given: every term is kept")),
-];
 
 /// The groups, in the order in which they are written.
 pub(super) const TABLE: &[Group] = &[
@@ -422,7 +424,7 @@ pub(super) const TABLE: &[Group] = &[
     Group {
         path: "/terms",
         per: Per::Body,
-        description: "Which groups of inertia terms a solver should use.",
+        description: "Which groups of the kinetic energy the body holds, and why. A solver leaves out what is dropped, in all places.",
         items: &[TERMS],
     },
     Group {

@@ -42,6 +42,20 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).expect("reference")).expect("JSON")
 }
 
+/// Solid bodies of `fixtures/models`.
+const SOLIDS: [&str; 10] = [
+    "bar_c3d8r",
+    "bracket_hex20",
+    "connecting_rod",
+    "conveyor_plate",
+    "cube_hex8",
+    "gear_disc",
+    "mems_gyroscope",
+    "robot_link",
+    "satellite",
+    "turbine_blade",
+];
+
 /// The bodies that belong to the project.
 fn own() -> Vec<Case> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models");
@@ -63,7 +77,7 @@ fn own() -> Vec<Case> {
             count: None,
         }
     };
-    ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8"].map(case).into()
+    SOLIDS.map(case).into()
 }
 
 /// Where larger bodies lie beside the project on some machines.

@@ -12,6 +12,7 @@ pub mod jointed;
 pub mod mesh;
 pub mod motion;
 pub mod nodal;
+pub mod partial;
 pub mod pipeline;
 pub mod plane;
 pub mod random;
