@@ -28,5 +28,6 @@ pub mod scene;
 pub mod selection;
 pub mod store;
 pub mod tailoring;
+pub mod trade;
 pub mod units;
 pub mod verification;

@@ -41,6 +41,52 @@ pub enum Command {
         after_help = "Example:\n  flexbody simulate rod.flex.h5 --scene tumble.toml -o tumble.h5 --csv tumble.csv --report tumble.html"
     )]
     Simulate(SimulateArguments),
+    /// Measure what accuracy costs in a scene: candidate bodies against a reference, and which to take
+    #[command(
+        after_help = "Examples:\n  flexbody trade rod.flex.h5 --scene tumble.toml --report trade.html\n  flexbody trade model.toml --modes 20 --scene tumble.toml --reference nodal --csv trade.csv"
+    )]
+    Trade(TradeArguments),
+}
+
+/// Arguments of `trade`.
+#[derive(Debug, Args)]
+pub struct TradeArguments {
+    /// Flex-body file, whose modes and groups of terms are candidates; or a manifest (.toml), of which settings of `convert` are too
+    #[arg(value_name = "BODY.flex.h5|MODEL.toml")]
+    pub body: PathBuf,
+    /// What the body does, and the tolerances (see docs/simulate.md)
+    #[arg(long, value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// What errors are measured against: full, the body with all modes and groups, of a manifest twice the modes and residual vectors; nodal, the unreduced equations (manifests only)
+    #[arg(long, value_enum, default_value_t = ReferenceName::Full)]
+    pub reference: ReferenceName,
+    /// Free modes that candidates of a manifest have at most
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000))]
+    pub modes: Option<u32>,
+    /// Simulations per candidate whose median time is told
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    pub repeat: u16,
+    /// Table to write the candidates to
+    #[arg(long, value_name = "TRADE.csv")]
+    pub csv: Option<PathBuf>,
+    /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Threads; all results but the times do not depend on it [default: all processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// What errors are measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReferenceName {
+    /// The largest body
+    Full,
+    /// The unreduced equations of all nodes
+    Nodal,
 }
 
 /// Arguments of `select`.

@@ -4,7 +4,7 @@ use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, Fr
 use super::checkpoint::resume;
 use super::output::{Outcome, tell};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
-use super::resources::{memory_left, peak_memory_bytes, resident_bytes};
+use super::resources::{memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::watcher::Watcher;
 use crate::basis::{
     BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
@@ -14,8 +14,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::error::Result;
 use crate::input::{
-    InterfaceNodes, LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses,
-    read_shapes,
+    LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
 };
 use crate::invariants::BodyFrame;
 use crate::model::{CheckedModel, FeModel};
@@ -378,36 +377,17 @@ fn refuse_overwriting(
     schemes: &[Scheme],
     loads: &[LoadSource],
 ) -> Result<()> {
-    let matrices = [Some(&files.stiffness.path), Some(&files.mass.path)];
-    let tables = [Some(&files.nodes), files.dofs.as_ref(), files.manifest.as_ref()];
-    let masses = schemes.iter().map(|scheme| match scheme {
+    let masses = schemes.iter().filter_map(|scheme| match scheme {
         Scheme::User(path) => Some(path),
         Scheme::Ready(_) => None,
     });
-    let interfaces = files.interfaces.iter().map(|interface| match &interface.nodes {
-        InterfaceNodes::File(path) => Some(path),
-        InterfaceNodes::Listed(_) => None,
-    });
     let shapes = arguments.shapes.as_ref().map(|path| MatrixLocation::parse(path).path);
-    let matrices = matrices.into_iter().chain([shapes.as_ref()]);
-    let loads = loads.iter().map(|set| match set {
+    let loads = loads.iter().filter_map(|set| match set {
         LoadSource::File(location) => Some(&location.path),
         _ => None,
     });
-    let damping = files.damping.as_ref().and_then(|damping| damping.matrix()).map(|place| Some(&place.path));
-    let geometric = files.geometric_stiffness.iter().map(|one| Some(&one.matrix.path));
-    let inputs =
-        matrices.chain(loads).chain(damping).chain(geometric).chain(tables).chain(masses).chain(interfaces);
-    refuse_replacing(inputs.flatten(), outputs.iter().flat_map(Places::all))
-}
-
-/// Sets the number of threads for the whole process; the number in force.
-fn use_threads(asked: Option<u16>) -> usize {
-    if let Some(threads) = asked {
-        // Fails only when a pool exists already, which then stays as it is: results are the same.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
-    }
-    rayon::current_num_threads()
+    let inputs = files.paths().into_iter().chain(masses).chain(&shapes).chain(loads);
+    refuse_replacing(inputs, outputs.iter().flat_map(Places::all))
 }
 
 fn wanted(arguments: &ConvertArguments, units: &UnitSystem, scene: Option<&Scene>) -> Wanted {

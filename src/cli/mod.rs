@@ -11,6 +11,7 @@ mod places;
 mod resources;
 mod select;
 mod simulate;
+mod trade;
 mod watcher;
 
 pub use arguments::Arguments;

@@ -1,7 +1,7 @@
 //! Printing of results and diagnostics, and the exit code.
 
 use super::arguments::{Arguments, Command, Printing};
-use super::{check, compare, convert, inspect, select, simulate};
+use super::{check, compare, convert, inspect, select, simulate, trade};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{ExitCode, Result};
 use crate::report::diagnostics_json;
@@ -48,6 +48,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Compare(arguments) => (arguments.printing, compare::run(arguments)),
         Command::Select(arguments) => (arguments.printing, select::run(arguments)),
         Command::Simulate(arguments) => (arguments.printing, simulate::run(arguments)),
+        Command::Trade(arguments) => (arguments.printing, trade::run(arguments)),
     };
     finish(printing, outcome)
 }

@@ -3,6 +3,15 @@
 /// Ticks per second of the CPU times in /proc: fixed for user space on Linux.
 const TICKS: f64 = 100.0;
 
+/// Sets the number of threads for the whole process; the number in force.
+pub(super) fn use_threads(asked: Option<u16>) -> usize {
+    if let Some(threads) = asked {
+        // Fails only when a pool exists already, which then stays as it is: results are the same.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
+    }
+    rayon::current_num_threads()
+}
+
 /// User and system CPU seconds of this process; zero where the system does not tell.
 pub(super) fn cpu_seconds() -> f64 {
     let read = || {

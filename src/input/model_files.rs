@@ -114,6 +114,19 @@ impl std::fmt::Display for MatrixLocation {
 }
 
 impl ModelFiles {
+    /// Every file that they name, but those of [`ModelFiles::residual_vectors`], which a conversion may replace.
+    pub fn paths(&self) -> Vec<&PathBuf> {
+        let interfaces = self.interfaces.iter().filter_map(|interface| match &interface.nodes {
+            InterfaceNodes::File(path) => Some(path),
+            InterfaceNodes::Listed(_) => None,
+        });
+        let damping = self.damping.as_ref().and_then(Damping::matrix).map(|place| &place.path);
+        let geometric = self.geometric_stiffness.iter().map(|one| &one.matrix.path);
+        let matrices = [&self.stiffness.path, &self.mass.path, &self.nodes].into_iter();
+        let others = self.dofs.iter().chain(&self.manifest).chain(damping);
+        matrices.chain(others).chain(geometric).chain(interfaces).collect()
+    }
+
     /// A three-dimensional model without a manifest, named after its stiffness file; `units` is `length,mass,time`
     /// as in `m,kg,s`.
     ///

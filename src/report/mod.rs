@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies.
 
 mod bar_chart;
 mod clusters;
@@ -15,10 +15,12 @@ mod mass_properties;
 mod numbers;
 mod render;
 mod run_data;
+mod scatter_chart;
 mod selection;
 mod simulation;
 mod term_facts;
 mod text;
+mod trade;
 
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
 pub use facts::Facts;
@@ -28,3 +30,4 @@ pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
 pub use term_facts::dropped_text;
+pub use trade::{TradeFacts, trade_csv};

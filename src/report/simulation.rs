@@ -373,7 +373,7 @@ pub fn simulation_csv(recording: &Recording) -> String {
 }
 
 /// Names are data: quoted where they hold what separates.
-fn csv_cell(text: &str) -> String {
+pub(super) fn csv_cell(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {

@@ -28,6 +28,27 @@ pub struct Scene {
     pub source: Option<SourceFile>,
 }
 
+impl Scene {
+    /// The same for a body that has only `modes` (from 0, ascending) of the one that it was written for.
+    pub fn of_modes(&self, modes: &[usize]) -> Self {
+        let mut scene = self.clone();
+        let kept =
+            |start: &ModeStart| Some(ModeStart { mode: modes.binary_search(&start.mode).ok()?, ..*start });
+        scene.initial.modes = self.initial.modes.iter().filter_map(kept).collect();
+        scene
+    }
+
+    /// Times at which something is not smooth, ascending.
+    pub fn breaks(&self) -> Vec<f64> {
+        let loads = self.loads.iter().map(|load| &load.history);
+        let histories = loads.chain(self.spin.iter().map(|spin| &spin.rate));
+        let mut times: Vec<f64> = histories.flat_map(History::breaks).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+}
+
 /// How a scene is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {

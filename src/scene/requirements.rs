@@ -95,7 +95,7 @@ pub struct Limits {
 }
 
 /// Largest errors of what a simulation is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Tolerance {
     /// Attitude of the frame in radians, at any time.
     pub attitude: f64,

@@ -89,7 +89,7 @@ pub fn simulate(
         watch(time / duration);
         Ok::<(), Failure>(())
     };
-    integrate(&mut method, &mut motion, &mut state, &time, &breaks(scene), observe)
+    integrate(&mut method, &mut motion, &mut state, &time, &scene.breaks(), observe)
         .map_err(|failure| stopped(scene, &method, failure))?;
     recording.work = method.work();
     let (deflection, at) = largest_deflection(body, &recording);
@@ -159,16 +159,6 @@ fn method(body: &FlexBody, scene: &Scene, duration: f64, dimension: usize) -> (S
             (Scheme::Conserving { order, step: Some(step) }, method)
         }
     }
-}
-
-/// Times at which something in the scene is not smooth.
-fn breaks(scene: &Scene) -> Vec<f64> {
-    let loads = scene.loads.iter().map(|load| &load.history);
-    let mut times: Vec<f64> =
-        loads.chain(scene.spin.iter().map(|spin| &spin.rate)).flat_map(|history| history.breaks()).collect();
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    times
 }
 
 fn stopped(scene: &Scene, method: &Method, failure: Failure) -> Error {

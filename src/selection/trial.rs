@@ -112,7 +112,7 @@ impl Bench<'_> {
         let bench = if modes.len() == whole.n_modes() {
             self
         } else {
-            started = scene_of_modes(self.scene, modes);
+            started = self.scene.of_modes(modes);
             &Bench { scene: &started, ..*self }
         };
         let history = match bench.motion(body, kept) {
@@ -289,19 +289,4 @@ pub fn multiplications(body: &FlexBody, groups: Groups) -> usize {
 /// Terms of equations with `groups`.
 pub fn terms(groups: Groups) -> Terms {
     Terms { w1: groups.w1, w2: groups.w2, w3: groups.w3, geometric_stiffness: true }
-}
-
-/// The scene of a body that has only `modes` of the one that it was written for.
-fn scene_of_modes(scene: &Scene, modes: &[usize]) -> Scene {
-    let mut scene = scene.clone();
-    scene.initial.modes = scene
-        .initial
-        .modes
-        .iter()
-        .filter_map(|start| {
-            let mode = modes.binary_search(&start.mode).ok()?;
-            Some(crate::scene::ModeStart { mode, ..*start })
-        })
-        .collect();
-    scene
 }

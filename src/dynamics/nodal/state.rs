@@ -3,7 +3,7 @@
 use super::equations::NodalEquations;
 use super::{NodalError, NodalEvaluation};
 use crate::dynamics::{EulerParameters, Orientation};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Largest rigid motion in displacements that is rounding, relative to the largest of them.
 const ROUNDING: f64 = 1e-8;
@@ -106,6 +106,11 @@ impl NodalEvaluation<'_> {
             u: self.u.clone(),
             ud: self.ud.clone(),
         }
+    }
+
+    /// Axes of the frame in the world, in columns.
+    pub fn axes(&self) -> Matrix3<f64> {
+        self.axes * self.equations.frame.axes
     }
 
     /// u (N), model axes.

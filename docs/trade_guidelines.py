@@ -1,0 +1,227 @@
+"""The equations of motion of one free-surface body in numpy, term by term: what guidelines I to IV of [WP19] keep, taken literally.
+
+Written from docs/theory.md section 3 alone; nothing of the program is used but the invariants of a flex-body file of a solid.
+"""
+
+import tomllib
+
+import h5py
+import numpy as np
+from scipy.integrate import solve_ivp
+
+# What a guideline keeps: of the inertia matrix, the coupling of rotation and modes, the load on the modes, Coriolis.
+GUIDELINES = {
+    "I": set(),
+    "II": {"load"},
+    "III": {"load", "W1Q", "load W2Q"},
+    "III free": {"load", "W1Q", "load W2Q", "QW2Q", "QW3"},
+    "IV": {"load", "W1Q", "load W2Q", "QW2Q", "QW3", "coriolis"},
+}
+
+
+def skew(v):
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
+class Body:
+    """Invariants of a file."""
+
+    def __init__(self, path):
+        with h5py.File(path) as file:
+            def read(name):
+                return file[f"invariants/{name}"][()]
+
+            self.solid = file["source"].attrs["mass_structure"] != "general"
+            self.prestressed = "geometric_stiffness" in file and len(file["geometric_stiffness"]) > 0
+            self.I0, self.W1, self.W2, self.W3 = (read(name) for name in ("I0", "W1", "W2", "W3"))
+            self.eigenvalue = file["modes/eigenvalue"][()]
+            self.nodes = {int(number): i for i, number in enumerate(file["nodes/id"][()])}
+            self.positions, self.shape = file["nodes/position"][()], file["modes/shape"][()]
+            self.interfaces = {name: {key: group[key][()] for key in ("reference", "translation", "rotation") if key in group} for name, group in file.get("interfaces", {}).items()}
+        self.nf = len(self.eigenvalue)
+
+    def point(self, load):
+        """Place, rows of translation and of rotation (3 x nf) where a load acts."""
+        if "node" in load:
+            i = self.nodes[load["node"]]
+            return self.positions[i], self.shape[:, i, :].T, None
+        own = self.interfaces[load["interface"]]
+        return own["reference"], own["translation"], own.get("rotation")
+
+
+def history(value):
+    """A value of a scene over time, and its rate."""
+    if isinstance(value, (int, float)):
+        return lambda t: (float(value), 0.0)
+    if "times" in value:
+        times, values = np.array(value["times"], float), np.array(value["values"], float)
+        slopes = np.append(np.diff(values) / np.diff(times), 0.0) if len(times) > 1 else np.zeros(1)
+
+        def table(t):
+            at = np.searchsorted(times, t, side="right") - 1
+            if at < 0 or at == len(times) - 1:
+                return values[max(at, 0)], 0.0
+            return values[at] + slopes[at] * (t - times[at]), slopes[at]
+
+        return table
+    if "amplitude" in value:
+        rate, phase = 2 * np.pi * value["frequency"], value.get("phase", 0.0)
+        return lambda t: (value["amplitude"] * np.sin(rate * t + phase), value["amplitude"] * rate * np.cos(rate * t + phase))
+    start, length, first = value.get("start", 0.0), value["duration"], value.get("from", 0.0)
+
+    def ramp(t):
+        x = min(max((t - start) / length, 0.0), 1.0)
+        step = value["to"] - first
+        return first + step * (x - np.sin(2 * np.pi * x) / (2 * np.pi)), step * (1 - np.cos(2 * np.pi * x)) / length
+
+    return ramp
+
+
+def rotation_matrix(e):
+    a, v = e[0], e[1:]
+    return np.eye(3) * (a * a - v @ v) + 2 * np.outer(v, v) + 2 * a * skew(v)
+
+
+class Motion:
+    """A body in a scene with some of the terms."""
+
+    def __init__(self, body, scene, kept):
+        self.body, self.scene, self.kept = body, scene, kept
+        nf = body.nf
+        # Blocks (a, b) in rows: W1 (9 x nf), W2 (9 nf x nf), W3 and its blocks transposed (3 nf x nf).
+        self.w1 = body.W1.reshape(9, nf)
+        self.w2 = body.W2.reshape(3, nf, 3, nf).transpose(0, 2, 1, 3).reshape(9 * nf, nf)
+        self.w3 = body.W3
+        self.w3_transposed = body.W3.reshape(3, nf, nf).transpose(0, 2, 1).reshape(3 * nf, nf)
+        damping = scene.get("damping", {}).get("ratio", 0.0)
+        self.damping = 2 * damping * np.sqrt(body.eigenvalue)
+        self.loads = [(body.point(load), load, history(load.get("history", 1.0))) for load in scene.get("load", [])]
+        spin = scene.get("spin")
+        self.spin = None if spin is None else (np.array(spin["axis"], float) / np.linalg.norm(spin["axis"]), history(spin["rate"]))
+
+    def start(self):
+        first = self.scene.get("initial", {})
+        turn = np.array(first.get("rotation", [0, 0, 0]), float)
+        angle = np.linalg.norm(turn)
+        e = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * turn / angle if angle > 0 else np.zeros(3)])
+        omega = np.array(first.get("angular_velocity", [0, 0, 0]), float)
+        q, qd = np.zeros(self.body.nf), np.zeros(self.body.nf)
+        for mode in first.get("mode", []):
+            if mode["number"] <= self.body.nf:
+                q[mode["number"] - 1], qd[mode["number"] - 1] = mode.get("amplitude", 0.0), mode.get("rate", 0.0)
+        return np.concatenate([e, omega, q, qd])
+
+    def rates(self, t, y):
+        body, kept, nf = self.body, self.kept, self.body.nf
+        e, w, q, qd = y[:4], y[4:7], y[7:7 + nf], y[7 + nf:]
+        alpha = None
+        if self.spin is not None:
+            axis, rate = self.spin
+            value, slope = rate(t)
+            w, alpha = axis * value, axis * slope
+        w2q, squares = (self.w2 @ q).reshape(9, nf), np.outer(w, w).ravel()
+        inertia, inertia_rate = body.I0.copy(), np.zeros((3, 3))
+        if "W1Q" in kept:
+            inertia += (self.w1 @ q).reshape(3, 3)
+        if "QW2Q" in kept:
+            inertia += (w2q @ q).reshape(3, 3)
+        if "coriolis" in kept:
+            inertia_rate = (self.w1 @ qd + w2q @ qd + (self.w2 @ qd).reshape(9, nf) @ q).reshape(3, 3)
+        coupling = (self.w3_transposed @ q).reshape(3, nf) if "QW3" in kept else np.zeros((3, nf))  # Q'W3
+        torque = np.cross(w, inertia @ w) + inertia_rate @ w + np.cross(w, coupling @ qd)
+        load = np.zeros(nf)
+        if "load" in kept:
+            load += 0.5 * squares @ self.w1
+        if "load W2Q" in kept:
+            load += squares @ w2q
+        force = load - body.eigenvalue * q - self.damping * qd
+        if "coriolis" in kept:
+            force += 2 * w @ (self.w3 @ qd).reshape(3, nf)
+        torque = -torque
+        axes = rotation_matrix(e)
+        for (place, translation, turn), of, factor in self.loads:
+            size = factor(t)[0]
+            for name in ("force", "torque"):
+                vector = np.array(of.get(name, [0, 0, 0]), float) * size
+                if of.get("axes", "world") == "world":
+                    vector = axes.T @ vector
+                if name == "force":
+                    torque += np.cross(place + translation @ q, vector)
+                    force += translation.T @ vector
+                elif vector.any():
+                    torque += vector
+                    force += turn.T @ vector
+        if alpha is None:
+            # Mass-normalised modes: the Schur complement is 3 x 3.
+            alpha = np.linalg.solve(inertia - coupling @ coupling.T, torque - coupling @ force)
+        qdd = force - coupling.T @ alpha
+        ed = 0.5 * np.concatenate([[-e[1:] @ w], e[0] * w + np.cross(e[1:], w)])
+        return np.concatenate([ed, alpha, qd, qdd])
+
+    def static_response(self, instants):
+        """The largest modal coordinate that the loads and the spin of some instants would hold."""
+        y = self.start()
+        y[7:] = 0.0
+        whole = Motion(self.body, self.scene, GUIDELINES["IV"])
+        return max(np.abs(whole.rates(t, y)[7 + self.body.nf:] / self.body.eigenvalue).max() for t in instants[:: max(1, len(instants) // 40)])
+
+    def states(self, instants, tolerance):
+        """(attitude, omega, q) at the instants; `None` where the integration cannot go on."""
+        y, times = self.start(), []
+        if self.spin is not None:
+            y[4:7] = self.spin[0] * self.spin[1](0.0)[0]
+        reach = max(np.abs(y[7:7 + self.body.nf]).max(), self.static_response(instants), 1e-300)
+        rate = np.sqrt(self.body.eigenvalue[0])
+        scale = np.concatenate([np.ones(4), np.full(3, 1e-3 * rate), np.full(self.body.nf, reach), np.full(self.body.nf, reach * rate)])
+        breaks = sorted({float(t) for _, of, _ in self.loads for t in kinks(of.get("history", 1.0))} | {float(t) for t in kinks(self.scene.get("spin", {}).get("rate", 0.0))})
+        stops = [t for t in breaks if 0 < t < instants[-1]] + [instants[-1]]
+        at, parts = 0.0, []
+        for stop in stops:
+            inside = [t for t in instants if at < t <= stop or (t == 0 and at == 0)]
+            found = solve_ivp(self.rates, (at, stop), y, method="DOP853", t_eval=sorted(set(inside) | {stop}), rtol=tolerance, atol=tolerance * scale)
+            if not found.success or not np.isfinite(found.y).all():
+                return None
+            chosen = np.isin(found.t, inside)
+            parts.append(found.y[:, chosen])
+            times.extend(found.t[chosen])
+            y, at = found.y[:, -1], stop
+        out = np.concatenate(parts, axis=1)
+        out[:4] /= np.linalg.norm(out[:4], axis=0)
+        return out
+
+
+def kinks(value):
+    if isinstance(value, dict) and "times" in value:
+        return value["times"]
+    if isinstance(value, dict) and "to" in value:
+        return [value.get("start", 0.0), value.get("start", 0.0) + value["duration"]]
+    return []
+
+
+def apart(body, reference, other):
+    """Errors of a motion: attitude in radians, omega and modes and root of the elastic energy relative to their largest."""
+    if other is None:
+        return None
+    nf = body.nf
+    dots = np.abs((reference[:4] * other[:4]).sum(axis=0)).clip(max=1.0)
+    chord = np.linalg.norm(reference[:4] - np.sign((reference[:4] * other[:4]).sum(axis=0)) * other[:4], axis=0)
+    angle = np.where(dots > 0.99, 4 * np.arcsin((chord / 2).clip(max=1.0)), 2 * np.arccos(dots)).max()
+
+    def relative(a, b):
+        largest = np.linalg.norm(a, axis=0).max()
+        return np.linalg.norm(a - b, axis=0).max() / largest if largest > 0 else 0.0
+
+    root = np.sqrt(body.eigenvalue)[:, None]
+    q, p = reference[7:7 + nf], other[7:7 + nf]
+    return {"attitude": angle, "omega": relative(reference[4:7], other[4:7]), "modes": relative(q, p), "stress": relative(root * q, root * p)}
+
+
+def read_scene(path):
+    return tomllib.loads(path.read_text())
+
+
+def study(body, scene, instants, tolerance=1e-9):
+    """The whole motion, and the errors of each guideline."""
+    everything = Motion(body, scene, GUIDELINES["IV"]).states(instants, tolerance)
+    errors = {name: apart(body, everything, Motion(body, scene, kept).states(instants, tolerance)) for name, kept in GUIDELINES.items() if name != "IV"}
+    return everything, errors

@@ -1,0 +1,78 @@
+//! `flexbody trade`.
+
+use super::arguments::{ReferenceName, TradeArguments};
+use super::output::{Outcome, tell};
+use super::places::{format_of, refuse_replacing};
+use super::resources::{memory_left, use_threads};
+use super::watcher::Watcher;
+use crate::basis::ModeSettings;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::input::{read_manifest, read_model};
+use crate::model::FeModel;
+use crate::output::OutputSlot;
+use crate::progress::Event;
+use crate::report::{Format, RunData, TradeFacts, trade_csv};
+use crate::scene::read_scene;
+use crate::store;
+use crate::trade::{Settings, Source, conversions, trade};
+
+pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
+    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    let outputs = || arguments.csv.iter().chain(&arguments.report);
+    refuse_replacing([&arguments.body, &arguments.scene].into_iter(), outputs())?;
+    let is_manifest = arguments.body.extension().is_some_and(|extension| extension == "toml");
+    refuse_contradictions(arguments, is_manifest)?;
+    let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
+    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let threads = use_threads(arguments.threads);
+
+    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
+    let scene = read_scene(&arguments.scene)?;
+    let memory = memory_left(None);
+    let mut diagnostics = Vec::new();
+    let (model, sources) = if is_manifest {
+        let files = read_manifest(&arguments.body)?;
+        refuse_replacing(files.paths().into_iter(), outputs())?;
+        let checked = FeModel::from_raw(read_model(&files)?)?;
+        diagnostics.extend(checked.diagnostics);
+        let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
+        let (sources, found) = conversions(&checked.model, modes, memory, &|event| watcher.hear(event))?;
+        diagnostics.extend(found);
+        (Some(checked.model), sources)
+    } else {
+        (None, vec![Source::new("file", store::read(&arguments.body)?, None)?])
+    };
+    let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
+    let settings = Settings { repeat: arguments.repeat.into(), memory: memory_left(None) };
+    let study = trade(&sources, &scene, nodal, &settings, &|event: Event<'_>| watcher.hear(event))
+        .map_err(|error| error.in_file(&arguments.scene))?;
+    diagnostics.extend(study.diagnostics.iter().cloned());
+    let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
+    tell(arguments.printing, &run.diagnostics);
+    let facts = TradeFacts::new(&study, &run);
+
+    if let Some(slot) = &table {
+        slot.fill(trade_csv(&study).as_bytes())?;
+    }
+    for (slot, format) in reports.iter().zip(formats) {
+        slot.fill(facts.render(format).as_bytes())?;
+    }
+    // Nothing appears before everything is done.
+    table.into_iter().chain(reports).try_for_each(OutputSlot::commit)?;
+    let passed = study.recommended.row().is_some();
+    Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed })
+}
+
+/// What a flex-body file cannot be asked for.
+fn refuse_contradictions(arguments: &TradeArguments, is_manifest: bool) -> Result<()> {
+    let message = match arguments {
+        _ if is_manifest => return Ok(()),
+        TradeArguments { reference: ReferenceName::Nodal, .. } => {
+            "--reference nodal needs the matrices: give the manifest"
+        }
+        TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the manifest",
+        _ => return Ok(()),
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
+}

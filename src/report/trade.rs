@@ -1,0 +1,468 @@
+//! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
+
+use super::Format;
+use super::html::{diagnostics_table, escape, page, section, table, terms};
+use super::numbers::{bytes, counted, duration, plain, significant};
+use super::run_data::RunData;
+use super::scatter_chart::{Chart, Series, scatter_chart};
+use super::text::{Page, diagnostics_lines};
+use crate::diagnostic::Diagnostic;
+use crate::provenance::generator;
+use crate::scene::{OutputErrors, Tolerance};
+use crate::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Storage, Times, Trade};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Errors below this part of the tolerance are none on the plot.
+const NO_ERROR: f64 = 1e-6;
+
+/// Growth from the first half of the time to the second that is worth a word: that of a phase.
+const GROWING: f64 = 1.8;
+
+/// Facts of a trade study.
+#[derive(Debug, Clone, Serialize)]
+pub struct TradeFacts<'a> {
+    format: &'static str,
+    format_major: u8,
+    format_minor: u8,
+    generator: String,
+    scene: &'a str,
+    body: &'a str,
+    reference: ReferenceKind,
+    tolerance: Tolerance,
+    allowed_multiplications: Option<usize>,
+    verdict: String,
+    recommended: Option<usize>,
+    front: Vec<usize>,
+    rows: Vec<RowFacts<'a>>,
+    diagnostics: &'a [Diagnostic],
+    threads: usize,
+    wall_seconds: f64,
+    cpu_seconds: f64,
+}
+
+/// A candidate.
+#[derive(Debug, Clone, Serialize)]
+struct RowFacts<'a> {
+    number: usize,
+    source: &'a str,
+    kind: Kind,
+    modes: usize,
+    /// From 1.
+    mode_numbers: Vec<usize>,
+    last_frequency_hz: f64,
+    groups: Vec<&'static str>,
+    lumped: Option<&'a str>,
+    storage: Storage,
+    failed: Option<&'a Diagnostic>,
+    measured: Option<MeasuredFacts>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct MeasuredFacts {
+    errors: OutputErrors,
+    /// Largest ratio of error to tolerance.
+    worst: f64,
+    growth: Option<f64>,
+    multiplications: usize,
+    file_bytes: Option<u64>,
+    steps: u64,
+    rejected_steps: u64,
+    evaluations: u64,
+    seconds: Times,
+}
+
+impl MeasuredFacts {
+    fn new(measured: &Measured) -> Self {
+        Self {
+            errors: measured.errors,
+            worst: measured.worst,
+            growth: measured.growth,
+            multiplications: measured.multiplications,
+            file_bytes: measured.bytes,
+            steps: measured.work.steps,
+            rejected_steps: measured.work.rejected,
+            evaluations: measured.work.rates,
+            seconds: measured.times,
+        }
+    }
+}
+
+impl<'a> RowFacts<'a> {
+    fn new(number: usize, row: &'a Row) -> Self {
+        let candidate = &row.candidate;
+        Self {
+            number,
+            source: &row.source,
+            kind: candidate.kind(),
+            modes: candidate.modes.len(),
+            mode_numbers: candidate.modes.iter().map(|mode| mode + 1).collect(),
+            last_frequency_hz: row.last_frequency_hz,
+            groups: candidate.group_names(),
+            lumped: candidate.lumped.as_deref(),
+            storage: candidate.storage,
+            failed: row.outcome.as_ref().err().map(|failed| &failed.0),
+            measured: row.outcome.as_ref().ok().map(MeasuredFacts::new),
+        }
+    }
+
+    /// `6 modes, W1`: what it has, in words.
+    fn in_words(&self) -> String {
+        let mut words = format!("{}, {}", counted(self.modes, "mode"), self.groups_in_words());
+        if !self.lowest() {
+            words.push_str(", not the lowest");
+        }
+        if let Some(scheme) = self.lumped {
+            let _ = write!(words, ", {}", plain(scheme));
+        }
+        if self.storage == Storage::F32 {
+            words.push_str(", f32");
+        }
+        words
+    }
+
+    fn groups_in_words(&self) -> String {
+        if self.groups.is_empty() { "no group".to_owned() } else { self.groups.join(" ") }
+    }
+
+    /// Whether it has all modes up to its last.
+    fn lowest(&self) -> bool {
+        self.mode_numbers.last() == Some(&self.modes)
+    }
+}
+
+impl<'a> TradeFacts<'a> {
+    /// Facts of a study, and of the run that made it.
+    pub fn new(trade: &'a Trade, run: &'a RunData) -> Self {
+        let rows: Vec<RowFacts<'a>> =
+            trade.rows.iter().enumerate().map(|(at, row)| RowFacts::new(at + 1, row)).collect();
+        Self {
+            format: "flexbody-trade",
+            format_major: 1,
+            format_minor: 0,
+            generator: generator(),
+            scene: &trade.scene,
+            body: &trade.body,
+            reference: trade.reference,
+            tolerance: trade.tolerance,
+            allowed_multiplications: trade.allowed,
+            verdict: verdict(trade, &rows),
+            recommended: trade.recommended.row().map(|row| row + 1),
+            front: trade.front.iter().map(|row| row + 1).collect(),
+            rows,
+            diagnostics: &run.diagnostics,
+            threads: run.threads,
+            wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
+            cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
+        }
+    }
+
+    /// The facts in a format, ending with a line break.
+    pub fn render(&self, format: Format) -> String {
+        match format {
+            Format::Json => {
+                let json = serde_json::to_string_pretty(self);
+                json.expect("keys are strings and numbers that are not finite become null") + "\n"
+            }
+            Format::Text => self.text(),
+            Format::Html => self.html(),
+        }
+    }
+
+    fn tolerances_in_words(&self) -> String {
+        let Tolerance { attitude, deflection, stress, reaction, .. } = self.tolerance;
+        let all = [("deflection", deflection), ("stress", stress), ("reaction", reaction)];
+        let relative = all.map(|(name, value)| format!("{name} {} %", significant(100.0 * value, 3)));
+        format!("attitude {} rad, {}", significant(attitude, 3), relative.join(", "))
+    }
+
+    fn against(&self) -> &'static str {
+        match self.reference {
+            ReferenceKind::Full => "the whole body",
+            ReferenceKind::Nodal => "the motion of all nodes",
+        }
+    }
+
+    /// Rows of the front, and the recommended one, ascending in cost.
+    fn shown(&self) -> Vec<&RowFacts<'a>> {
+        let mut numbers = self.front.clone();
+        // One that is as cheap and as good as a row of the front is not on it.
+        numbers.extend(self.recommended.filter(|row| !self.front.contains(row)));
+        let cost = |row: &RowFacts<'a>| row.measured.as_ref().map(|measured| measured.multiplications);
+        let mut rows: Vec<_> = numbers.iter().map(|number| &self.rows[number - 1]).collect();
+        rows.sort_by_key(|row| cost(row));
+        rows
+    }
+
+    fn text(&self) -> String {
+        let mut page = Page(String::new());
+        let count = counted(self.rows.len(), "candidate");
+        page.entry(
+            "Trade",
+            &format!("{}: {}, {count} against {}", plain(self.scene), plain(self.body), self.against()),
+        );
+        page.entry("Tolerances", &self.tolerances_in_words());
+        if let Some(allowed) = self.allowed_multiplications {
+            page.entry("Cost", &format!("at most {allowed} multiplications per evaluation"));
+        }
+        page.entry("Verdict", &self.verdict);
+        page.0.push_str("\n  multiplications  evaluation  simulation      file  error/tol  what\n");
+        for row in self.shown() {
+            let Some(measured) = &row.measured else { continue };
+            let taken = if self.recommended == Some(row.number) { '>' } else { ' ' };
+            let _ = writeln!(
+                page.0,
+                "{taken} {:>15}  {:>10}  {:>10}  {:>8}  {:>9}  {}",
+                measured.multiplications,
+                short(measured.seconds.evaluation),
+                duration(measured.seconds.integration),
+                measured.file_bytes.map_or_else(|| "-".to_owned(), bytes),
+                significant(measured.worst, 3),
+                row.in_words()
+            );
+        }
+        page.0.push('\n');
+        let failed = self.rows.iter().filter(|row| row.failed.is_some()).count();
+        if failed > 0 {
+            page.entry("Failed", &format!("{}: --json and --report say why", counted(failed, "candidate")));
+        }
+        let (wall, cpu) = (duration(self.wall_seconds), duration(self.cpu_seconds));
+        page.entry("Time", &format!("{wall} wall, {cpu} CPU, {}", counted(self.threads, "thread")));
+        diagnostics_lines(&mut page, self.diagnostics);
+        page.0
+    }
+
+    fn html(&self) -> String {
+        let mut html = String::new();
+        let class = if self.recommended.is_some() { "" } else { " open" };
+        let _ = writeln!(
+            html,
+            "<p class=\"verdict{class}\"><strong>{}.</strong></p>",
+            escape(&capital(&self.verdict))
+        );
+        section(&mut html, "What is compared");
+        terms(
+            &mut html,
+            [
+                ("Body", escape(self.body)),
+                ("Reference", self.against().to_owned()),
+                ("Tolerances", escape(&self.tolerances_in_words())),
+                (
+                    "Candidates",
+                    format!(
+                        "{}, each integrated with the method and the step of the reference",
+                        self.rows.len()
+                    ),
+                ),
+                ("Cost", "multiplications of one evaluation of the equations of motion".to_owned()),
+                (
+                    "Time",
+                    format!(
+                        "{} wall, {} CPU, {}",
+                        duration(self.wall_seconds),
+                        duration(self.cpu_seconds),
+                        counted(self.threads, "thread")
+                    ),
+                ),
+            ],
+        );
+        section(&mut html, "Error against cost");
+        html.push_str(&self.chart());
+        section(&mut html, "Pareto front");
+        self.table(&mut html, "No other candidate is as cheap and as accurate", &self.shown());
+        section(&mut html, "All candidates");
+        self.table(&mut html, "In the order in which they were tried", &self.rows.iter().collect::<Vec<_>>());
+        diagnostics_table(&mut html, self.diagnostics);
+        page(self.scene, "Trade study", &self.generator, &html)
+    }
+
+    fn chart(&self) -> String {
+        let point = |number: usize| {
+            let measured = self.rows[number - 1].measured.as_ref()?;
+            Some((measured.multiplications as f64, measured.worst))
+        };
+        let of_kind = |kind: Kind| {
+            let rows = self.rows.iter().filter(move |row| row.kind == kind);
+            let named = rows.filter_map(|row| {
+                let (cost, error) = point(row.number)?;
+                Some((format!("{}: {}", row.number, row.in_words()), cost, error))
+            });
+            Series { name: kind.name(), points: named.collect() }
+        };
+        let chart = Chart {
+            title: "Largest ratio of error to tolerance against multiplications per evaluation",
+            x: "multiplications per evaluation",
+            y: "largest error / tolerance",
+            front: self.front.iter().filter_map(|&number| point(number)).collect(),
+            ring: self.recommended.and_then(point),
+            most: self.allowed_multiplications.map(|most| most as f64),
+            floor: NO_ERROR,
+        };
+        scatter_chart(&chart, &Kind::ALL.map(of_kind))
+    }
+
+    fn table(&self, html: &mut String, caption: &str, rows: &[&RowFacts<'a>]) {
+        let head = [
+            "No.",
+            "What",
+            "Of",
+            "To (Hz)",
+            "Multiplications",
+            "Evaluation",
+            "Simulation",
+            "Steps",
+            "File",
+            "Made in",
+            "Attitude (rad)",
+            "Deflection",
+            "Stress",
+            "Reaction",
+            "Error / tolerance",
+        ];
+        let optional = |value: Option<f64>| value.map_or_else(|| "&ndash;".to_owned(), |v| significant(v, 3));
+        let cells = |row: &&RowFacts<'a>| {
+            let name = if self.recommended == Some(row.number) {
+                format!("<strong>{}</strong>", row.number)
+            } else {
+                row.number.to_string()
+            };
+            let mut cells = vec![
+                name,
+                escape(&row.in_words()),
+                escape(row.source),
+                significant(row.last_frequency_hz, 5),
+            ];
+            match (&row.measured, row.failed) {
+                (Some(m), _) => cells.extend([
+                    m.multiplications.to_string(),
+                    short(m.seconds.evaluation),
+                    duration(m.seconds.integration),
+                    m.steps.to_string(),
+                    m.file_bytes.map_or_else(|| "&ndash;".to_owned(), bytes),
+                    m.seconds.preprocessing.map_or_else(|| "&ndash;".to_owned(), duration),
+                    significant(m.errors.attitude, 3),
+                    optional(m.errors.deflection),
+                    optional(m.errors.stress),
+                    optional(m.errors.reaction),
+                    significant(m.worst, 3),
+                ]),
+                (None, failed) => {
+                    let message = failed.map_or("", |diagnostic| diagnostic.message());
+                    cells.push(format!("<span class=\"error\">{}</span>", escape(message)));
+                    cells.extend(std::iter::repeat_n(String::new(), head.len() - cells.len()));
+                }
+            }
+            cells
+        };
+        let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+        table(html, caption, &head.map(str::to_owned), &[1, 2], &rows);
+    }
+}
+
+/// What to take, as a sentence without a full stop.
+fn verdict(trade: &Trade, rows: &[RowFacts<'_>]) -> String {
+    let growth = |measured: &MeasuredFacts| match measured.growth {
+        Some(growth) if growth > GROWING && measured.worst > NO_ERROR => {
+            format!(
+                "; its errors grow with time, {} times from the first half to the second",
+                significant(growth, 2)
+            )
+        }
+        _ => String::new(),
+    };
+    let of = |row: usize| rows[row].measured.as_ref().map(|measured| (&rows[row], measured));
+    let first = rows.first().and_then(|row| row.measured.as_ref()).map_or(0, |m| m.multiplications);
+    match trade.recommended {
+        Recommendation::Cheapest(row) => of(row).map_or_else(String::new, |(row, measured)| {
+            let cheaper = significant(first as f64 / measured.multiplications as f64, 3);
+            let own = if row.number == 1 {
+                "nothing cheaper than the whole body holds every tolerance".to_owned()
+            } else {
+                format!(
+                    "{} holds every tolerance at {cheaper} times less work than the whole body",
+                    row.in_words()
+                )
+            };
+            own + &growth(measured)
+        }),
+        Recommendation::MostAccurate(row) => of(row).map_or_else(String::new, |(row, measured)| {
+            let ratio = significant(measured.worst, 3);
+            let own = format!(
+                "{} is the most accurate for the allowed cost: {ratio} of the tolerance at the worst",
+                row.in_words()
+            );
+            own + &growth(measured)
+        }),
+        Recommendation::None if trade.allowed.is_some() => "no candidate is as cheap as allowed".to_owned(),
+        Recommendation::None => {
+            let worst = rows
+                .iter()
+                .filter_map(|row| Some(row.measured.as_ref()?.worst))
+                .fold(f64::INFINITY, f64::min);
+            if worst.is_finite() {
+                format!("no candidate holds every tolerance: the best is at {} of it", significant(worst, 3))
+            } else {
+                "no candidate could be simulated".to_owned()
+            }
+        }
+    }
+}
+
+fn capital(fragment: &str) -> String {
+    let mut characters = fragment.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
+}
+
+/// A short time.
+fn short(seconds: f64) -> String {
+    if seconds < 1e-6 {
+        format!("{} ns", significant(1e9 * seconds, 3))
+    } else {
+        format!("{} us", significant(1e6 * seconds, 3))
+    }
+}
+
+/// The study as a table of comma-separated values, a row for every candidate; numbers round-trip.
+pub fn trade_csv(trade: &Trade) -> String {
+    let mut out = "number,source,kind,modes,last_frequency_hz,groups,lumped,storage,multiplications,evaluation_seconds,\
+                   integration_seconds,preprocessing_seconds,steps,file_bytes,attitude,deflection,stress,reaction,worst,\
+                   on_front,recommended,failed\n"
+        .to_owned();
+    for (at, row) in trade.rows.iter().enumerate() {
+        let facts = RowFacts::new(at + 1, row);
+        let text = |text: &str| super::simulation::csv_cell(text);
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
+        let m = facts.measured.as_ref();
+        let errors = m.map(|m| m.errors);
+        let count = |of: fn(&MeasuredFacts) -> Option<u64>| {
+            m.and_then(of).map_or_else(String::new, |n| n.to_string())
+        };
+        let cells = [
+            facts.number.to_string(),
+            text(facts.source),
+            text(facts.kind.name()),
+            facts.modes.to_string(),
+            number(Some(facts.last_frequency_hz)),
+            facts.groups.join(" "),
+            text(facts.lumped.unwrap_or_default()),
+            if facts.storage == Storage::F32 { "f32" } else { "f64" }.to_owned(),
+            count(|m| Some(m.multiplications as u64)),
+            number(m.map(|m| m.seconds.evaluation)),
+            number(m.map(|m| m.seconds.integration)),
+            number(m.and_then(|m| m.seconds.preprocessing)),
+            count(|m| Some(m.steps)),
+            count(|m| m.file_bytes),
+            number(errors.map(|e| e.attitude)),
+            number(errors.and_then(|e| e.deflection)),
+            number(errors.and_then(|e| e.stress)),
+            number(errors.and_then(|e| e.reaction)),
+            number(m.map(|m| m.worst)),
+            trade.front.contains(&at).to_string(),
+            (trade.recommended.row() == Some(at)).to_string(),
+            text(facts.failed.map_or("", |failed| failed.message())),
+        ];
+        out.push_str(&cells.join(","));
+        out.push('\n');
+    }
+    out
+}

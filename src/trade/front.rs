@@ -1,0 +1,67 @@
+//! The best of the candidates.
+
+use super::Row;
+
+/// The candidate to take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Recommendation {
+    /// This row is the cheapest that holds every tolerance.
+    Cheapest(usize),
+    /// This row is the most accurate that the allowed multiplications pay for.
+    MostAccurate(usize),
+    /// No candidate holds the tolerances, or none is as cheap as allowed.
+    None,
+}
+
+impl Recommendation {
+    /// The row.
+    pub fn row(self) -> Option<usize> {
+        match self {
+            Self::Cheapest(row) | Self::MostAccurate(row) => Some(row),
+            Self::None => None,
+        }
+    }
+
+    /// Of `rows`, with the multiplications that the scene allows instead of tolerances.
+    pub(super) fn new(rows: &[Row], allowed: Option<usize>) -> Self {
+        let points = points(rows);
+        match allowed {
+            Some(allowed) => {
+                let within = points.iter().filter(|point| point.0 <= allowed);
+                let best =
+                    within.min_by(|a, b| (a.1.total_cmp(&b.1)).then(a.0.cmp(&b.0)).then(a.2.cmp(&b.2)));
+                best.map_or(Self::None, |point| Self::MostAccurate(point.2))
+            }
+            None => {
+                points.iter().find(|point| point.1 <= 1.0).map_or(Self::None, |point| Self::Cheapest(point.2))
+            }
+        }
+    }
+}
+
+/// Rows (from 0) that no other is cheaper than and as accurate as, ascending in cost: the Pareto front of multiplications per evaluation
+/// and the largest ratio of error to tolerance. Multiplications stand for the time of an evaluation, which is their number but for what
+/// clocks add: the front does not depend on the machine and its load.
+pub fn front(rows: &[Row]) -> Vec<usize> {
+    let mut best = f64::INFINITY;
+    let better = |point: &(usize, f64, usize)| {
+        let better = point.1 < best;
+        if better {
+            best = point.1;
+        }
+        better
+    };
+    points(rows).into_iter().filter(better).map(|point| point.2).collect()
+}
+
+/// (multiplications, worst ratio, row) of what was measured, ascending.
+fn points(rows: &[Row]) -> Vec<(usize, f64, usize)> {
+    let of = |(at, row): (usize, &Row)| {
+        let measured = row.outcome.as_ref().ok()?;
+        Some((measured.multiplications, measured.worst, at))
+    };
+    let mut points: Vec<_> = rows.iter().enumerate().filter_map(of).collect();
+    points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    points
+}

@@ -1,0 +1,16 @@
+//! What accuracy costs: candidate bodies for a scene, measured against a reference, and the best of them.
+
+mod candidate;
+mod conversions;
+mod front;
+mod nodal;
+mod source;
+mod study;
+mod timing;
+
+pub use candidate::{Candidate, Kind, Storage};
+pub use conversions::conversions;
+pub use front::{Recommendation, front};
+pub use nodal::NodalReference;
+pub use source::Source;
+pub use study::{Failed, Measured, ReferenceKind, Row, Settings, Times, Trade, trade};
