@@ -209,9 +209,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
     let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
     let held = body.invariants().groups;
     let eigenvalues = &body.modes().eigenvalue;
-    let rigid = Norms::of_rigid(&body.invariants().inertia(), eigenvalues, None);
-    let own = Norms::of_invariants(body.invariants(), eigenvalues, None);
-    let significances = significances(&situation, &rigid, own.as_ref());
+    let significances = significances(&situation, body);
 
     watch(Event::Phase("bounds"));
     let mut trials = bounded(&cases, true)?;

@@ -3,7 +3,7 @@
 
 use super::norms::Norms;
 use super::situation::Situation;
-use crate::flex_body::Group;
+use crate::flex_body::{FlexBody, Group};
 use nalgebra::Vector3;
 
 /// How large a term is beside what it stands next to.
@@ -25,33 +25,44 @@ pub struct Significance {
     pub of_body: Option<f64>,
 }
 
-/// The sizes of all terms at the largest amplitudes and rates of a situation.
+/// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation or the body axis where they
+/// are largest.
 ///
-/// With eta = |q| / sqrt(I_min), I_min the least principal inertia, Omega_1 the first circular frequency of the body (of the
-/// assembly for Coriolis forces), w and alpha the largest angular velocity and acceleration.
-pub fn significances(situation: &Situation, rigid: &Norms, own: Option<&Norms>) -> Vec<Significance> {
-    let least = situation.inertia.symmetric_eigenvalues().min();
+/// With eta = |q| / sqrt(e'I0 e), Omega_1 the first circular frequency of the body (of the assembly for Coriolis forces), w and alpha
+/// the largest angular velocity and acceleration.
+pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
+    let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
+    let inertia = &situation.inertia;
     let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
-    let first = rigid.first;
-    let eta = q / least.sqrt();
-    let most = situation.inertia.symmetric_eigenvalues().max();
-    let trace = (0.5 * situation.inertia.trace()).sqrt();
-    let of = |norms: &Norms| {
+    let trace = (0.5 * inertia.trace()).sqrt();
+    let sizes = |norms: &Norms, axis: &Vector3<f64>| {
+        let about = axis.dot(&(inertia * axis));
         [
-            norms.inertia * q / least,
-            norms.spin * q * q / least,
-            (norms.coupling * q).powi(2) / least,
-            norms.centrifugal_energy * w * w / (first * q),
+            2.0 * norms.centrifugal * q / about,
+            norms.spin * q * q / about,
+            (norms.coupling * q).powi(2) / about,
+            norms.centrifugal_energy * w * w / (norms.first * q),
             norms.softening * w * w,
             2.0 * norms.coupling * w / situation.first_rate.value,
-            norms.coupling * alpha / (first * first),
-            2.0 * first * q * (norms.inertia / 2.0 + norms.spin * q) / most,
+            norms.coupling * alpha / (norms.first * norms.first),
+            2.0 * norms.first * q * (trace + q) / about,
         ]
     };
-    let mut bound = of(rigid);
-    // Along its own axis linear inertia is at most 2 eta.
-    bound[0] = bound[0].min(2.0 * eta);
-    bound[7] = bound[7].min(2.0 * first * q * (trace + q) / most);
+    let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
+    let axes = match driven {
+        Some(axis) => vec![axis],
+        None if body.dimension() == 2 => vec![Vector3::z()],
+        None => vec![Vector3::x(), Vector3::y(), Vector3::z()],
+    };
+    let largest = |norms: &dyn Fn(&Vector3<f64>) -> Option<Norms>| -> Option<[f64; 8]> {
+        axes.iter().try_fold([0.0; 8], |most: [f64; 8], axis| {
+            let own = sizes(&norms(axis)?, axis);
+            Some(std::array::from_fn(|i| most[i].max(own[i])))
+        })
+    };
+    let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
+    let bound = bound.unwrap_or([f64::INFINITY; 8]);
+    let own = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));
     let rows: [(&str, &str, &str, Group, &str); 8] = [
         ("linear inertia W1 Q", "I0", "2 eta", Group::W1, "III"),
         ("quadratic inertia Q'W2 Q", "I0", "eta^2", Group::W2, "III, free slender bodies"),
@@ -59,7 +70,7 @@ pub fn significances(situation: &Situation, rigid: &Norms, own: Option<&Norms>) 
         (
             "constant centrifugal load W1'w w / 2",
             "elastic forces at the largest amplitude",
-            "w^2 sqrt(I0) / (Omega_1^2 |q|)",
+            "w^2 sqrt(e'I0 e) / (Omega_1^2 |q|)",
             Group::W1,
             "II",
         ),
@@ -86,7 +97,6 @@ pub fn significances(situation: &Situation, rigid: &Norms, own: Option<&Norms>) 
             "III",
         ),
     ];
-    let own = own.map(of);
     rows.into_iter()
         .enumerate()
         .map(|(i, (term, beside, formula, group, guideline))| Significance {
@@ -96,13 +106,13 @@ pub fn significances(situation: &Situation, rigid: &Norms, own: Option<&Norms>) 
             group,
             guideline,
             bound: bound[i],
-            of_body: own.map(|own| own[i].min(bound[i])),
+            of_body: own.map(|own| own[i]),
         })
         .collect()
 }
 
 /// The centrifugal static response of every mode to spin of unit rate about the body axes, f_p / lambda_p ([WP19] section 5): rows x, y, z.
-pub fn centrifugal_responses(body: &crate::flex_body::FlexBody) -> Option<Vec<[f64; 3]>> {
+pub fn centrifugal_responses(body: &FlexBody) -> Option<Vec<[f64; 3]>> {
     let (w1, nf) = (body.invariants().w1()?, body.n_modes());
     let response = |j: usize, axis: usize| 0.5 * w1[(axis, axis * nf + j)] / body.modes().eigenvalue[j];
     Some((0..nf).map(|j| Vector3::from_fn(|axis, _| response(j, axis)).into()).collect())

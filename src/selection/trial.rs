@@ -217,7 +217,9 @@ impl Bench<'_> {
 
     /// Largest deflection of a watched point, or without any of a node, for |Lambda^(1/2) q| = 1.
     fn reach(&self) -> f64 {
-        self.watched_rows().iter().map(|rows| self.reach_of(rows)).fold(0.0, f64::max)
+        let mut reach = 0.0f64;
+        self.each_watched(|rows| reach = reach.max(self.reach_of(rows)));
+        reach
     }
 
     fn reach_of_nodes(&self) -> f64 {
@@ -230,19 +232,24 @@ impl Bench<'_> {
         PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / eigenvalues[j].sqrt()))
     }
 
-    /// Psi of the watched points; of all nodes where there are none.
-    fn watched_rows(&self) -> Vec<DMatrix<f64>> {
+    /// Hands over Psi of every watched point; of every node where there are none.
+    fn each_watched(&self, mut hear: impl FnMut(&DMatrix<f64>)) {
         let rows = PointRows::new(self.body);
         match self.watched {
-            [] => (0..self.body.n_nodes()).map(|node| rows.of_node(node)).collect(),
-            points => points.iter().map(|point| rows.of(point)).collect(),
+            [] => (0..self.body.n_nodes()).for_each(|node| hear(&rows.of_node(node))),
+            points => points.iter().for_each(|point| hear(&rows.of(point))),
         }
     }
 
     /// What every mode does in a motion of the body.
     pub fn shares(&self, recording: &Recording) -> Vec<ModeShare> {
         let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let rows = self.watched_rows();
+        let mut longest = vec![0.0f64; self.body.n_modes()];
+        self.each_watched(|rows| {
+            for (longest, column) in longest.iter_mut().zip(rows.column_iter()) {
+                *longest = longest.max(column.norm());
+            }
+        });
         let energy = most(&mut recording.balances.iter().map(|balance| balance.elastic)).sqrt();
         let paths = recording.paths.iter().flat_map(|path| &path.deflection);
         let deflection = match recording.paths.is_empty() {
@@ -251,7 +258,7 @@ impl Bench<'_> {
         };
         let share = |j: usize| {
             let amplitude = most(&mut recording.states.iter().map(|state| state.q[j].abs()));
-            let moved = most(&mut rows.iter().map(|rows| rows.column(j).norm())) * amplitude;
+            let moved = longest[j] * amplitude;
             let root_energy = (0.5 * self.body.modes().eigenvalue[j]).sqrt() * amplitude;
             ModeShare {
                 amplitude,
