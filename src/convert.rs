@@ -8,7 +8,7 @@ use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
-    Modes, Parts, Source, Truncation,
+    Modes, Parts, Source, Storage, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
@@ -270,6 +270,7 @@ pub fn convert_for(
         lumped,
         certificate,
         terms,
+        storage: Storage::F64,
     })?;
     Ok(Conversion {
         body,
