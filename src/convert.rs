@@ -8,7 +8,7 @@ use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
-    Modes, Parts, Source, TermDecision, Truncation,
+    Modes, Parts, Source, Storage, TermDecision, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
@@ -208,6 +208,7 @@ pub fn convert_for(
             lumped: Vec::new(),
             certificate: certificate(model, &found, None),
             terms: Vec::new(),
+            storage: Storage::default(),
         };
         Ok((parts, warning))
     };

@@ -1,6 +1,6 @@
 //! `flexbody convert`.
 
-use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName};
+use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
 use super::checkpoint::resume;
 use super::output::{Outcome, tell};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
@@ -141,6 +141,9 @@ impl Job<'_> {
         })?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
+        if arguments.storage == StorageName::F32 {
+            conversion.body = conversion.body.rounded_to_f32()?;
+        }
         watcher.hear(Event::Phase("writing"));
         store::fill_slot(&conversion.body, &reserved.body)?;
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
@@ -256,6 +259,9 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
     let message = match arguments {
         ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
             "--shapes needs --basis imported"
+        }
+        ConvertArguments { storage: StorageName::F32, accuracy: AccuracyName::Certified, .. } => {
+            "--storage f32 rounds what --accuracy certified guarantees: take --storage f64"
         }
         ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
             "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
