@@ -32,7 +32,9 @@ impl FlexBody {
     ///
     /// # Errors
     /// [`BodySchema`](crate::diagnostic::Code::BodySchema), one diagnostic per violation.
-    pub fn new(parts: Parts) -> Result<Self> {
+    pub fn new(mut parts: Parts) -> Result<Self> {
+        // As files have them.
+        parts.terms.sort_by_key(|term| term.group);
         let problems = problems(&parts);
         if problems.is_empty() { Ok(Self { parts }) } else { Err(Error::new(problems)) }
     }

@@ -103,11 +103,10 @@ impl Certificate {
         let below = of.eigenvalue.iter().filter(|l| **l < self.shift).count();
         let complete = all || lowest && self.proved_modes.is_some_and(|count| below == count.min(nf));
         let left_out = || {
-            let before = match self.proved_modes {
-                Some(count) => format!("{count} modes were proved complete below the shift"),
-                None => "modes were not proved complete".to_owned(),
-            };
-            let remark = format!("{} of {nf} modes were kept, of which {before}", modes.len());
+            let proved =
+                |count: usize| format!(", of which the {count} below the shift were proved complete");
+            let proved = self.proved_modes.map_or_else(String::new, proved);
+            let remark = format!("{} of {nf} modes were kept{proved}", modes.len());
             if self.remark.is_empty() { remark } else { format!("{}; {remark}", self.remark) }
         };
         let guarantee = |guarantee: &Guarantee| Guarantee {
