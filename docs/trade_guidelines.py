@@ -220,7 +220,7 @@ def read_scene(path):
     return tomllib.loads(path.read_text())
 
 
-def study(body, scene, instants, tolerance=1e-9):
+def study(body, scene, instants, tolerance=1e-8):
     """The whole motion, and the errors of each guideline."""
     everything = Motion(body, scene, GUIDELINES["IV"]).states(instants, tolerance)
     errors = {name: apart(body, everything, Motion(body, scene, kept).states(instants, tolerance)) for name, kept in GUIDELINES.items() if name != "IV"}

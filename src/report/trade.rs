@@ -302,50 +302,40 @@ impl<'a> TradeFacts<'a> {
     }
 
     fn table(&self, html: &mut String, caption: &str, rows: &[&RowFacts<'a>]) {
-        let head = [
-            "No.",
-            "What",
-            "Of",
-            "To (Hz)",
-            "Multiplications",
-            "Evaluation",
-            "Simulation",
-            "Steps",
-            "File",
-            "Made in",
-            "Attitude (rad)",
-            "Deflection",
-            "Stress",
-            "Reaction",
-            "Error / tolerance",
-        ];
-        let optional = |value: Option<f64>| value.map_or_else(|| "&ndash;".to_owned(), |v| significant(v, 3));
+        // A body alone is one source, and nobody knows how long it took to make.
+        let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
+        let none = || "&ndash;".to_owned();
+        let optional = |value: Option<f64>| value.map_or_else(none, |v| significant(v, 3));
+        let made_in = |m: &MeasuredFacts| m.seconds.preprocessing.map_or_else(none, duration);
+        let mut head = vec!["No.", "What"];
+        head.extend(several.then_some("Of"));
+        head.extend(["To (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
+        head.extend(several.then_some("Made in"));
+        head.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
         let cells = |row: &&RowFacts<'a>| {
-            let name = if self.recommended == Some(row.number) {
-                format!("<strong>{}</strong>", row.number)
-            } else {
-                row.number.to_string()
-            };
-            let mut cells = vec![
-                name,
-                escape(&row.in_words()),
-                escape(row.source),
-                significant(row.last_frequency_hz, 5),
-            ];
+            let take = if self.recommended == Some(row.number) { "&#9654;&nbsp;" } else { "" };
+            let mut cells =
+                vec![format!("{take}{}", row.number), escape(&row.in_words()).replace(' ', "&nbsp;")];
+            cells.extend(several.then(|| escape(row.source)));
+            cells.push(significant(row.last_frequency_hz, 5));
             match (&row.measured, row.failed) {
-                (Some(m), _) => cells.extend([
-                    m.multiplications.to_string(),
-                    short(m.seconds.evaluation),
-                    duration(m.seconds.integration),
-                    m.steps.to_string(),
-                    m.file_bytes.map_or_else(|| "&ndash;".to_owned(), bytes),
-                    m.seconds.preprocessing.map_or_else(|| "&ndash;".to_owned(), duration),
-                    significant(m.errors.attitude, 3),
-                    optional(m.errors.deflection),
-                    optional(m.errors.stress),
-                    optional(m.errors.reaction),
-                    significant(m.worst, 3),
-                ]),
+                (Some(m), _) => {
+                    cells.extend([
+                        m.multiplications.to_string(),
+                        short(m.seconds.evaluation),
+                        duration(m.seconds.integration),
+                        m.steps.to_string(),
+                        m.file_bytes.map_or_else(none, bytes),
+                    ]);
+                    cells.extend(several.then(|| made_in(m)));
+                    cells.extend([
+                        significant(m.errors.attitude, 3),
+                        optional(m.errors.deflection),
+                        optional(m.errors.stress),
+                        optional(m.errors.reaction),
+                        significant(m.worst, 3),
+                    ]);
+                }
                 (None, failed) => {
                     let message = failed.map_or("", |diagnostic| diagnostic.message());
                     cells.push(format!("<span class=\"error\">{}</span>", escape(message)));
@@ -355,7 +345,8 @@ impl<'a> TradeFacts<'a> {
             cells
         };
         let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
-        table(html, caption, &head.map(str::to_owned), &[1, 2], &rows);
+        let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+        table(html, caption, &head, if several { &[1, 2] } else { &[1] }, &rows);
     }
 }
 

@@ -97,8 +97,8 @@ impl Candidate {
                 group,
                 kept: false,
                 tier: 2,
-                bound: 0.0,
-                limit: 0.0,
+                bound: f64::INFINITY,
+                limit: f64::INFINITY,
                 reason: "a candidate of a trade study".to_owned(),
             };
             body = body.reduced(&self.modes, self.groups, self.groups.dropped().map(decide).collect())?;
