@@ -22,9 +22,9 @@ use crate::output::OutputSlot;
 use crate::progress::Event;
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
 use crate::scene::{Scene, read_scene};
-use crate::selection::{WantedResponses, largest_eigenvalue};
+use crate::selection::WantedResponses;
 use crate::store;
-use crate::tailoring::convert_for_scene;
+use crate::tailoring::{Tailoring, convert_for_scene};
 use crate::units::UnitSystem;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
@@ -130,9 +130,11 @@ impl Job<'_> {
         let resume = resume(checkpoint.as_ref(), &save);
         let watch = |event: Event<'_>| watcher.hear(event);
         let (mut conversion, selection) = match (self.scene, &arguments.scene) {
-            (Some(scene), Some(path)) => convert_for_scene(&model, &settings, scene, resume, &watch)
-                .map_err(|error| error.in_file(path))
-                .map(|(conversion, selection)| (conversion, Some(selection))),
+            (Some(scene), Some(path)) => {
+                convert_for_scene(&model, &self.of_band(settings), scene, resume, &watch)
+                    .map_err(|error| error.in_file(path))
+                    .map(|(conversion, selection)| (conversion, Some(selection)))
+            }
             _ => convert_for(&model, &settings, None, resume, &watch).map(|conversion| (conversion, None)),
         }
         .inspect_err(|_| {
@@ -173,11 +175,18 @@ impl Job<'_> {
         Ok(Done { slots, outcome, diagnostics })
     }
 
+    /// Free modes by the band of the scene, unless their number or highest frequency is given.
+    fn of_band(&self, settings: ConvertSettings) -> Tailoring {
+        let ConvertArguments { modes, max_frequency, basis, .. } = self.arguments;
+        let by_band = modes.is_none() && max_frequency.is_none() && *basis == BasisName::Free;
+        Tailoring { settings, by_band }
+    }
+
     fn settings(&self, model: &FeModel, basis: BasisChoice) -> ConvertSettings {
         let Self { arguments, .. } = *self;
         ConvertSettings {
             modes: ModeSettings {
-                wanted: wanted(arguments, model.units(), self.scene),
+                wanted: wanted(arguments, model.units()),
                 accuracy: match arguments.accuracy {
                     AccuracyName::Fast => Accuracy::Fast,
                     AccuracyName::Standard => Accuracy::Standard,
@@ -396,12 +405,10 @@ fn refuse_overwriting(
     refuse_replacing(inputs, outputs.iter().flat_map(Places::all))
 }
 
-fn wanted(arguments: &ConvertArguments, units: &UnitSystem, scene: Option<&Scene>) -> Wanted {
-    let of_scene = scene.and_then(largest_eigenvalue).filter(|_| arguments.basis == BasisName::Free);
-    match (arguments.max_frequency, arguments.modes, of_scene) {
-        (Some(hertz), ..) => Wanted::Below(units.eigenvalue_of(hertz)),
-        (None, None, Some(eigenvalue)) => Wanted::Below(eigenvalue),
-        _ => Wanted::Lowest(match (arguments.modes, arguments.basis) {
+fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
+    match arguments.max_frequency {
+        Some(hertz) => Wanted::Below(units.eigenvalue_of(hertz)),
+        None => Wanted::Lowest(match (arguments.modes, arguments.basis) {
             (Some(modes), _) => modes as usize,
             (None, BasisName::Imported) => usize::MAX,
             (None, _) => ModeSettings::DEFAULT_COUNT,

@@ -7,9 +7,9 @@ use super::places::{format_of, refuse_replacing};
 use super::resources::memory_left;
 use super::watcher::Watcher;
 use crate::basis::{BasisChoice, FreeSurface, ModeSettings};
-use crate::convert::{ConvertSettings, convert};
+use crate::convert::ConvertSettings;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::Wanted;
+use crate::eigen::{Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::input::{read_manifest, read_model};
@@ -18,8 +18,9 @@ use crate::output::OutputSlot;
 use crate::progress::{Event, Watch};
 use crate::report::{Format, RunData, SelectionFacts};
 use crate::scene::{Scene, read_scene};
-use crate::selection::{largest_eigenvalue, select};
+use crate::selection::select;
 use crate::store;
+use crate::tailoring::Tailoring;
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -62,18 +63,19 @@ fn converted(
         true => responses_to(scene),
         false => files.residual_vectors.clone(),
     };
-    let wanted = match (arguments.modes, largest_eigenvalue(scene)) {
-        (Some(modes), _) => Wanted::Lowest(modes as usize),
-        (None, Some(eigenvalue)) => Wanted::Below(eigenvalue),
-        (None, None) => Wanted::Lowest(ModeSettings::DEFAULT_COUNT),
-    };
+    let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
     let settings = ConvertSettings {
-        modes: ModeSettings { wanted, memory: memory_left(None), ..ModeSettings::default() },
+        modes: ModeSettings {
+            wanted: Wanted::Lowest(wanted),
+            memory: memory_left(None),
+            ..ModeSettings::default()
+        },
         basis: BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),
         lumped: Vec::new(),
         ..ConvertSettings::default()
     };
-    let conversion = convert(&model, &settings, watch)?;
+    let tailoring = Tailoring { settings, by_band: arguments.modes.is_none() };
+    let conversion = tailoring.convert(&model, scene, None, Resume::default(), watch)?;
     diagnostics.extend(conversion.diagnostics);
     Ok((conversion.body, diagnostics))
 }
