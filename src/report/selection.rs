@@ -216,6 +216,18 @@ impl<'a> SelectionFacts<'a> {
         all.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
+    fn tolerance_in_words(&self) -> String {
+        let ToleranceFacts { attitude, deflection, stress, reaction } = self.tolerance;
+        let part = |part: f64| significant(100.0 * part, 3);
+        format!(
+            "attitude {} rad, deflection {} %, stress {} %, reaction {} %",
+            significant(attitude, 3),
+            part(deflection),
+            part(stress),
+            part(reaction)
+        )
+    }
+
     fn cost_in_words(&self) -> Option<String> {
         let chosen = self.chosen.as_ref()?;
         let ratio = self.multiplications_before as f64 / chosen.multiplications as f64;
@@ -252,6 +264,7 @@ impl<'a> SelectionFacts<'a> {
             let label = if i == 0 { "Inputs" } else { "" };
             page.entry(label, &format!("{} {}: {}", input.name, significant(input.value, 4), input.source));
         }
+        page.entry("Allowed", &self.tolerance_in_words());
         diagnostics_lines(&mut page, self.diagnostics);
         page.0
     }
@@ -282,7 +295,7 @@ impl<'a> SelectionFacts<'a> {
             .inputs
             .iter()
             .map(|input| (input.name, format!("{}: {}", significant(input.value, 5), escape(input.source))));
-        terms(&mut html, inputs);
+        terms(&mut html, inputs.chain([("Tolerances", self.tolerance_in_words())]));
         section(&mut html, "Sizes of the terms");
         let head = ["Term", "beside", "Group", "Guideline", "Formula", "Tier 0", "Tier 1", "Slack"];
         let rows: Vec<Vec<String>> = self

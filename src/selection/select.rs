@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 /// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
 const PART_OF_BOUNDS: f64 = 0.5;
 
-/// Part of the rest that dropped terms may take before modes are dropped.
+/// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are kept.
 const PART_OF_TERMS: f64 = 0.5;
 
 /// How far the run may stay behind the rotation that the scene allows for its measurements to count.
@@ -269,6 +269,9 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
                         search.terms(&mut choice, &mut trials)?;
                     }
                     search.modes(&mut choice, &mut trials)?;
+                    if short_of.is_none() {
+                        search.fewer_terms(&mut choice, &mut trials)?;
+                    }
                     "the fewest whose motion is within the tolerances".to_owned()
                 }
             };
@@ -359,6 +362,21 @@ impl Search<'_> {
                 continue;
             }
             let trial = self.measured(&choice.modes, groups, PART_OF_TERMS * self.budget())?;
+            let passed = trial.passed();
+            trials.push(trial);
+            if passed {
+                choice.groups = groups;
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Cheaper groups with the modes that are kept, where these take less of the tolerances than was left to them.
+    fn fewer_terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+        let smaller = sets().filter(|set| *set != choice.groups && set.and(choice.groups) == *set);
+        for groups in smaller.collect::<Vec<_>>() {
+            let trial = self.measured(&choice.modes, groups, self.budget())?;
             let passed = trial.passed();
             trials.push(trial);
             if passed {
@@ -470,8 +488,8 @@ fn decisions(
     short_of: Option<(f64, f64)>,
 ) -> Vec<TermDecision> {
     let held = body.invariants().groups;
-    let all = body.n_modes();
-    let of_groups = |kept: Groups| trials.iter().rfind(move |trial| trial.modes == all && trial.kept == kept);
+    let of_groups = |kept: Groups| trials.iter().rfind(move |trial| trial.kept == kept);
+    let within = |kept: Groups| trials.iter().find(move |trial| trial.kept == kept && trial.passed());
     let decide = |group: Group| {
         let kept = choice.groups.has(group);
         let undecided = |kept: bool, reason: &str| TermDecision {
@@ -489,7 +507,7 @@ fn decisions(
         let basis = if kept {
             of_groups(choice.groups.and(Groups::without(group)))
         } else {
-            of_groups(choice.groups).or(choice.chosen.as_ref())
+            within(choice.groups).or(choice.chosen.as_ref())
         };
         let mut decided = match basis {
             Some(trial) => decision(group, kept, trial, scene, rotation),
