@@ -189,8 +189,8 @@ end, with this step and with half of it.
 `cargo bench --bench dynamics`: state in, accelerations of the free body out; microseconds of processor time, best of several. *Dense matrices* is theory section 6 as it is
 printed, in matrices of nalgebra. bracket_hex20 is a solid, shell_folded has a general mass matrix.
 
-| body | modes | dense matrices (us) | all terms (us) | ratio | without W3 (us) | W1 only (us) |
-|---|---|---|---|---|---|---|
+| body | modes | dense matrices (us) | all terms (us) | ratio | without W3 (us) | W1 only (us) | I0 only (us) | all terms / I0 only |
+|---|---|---|---|---|---|---|---|---|
 {evaluations}
 
 Jacobians by all coordinates and velocities and gravity, bracket_hex20:
@@ -238,8 +238,8 @@ def main():
                     for f in found]
     evaluations = []
     for body, modes in sorted({(b, m) for b, m, what in cost if what == "dense matrices"}, key=lambda k: (k[1], k[0])):
-        dense, every, no_w3, w1 = (cost[body, modes, what] for what in ["dense matrices", "all terms", "without W3", "W1 only"])
-        evaluations.append([body, modes, number(dense), number(every), f"{dense / every:.0f}", number(no_w3), number(w1)])
+        dense, every, no_w3, w1, i0 = (cost[body, modes, what] for what in ["dense matrices", "all terms", "without W3", "W1 only", "I0 only"])
+        evaluations.append([body, modes, number(dense), number(every), f"{dense / every:.0f}", number(no_w3), number(w1), number(i0), f"{every / i0:.1f}"])
     others = [[m, number(cost["bracket_hex20", m, "Jacobians"]), number(cost["bracket_hex20", m, "gravity"])] for m in MODES]
     nodal = sorted([body, rows, number(us)] for (body, rows, what), us in cost.items() if what == "all nodes")
     page = PAGE.format(machine=machine(), python=platform.python_version(), exudyn=version("exudyn"), numpy=version("numpy"), turns=TURNS,

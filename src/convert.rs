@@ -7,12 +7,13 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure, Modes,
-    Parts, Source, Truncation,
+    Certificate, FlexBody, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
+    Modes, Parts, Source, Storage, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
-    choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, error_norms,
+    choose_general_frame, choose_plane_frame, condense_certified, condense_lumped, condense_lumped_linear,
+    error_norms,
 };
 use crate::linalg::{SymmetricMatrix, gram, multiply};
 use crate::model::{Coupling, Damping, FeModel, Nodes, Reference, rigid_count};
@@ -23,11 +24,14 @@ use std::collections::HashMap;
 mod body_modes;
 mod damping;
 mod geometric_stiffness;
+mod spectrum;
 
 pub(crate) use damping::modal_damping;
 pub(crate) use geometric_stiffness::modal_geometric_stiffness;
+pub use spectrum::{Decide, Spectrum};
 
 pub(crate) use body_modes::{BodyModes, Place, rigid_mass};
+use spectrum::{Decided, Known};
 
 /// A lumped comparator that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,6 +98,8 @@ pub struct Conversion {
     pub lumped_modes: Vec<LumpedPipeline>,
     /// Work of the eigen-solver.
     pub counters: Counters,
+    /// Columns that the condensation multiplied by M, for the consistent mass.
+    pub condensed_columns: u64,
     /// Memory and precision as decided before the work; none on the dense path.
     pub plan: Option<Plan>,
     /// Warnings and notes.
@@ -106,16 +112,22 @@ pub struct Conversion {
 /// Those of [`free_surface`](crate::basis::free_surface) and [`choose_frame`]; [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not
 /// fit the nodes (found before any work).
 pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
-    convert_resumed(model, settings, Resume::default(), watch)
+    convert_for(model, settings, None, Resume::default(), watch)
 }
 
-/// The same with a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+/// The same with what `decide` leaves of the kinetic energy, and with a search for modes that starts where an earlier one stood, or that
+/// is kept (a checkpoint).
+///
+/// `decide` is asked when the modes are known and before W1, W2 and W3 exist. Without W2 and W3, no product with M is formed but that of
+/// rigid motion, and no nf x nf array but K_ff and m_ff; lumped comparators hold the same groups. Accuracy `certified` condenses
+/// everything first: its digits are about the whole.
 ///
 /// # Errors
-/// As [`convert`].
-pub fn convert_resumed(
+/// As [`convert`], and those of `decide`.
+pub fn convert_for(
     model: &FeModel,
     settings: &ConvertSettings,
+    decide: Option<Decide<'_>>,
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<Conversion> {
@@ -138,10 +150,25 @@ pub fn convert_resumed(
     };
     let place = Place::new(model, frame);
     let modes = BodyModes::new(model, &place, &found.solution.vectors);
+    let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
+    let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+    let interfaces = interfaces(model, &frame, coupled);
+    let known = Known {
+        model,
+        place: &place,
+        mass_properties: &mass_properties,
+        eigenvalues: &found.solution.eigenvalues,
+        provenance: &found.provenance,
+        nodes: &nodes,
+        interfaces: &interfaces,
+    };
     let modal_stiffness = || reduced(model.stiffness(), modes.vectors.as_ref());
-    let (invariants, guarantee) = match (&found.solution.bounds, model.scalar_mass()) {
-        (None, _) | (_, None) => (modes.condensed(model, &place, modal_stiffness()), None),
-        (Some(bounds), Some(mass)) => {
+    let decided = decide.map(|decide| Decided::new(&known, &modes, modal_stiffness(), decide)).transpose()?;
+    let groups = decided.as_ref().map_or(Groups::ALL, Decided::groups);
+    let mut condensed_columns = decided.as_ref().map_or(0, |_| modes.condensed_columns(model, true));
+    let (invariants, guarantee) = match (&found.solution.bounds, model.scalar_mass(), &decided) {
+        (Some(bounds), Some(mass), _) => {
+            condensed_columns += modes.condensed_columns(model, false);
             let shapes = modes.displacements.as_ref();
             let own = condense_certified(mass, &place.positions, shapes, model.stiffness(), &frame.axes);
             let guarantee = Guarantee {
@@ -154,7 +181,14 @@ pub fn convert_resumed(
             };
             (own.invariants, Some(guarantee))
         }
+        (_, _, Some(decided)) if !groups.w2 && !groups.w3 => (decided.linear.clone(), None),
+        _ => {
+            condensed_columns += modes.condensed_columns(model, false);
+            (modes.condensed(model, &place, modal_stiffness()), None)
+        }
     };
+    let invariants = invariants.with_groups(groups);
+    let terms = decided.map_or_else(Vec::new, |decided| decided.terms);
     let eigenvalues = &found.solution.eigenvalues;
     let damping = modal_damping(model, modes.vectors.as_ref(), eigenvalues, &invariants)?;
     let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
@@ -166,10 +200,7 @@ pub fn convert_resumed(
         .iter()
         .map(|masses| {
             let modal_stiffness = invariants.modal_stiffness.clone();
-            let mut other = condense_lumped(masses, &place.positions, modes.of_nodes(), modal_stiffness);
-            if only_about_z(model) {
-                other = other.about_z();
-            }
+            let other = lumped_invariants(model, &place, masses, modes.of_nodes(), modal_stiffness, groups);
             LumpedBody {
                 scheme: masses.scheme().name().to_owned(),
                 comparison: error_norms(&invariants, &other),
@@ -188,9 +219,6 @@ pub fn convert_resumed(
         Vec::new()
     };
     let certificate = certificate(model, &found, guarantee);
-    let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions };
-    let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
-    let interfaces = interfaces(model, &frame, coupled);
     let fits = interfaces.iter().filter_map(|i| poor_fit(i, &nodes, &modes, model.dimension()));
     diagnostics.extend(fits);
     let solution = found.solution;
@@ -241,13 +269,15 @@ pub fn convert_resumed(
         geometric_stiffness,
         lumped,
         certificate,
-        terms: Vec::new(),
+        terms,
+        storage: Storage::F64,
     })?;
     Ok(Conversion {
         body,
         mass_properties,
         lumped_modes,
         counters: solution.counters,
+        condensed_columns,
         plan: solution.plan,
         diagnostics,
     })
@@ -264,6 +294,20 @@ fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
 /// Whether nothing but the rotation about z is known of a body: lumped masses are compared in this alone then.
 fn only_about_z(model: &FeModel) -> bool {
     model.dimension() == 2 && model.scalar_mass().is_none()
+}
+
+/// What lumped masses make of the groups that the body holds.
+fn lumped_invariants(
+    model: &FeModel,
+    place: &Place,
+    masses: &LumpedMasses,
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+    groups: Groups,
+) -> Invariants {
+    let condense = if groups.w2 || groups.w3 { condense_lumped } else { condense_lumped_linear };
+    let own = condense(masses, &place.positions, shapes, modal_stiffness);
+    if only_about_z(model) { own.about_z() } else { own }.with_groups(groups)
 }
 
 fn lumped_masses(model: &FeModel, lumping: &Lumping) -> Result<LumpedMasses> {
@@ -334,15 +378,9 @@ fn lumped_pipeline(
         gram(exact.modes.vectors.as_ref(), exact.model.pencil().apply_mass(modes.vectors.as_ref()).as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..nf)));
     let shapes = modes.of_nodes();
-    let mut own = condense_lumped(
-        masses,
-        &exact.place.positions,
-        shapes,
-        reduced(exact.model.stiffness(), modes.vectors.as_ref()),
-    );
-    if only_about_z(exact.model) {
-        own = own.about_z();
-    }
+    let stiffness = reduced(exact.model.stiffness(), modes.vectors.as_ref());
+    let groups = exact.invariants.groups;
+    let own = lumped_invariants(exact.model, exact.place, masses, shapes, stiffness, groups);
     Ok(LumpedPipeline {
         scheme,
         eigenvalues: found.eigenvalues,

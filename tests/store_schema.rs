@@ -75,7 +75,8 @@ fn constants_and_shapes_are_checked() {
         ("/groups/terms/attributes/W3", serde_json::json!("dropped")),
         ("/groups/modes/datasets/shape/shape", serde_json::json!([2, 3, 2])),
         ("/groups/invariants/datasets/W1/shape", serde_json::json!([3, 7])),
-        ("/groups/invariants/datasets/W1/type", serde_json::json!("float32")),
+        ("/groups/invariants/datasets/W1/type", serde_json::json!("float16")),
+        ("/groups/invariants/datasets/C1/type", serde_json::json!("float32")),
         ("/groups/nodes/datasets/id/shape", serde_json::json!([0])),
     ] {
         let mut broken = whole.clone();

@@ -177,6 +177,9 @@ pub struct ConvertArguments {
     /// Precision of the factor: auto takes f32 where f64 does not fit the memory or is slower
     #[arg(long, value_enum, default_value_t = FactorName::Auto)]
     pub factor: FactorName,
+    /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
+    #[arg(long, value_enum, default_value_t = StorageName::F64)]
+    pub storage: StorageName,
     /// Memory that the program may use: a number with K, M, G or T [default: what the machine and its control groups leave]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
@@ -306,6 +309,15 @@ pub enum FactorName {
     /// Double precision
     F64,
     /// Single precision, corrected in double
+    F32,
+}
+
+/// Names of the precisions of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StorageName {
+    /// 64-bit floats
+    F64,
+    /// 32-bit floats
     F32,
 }
 

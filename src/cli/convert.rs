@@ -1,6 +1,6 @@
 //! `flexbody convert`.
 
-use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName};
+use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
 use super::checkpoint::resume;
 use super::output::{Outcome, tell};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
@@ -9,7 +9,7 @@ use super::watcher::Watcher;
 use crate::basis::{
     BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
 };
-use crate::convert::{Conversion, ConvertSettings, Lumping, convert_resumed};
+use crate::convert::{Conversion, ConvertSettings, Lumping, convert_for};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::error::Result;
@@ -121,7 +121,14 @@ impl Job<'_> {
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
-        let conversion = convert_resumed(&model, &settings, resume, &|event| watcher.hear(event))
+        let stored = |mut conversion: Conversion| {
+            if arguments.storage == StorageName::F32 {
+                conversion.body = conversion.body.rounded_to_f32()?;
+            }
+            Ok(conversion)
+        };
+        let conversion = convert_for(&model, &settings, None, resume, &|event| watcher.hear(event))
+            .and_then(stored)
             .inspect_err(|_| {
                 watcher.clear();
                 tell(arguments.printing, &diagnostics);
@@ -216,6 +223,9 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
     let message = match arguments {
         ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
             "--shapes needs --basis imported"
+        }
+        ConvertArguments { storage: StorageName::F32, accuracy: AccuracyName::Certified, .. } => {
+            "--storage f32 rounds what --accuracy certified guarantees: take --storage f64"
         }
         ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
             "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
@@ -369,6 +379,7 @@ fn run_data(
         ("solved_columns", work.solved_columns),
         ("stiffness_columns", work.stiffness_columns),
         ("mass_columns", work.mass_columns),
+        ("condensed_columns", conversion.condensed_columns),
         ("restarts", work.restarts),
         ("factor_len", work.factor_len),
         ("factor_flops", work.factor_flops),

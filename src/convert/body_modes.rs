@@ -2,9 +2,11 @@
 
 use crate::eigen::canonical_basis;
 use crate::flex_body::{FlexBody, Frame, InternalRows};
-use crate::invariants::{Invariants, RigidMotion, condense, condense_general};
-use crate::linalg::gram;
-use crate::model::FeModel;
+use crate::invariants::{
+    Invariants, RigidMotion, condense, condense_general, condense_general_linear, condense_linear,
+};
+use crate::linalg::{SymmetricMatrix, gram};
+use crate::model::{FeModel, rigid_count};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
@@ -110,8 +112,36 @@ impl BodyModes {
 
     /// The invariants, by the formulas that the mass of `model` allows.
     pub fn condensed(&self, model: &FeModel, place: &Place, modal_stiffness: Mat<f64>) -> Invariants {
+        self.by(model, place, modal_stiffness, condense, condense_general)
+    }
+
+    /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
+    pub fn condensed_linear(&self, model: &FeModel, place: &Place, modal_stiffness: Mat<f64>) -> Invariants {
+        self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
+    }
+
+    /// Columns that the condensation with and without W2 or W3 multiplies by M.
+    pub fn condensed_columns(&self, model: &FeModel, linear: bool) -> u64 {
+        let nf = self.vectors.ncols() as u64;
+        match (model.scalar_mass(), linear) {
+            (Some(_), true) => 4,
+            (Some(_), false) => 4 + 3 * nf,
+            (None, true) => rigid_count(model.dimension()) as u64,
+            (None, false) if model.dimension() == 2 => 3 + 2 * nf,
+            (None, false) => 6 + 4 * nf,
+        }
+    }
+
+    fn by(
+        &self,
+        model: &FeModel,
+        place: &Place,
+        modal_stiffness: Mat<f64>,
+        solid: impl Fn(&SymmetricMatrix, &[[f64; 3]], MatRef<'_, f64>, Mat<f64>) -> Invariants,
+        general: impl Fn(&SymmetricMatrix, &RigidMotion<'_>, MatRef<'_, f64>, Mat<f64>) -> Invariants,
+    ) -> Invariants {
         if let Some(mass) = model.scalar_mass() {
-            return condense(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
+            return solid(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
         }
         let fields = rigid_fields(model, &place.frame);
         let motion = RigidMotion {
@@ -119,7 +149,7 @@ impl BodyModes {
             displacements: model.rows().displacements(),
             axes: place.frame.axes,
         };
-        condense_general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
+        general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
     }
 }
 

@@ -86,7 +86,7 @@ pub struct EquationsOfMotion {
 impl EquationsOfMotion {
     /// The equations of `body` with those of the given terms that it holds.
     ///
-    /// Taken as they are meant: m_ff that is the identity to 1e-12 is the identity; K_ff and D whose entries beside the diagonal are
+    /// Taken as they are meant: m_ff that is the identity to 1e-12 (with arrays of 32-bit floats to their rounding) is the identity; K_ff and D whose entries beside the diagonal are
     /// below 1e-10 of sqrt(a_ii a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
     pub fn new(body: &FlexBody, terms: Terms) -> Self {
         let (invariants, modes, nf) = (body.invariants(), body.modes(), body.n_modes());
@@ -183,7 +183,10 @@ impl EquationsOfMotion {
             w3,
             w3_skew,
             accelerated,
-            modal_mass: ModalMass::new(invariants.modal_mass().as_ref(), MASS_ROUNDING),
+            modal_mass: ModalMass::new(
+                invariants.modal_mass().as_ref(),
+                MASS_ROUNDING + body.storage().rounding(),
+            ),
             stiffness: ModalMatrix::new(invariants.modal_stiffness.as_ref(), STIFFNESS_ROUNDING),
             damping,
             terms,

@@ -5,6 +5,7 @@ mod interface;
 mod model_rows;
 mod parts;
 mod reduced;
+mod storage;
 mod terms;
 mod validate;
 
@@ -15,4 +16,5 @@ pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
 };
+pub use storage::Storage;
 pub use terms::TermDecision;

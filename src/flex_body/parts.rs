@@ -1,6 +1,6 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use super::{Interface, InterfaceCoordinates, TermDecision};
+use super::{Interface, InterfaceCoordinates, Storage, TermDecision};
 use crate::invariants::{DIGITS, Frame, Invariants};
 use crate::model::{BodyNumber, GeometricStiffness, Nodes};
 use crate::provenance::SourceFile;
@@ -162,4 +162,6 @@ pub struct Parts {
     pub coordinates: Option<InterfaceCoordinates>,
     /// What was decided about the groups of the kinetic energy; empty where nobody asked, and then all are held.
     pub terms: Vec<TermDecision>,
+    /// Precision of shapes and of the inertia of the modes.
+    pub storage: Storage,
 }

@@ -1,6 +1,8 @@
 //! A body with some of its modes, and some groups of its kinetic energy.
 
-use super::{Certificate, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts, TermDecision};
+use super::{
+    Certificate, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts, Storage, TermDecision,
+};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::invariants::error_norms;
@@ -42,7 +44,7 @@ impl FlexBody {
             }
         };
         let before = parts.terms.iter().filter(|old| terms.iter().all(|new| new.group != old.group));
-        Self::new(Parts {
+        let body = Self::new(Parts {
             source: parts.source.clone(),
             dimension: parts.dimension,
             units: parts.units.clone(),
@@ -60,7 +62,10 @@ impl FlexBody {
             coordinates: parts.coordinates.clone().filter(|_| all),
             terms: before.cloned().chain(terms.iter().cloned()).collect(),
             invariants,
-        })
+            storage: parts.storage,
+        })?;
+        // W3 without S is stored by itself: the difference of two rounded numbers.
+        if parts.storage == Storage::F32 { body.rounded_to_f32() } else { Ok(body) }
     }
 }
 

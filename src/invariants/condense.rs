@@ -22,10 +22,10 @@ pub(super) const MAX_GROUPS: usize = 64;
 /// Columns per pass over the mass matrix.
 const PANEL: usize = 64;
 /// Columns of a panel that are summed at a time, in registers.
-const LANE: usize = 16;
+pub(super) const LANE: usize = 16;
 
 /// A part of a row of a panel.
-type Lane = [f64; LANE];
+pub(super) type Lane = [f64; LANE];
 
 /// A symmetric mass on the nodes, the same for every direction.
 pub(super) trait NodalMass: Sync {
@@ -153,7 +153,7 @@ pub(super) fn condense_rigid<M: NodalMass + ?Sized>(
     rigid_part(weighted_gram(mass, Columns { positions, shapes: no_modes.as_ref() }).as_ref())
 }
 
-fn rigid_part(gram: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
+pub(super) fn rigid_part(gram: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let first_moment = Vector3::from_fn(|k, _| gram[(0, 1 + k)]);
     (gram[(0, 0)], first_moment, Matrix3::from_fn(|k, l| gram[(1 + k, 1 + l)]))
 }
@@ -201,7 +201,7 @@ impl Columns<'_> {
 }
 
 /// Zeros that begin at a cache line: the dense kernels meet the same alignment in every run.
-struct Aligned {
+pub(super) struct Aligned {
     values: Vec<f64>,
     start: usize,
 }
@@ -209,7 +209,7 @@ struct Aligned {
 impl Aligned {
     const LINE: usize = 8;
 
-    fn zeros(len: usize) -> Self {
+    pub fn zeros(len: usize) -> Self {
         let values = vec![0.0; len + Self::LINE];
         let start = values.as_ptr().align_offset(64).min(Self::LINE);
         Self { values, start }
@@ -219,7 +219,7 @@ impl Aligned {
         &self.values[self.start..self.values.len() + self.start - Self::LINE]
     }
 
-    fn get_mut(&mut self) -> &mut [f64] {
+    pub fn get_mut(&mut self) -> &mut [f64] {
         let end = self.values.len() + self.start - Self::LINE;
         &mut self.values[self.start..end]
     }
@@ -306,7 +306,13 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Rang
 
 /// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for.
 #[inline(always)] // compiled once per instruction set
-fn mass_times<M: NodalMass + ?Sized>(mass: &M, first: usize, x: &[Lane], lanes: usize, targets: &mut [Lane]) {
+pub(super) fn mass_times<M: NodalMass + ?Sized>(
+    mass: &M,
+    first: usize,
+    x: &[Lane],
+    lanes: usize,
+    targets: &mut [Lane],
+) {
     for (k, row) in targets.chunks_exact_mut(lanes).enumerate() {
         for (lane, target) in row.iter_mut().enumerate() {
             *target = mass.row_times(first + k, x, lanes, lane);

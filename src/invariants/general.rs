@@ -62,6 +62,28 @@ pub fn condense_general(
     }
 }
 
+/// The same for modes that are mass-normalised, without W2 and W3: the columns \[Phi_t, B_x\] alone are multiplied by M, and m_ff = I is
+/// taken for granted.
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn condense_general_linear(
+    mass: &SymmetricMatrix,
+    motion: &RigidMotion<'_>,
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+) -> Invariants {
+    let (n, nf) = (mass.n(), shapes.ncols());
+    assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
+    let columns = Columns { motion, shapes };
+    let products = Products { gram: columns.rigid_gram(mass), rigid: columns.rigid(), nf };
+    let whole = match columns.rigid() {
+        3 => products.in_plane(modal_stiffness),
+        _ => products.in_space(modal_stiffness),
+    };
+    whole.with_groups(Groups { w1: true, ..Groups::NONE })
+}
+
 /// X = [Phi_t, B_x, B_j e_b for each axis b and mode j, Psi].
 struct Columns<'a> {
     motion: &'a RigidMotion<'a>,
@@ -105,6 +127,26 @@ impl Columns<'_> {
         Mat::from_fn(self.shapes.nrows(), columns.len(), |row, c| self.get(row, start + c))
     }
 
+    /// The rows and columns of X' M X of rigid motion, and I for the modes; zero elsewhere.
+    fn rigid_gram(&self, mass: &SymmetricMatrix) -> Mat<f64> {
+        let (count, r) = (self.count(), self.rigid());
+        let mut y = Mat::zeros(self.shapes.nrows(), r);
+        multiply(mass, 1, self.motion.fields, y.as_mut());
+        let first_mode = count - self.shapes.ncols();
+        let mut all = Mat::from_fn(count, count, |i, j| if i == j && i >= first_mode { 1.0 } else { 0.0 });
+        for start in (0..count).step_by(BLOCK) {
+            let columns = start..(start + BLOCK).min(count);
+            let part = gram(self.block(columns.clone()).as_ref(), y.as_ref());
+            for (k, column) in columns.enumerate() {
+                for row in 0..r.min(column + 1) {
+                    all[(row, column)] = part[(k, row)];
+                    all[(column, row)] = part[(k, row)];
+                }
+            }
+        }
+        all
+    }
+
     /// X' M X, exactly symmetric.
     fn gram(&self, mass: &SymmetricMatrix) -> Mat<f64> {
         let count = self.count();
@@ -129,7 +171,7 @@ impl Columns<'_> {
     }
 }
 
-/// The Gram matrix of [`Columns`].
+/// The Gram matrix of [`Columns`], of [`condense_general_linear`] without what W2 and W3 are made of.
 struct Products {
     gram: Mat<f64>,
     rigid: usize,

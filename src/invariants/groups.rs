@@ -70,6 +70,11 @@ impl Groups {
         Self { w1: !self.w1, w2: !self.w2, w3: !self.w3 }
     }
 
+    /// All but one.
+    pub fn without(group: Group) -> Self {
+        Self { w1: group != Group::W1, w2: group != Group::W2, w3: group != Group::W3 }
+    }
+
     /// Those that are in both.
     pub fn and(self, other: Self) -> Self {
         Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }
@@ -137,6 +142,25 @@ impl Invariants {
             }),
             groups: self.groups,
         }
+    }
+
+    /// The same with `round` of every entry of Ibar, S, W0 and W3 that the body holds for its groups. What gives C2 and m_ff where W1 and
+    /// W2 are not held stays.
+    pub(crate) fn rounded(&self, round: impl Fn(f64) -> f64) -> Self {
+        let matrix = |a: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| round(a[(i, j)]));
+        let mut rounded = self.clone();
+        if self.groups.w1 {
+            rounded.ibar.iter_mut().flatten().flatten().for_each(|v| *v = round(*v));
+        }
+        for (k, row) in rounded.s.iter_mut().enumerate() {
+            for (l, s) in row.iter_mut().enumerate().filter(|(l, _)| self.groups.w2 || *l != k) {
+                *s = matrix(&self.s[k][l]);
+            }
+        }
+        if let Some(general) = &mut rounded.general {
+            (general.w0, general.w3) = (matrix(&general.w0), matrix(&general.w3));
+        }
+        rounded
     }
 
     /// Whether nothing is there of the groups that are not held.

@@ -96,6 +96,9 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         None => comparison.norms_only(&pair, tolerances.invariants),
     }
     comparison.say_what_is_dropped(a, b);
+    if a.storage() != b.storage() {
+        comparison.notes.push("one of the bodies is rounded to 32-bit floats".to_owned());
+    }
     if a.units().stated != b.units().stated {
         comparison
             .notes

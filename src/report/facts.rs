@@ -53,6 +53,8 @@ pub(super) struct ModelFacts {
     pub n_nodes: usize,
     pub n_dofs: usize,
     pub mass_structure: &'static str,
+    /// Precision of shapes and of the inertia of the modes: `f64` or `f32`.
+    pub storage: &'static str,
     /// What is not exact of a mass that does not commute with rotations.
     pub approximation: Option<&'static str>,
     pub units: UnitFacts,
@@ -254,6 +256,7 @@ impl ModelFacts {
                 MassStructure::Diagonal => "diagonal",
                 MassStructure::General => "general",
             },
+            storage: body.storage().name(),
             approximation: (source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK),
             units: UnitFacts::new(units),
             files: source.files.clone(),
@@ -264,6 +267,11 @@ impl ModelFacts {
                 .collect(),
             settings: source.settings.clone(),
         }
+    }
+
+    /// What rounding took; nothing of 64-bit floats.
+    pub fn storage_in_words(&self) -> Option<&'static str> {
+        (self.storage == "f32").then_some("shapes and inertia of the modes rounded to 32-bit floats")
     }
 
     /// What the structure of the mass matrix means for `exact`.

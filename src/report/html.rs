@@ -135,14 +135,15 @@ fn body(html: &mut String, facts: &Facts) {
             (
                 "Model",
                 format!(
-                    "{} nodes, {} degrees of freedom, {}{}",
+                    "{} nodes, {} degrees of freedom, {}{}{}",
                     model.n_nodes,
                     model.n_dofs,
                     model.mass_in_words(),
                     model.body.as_ref().map_or(String::new(), |b| format!(
                         "; body {} of {} in the matrices",
                         b.number, b.of
-                    ))
+                    )),
+                    model.storage_in_words().map_or(String::new(), |rounded| format!("; {rounded}"))
                 ),
             ),
             ("Units", escape(&units.in_words())),

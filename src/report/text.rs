@@ -113,6 +113,9 @@ fn heading(page: &mut Page, facts: &Facts) {
     if let Some(remark) = model.approximation {
         page.entry("", remark);
     }
+    if let Some(rounded) = model.storage_in_words() {
+        page.entry("storage", rounded);
+    }
     if let Some(body) = &model.body {
         page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
     }

@@ -55,6 +55,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         interfaces,
         coordinates,
         terms,
+        storage: scan.storage,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Entries that follow from others: what the file says against what the body gives.
 
 use super::hdf5_value::index;
-use super::item::{DERIVED_TOLERANCE, Group, Origin, Per};
+use super::item::{DERIVED_TOLERANCE, Group, Origin, Per, SHORT_TOLERANCE};
 use super::scan::{Scan, key, place};
 use super::schema::TABLE;
 use super::value::{Value, View};
@@ -32,7 +32,9 @@ fn check_group(scan: &mut Scan, group: &Group, path: &str, view: &View<'_>) {
                     Some(Value::Floats(values)) => values.iter().fold(0.0f64, |m, v| m.max(v.abs())),
                     _ => 0.0,
                 };
-                let differs = |(a, b): (&f64, &f64)| (a - b).abs() > DERIVED_TOLERANCE * largest;
+                let tolerance =
+                    if item.is_short(view.body.storage) { SHORT_TOLERANCE } else { DERIVED_TOLERANCE };
+                let differs = |(a, b): (&f64, &f64)| (a - b).abs() > tolerance * largest;
                 if let Some(i) = found.iter().zip(expected).position(differs) {
                     let at = index(i, &item.dims(view));
                     let (found, expected) = (found[i], expected[i]);

@@ -101,6 +101,7 @@ fn content(item: &Item) -> String {
 
 fn kind(item: &Item) -> &'static str {
     match item.kind {
+        Kind::Floats(_) if item.large => "float64 or float32",
         Kind::Floats(_) | Kind::Float | Kind::Named => "float64",
         Kind::Ints(_) | Kind::Int => "int64",
         Kind::Text => "text",
@@ -245,7 +246,7 @@ fn entry(item: &Item) -> Value {
                 "type": "object",
                 "required": ["type", "shape", "units", "symbol", "description"],
                 "properties": {
-                    "type": { "const": kind(item) },
+                    "type": { "enum": kind(item).split(" or ").collect::<Vec<_>>() },
                     "shape": {
                         "type": "array",
                         "prefixItems": sizes.collect::<Vec<_>>(),

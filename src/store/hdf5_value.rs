@@ -103,6 +103,11 @@ impl Element for f64 {
     const NAME: &'static str = "64-bit floats";
 }
 
+impl Element for f32 {
+    const TYPE: TypeDescriptor = TypeDescriptor::Float(FloatSize::U4);
+    const NAME: &'static str = "32-bit floats";
+}
+
 impl Element for i64 {
     const TYPE: TypeDescriptor = TypeDescriptor::Integer(IntSize::U8);
     const NAME: &'static str = "64-bit integers";
@@ -127,7 +132,7 @@ pub(super) fn dataset<T: Element>(
     }
     let dims = dataset.get_shape().map_err(|e| format!("expected a shape, found {e}"))?;
     let elements = sizes.fit(shape, &dims)?;
-    storage(&dataset, elements, stored)?;
+    storage(&dataset, elements, size_of::<T>(), stored)?;
     let mut values = Vec::new();
     values
         .try_reserve_exact(elements)
@@ -186,7 +191,7 @@ impl Sizes {
 }
 
 /// Refuses data that lie in other files, and sizes that the stored bytes cannot hold.
-fn storage(dataset: &hdf5::Dataset, elements: usize, stored: &mut Stored) -> Result<(), String> {
+fn storage(dataset: &hdf5::Dataset, elements: usize, size: usize, stored: &mut Stored) -> Result<(), String> {
     let plist = dataset.create_plist().map_err(|e| format!("expected a storage layout, found {e}"))?;
     let layout = plist.get_layout().map_err(|e| format!("expected a storage layout, found {e}"))?;
     let external = plist.get_external().map_err(|e| format!("expected a storage layout, found {e}"))?;
@@ -195,7 +200,7 @@ fn storage(dataset: &hdf5::Dataset, elements: usize, stored: &mut Stored) -> Res
     }
     let bytes = dataset.storage_size();
     let most = if layout == Layout::Chunked { bytes.saturating_mul(HIGHEST_COMPRESSION) } else { bytes };
-    if (elements as u64).saturating_mul(8) > most {
+    if (elements as u64).saturating_mul(size as u64) > most {
         return Err(format!("expected stored data for {elements} values, found {bytes} bytes"));
     }
     let Some(left) = stored.left.checked_sub(bytes) else {

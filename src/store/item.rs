@@ -1,7 +1,7 @@
 //! What the table of the flex-body file is made of: entries, their shapes, and where their values come from.
 
 use super::value::{Units, Value, View, text};
-use crate::flex_body::{Group as TermGroup, Interface, LumpedBody, Parts};
+use crate::flex_body::{Group as TermGroup, Interface, LumpedBody, Parts, Storage};
 
 /// One extent of a dataset's shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +62,9 @@ use Origin::{ConstantInt, ConstantText, Derived, Primary};
 /// independent evaluations of the invariants reach.
 pub(super) const DERIVED_TOLERANCE: f64 = 1e-12;
 
+/// The same of an array of 32-bit floats, which is rounded by itself.
+pub(super) const SHORT_TOLERANCE: f64 = f32::EPSILON as f64;
+
 /// How often a group occurs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Per {
@@ -84,6 +87,8 @@ pub(super) struct Item {
     pub origin: Origin,
     /// The group of the kinetic energy that the entry belongs to: there where the body holds it, required or not there at all.
     pub of: Option<TermGroup>,
+    /// A large array, of 32-bit floats where the body is stored so.
+    pub large: bool,
 }
 
 /// A group with its entries. `<scheme>` and `<name>` stand for names that are data.
@@ -106,6 +111,17 @@ impl Item {
     pub const fn of(mut self, group: TermGroup) -> Self {
         self.of = Some(group);
         self
+    }
+
+    /// A large array, that may be stored in 32-bit floats.
+    pub const fn large(mut self) -> Self {
+        self.large = true;
+        self
+    }
+
+    /// Whether a body keeps this array in 32-bit floats.
+    pub fn is_short(&self, storage: Storage) -> bool {
+        self.large && storage == Storage::F32
     }
 
     pub const fn optional(mut self) -> Self {

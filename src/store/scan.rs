@@ -8,7 +8,7 @@ use super::schema::TABLE;
 use super::schema::terms::{DROPPED, KEPT};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::flex_body::{Group as TermGroup, Groups};
+use crate::flex_body::{Group as TermGroup, Groups, Storage};
 use crate::units::UnitSystem;
 use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -29,6 +29,8 @@ pub(super) struct Scan {
     sizes: Sizes,
     stored: Stored,
     units: Option<UnitSystem>,
+    /// Precision of the large arrays, which the root says.
+    pub storage: Storage,
     /// Entries of groups of the kinetic energy, and whether they are there.
     of_groups: Vec<(String, &'static Item, bool)>,
 }
@@ -64,6 +66,7 @@ impl Scan {
             sizes: Sizes::default(),
             stored: Stored::new(bytes),
             units: None,
+            storage: Storage::F64,
             of_groups: Vec::new(),
         };
         for group in TABLE {
@@ -166,6 +169,7 @@ impl Scan {
         self.sizes = sizes;
         if group.path == "/" {
             self.units = self.unit_system();
+            self.storage = self.precision();
         }
     }
 
@@ -177,7 +181,12 @@ impl Scan {
     ) -> Result<Option<Value>, String> {
         match item.kind {
             Kind::Floats(shape) => {
-                let values = hdf5_value::dataset::<f64>(place, item.name, shape, sizes, &mut self.stored)?;
+                let stored = &mut self.stored;
+                let values = match item.is_short(self.storage) {
+                    false => hdf5_value::dataset::<f64>(place, item.name, shape, sizes, stored)?,
+                    true => hdf5_value::dataset::<f32>(place, item.name, shape, sizes, stored)?
+                        .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims)),
+                };
                 let Some((values, dims)) = values else { return Ok(None) };
                 match values.iter().position(|v| !v.is_finite()) {
                     Some(i) => Err(format!(
@@ -276,6 +285,16 @@ impl Scan {
                 Err(problem) => self.add(format!("{name}@{attribute}: {problem}")),
             }
         }
+    }
+
+    fn precision(&mut self) -> Storage {
+        let Some(Value::Text(name)) = self.values.get("/@storage") else { return Storage::F64 };
+        let known = Storage::ALL.into_iter().find(|storage| storage.name() == name);
+        if known.is_none() {
+            let message = format!("/@storage: expected `f64` or `f32`, found {name:?}");
+            self.add(message);
+        }
+        known.unwrap_or_default()
     }
 
     fn unit_system(&mut self) -> Option<UnitSystem> {

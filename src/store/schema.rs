@@ -5,7 +5,7 @@ use super::item::Kind::{Floats, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
 use super::item::{Get, Group, Item, Kind, Origin, Per};
 use super::value::{Units, Value, count, matrix, rows, shape_rows, small, text};
-use crate::flex_body::{Group as TermGroup, MassStructure};
+use crate::flex_body::{Group as TermGroup, MassStructure, Storage};
 use crate::invariants::GENERAL_REMARK;
 use crate::provenance;
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, guarantee};
@@ -46,7 +46,18 @@ const fn dataset(
     description: &'static str,
     get: Get,
 ) -> Item {
-    Item { name, kind, units, symbol, description, required: true, since: 0, origin: Primary(get), of: None }
+    Item {
+        name,
+        kind,
+        units,
+        symbol,
+        description,
+        required: true,
+        since: 0,
+        origin: Primary(get),
+        of: None,
+        large: false,
+    }
 }
 
 /// A required attribute of version 1.0.
@@ -62,7 +73,18 @@ const fn attribute(
 
 /// A required attribute of version 1.0 with one value for every file.
 const fn constant(name: &'static str, kind: Kind, origin: Origin, description: &'static str) -> Item {
-    Item { name, kind, units: ONE, symbol: "", description, required: true, since: 0, origin, of: None }
+    Item {
+        name,
+        kind,
+        units: ONE,
+        symbol: "",
+        description,
+        required: true,
+        since: 0,
+        origin,
+        of: None,
+        large: false,
+    }
 }
 
 const ROOT: &[Item] = &[
@@ -102,6 +124,14 @@ const ROOT: &[Item] = &[
     attribute("units_time", Text, ONE, "unit of time: a name (`s ms us`) or its size in s", |v| {
         text(v.body.units.time.name())
     }),
+    attribute(
+        "storage",
+        Text,
+        ONE,
+        "`f32`: shapes and the inertia of the modes are rounded to 32-bit floats, in the datasets marked float32; absent: `f64`, all floats have 64 bits",
+        |v| text((v.body.storage == Storage::F32).then(|| v.body.storage.name())?),
+    )
+    .added(3),
     attribute("units_stated", Int, ONE, "1: the user stated the units; 0: m, kg, s were assumed", |v| {
         Some(Value::Int(v.body.units.stated.into()))
     }),
@@ -280,7 +310,8 @@ const MODES: &[Item] = &[
         "Psi",
         "mass-normalised mode shapes: displacement of every node in body axes; the largest component of each mode is positive",
         |v| Some(shape_rows(&v.body.modes.shape, 0..v.body.nodes.len())),
-    ),
+    )
+    .large(),
     dataset(
         "rotation",
         Floats(&[Modes, Nodes, Fixed(3)]),
@@ -289,7 +320,8 @@ const MODES: &[Item] = &[
         "rotation of every node in body axes, zero where the model has none; absent: a model of displacements",
         |v| Some(shape_rows(v.body.modes.rotation.as_ref()?, 0..v.body.nodes.len())),
     )
-    .added(2),
+    .added(2)
+    .large(),
     dataset(
         "internal_dof",
         Ints(&[InternalRows, Fixed(2)]),
@@ -307,7 +339,8 @@ const MODES: &[Item] = &[
         "the modes at these rows, as the FE model scales them; vectors (three rows) in body axes",
         |v| matrix(v.body.modes.internal.as_ref()?.shape.as_ref()),
     )
-    .added(2),
+    .added(2)
+    .large(),
 ];
 
 const INVARIANTS: &[Item] = &[
@@ -325,12 +358,14 @@ const INVARIANTS: &[Item] = &[
         let own = v.invariants();
         own.groups.w1.then(|| Value::Floats(own.ibar.as_flattened().iter().flatten().copied().collect()))
     })
-    .of(TermGroup::W1),
+    .of(TermGroup::W1)
+    .large(),
     dataset("S", Floats(&[Fixed(3), Fixed(3), Modes, Modes]), ONE, "S", "S_kl = Psi_k' Ms Psi_l", |v| {
         let own = v.invariants();
         own.groups.w2.then(|| Value::Floats(own.s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
     })
-    .of(TermGroup::W2),
+    .of(TermGroup::W2)
+    .large(),
     dataset("modal_stiffness", Floats(&[Modes, Modes]), PER_TIME2, "K_ff", "Psi' K Psi", |v| {
         matrix(v.invariants().modal_stiffness.as_ref())
     }),
@@ -341,22 +376,26 @@ const INVARIANTS: &[Item] = &[
     dataset("W0", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS, "W0", "mass structure `general` only: Phi_t' M B_j, column b nf + j; else block b is (-C1~) e_b", |v| {
         matrix(v.invariants().general.as_ref()?.w0.as_ref())
     })
-    .added(2),
+    .added(2)
+    .large(),
     dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
         matrix(v.invariants().w1()?.as_ref())
     })
     .derived("Ibar")
-    .of(TermGroup::W1),
+    .of(TermGroup::W1)
+    .large(),
     dataset("W2", Floats(&[ThreeModes, ThreeModes]), ONE, "W2", "diagonal blocks S_ll + S_mm, block (k,l) = -S_lk; row and column b nf + j", |v| {
         matrix(v.invariants().w2()?.as_ref())
     })
     .derived("S")
-    .of(TermGroup::W2),
+    .of(TermGroup::W2)
+    .large(),
     dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general` (B_j' M Psi) and without W2: information of its own", |v| {
         matrix(v.invariants().w3()?.as_ref())
     })
     .derived("S")
-    .of(TermGroup::W3),
+    .of(TermGroup::W3)
+    .large(),
     dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]; without W1: information of its own", |v| {
         matrix(v.invariants().c2().as_ref())
     })

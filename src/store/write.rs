@@ -116,16 +116,11 @@ pub(super) fn make(parent: &hdf5::Group, name: &str) -> hdf5::Result<hdf5::Group
 fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<()> {
     let shape = item.dims(view);
     match (item.kind, value) {
-        (Kind::Floats(_), Value::Floats(values)) => {
-            let mut builder = place.new_dataset::<f64>().obj_track_times(false);
-            if let [Extent::Modes, Extent::Nodes, _] = item.shape().unwrap_or(&[]) {
-                // One chunk per mode: a reader of few modes touches only these.
-                builder = builder.chunk(vec![1, shape[1], shape[2]]).shuffle().deflate(DEFLATE_LEVEL);
-            }
-            let dataset = builder.shape(shape).create(item.name)?;
-            dataset.write_raw(&values)?;
-            describe(&dataset, item, view)
+        (Kind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
+            let short: Vec<f32> = values.into_iter().map(nearest_f32).collect();
+            put_floats(place, item, view, &short)
         }
+        (Kind::Floats(_), Value::Floats(values)) => put_floats(place, item, view, &values),
         (Kind::Ints(_), Value::Ints(values)) => {
             let dataset = place.new_dataset::<i64>().obj_track_times(false).shape(shape).create(item.name)?;
             dataset.write_raw(&values)?;
@@ -139,6 +134,28 @@ fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5:
         }
         (kind, value) => unreachable!("table entry {}: {kind:?} for {value:?}", item.name),
     }
+}
+
+fn put_floats<T: hdf5::H5Type>(
+    place: &hdf5::Group,
+    item: &Item,
+    view: &View<'_>,
+    values: &[T],
+) -> hdf5::Result<()> {
+    let shape = item.dims(view);
+    let mut builder = place.new_dataset::<T>().obj_track_times(false);
+    if let [Extent::Modes, Extent::Nodes, _] = item.shape().unwrap_or(&[]) {
+        // One chunk per mode: a reader of few modes touches only these.
+        builder = builder.chunk(vec![1, shape[1], shape[2]]).shuffle().deflate(DEFLATE_LEVEL);
+    }
+    let dataset = builder.shape(shape).create(item.name)?;
+    dataset.write_raw(values)?;
+    describe(&dataset, item, view)
+}
+
+#[allow(clippy::cast_possible_truncation)] // what it is for
+fn nearest_f32(value: f64) -> f32 {
+    value as f32
 }
 
 fn describe(dataset: &hdf5::Dataset, item: &Item, view: &View<'_>) -> hdf5::Result<()> {

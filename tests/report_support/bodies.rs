@@ -9,7 +9,7 @@ use cuboid::Cuboid;
 use faer::Mat;
 use flexbody::diagnostic::{Code, Diagnostic};
 use flexbody::flex_body::{
-    Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, Source,
+    Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
 };
 use flexbody::invariants::{BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, choose_frame, condense};
 use flexbody::linalg::SymmetricMatrix;
@@ -123,6 +123,7 @@ pub fn engine_mount() -> FlexBody {
         }],
         coordinates: None,
         terms: Vec::new(),
+        storage: Storage::F64,
     })
     .unwrap_or_else(|e| panic!("{e}"))
 }
@@ -264,6 +265,7 @@ pub fn condensed(
         interfaces: vec![],
         coordinates: None,
         terms: Vec::new(),
+        storage: Storage::F64,
     })
     .unwrap_or_else(|e| panic!("{e}"))
 }

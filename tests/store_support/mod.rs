@@ -4,7 +4,7 @@
 use faer::Mat;
 use flexbody::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Truncation, UnitLoad,
+    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage, Truncation, UnitLoad,
 };
 use flexbody::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
@@ -227,6 +227,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             .collect(),
         coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
         terms: Vec::new(),
+        storage: Storage::F64,
     }
 }
 

@@ -11,7 +11,7 @@ use flexbody::basis::ModeSettings;
 use flexbody::convert::{ConvertSettings, convert};
 use flexbody::dynamics::{EquationsOfMotion, Evaluation};
 use flexbody::eigen::Wanted;
-use flexbody::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source};
+use flexbody::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source, Storage};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::invariants::{BodyFrame, GeneralTerms, Groups, Invariants};
 use flexbody::model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
@@ -138,6 +138,7 @@ pub fn made_of(
         interfaces: Vec::new(),
         coordinates: None,
         terms: Vec::new(),
+        storage: Storage::F64,
     })
     .expect("valid parts")
 }
