@@ -131,7 +131,7 @@ def measured(told):
             out.append(f"| {name} | | | | | | {row['failed']['message']} |")
             continue
         seconds = own["seconds"]
-        cells = [f"{own['multiplications']:,}", number(1e6 * seconds["evaluation"], 3), number(1e3 * seconds["integration"], 3), f"{own['steps']:,}", number(own["file_bytes"] and own["file_bytes"] / 1e3, 3), number(own["worst"], 3)]
+        cells = [f"{own['multiplications']:,}", number(1e6 * seconds["evaluation"], 3), number(1e3 * seconds["integration"], 3), f"{own['steps']:,}", number(own["file_bytes"] / 1e3, 3), number(own["worst"], 3)]
         out.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(out)
 

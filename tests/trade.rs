@@ -4,12 +4,13 @@ mod support;
 
 use flexbody::diagnostic::Code;
 use flexbody::dynamics::Terms;
-use flexbody::flex_body::{FlexBody, Groups};
+use flexbody::flex_body::{FlexBody, Groups, Storage};
+use flexbody::invariants::BodyFrame;
 use flexbody::model::FeModel;
 use flexbody::progress::SILENT;
 use flexbody::scene::{Initial, ModeStart, Run, Scene, Scheme, simulate};
 use flexbody::trade::{
-    Kind, Recommendation, ReferenceKind, Row, Settings, Source, Storage, Trade, conversions, front, trade,
+    Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -17,7 +18,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use support::elements::{Kind as Element, MassRule, Material};
-use support::flexible::soft_block;
+use support::flexible::{fixture, soft_block};
 use support::mesh::{Mesh, grid};
 
 const QUICK: Settings = Settings { repeat: 1, memory: None };
@@ -135,6 +136,16 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     assert!(stress > 0.01, "a coarse mesh: {stress}");
     assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 1e-9, "{errors:?} {stress}");
     assert!((errors.attitude - attitude).abs() < 1e-7, "{errors:?} {attitude}");
+}
+
+#[test]
+fn a_body_of_beams_has_candidates_of_lumped_mass_too() {
+    let body = fixture("frame_beams", 4, BodyFrame::Model);
+    let found = study(body.clone(), &tumble(0.05 * first_rate(&body), 0.2));
+    let lumped = found.rows.iter().filter(|row| row.candidate.kind() == Kind::Lumped);
+    let worst: Vec<f64> = lumped.map(|row| row.outcome.as_ref().expect("a motion").worst).collect();
+    assert_eq!(worst.len(), body.lumped().len());
+    assert!(!worst.is_empty() && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
 }
 
 #[test]

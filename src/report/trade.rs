@@ -7,9 +7,10 @@ use super::run_data::RunData;
 use super::scatter_chart::{Chart, Series, scatter_chart};
 use super::text::{Page, diagnostics_lines};
 use crate::diagnostic::Diagnostic;
+use crate::flex_body::Storage;
 use crate::provenance::generator;
 use crate::scene::{OutputErrors, Tolerance};
-use crate::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Storage, Times, Trade};
+use crate::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Times, Trade};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -53,7 +54,7 @@ struct RowFacts<'a> {
     last_frequency_hz: f64,
     groups: Vec<&'static str>,
     lumped: Option<&'a str>,
-    storage: Storage,
+    storage: &'static str,
     failed: Option<&'a Diagnostic>,
     measured: Option<MeasuredFacts>,
 }
@@ -65,7 +66,7 @@ struct MeasuredFacts {
     worst: f64,
     growth: Option<f64>,
     multiplications: usize,
-    file_bytes: Option<u64>,
+    file_bytes: u64,
     steps: u64,
     rejected_steps: u64,
     evaluations: u64,
@@ -100,7 +101,7 @@ impl<'a> RowFacts<'a> {
             last_frequency_hz: row.last_frequency_hz,
             groups: candidate.group_names(),
             lumped: candidate.lumped.as_deref(),
-            storage: candidate.storage,
+            storage: candidate.storage.name(),
             failed: row.outcome.as_ref().err().map(|failed| &failed.0),
             measured: row.outcome.as_ref().ok().map(MeasuredFacts::new),
         }
@@ -115,7 +116,7 @@ impl<'a> RowFacts<'a> {
         if let Some(scheme) = self.lumped {
             let _ = write!(words, ", {}", plain(scheme));
         }
-        if self.storage == Storage::F32 {
+        if self.storage == Storage::F32.name() {
             words.push_str(", f32");
         }
         words
@@ -216,7 +217,7 @@ impl<'a> TradeFacts<'a> {
                 measured.multiplications,
                 short(measured.seconds.evaluation),
                 duration(measured.seconds.integration),
-                measured.file_bytes.map_or_else(|| "-".to_owned(), bytes),
+                bytes(measured.file_bytes),
                 significant(measured.worst, 3),
                 row.in_words()
             );
@@ -325,7 +326,7 @@ impl<'a> TradeFacts<'a> {
                         short(m.seconds.evaluation),
                         duration(m.seconds.integration),
                         m.steps.to_string(),
-                        m.file_bytes.map_or_else(none, bytes),
+                        bytes(m.file_bytes),
                     ]);
                     cells.extend(several.then(|| made_in(m)));
                     cells.extend([
@@ -425,9 +426,7 @@ pub fn trade_csv(trade: &Trade) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
         let errors = m.map(|m| m.errors);
-        let count = |of: fn(&MeasuredFacts) -> Option<u64>| {
-            m.and_then(of).map_or_else(String::new, |n| n.to_string())
-        };
+        let count = |of: fn(&MeasuredFacts) -> u64| m.map_or_else(String::new, |m| of(m).to_string());
         let cells = [
             facts.number.to_string(),
             text(facts.source),
@@ -436,12 +435,12 @@ pub fn trade_csv(trade: &Trade) -> String {
             number(Some(facts.last_frequency_hz)),
             facts.groups.join(" "),
             text(facts.lumped.unwrap_or_default()),
-            if facts.storage == Storage::F32 { "f32" } else { "f64" }.to_owned(),
-            count(|m| Some(m.multiplications as u64)),
+            facts.storage.to_owned(),
+            count(|m| m.multiplications as u64),
             number(m.map(|m| m.seconds.evaluation)),
             number(m.map(|m| m.seconds.integration)),
             number(m.and_then(|m| m.seconds.preprocessing)),
-            count(|m| Some(m.steps)),
+            count(|m| m.steps),
             count(|m| m.file_bytes),
             number(errors.map(|e| e.attitude)),
             number(errors.and_then(|e| e.deflection)),

@@ -12,6 +12,9 @@ const NO_TORQUE: f64 = 1e-10;
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
 pub(crate) const LEAST_REACTION: f64 = 1e-3;
 
+/// Force and torque.
+type Reaction = (Vector3<f64>, Vector3<f64>);
+
 /// Largest errors over time. `None`: the reference has nothing of it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct OutputErrors {
@@ -146,7 +149,7 @@ impl ErrorHistory {
         let energy = largest_of(&mut reference.balances.iter().map(|balance| balance.elastic));
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
         let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
-            let of = |part: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>, lever: f64| {
+            let of = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
                 let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
                 let largest = largest_of(&mut a.iter().map(|a| part(a).norm()));
                 // Forces that are rounding are no forces, however small the least that counts.

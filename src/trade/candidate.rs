@@ -2,21 +2,11 @@
 
 use super::Source;
 use crate::error::Result;
-use crate::flex_body::{FlexBody, Group, Groups, TermDecision};
+use crate::flex_body::{FlexBody, Group, Groups, Storage, TermDecision};
 use crate::scene::Recording;
 
 /// Mode counts of a ladder: about three to a doubling of the work.
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
-
-/// Precision of the numbers in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Storage {
-    /// Double precision.
-    F64,
-    /// Arrays in single precision.
-    F32,
-}
 
 /// What sets a candidate apart: a series of the plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -105,7 +95,7 @@ impl Candidate {
         }
         Ok(match self.storage {
             Storage::F64 => body,
-            Storage::F32 => rounded(body)?,
+            Storage::F32 => body.rounded_to_f32()?,
         })
     }
 }
@@ -167,23 +157,4 @@ fn by_energy(body: &FlexBody, motion: &Recording) -> Vec<usize> {
     let mut order: Vec<usize> = (0..energy.len()).collect();
     order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]));
     order
-}
-
-/// The body with all of its arrays in single precision.
-fn rounded(body: FlexBody) -> Result<FlexBody> {
-    let single = |value: &mut f64| *value = f64::from(*value as f32);
-    let matrix = |a: &mut faer::Mat<f64>| {
-        (0..a.ncols()).for_each(|j| a.col_as_slice_mut(j).iter_mut().for_each(single))
-    };
-    let mut parts = body.into_parts();
-    let invariants = &mut parts.invariants;
-    matrix(&mut invariants.c1);
-    invariants.ibar.iter_mut().flatten().flatten().for_each(single);
-    invariants.s.iter_mut().flatten().for_each(matrix);
-    if let Some(general) = &mut invariants.general {
-        [&mut general.w0, &mut general.w3].into_iter().for_each(matrix);
-    }
-    matrix(&mut parts.modes.shape);
-    parts.modes.rotation.iter_mut().for_each(matrix);
-    FlexBody::new(parts)
 }

@@ -8,7 +8,7 @@ mod source;
 mod study;
 mod timing;
 
-pub use candidate::{Candidate, Kind, Storage};
+pub use candidate::{Candidate, Kind};
 pub use conversions::conversions;
 pub use front::{Recommendation, front};
 pub use nodal::NodalReference;

@@ -2,7 +2,7 @@
 
 use crate::dynamics::Configuration;
 use crate::error::Result;
-use crate::flex_body::{FlexBody, LumpedBody};
+use crate::flex_body::{FlexBody, LumpedBody, MassStructure};
 use crate::linalg::{gram, multiply};
 use crate::model::FeModel;
 use crate::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Recording, Scene};
@@ -67,6 +67,9 @@ impl Source {
         let mut parts = self.body.clone().into_parts();
         if let Some(lumped) = self.lumped.iter().find(|lumped| lumped.scheme == scheme) {
             parts.invariants = lumped.invariants.clone();
+            if parts.invariants.general.is_none() {
+                parts.source.mass_structure = MassStructure::Diagonal;
+            }
         }
         FlexBody::new(parts)
     }

@@ -1,7 +1,7 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
 use super::candidate::candidates;
-use super::{Candidate, NodalReference, Recommendation, Source, Storage, front, timing};
+use super::{Candidate, NodalReference, Recommendation, Source, front, timing};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{EquationsOfMotion, Terms};
 use crate::error::{Error, Result};
@@ -65,8 +65,8 @@ pub struct Measured {
     pub growth: Option<f64>,
     /// Multiplications of one evaluation of the equations.
     pub multiplications: usize,
-    /// Size of its file; none of single precision, which no file holds. Unit: bytes.
-    pub bytes: Option<u64>,
+    /// Size of its file. Unit: bytes.
+    pub bytes: u64,
     /// Work of its simulation, with the steps that a scene without a given step takes for it.
     pub work: Work,
     /// Times.
@@ -201,7 +201,7 @@ impl Job<'_> {
     /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
     fn measure(&self, candidate: Candidate) -> Result<Row> {
         let source = &self.sources[candidate.source];
-        let last = candidate.modes.last().map_or(0, |&mode| mode);
+        let last = candidate.modes.last().copied().unwrap_or(0);
         let outcome = match self.measured(source, &candidate) {
             Ok(measured) => Ok(measured),
             Err(error) if error.diagnostics().iter().all(|d| d.code() == Code::SimulationStopped) => {
@@ -237,7 +237,7 @@ impl Job<'_> {
             worst: errors.worst(&scene.requirements.tolerance),
             growth: history.growth(),
             multiplications: EquationsOfMotion::new(&body, scene.run.terms).multiplications(),
-            bytes: if candidate.storage == Storage::F64 { Some(file_size(&body)?) } else { None },
+            bytes: file_size(&body)?,
             work: motion.work,
             times: Times { preprocessing: source.preprocessing(), evaluation: 0.0, integration: 0.0 },
         })
