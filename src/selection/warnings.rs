@@ -10,29 +10,30 @@ use std::f64::consts::TAU;
 const GROWING: f64 = 1.8;
 
 /// Errors below this part of their tolerance do not matter yet, though they grow.
-const MATTERS: f64 = 0.01;
+const MATTERS: f64 = 0.1;
 
 /// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths of its resonance.
 const NEAR: f64 = 0.1;
 
-/// How much more the errors of a model grow from the first half of the run to the second than the motion does, where that is worth a
-/// word: about 1 for errors that stay in step with the motion, more where phases run apart.
+/// How much more the errors of a model grow from the first half of the run to the second than the motion does, where those of the second
+/// matter: about 1 for errors that stay in step with the motion, more where phases run apart.
 pub(super) fn growth_of(bench: &Bench<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
-    let halves = |values: &[f64]| -> Option<f64> {
+    let most = |half: &[f64]| half.iter().copied().fold(0.0, f64::max);
+    let halves = |values: &[f64]| {
         let (first, second) = values.split_at(values.len().div_ceil(2));
-        let most = |half: &[f64]| half.iter().copied().fold(0.0, f64::max);
-        (most(first) > 0.0).then(|| most(second) / most(first))
+        (most(first), most(second))
+    };
+    let growth = |(first, second): (f64, f64), allowed: f64| {
+        (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
     };
     let energies = measure.recording().balances.iter().map(|balance| balance.elastic.max(0.0).sqrt());
-    let motion = halves(&energies.collect::<Vec<_>>())?;
-    let of_stress = errors.stress.as_ref().and_then(|stress| halves(stress)).map(|growth| growth / motion);
+    let motion = growth(halves(&energies.collect::<Vec<_>>()), 0.0)?;
+    let tolerance = &bench.scene.requirements.tolerance;
     // The attitude has no amplitude: it grows when it grows.
-    let matters = |error: f64, allowed: f64| error > MATTERS * allowed;
-    let (largest, tolerance) = (errors.largest(), &bench.scene.requirements.tolerance);
-    let of_attitude = halves(&errors.attitude).filter(|_| matters(largest.attitude, tolerance.attitude));
-    let of_stress =
-        of_stress.filter(|_| largest.stress.is_some_and(|stress| matters(stress, tolerance.stress)));
-    [of_attitude, of_stress].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
+    let of_attitude = growth(halves(&errors.attitude), tolerance.attitude);
+    let of_stress = errors.stress.as_ref().and_then(|stress| growth(halves(stress), tolerance.stress));
+    let beyond_motion = of_stress.map(|growth| growth / motion.max(1.0));
+    [of_attitude, beyond_motion].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
 }
 
 /// The warning about it.
