@@ -97,7 +97,12 @@ def decided(program, folder, scene):
     """What `select` decides, in words."""
     told = json.loads(run(program, "select", "body.flex.h5", "--scene", scene, "--json", folder=folder))
     kept = [term["group"] for term in told["terms"] if term["kept"]]
-    lines = [f"* {'keeps' if term['kept'] else 'drops'} {term['group']} (tier {term['tier']}): {term['reason']}" for term in told["terms"]]
+    def proof(term):
+        if not term["limit"]:
+            return term["reason"]
+        return f"{term['reason']}: {'without it' if term['kept'] else 'at most'} {number(term['bound'], 3)}, allowed {number(term['limit'], 3)}"
+
+    lines = [f"* {'keeps' if term['kept'] else 'drops'} {term['group']} (tier {term['tier']}): {proof(term)}" for term in told["terms"]]
     modes = told["modes"]
     chosen = told["chosen"]
     cost = f", {chosen['multiplications']:,} of {told['multiplications_before']:,} multiplications" if chosen else ""

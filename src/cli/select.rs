@@ -47,7 +47,11 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
         slot.fill(facts.render(format).as_bytes())?;
     }
     reports.into_iter().try_for_each(OutputSlot::commit)?;
-    Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed: true })
+    Ok(Outcome {
+        text: facts.render(Format::Text),
+        json: facts.render(Format::Json),
+        passed: selection.holds(),
+    })
 }
 
 /// The body of a model with everything that the scene may need.

@@ -9,7 +9,7 @@ use crate::diagnostic::Diagnostic;
 use crate::flex_body::{Group, TermDecision};
 use crate::provenance::generator;
 use crate::scene::OutputErrors;
-use crate::selection::{Selection, Trial};
+use crate::selection::{Participation, Selection, Trial};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -67,7 +67,19 @@ struct ModesFacts<'a> {
     /// Numbers from 1.
     kept: Vec<usize>,
     reason: &'a str,
+    static_responses: Vec<ResponseFacts<'a>>,
     shares: Vec<ShareFacts>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ResponseFacts<'a> {
+    load: &'a str,
+    /// What the selected modes lack of the response of the body.
+    selected_lack: f64,
+    /// What the modes of the body lack of the response of the model.
+    body_lacks: Option<f64>,
+    /// The same without its residual vectors.
+    without_residual_vectors: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -101,6 +113,17 @@ struct TrialFacts<'a> {
     budget: f64,
     passed: bool,
     remark: &'a str,
+}
+
+impl<'a> ResponseFacts<'a> {
+    fn new(participation: &'a Participation) -> Self {
+        Self {
+            load: &participation.load,
+            selected_lack: participation.selected,
+            body_lacks: participation.body.map(|(after, _)| after),
+            without_residual_vectors: participation.body.map(|(_, before)| before),
+        }
+    }
 }
 
 impl<'a> TrialFacts<'a> {
@@ -169,6 +192,7 @@ impl<'a> SelectionFacts<'a> {
                 of: selection.n_modes,
                 kept: selection.modes.iter().map(|j| j + 1).collect(),
                 reason: &selection.mode_reason,
+                static_responses: selection.participations.iter().map(ResponseFacts::new).collect(),
                 shares: shares.collect(),
             },
             chosen: selection.chosen.as_ref().map(TrialFacts::new),
@@ -318,6 +342,10 @@ impl<'a> SelectionFacts<'a> {
             section(&mut html, "Modes");
             self.modes_table(&mut html);
         }
+        if !self.modes.static_responses.is_empty() {
+            section(&mut html, "Static responses");
+            self.responses_table(&mut html);
+        }
         diagnostics_table(&mut html, self.diagnostics);
         page(self.scene, "Terms and modes that a scene needs", &self.generator, &html)
     }
@@ -362,6 +390,24 @@ impl<'a> SelectionFacts<'a> {
             .collect();
         let caption = "Errors of models with fewer terms or modes: guaranteed bounds (tiers 0 and 1) or measured (tier 2). The last row is the selection.";
         table(html, caption, &head.map(str::to_owned), &[8], &rows);
+    }
+
+    fn responses_table(&self, html: &mut String) {
+        let part = |value: Option<f64>| {
+            value.map_or_else(|| "not recorded".to_owned(), |v| significant(100.0 * v, 3))
+        };
+        let rows: Vec<Vec<String>> = self
+            .modes
+            .static_responses
+            .iter()
+            .map(|one| {
+                let selected = part(Some(one.selected_lack));
+                vec![escape(one.load), selected, part(one.body_lacks), part(one.without_residual_vectors)]
+            })
+            .collect();
+        let head = ["Load", "Selected modes, %", "Body, %", "Body without residual vectors, %"];
+        let caption = "What modes lack of the static response, in the norm of K: the selected of that of the body, and the body of that of the model.";
+        table(html, caption, &head.map(str::to_owned), &[], &rows);
     }
 
     fn modes_table(&self, html: &mut String) {

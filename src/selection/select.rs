@@ -2,6 +2,7 @@
 
 use super::basis::BEYOND_BAND;
 use super::norms::Norms;
+use super::participation::{Participation, participations};
 use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
 use super::trial::{Bench, ModeShare, Trial, multiplications};
@@ -49,6 +50,8 @@ pub struct Selection {
     pub modes: Vec<usize>,
     /// What every mode of the body does, where a motion was integrated.
     pub shares: Vec<ModeShare>,
+    /// What the selected modes lack of the static responses to the loads.
+    pub participations: Vec<Participation>,
     /// Why these modes.
     pub mode_reason: String,
     /// The selected model, measured against all that the body holds; none where nothing was integrated.
@@ -57,8 +60,20 @@ pub struct Selection {
     pub multiplications: usize,
     /// Guideline of [WP19] section 8 that the kept groups are nearest to.
     pub guideline: &'static str,
+    /// The cost that the scene allows, where that decides.
+    pub most_multiplications: Option<usize>,
     /// What has to be said.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Selection {
+    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured.
+    pub fn holds(&self) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
+            Some(most) => chosen.multiplications <= most,
+            None => chosen.passed(),
+        })
+    }
 }
 
 /// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size of K_ff, W3 two times three.
@@ -260,10 +275,10 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
             watch(Event::Phase("trials"));
             let search = Search { cases: &tried, by_bounds: by_bounds.is_some() };
             mode_reason = match scene.requirements.multiplications {
-                Some(most) => {
-                    search.within_cost(most, &mut choice, &mut trials)?;
-                    format!("the most accurate of at most {most} multiplications")
-                }
+                Some(most) => match search.within_cost(most, &mut choice, &mut trials)? {
+                    true => format!("the most accurate of at most {most} multiplications"),
+                    false => format!("no model takes {most} multiplications or fewer: everything is kept"),
+                },
                 None => {
                     if short_of.is_none() {
                         search.terms(&mut choice, &mut trials)?;
@@ -302,10 +317,12 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         guideline: guideline(choice.groups),
         groups: choice.groups,
         n_modes: all.len(),
+        participations: participations(body, scene, &loads, &choice.modes),
         modes: choice.modes,
         shares: choice.shares,
         mode_reason,
         chosen: choice.chosen,
+        most_multiplications: scene.requirements.multiplications,
         trials,
         diagnostics: once(diagnostics),
     })
@@ -439,7 +456,8 @@ impl Search<'_> {
     }
 
     /// The most accurate model of at most `most` multiplications: for every set of groups as many modes as that allows.
-    fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+    /// Whether there is one.
+    fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<bool> {
         let ranked = self.ranked(choice);
         let mut best: Option<(f64, Groups, Vec<usize>)> = None;
         for groups in sets() {
@@ -468,13 +486,14 @@ impl Search<'_> {
             }
             trials.push(trial);
         }
+        let found = best.is_some();
         if let Some((_, groups, modes)) = best {
             (choice.groups, choice.modes) = (groups, modes);
         }
         for (j, share) in choice.shares.iter_mut().enumerate() {
             share.kept = choice.modes.binary_search(&j).is_ok();
         }
-        Ok(())
+        Ok(found)
     }
 }
 

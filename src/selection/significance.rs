@@ -110,10 +110,3 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
         })
         .collect()
 }
-
-/// The centrifugal static response of every mode to spin of unit rate about the body axes, f_p / lambda_p ([WP19] section 5): rows x, y, z.
-pub fn centrifugal_responses(body: &FlexBody) -> Option<Vec<[f64; 3]>> {
-    let (w1, nf) = (body.invariants().w1()?, body.n_modes());
-    let response = |j: usize, axis: usize| 0.5 * w1[(axis, axis * nf + j)] / body.modes().eigenvalue[j];
-    Some((0..nf).map(|j| Vector3::from_fn(|axis, _| response(j, axis)).into()).collect())
-}
