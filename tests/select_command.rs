@@ -104,7 +104,7 @@ fn contradictions_are_refused() {
     for (words, said) in [
         (&["select", "whole.flex.h5", "--scene", "scene.toml", "--modes", "3"][..], "--modes is for a model"),
         (&["select", "whole.flex.h5", "--scene", "scene.toml", "--report", "scene.toml"], "scene.toml"),
-        (&["convert", &manifest, "--scene", "none.toml", "-o", "x.flex.h5"], "cannot read"),
+        (&["convert", &manifest, "--scene", "none.toml", "-o", "x.flex.h5"], "does not exist"),
     ] {
         let run = flexbody(place, words);
         assert_eq!(run.status.code(), Some(2), "{words:?}");

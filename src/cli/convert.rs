@@ -401,7 +401,7 @@ fn refuse_overwriting(
         LoadSource::File(location) => Some(&location.path),
         _ => None,
     });
-    let inputs = files.paths().into_iter().chain(masses).chain(&shapes).chain(loads);
+    let inputs = files.paths().into_iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
     refuse_replacing(inputs, outputs.iter().flat_map(Places::all))
 }
 
