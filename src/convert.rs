@@ -7,8 +7,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody, MassStructure,
-    Modes, Parts, Source, TermDecision, Truncation,
+    Certificate, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody,
+    MassStructure, Modes, Parts, Source, TermDecision, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
@@ -216,7 +216,11 @@ pub fn convert_for(
     let linear = decide.map(|_| modes.condensed_linear(model, &place, modal_stiffness.clone()));
     let mut condensed_columns = decide.map_or(0, |_| modes.condensed_columns(model, true));
     let terms = match (decide, &linear) {
-        (Some(decide), Some(linear)) => decide(&FlexBody::new(of(linear.clone())?.0)?)?,
+        (Some(decide), Some(linear)) => {
+            let (mut parts, _) = of(linear.clone())?;
+            parts.terms = linear.groups.dropped().map(not_computed).collect();
+            decide(&FlexBody::new(parts)?)?
+        }
         _ => Vec::new(),
     };
     let dropped = terms.iter().filter(|term| !term.kept);
@@ -282,6 +286,18 @@ pub fn convert_for(
         plan: solution.plan,
         diagnostics,
     })
+}
+
+/// The decision about a group before there is one.
+fn not_computed(group: Group) -> TermDecision {
+    TermDecision {
+        group,
+        kept: false,
+        tier: 0,
+        bound: 0.0,
+        limit: 0.0,
+        reason: "not computed yet".to_owned(),
+    }
 }
 
 /// Psi' A Psi, where the matrix A and the modes are in model axes.
