@@ -3,8 +3,8 @@
 //!
 //! A case is a folder with a `model.toml`, or with a file `args` (one command-line argument per line), and
 //! `expected.txt`: what `flexbody convert` prints to stderr, warnings of a case that succeeds included. With a `scene.toml` it is what
-//! `flexbody simulate` prints of it, for four modes of the model of `fixtures/models` that the file `body` names. A new case
-//! needs no code. `FLEXBODY_BLESS=1 cargo test --test bad_input` writes the reports; read the difference.
+//! `flexbody simulate` prints of it, for four modes of the model of `fixtures/models` that the file `body` names; with a file `select` too,
+//! what `flexbody select` prints. A new case needs no code. `FLEXBODY_BLESS=1 cargo test --test bad_input` writes the reports; read the difference.
 
 use flexbody::diagnostic::Code;
 use std::collections::BTreeSet;
@@ -40,18 +40,20 @@ fn convert(model: &str, body: &Path) {
 /// What is wrong with one case, empty when nothing is.
 fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
     let (input_folder, output_folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let output = output_folder.path().join("body.flex.h5");
+    let selects = case.join("select").exists();
+    let (option, file) = if selects { ("--report", "report.json") } else { ("--output", "body.flex.h5") };
+    let output = output_folder.path().join(file);
     let before = entries(case);
     let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
     if let Ok(model) = fs::read_to_string(case.join("body")) {
         let body = input_folder.path().join("body.flex.h5");
         convert(model.trim(), &body);
-        command.arg("simulate").arg(body).args(["--scene", "scene.toml"]);
+        command.arg(if selects { "select" } else { "simulate" }).arg(body).args(["--scene", "scene.toml"]);
     } else {
         let inputs = fs::read_to_string(case.join("args")).unwrap_or_else(|_| "model.toml".to_owned());
         command.arg("convert").args(inputs.lines());
     }
-    let run = command.arg("--output").arg(&output).current_dir(case).output().unwrap();
+    let run = command.arg(option).arg(&output).current_dir(case).output().unwrap();
     let report = String::from_utf8(run.stderr).unwrap();
     if bless {
         fs::write(case.join("expected.txt"), &report).unwrap();

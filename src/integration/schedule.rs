@@ -5,6 +5,9 @@ use super::{Explicit, Failure, Gauss, System, Work};
 /// What lengths may differ by, relative, as rounding of times makes them.
 const STEP_ROUNDING: f64 = 1e-9;
 
+/// Where explicit steps to a break end, relative: a few roundings before it.
+const BEFORE_BREAK: f64 = 4.0 * f64::EPSILON;
+
 /// How a system is integrated.
 #[derive(Debug, Clone)]
 pub enum Method {
@@ -64,12 +67,15 @@ pub fn integrate<E: From<Failure>>(
     let mut within = vec![0.0; state.len()];
     for stop in stops {
         method.restart();
+        // f at a break is that after it, which is not what the last rate of an explicit step is about.
+        let before = if breaks.contains(&stop) { stop - BEFORE_BREAK * stop.abs() } else { stop };
         while time < stop {
             match method {
+                Method::Explicit(_) if time >= before => time = stop,
                 Method::Explicit(method) => {
-                    let end = method.step(system, time, state, stop)?;
+                    let end = method.step(system, time, state, before)?;
                     finite(state, time)?;
-                    time = end;
+                    time = if end < before { end } else { stop };
                     while let Some(instant) = wanted.next_if(|&instant| instant < time) {
                         method.interpolate(system, instant, state, &mut within)?;
                         observe(instant, &within)?;
