@@ -1,21 +1,11 @@
 //! `select` and `convert --scene` as a user runs them.
 
+mod support;
+
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn fixtures() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures")
-}
-
-fn flexbody(folder: &Path, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flexbody"))
-        .current_dir(folder)
-        .args(words)
-        .output()
-        .expect("the program runs")
-}
+use std::path::Path;
+use support::program::{fixtures, flexbody};
 
 /// A bracket that is spun up and shaken, in the folder `place`: `whole.flex.h5` and `scene.toml`.
 fn prepare(place: &Path, more: &str) -> String {

@@ -9,21 +9,10 @@ use flexbody::store;
 use hdf5_metno as hdf5;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
+use support::program::{fixtures, flexbody};
 use tempfile::TempDir;
-
-fn fixtures() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures")
-}
-
-fn flexbody(folder: &Path, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flexbody"))
-        .args(words)
-        .current_dir(folder)
-        .output()
-        .expect("the program runs")
-}
 
 fn done(folder: &Path, words: &[&str]) -> Output {
     let run = flexbody(folder, words);

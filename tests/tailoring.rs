@@ -10,7 +10,7 @@ use flexbody::progress::SILENT;
 use flexbody::provenance::{SourceFile, sha256_hex};
 use flexbody::scene::read_scene;
 use flexbody::store;
-use flexbody::tailoring::convert_for_scene;
+use flexbody::tailoring::{Tailoring, convert_for_scene};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -58,7 +58,8 @@ fn a_mild_scene_never_forms_w() {
     let modes = ModeSettings { wanted: Wanted::Lowest(MODES), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, ..ConvertSettings::default() };
     let (conversion, selection) =
-        convert_for_scene(&model, &settings, &scene, Resume::default(), SILENT).expect("converts");
+        convert_for_scene(&model, &Tailoring { settings, by_band: false }, &scene, Resume::default(), SILENT)
+            .expect("converts");
     assert_eq!(conversion.condensed_columns, 4, "the columns of rigid motion");
     assert_eq!((selection.groups, conversion.body.groups()), (Groups::NONE, Groups::NONE));
     let terms = conversion.body.terms();

@@ -15,11 +15,10 @@ use flexbody::trade::{
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use support::elements::{Kind as Element, MassRule, Material};
 use support::flexible::{fixture, soft_block};
 use support::mesh::{Mesh, grid};
+use support::program::{fixtures, flexbody};
 
 const QUICK: Settings = Settings { repeat: 1, memory: None };
 
@@ -275,18 +274,6 @@ fn a_front_has_nothing_that_another_beats() {
     assert_eq!(front(&rows), [2, 3]);
     rows[3].outcome.as_mut().expect("a motion").worst = f64::NAN;
     assert_eq!(front(&rows), [2, 0, 4]);
-}
-
-fn fixtures() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures")
-}
-
-fn flexbody(folder: &Path, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flexbody"))
-        .args(words)
-        .current_dir(folder)
-        .output()
-        .expect("the program runs")
 }
 
 #[test]

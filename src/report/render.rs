@@ -1,6 +1,7 @@
 //! The formats of a report.
 
 use super::{Facts, html, text};
+use serde::Serialize;
 use std::path::Path;
 
 /// How a report is written.
@@ -26,13 +27,16 @@ impl Format {
     }
 }
 
+/// Facts as JSON, ending with a line break.
+pub(super) fn json(facts: &impl Serialize) -> String {
+    let json = serde_json::to_string_pretty(facts);
+    json.expect("keys are strings and numbers that are not finite become null") + "\n"
+}
+
 /// Writes the facts, ending with a line break.
 pub fn render(facts: &Facts, format: Format) -> String {
     match format {
-        Format::Json => {
-            let json = serde_json::to_string_pretty(facts);
-            json.expect("keys are strings and numbers that are not finite become null") + "\n"
-        }
+        Format::Json => json(facts),
         Format::Text => text::render(facts),
         Format::Html => html::render(facts),
     }

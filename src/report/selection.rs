@@ -3,6 +3,7 @@
 use super::Format;
 use super::html::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{counted, significant};
+use super::render::json;
 use super::run_data::RunData;
 use super::text::{Page, diagnostics_lines};
 use crate::diagnostic::Diagnostic;
@@ -206,10 +207,7 @@ impl<'a> SelectionFacts<'a> {
     /// The facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         match format {
-            Format::Json => {
-                let json = serde_json::to_string_pretty(self);
-                json.expect("keys are strings and numbers that are not finite become null") + "\n"
-            }
+            Format::Json => json(self),
             Format::Text => self.text(),
             Format::Html => self.html(),
         }

@@ -5,6 +5,7 @@ use super::facts::UnitFacts;
 use super::html::{diagnostics_table, escape, page, section, terms};
 use super::line_chart::{Line, STYLES, line_chart};
 use super::numbers::{counted, significant};
+use super::render::json;
 use super::run_data::RunData;
 use super::text::{Page, diagnostics_lines};
 use crate::diagnostic::Diagnostic;
@@ -116,10 +117,7 @@ impl<'a> SimulationFacts<'a> {
     /// The facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         match format {
-            Format::Json => {
-                let json = serde_json::to_string_pretty(self);
-                json.expect("keys are strings and numbers that are not finite become null") + "\n"
-            }
+            Format::Json => json(self),
             Format::Text => self.text(),
             Format::Html => self.html(),
         }

@@ -3,6 +3,7 @@
 use super::Format;
 use super::html::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{bytes, counted, duration, plain, significant};
+use super::render::json;
 use super::run_data::RunData;
 use super::scatter_chart::{Chart, Series, scatter_chart};
 use super::text::{Page, diagnostics_lines};
@@ -161,10 +162,7 @@ impl<'a> TradeFacts<'a> {
     /// The facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
         match format {
-            Format::Json => {
-                let json = serde_json::to_string_pretty(self);
-                json.expect("keys are strings and numbers that are not finite become null") + "\n"
-            }
+            Format::Json => json(self),
             Format::Text => self.text(),
             Format::Html => self.html(),
         }

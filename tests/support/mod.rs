@@ -15,6 +15,7 @@ pub mod nodal;
 pub mod partial;
 pub mod pipeline;
 pub mod plane;
+pub mod program;
 pub mod random;
 pub mod reference;
 pub mod unreduced;
