@@ -58,7 +58,7 @@ the model. Times are of this machine; everything else is the same everywhere. Wr
 """
 GUIDE = """## Guidelines I to IV
 
-Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](theory.md#7-which-terms-matter-unit-free-bounds), section 7), whether or not they cut across a group of the kinetic energy:
+Guidelines of [WP19], section 8, taken literally as sets of terms ([theory](theory.md#7-sizes-of-the-terms), section 7), whether or not they cut across a group of the kinetic energy:
 
 | | terms |
 |---|---|
@@ -111,7 +111,7 @@ def decided(program, folder, scene):
 
 
 def described(row):
-    words = f"{row['modes']} modes, {' '.join(row['groups']) or 'no group'}"
+    words = f"{row['modes']} mode{'s' if row['modes'] > 1 else ''}, {' '.join(row['groups']) or 'no group'}"
     if row["mode_numbers"][-1] != row["modes"]:
         words += " (the liveliest)"
     return words + (f", {row['lumped']}" if row["lumped"] else "") + (", f32" if row["storage"] == "f32" else "")
@@ -160,7 +160,7 @@ def scene_part(program, name, model, modes, residual):
         told = json.loads((folder / "trade.json").read_text())
         figure(folder, name)
     options = f"--modes {modes}" + (f" --residual-vectors {residual}" if residual else "")
-    parts = [f"## {told['scene']}", f"`{model}`, `{options}`; {len(told['rows'])} candidates. {told['verdict'].capitalize()}.", decision, measured(told), f"![error against work](images/trade_{name}.svg)"]
+    parts = [f"## {told['scene']}", f"`{model}`, `{options}`; {len(told['rows'])} candidates. {told['verdict'][0].upper() + told['verdict'][1:]}.", decision, measured(told), f"![error against work](images/trade_{name}.svg)"]
     return "\n\n".join(parts) + "\n\n"
 
 
