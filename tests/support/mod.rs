@@ -17,4 +17,5 @@ pub mod pipeline;
 pub mod plane;
 pub mod random;
 pub mod reference;
+pub mod scenes;
 pub mod unreduced;
