@@ -26,7 +26,7 @@ struct Instant<'r> {
     state: &'r Configuration,
     /// Angular acceleration.
     alpha: Vector3<f64>,
-    /// q'', from the rates at the instants beside.
+    /// q'', from the motion at the instants beside.
     acceleration: Vec<f64>,
 }
 
@@ -55,24 +55,39 @@ fn instants<'r>(bench: &Bench<'_>, run: &'r Recording) -> Vec<Instant<'r>> {
     let last = run.time.len() - 1;
     let instant = |i: usize| {
         let time = run.time[i];
-        let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
-        let step = run.time[after] - run.time[before];
-        let rates = run.states[before].qd.iter().zip(&run.states[after].qd);
         let spin = bench.scene.spin.as_ref();
         Instant {
             time,
             state: &run.states[i],
             alpha: spin.map_or_else(Vector3::zeros, |spin| spin.axis * spin.rate.at(time).1),
-            acceleration: rates.map(|(a, b)| (b - a) / step).collect(),
+            acceleration: acceleration(run, i),
         }
     };
     (0..=last).map(instant).collect()
+}
+
+/// q'' at an instant: of the polynomial through q and q' there and beside, of degree five, at the ends of degree three.
+fn acceleration(run: &Recording, i: usize) -> Vec<f64> {
+    let last = run.time.len() - 1;
+    let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+    let h = (run.time[after] - run.time[before]) / (after - before) as f64;
+    let (a, now, b) = (&run.states[before], &run.states[i], &run.states[after]);
+    let of_mode = |j: usize| {
+        let rise = b.q[j] - a.q[j];
+        match (i == 0, i == last) {
+            (true, _) => (6.0 * rise / h - 4.0 * a.qd[j] - 2.0 * b.qd[j]) / h,
+            (_, true) => (2.0 * a.qd[j] + 4.0 * b.qd[j] - 6.0 * rise / h) / h,
+            _ => (2.0 * ((b.q[j] - now.q[j]) - (now.q[j] - a.q[j])) / h - 0.5 * (b.qd[j] - a.qd[j])) / h,
+        }
+    };
+    (0..now.q.len()).map(of_mode).collect()
 }
 
 /// Bounds of the dropped terms by the norms of theirs.
 fn of_norms(instants: &[Instant<'_>], dropped: Groups, norms: &Norms, root: &[f64]) -> (LoadSizes, f64, f64) {
     let count = |group: bool| f64::from(group);
     let (w1, w2, w3) = (count(dropped.w1), count(dropped.w2), norms.coupling * count(dropped.w3));
+    let turning = norms.turning * count(dropped.w3);
     let scalars = |i: &Instant<'_>| {
         let (q, qd) = (&i.state.q, &i.state.qd);
         [i.state.omega.norm(), i.alpha.norm(), norm(q), norm(qd), weighted(q, root)]
@@ -92,12 +107,13 @@ fn of_norms(instants: &[Instant<'_>], dropped: Groups, norms: &Norms, root: &[f6
         torque = torque.max(
             w1 * norms.inertia * (v * w + q * turn)
                 + w2 * (2.0 * q * v * w + q * q * turn)
-                + w3 * (q * a + w * q * v),
+                + turning * (q * a + w * q * v),
         );
         match before {
             None => sizes.begun = in_energy,
             Some((earlier, force_before)) => {
-                sizes.impulse += 0.5 * (force + force_before) * (instant.time - earlier.time);
+                // The larger of both ends: what jumps between them is not missed.
+                sizes.impulse += force.max(force_before) * (instant.time - earlier.time);
                 let [w0, alpha0, q0, v0, energy0] = scalars(earlier);
                 let (state, old) = (instant.state, earlier.state);
                 let (dw, da) = ((state.omega - old.omega).norm(), (instant.alpha - earlier.alpha).norm());
@@ -117,7 +133,7 @@ fn of_norms(instants: &[Instant<'_>], dropped: Groups, norms: &Norms, root: &[f6
         }
         before = Some((instant, force));
     }
-    let stiff = norms.coupling * norms.last * instants.iter().map(|i| norm(&i.state.q)).fold(0.0, f64::max);
+    let stiff = norms.turning * norms.last * instants.iter().map(|i| norm(&i.state.q)).fold(0.0, f64::max);
     (sizes, torque, stiff)
 }
 
@@ -174,7 +190,7 @@ fn of_terms(
         match &before {
             None => sizes.begun = norm(&of_energy),
             Some((then, earlier)) => {
-                sizes.impulse += 0.5 * (norm(&force) + norm(earlier)) * (instant.time - then);
+                sizes.impulse += norm(&force).max(norm(earlier)) * (instant.time - then);
                 let steps: Vec<f64> =
                     force.iter().zip(earlier).zip(root).map(|((a, b), root)| (a - b) / root).collect();
                 sizes.moved += norm(&steps);

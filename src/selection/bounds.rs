@@ -129,11 +129,11 @@ impl Operator {
     /// sqrt(2 H) of the response to a load, from rest without deformation.
     fn response(&self, load: &LoadSizes) -> f64 {
         let (m, r) = (self.margin, &self.rotation);
-        let impulse = self.growth * load.impulse;
+        let impulse = product(self.growth, load.impulse);
         // The static response (Lambda - E)^-1 F moves with the load and with E.
         let moved = load.moved + 2.0 * r.largest * r.variation * self.softening * load.largest / m;
         let turned = r.variation * self.coupling * load.largest / (m * self.first);
-        let varied = self.growth * ((load.begun + moved) / m.sqrt() + turned) + load.largest / m.sqrt();
+        let varied = product(self.growth, (load.begun + moved) / m.sqrt() + turned) + load.largest / m.sqrt();
         impulse.min(varied)
     }
 }
@@ -153,7 +153,7 @@ impl Driven {
             loads.push(self.centrifugal(norms));
         }
         let sum = |start: f64, loads: &mut dyn Iterator<Item = ModalLoad>| {
-            operator.growth * start
+            product(operator.growth, start)
                 + loads.map(|load| operator.response(&load.sizes(self.rotation.duration))).sum::<f64>()
         };
         let energy = sum(self.start.energy, &mut loads.iter().copied());
@@ -245,8 +245,8 @@ impl Driven {
         let there = |group: bool, torque: f64| if group { torque } else { 0.0 };
         let torque = there(dropped.w1, norms.inertia * (v * w + q * turn))
             + there(dropped.w2, 2.0 * q * v * w + q * q * turn)
-            + there(dropped.w3, norms.coupling * (product(q, a) + w * q * v));
-        Lacking { torque, stiff: norms.coupling * norms.last * q }
+            + there(dropped.w3, product(norms.turning, product(q, a) + w * q * v));
+        Lacking { torque, stiff: product(norms.turning * norms.last, q) }
     }
 
     /// Bound of the error of the torque that the rotation takes, without that of the levers of loads: what it lacks, and what the whole
@@ -259,9 +259,10 @@ impl Driven {
         let linear = norms.inertia * (dv * w + dq * turn);
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
         // q'W3 e'' with e'' of the equations of motion, whose part Lambda e meets W3'q in the norm of stiffness.
-        let stiff = (lacking.stiff + norms.coupling * norms.last * dq) * error.energy;
-        let rest = norms.coupling * q * error.acceleration_without_stiffness;
-        let coupled = stiff + rest + norms.coupling * (product(dq, own.acceleration) + w * (q * dv + dq * v));
+        let stiff = product(lacking.stiff + product(norms.turning * norms.last, dq), error.energy);
+        let rest = product(product(norms.turning, q), error.acceleration_without_stiffness);
+        let coupled =
+            stiff + rest + product(norms.turning, product(dq, own.acceleration) + w * (q * dv + dq * v));
         lacking.torque + linear + quadratic + coupled
     }
 }

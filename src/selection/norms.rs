@@ -28,6 +28,8 @@ pub struct Norms {
     pub softening: f64,
     /// |W3(w)| over |w|. Tier 0: 1.
     pub coupling: f64,
+    /// |Q'W3| over |q|: the same for any direction, since the torque has all. Tier 0: 1.
+    pub turning: f64,
 }
 
 impl Norms {
@@ -46,6 +48,7 @@ impl Norms {
             spin: 1.0,
             softening: 1.0 / (first * first),
             coupling: 1.0,
+            turning: 1.0,
         }
     }
 
@@ -84,17 +87,10 @@ impl Norms {
             let part = |i: usize, j: usize| (0..3).map(|a| e[a] * w3[(a * nf + i, j)]).sum::<f64>();
             spectral_norm(&Mat::from_fn(nf, nf, part))
         };
-        let coupling = match axis {
-            Some(e) => coupling(e)?,
-            None => {
-                let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-                axes.iter()
-                    .map(coupling)
-                    .map(|norm| norm.map(|norm| norm * norm))
-                    .sum::<Option<f64>>()?
-                    .sqrt()
-            }
-        };
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let squares = axes.iter().map(|e| coupling(e).map(|norm| norm * norm));
+        let turning = squares.sum::<Option<f64>>()?.sqrt().min(rigid.turning);
+        let coupling = axis.map_or(Some(turning), coupling)?;
         Some(Self {
             tier: 1,
             centrifugal: centrifugal.min(rigid.centrifugal),
@@ -102,7 +98,8 @@ impl Norms {
             inertia: (2.0 * load.norm(|_| 1.0)).min(rigid.inertia),
             spin: spectral_norm(&spin)?.min(rigid.spin),
             softening: softening.min(rigid.softening),
-            coupling: coupling.min(rigid.coupling),
+            coupling: coupling.min(turning),
+            turning,
             ..rigid
         })
     }

@@ -13,7 +13,7 @@ use crate::dynamics::BodyPoint;
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Group, Groups, TermDecision};
 use crate::progress::{Event, Watch};
-use crate::scene::{Measure, Range, Scene, damped, points_of};
+use crate::scene::{Measure, Range, Scene, Tolerance, damped, points_of};
 use nalgebra::Vector3;
 
 /// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
@@ -182,7 +182,7 @@ fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             if of_run && !runs {
                 return Ok(Vec::new());
             }
-            let run = if of_run { Some(bench.fine_motion(kept)?) } else { None };
+            let run = if of_run { bench.fine_motion(kept)? } else { None };
             let rigid = Norms::of_rigid(&inertia, eigenvalues, axis);
             let own = Norms::of_invariants(body.invariants(), eigenvalues, axis).filter(|_| tier_1);
             let tiers = [Some(rigid), own].into_iter().flatten();
@@ -356,7 +356,12 @@ struct Search<'s> {
 
 impl Search<'_> {
     fn budget(&self) -> f64 {
-        if self.by_bounds { 1.0 - PART_OF_BOUNDS } else { 1.0 }
+        if !self.by_bounds {
+            return 1.0;
+        }
+        // What is measured is relative to a motion that may be larger than that of the whole body by as much as bounds allow.
+        let Tolerance { deflection, stress, reaction, .. } = self.cases[0].0.scene.requirements.tolerance;
+        (1.0 - PART_OF_BOUNDS) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
     }
 
     fn body(&self) -> &FlexBody {

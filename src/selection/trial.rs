@@ -12,7 +12,8 @@ use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
 use crate::model::extents;
 use crate::scene::{
-    ErrorHistory, LEAST_REACTION, Measure, OutputErrors, Recording, Resolution, Scene, simulate,
+    ErrorHistory, History, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin,
+    simulate,
 };
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
@@ -76,17 +77,39 @@ impl Bench<'_> {
         simulate(body, &scene, self.memory, |_| ())
     }
 
-    /// The motion of the body with the groups `kept`, at instants that follow its fastest mode.
+    /// The motion of the body with the groups `kept`, at instants that follow its fastest mode, the loads and the spin, those of the scene
+    /// among them. `None` where these would be too many.
     ///
     /// # Errors
     /// As [`simulate`].
-    pub fn fine_motion(&self, kept: Groups) -> Result<Recording> {
+    pub fn fine_motion(&self, kept: Groups) -> Result<Option<Recording>> {
         let mut scene = self.scene.clone();
-        let fastest = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
-        let wanted = self.situation.duration.value * fastest / TAU * INSTANTS_PER_PERIOD;
-        scene.run.outputs = scene.run.outputs.max((wanted as usize).min(MOST_INSTANTS));
+        let most = MOST_INSTANTS.max(scene.run.outputs);
+        let wanted = (self.situation.duration.value * self.fastest() / TAU * INSTANTS_PER_PERIOD).ceil();
+        if wanted.is_nan() || wanted > most as f64 {
+            return Ok(None);
+        }
+        scene.run.outputs *= (wanted as usize).div_ceil(scene.run.outputs).max(1);
         scene.run.terms = terms(kept);
-        Ok(simulate(self.body, &scene, self.memory, |_| ())?.0)
+        Ok(Some(simulate(self.body, &scene, self.memory, |_| ())?.0))
+    }
+
+    /// Largest circular frequency of anything in the motion of the body. What a spin does between two of its breaks is one half of a period.
+    fn fastest(&self) -> f64 {
+        let duration = self.situation.duration.value;
+        let modes = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+        let histories = self.scene.loads.iter().map(|load| &load.history);
+        let tones =
+            histories.chain(self.scene.spin.iter().map(|spin| &spin.rate)).map(|history| match history {
+                History::Sine { frequency, .. } => TAU * frequency,
+                _ => 0.0,
+            });
+        let mut breaks = self.scene.spin.as_ref().map_or(Vec::new(), |spin| spin.rate.breaks());
+        breaks.retain(|&time| 0.0 < time && time < duration);
+        let ends = [0.0].into_iter().chain(breaks).chain([duration]);
+        let ends: Vec<f64> = ends.collect();
+        let pieces = ends.windows(2).map(|ends| 0.5 * TAU / (ends[1] - ends[0]));
+        tones.chain(pieces).fold(modes, f64::max) + self.situation.spin.value
     }
 
     /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure` holds; and how its errors grow.
@@ -181,32 +204,41 @@ impl Bench<'_> {
         };
         let error = driven.error(norms, &residual).ok_or_else(softened)?;
         // The levers of the loads deform with the body.
-        let forces: f64 = self
-            .scene
-            .loads
-            .iter()
-            .map(|load| Variation::of(&load.history, driven.rotation.duration).largest * load.force.norm())
-            .sum();
-        let levers = forces * self.reach_of_nodes() * error.energy;
+        let rows = PointRows::new(self.body);
+        let lever = |(load, point): (&Load, &BodyPoint)| {
+            let largest = Variation::of(&load.history, driven.rotation.duration).largest;
+            largest * load.force.norm() * self.reach_of(&rows.of(point))
+        };
+        let levers = self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>() * error.energy;
         let torque = driven.torque_error(norms, &own, &error, &lacking) + levers;
 
-        // Relative to what is certain of the whole motion, or to the least that counts.
+        // Relative to what is certain of the whole motion at the instants of the scene, or to the least that counts.
+        let outputs = self.scene.run.outputs;
+        let every = run.map_or(1, |run| ((run.time.len() - 1) / outputs).max(1));
         let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
         let relative = |error: f64, of_run: &dyn Fn(&Recording) -> f64, least: f64| {
             error / (run.map_or(0.0, of_run) - error).max(least)
         };
         let paths = |run: &Recording| {
-            let all = run.paths.iter().flat_map(|path| &path.deflection);
+            let all = run.paths.iter().flat_map(|path| path.deflection.iter().step_by(every));
             all.map(|d| d.norm()).fold(0.0, f64::max)
         };
-        let energies =
-            |run: &Recording| run.balances.iter().map(|balance| balance.elastic).fold(0.0, f64::max).sqrt();
+        let energies = |run: &Recording| {
+            let all = run.balances.iter().step_by(every);
+            all.map(|balance| balance.elastic).fold(0.0, f64::max).sqrt()
+        };
         let torques = |run: &Recording| {
-            let all = run.reactions.iter().flatten();
+            let all = run.reactions.iter().flat_map(|all| all.iter().step_by(every));
             all.map(|(_, torque)| torque.norm()).fold(0.0, f64::max)
         };
-        let inertia = 0.5 * self.body.invariants().inertia().trace();
-        let least_torque = LEAST_REACTION * inertia * driven.rotation.largest.powi(2);
+        // The inertia whose radius of gyration a recording has: of a plane body that about its normal alone.
+        let inertia = self.body.invariants().inertia();
+        let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
+        let rate = |spin: &Spin| {
+            let at = |i: usize| driven.rotation.duration * (i as f64 / outputs as f64);
+            (0..=outputs).map(|i| spin.rate.at(at(i)).0.abs()).fold(0.0, f64::max)
+        };
+        let least_torque = LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2);
         Ok(OutputErrors {
             attitude: 0.0,
             deflection: Some(relative(self.reach() * error.energy, &paths, least.deflection)),
@@ -220,11 +252,6 @@ impl Bench<'_> {
         let mut reach = 0.0f64;
         self.each_watched(|rows| reach = reach.max(self.reach_of(rows)));
         reach
-    }
-
-    fn reach_of_nodes(&self) -> f64 {
-        let rows = PointRows::new(self.body);
-        (0..self.body.n_nodes()).map(|node| self.reach_of(&rows.of_node(node))).fold(0.0, f64::max)
     }
 
     fn reach_of(&self, rows: &DMatrix<f64>) -> f64 {

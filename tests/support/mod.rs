@@ -18,4 +18,5 @@ pub mod plane;
 pub mod program;
 pub mod random;
 pub mod reference;
+pub mod scenes;
 pub mod unreduced;
