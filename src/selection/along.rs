@@ -2,8 +2,8 @@
 
 use super::bounds::{Amplitude, LoadSizes};
 use super::norms::Norms;
-use super::trial::{Bench, terms};
-use crate::dynamics::{Configuration, EquationsOfMotion, Evaluation};
+use super::trial::Bench;
+use crate::dynamics::{Configuration, EquationsOfMotion, Evaluation, Terms};
 use crate::flex_body::Groups;
 use crate::scene::Recording;
 use faer::Mat;
@@ -145,7 +145,8 @@ fn of_terms(
     root: &[f64],
 ) -> (LoadSizes, f64, f64) {
     let invariants = bench.body.invariants();
-    let equations = [invariants.groups, kept].map(|groups| EquationsOfMotion::new(bench.body, terms(groups)));
+    let equations =
+        [invariants.groups, kept].map(|groups| EquationsOfMotion::new(bench.body, Terms::ALL.held(groups)));
     let mut evaluations = equations.each_ref().map(Evaluation::new);
     let (rigid, nf) = (equations[0].n_rigid(), root.len());
     let axes: &[usize] = if rigid == 3 { &[2] } else { &[0, 1, 2] };

@@ -73,7 +73,7 @@ impl Bench<'_> {
     /// As [`simulate`].
     pub fn motion(&self, body: &FlexBody, kept: Groups) -> Result<(Recording, Vec<Diagnostic>)> {
         let mut scene = self.scene.clone();
-        scene.run.terms = terms(kept);
+        scene.run.terms = Terms::ALL.held(kept);
         simulate(body, &scene, self.memory, |_| ())
     }
 
@@ -90,7 +90,7 @@ impl Bench<'_> {
             return Ok(None);
         }
         scene.run.outputs *= (wanted as usize).div_ceil(scene.run.outputs).max(1);
-        scene.run.terms = terms(kept);
+        scene.run.terms = Terms::ALL.held(kept);
         Ok(Some(simulate(self.body, &scene, self.memory, |_| ())?.0))
     }
 
@@ -317,10 +317,5 @@ pub struct ModeShare {
 
 /// Multiplications of an evaluation of the equations of `body` with `groups`.
 pub fn multiplications(body: &FlexBody, groups: Groups) -> usize {
-    EquationsOfMotion::new(body, terms(groups)).multiplications()
-}
-
-/// Terms of equations with `groups`.
-pub fn terms(groups: Groups) -> Terms {
-    Terms { w1: groups.w1, w2: groups.w2, w3: groups.w3, geometric_stiffness: true }
+    EquationsOfMotion::new(body, Terms::ALL.held(groups)).multiplications()
 }
