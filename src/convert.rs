@@ -119,7 +119,7 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) ->
 /// is kept (a checkpoint).
 ///
 /// `decide` is asked when the modes are known, about a body that holds W1 but not W2 and W3. Without these, no product with M is formed but that of
-/// rigid motion, and no nf x nf array but K_ff and m_ff; lumped comparators hold the same groups. Accuracy `certified` condenses
+/// rigid motion, and of solids no nf x nf array but K_ff and m_ff; lumped comparators hold the same groups. Accuracy `certified` condenses
 /// everything first: its digits are about the whole.
 ///
 /// # Errors

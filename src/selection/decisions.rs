@@ -76,7 +76,7 @@ pub(super) fn decision(
     TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
 }
 
-/// The guideline of [WP19] section 8 that a set of groups is nearest to.
+/// The guideline of \[WP19\] section 8 that a set of groups is nearest to.
 pub(super) fn guideline(groups: Groups) -> &'static str {
     match (groups.w1, groups.w2, groups.w3) {
         (false, false, false) => "I: inertia of the undeformed body",

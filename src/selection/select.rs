@@ -48,7 +48,7 @@ pub struct Selection {
     pub chosen: Option<Trial>,
     /// Multiplications of an evaluation with everything that the body holds.
     pub multiplications: usize,
-    /// Guideline of [WP19] section 8 that the kept groups are nearest to.
+    /// Guideline of \[WP19\] section 8 that the kept groups are nearest to.
     pub guideline: &'static str,
     /// The cost that the scene allows, where that decides.
     pub most_multiplications: Option<usize>,

@@ -1,4 +1,4 @@
-//! Significance of every term of the equations of motion for a body and a scene: unit-free ([WP19] eq. 28 and 36 to 40, as corrected in the
+//! Significance of every term of the equations of motion for a body and a scene: unit-free (\[WP19\] eq. 28 and 36 to 40, as corrected in the
 //! theory, section 11), and with the invariants of the body.
 
 use super::norms::Norms;
@@ -17,7 +17,7 @@ pub struct Significance {
     pub formula: &'static str,
     /// Group of the kinetic energy that it belongs to.
     pub group: Group,
-    /// Guideline of [WP19] section 8 that asks for it.
+    /// Guideline of \[WP19\] section 8 that asks for it.
     pub guideline: &'static str,
     /// Bound from I0 and the frequencies (tier 0).
     pub bound: f64,

@@ -174,7 +174,7 @@ fn turning(
 }
 
 /// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more than what a load of the
-/// size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p ([WP19] 5.2).
+/// size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p (\[WP19\] 5.2).
 fn amplitudes(body: &FlexBody, scene: &Scene) -> Vec<f64> {
     let (limits, shape) = (&scene.requirements.limits, &body.modes().shape);
     let extent = extents(&body.nodes().positions).into_iter().fold(0.0, f64::max);
