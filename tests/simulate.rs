@@ -58,6 +58,7 @@ fn scenes_of_the_fixtures_fit_their_schema_and_run() {
         ("robot_link", "robot_link"),
         ("gear_disc", "gear_disc"),
         ("conveyor_plate", "conveyor_plate"),
+        ("block_79_periods", "cube_hex8"),
     ];
     let files = fs::read_dir(fixtures().join("scenes")).expect("scenes").count();
     assert_eq!(files, scenes.len(), "every scene has its model");
