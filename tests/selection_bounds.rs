@@ -4,46 +4,21 @@ mod support;
 
 use flexbody::dynamics::BodyPoint;
 use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::invariants::BodyFrame;
 use flexbody::scene::{Measure, OutputErrors, Point, Recording, Scene};
 use flexbody::selection::{Bench, Norms, Situation};
 use nalgebra::{DMatrix, DVector, Vector3};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
-use std::sync::OnceLock;
 use support::equations::ReducedBody;
-use support::flexible::{body_of, fixture, oracle, soft_block};
+use support::flexible::oracle;
 use support::partial::combinations;
-use support::plane::rectangle;
 use support::random::Random;
-use support::scenes::{Doing, Shape, direction, doing, some_modes};
+use support::scenes::{Doing, Shape, bodies, direction, doing, seeded, some_modes};
 
 /// Rounding of sums of squares.
 const ROUNDING: f64 = 1.0 + 1e-10;
 
 /// What the integration may add to a difference of motions, relative to the motion.
 const INTEGRATION: f64 = 1e-5;
-
-fn bodies() -> &'static [FlexBody] {
-    static BODIES: OnceLock<Vec<FlexBody>> = OnceLock::new();
-    BODIES.get_or_init(|| {
-        vec![
-            soft_block(8),
-            fixture("bracket_hex20", 8, BodyFrame::Principal),
-            fixture("connecting_rod", 8, BodyFrame::Principal),
-            body_of(rectangle(6, 3, 0.3, [5.0, -2.0]), 8, BodyFrame::Principal),
-        ]
-    })
-}
-
-fn seeded(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
-        ..ProptestConfig::default()
-    }
-}
 
 fn length(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()

@@ -4,7 +4,6 @@ mod support;
 
 use flexbody::dynamics::{EquationsOfMotion, Terms};
 use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::invariants::BodyFrame;
 use flexbody::progress::SILENT;
 use flexbody::scene::{
     AttachmentKind, Initial, Measure, MotionRange, Range, Requirements, Run, Scene, Scheme, Tolerance,
@@ -13,35 +12,10 @@ use flexbody::scene::{
 use flexbody::selection::{Selection, select};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
-use std::sync::OnceLock;
-use support::flexible::{body_of, fixture, soft_block};
-use support::plane::rectangle;
-use support::scenes::{doing, some_modes};
+use support::scenes::{bodies, doing, seeded, some_modes};
 
 /// What integration adds to errors.
 const INTEGRATION: f64 = 1e-5;
-
-fn bodies() -> &'static [FlexBody] {
-    static BODIES: OnceLock<Vec<FlexBody>> = OnceLock::new();
-    BODIES.get_or_init(|| {
-        vec![
-            soft_block(8),
-            fixture("bracket_hex20", 8, BodyFrame::Principal),
-            fixture("connecting_rod", 8, BodyFrame::Principal),
-            body_of(rectangle(6, 3, 0.3, [5.0, -2.0]), 8, BodyFrame::Principal),
-        ]
-    })
-}
-
-fn seeded(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
-        ..ProptestConfig::default()
-    }
-}
 
 fn selected(body: &FlexBody, scene: &Scene) -> Selection {
     select(body, scene, None, SILENT).expect("a selection")

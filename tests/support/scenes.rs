@@ -1,13 +1,41 @@
 //! Random scenes for a body, unit-free: rates are relative to the first frequency of the body, times to its first period.
 
+use super::flexible::{body_of, fixture, soft_block};
+use super::plane::rectangle;
 use flexbody::dynamics::Terms;
 use flexbody::flex_body::FlexBody;
+use flexbody::invariants::BodyFrame;
 use flexbody::scene::{
     Axes, History, Initial, Load, ModeStart, Point, Requirements, Run, Scene, Scheme, Spin,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use std::f64::consts::TAU;
+use std::sync::OnceLock;
+
+/// Solids, soft and stiff, and a plane body.
+pub fn bodies() -> &'static [FlexBody] {
+    static BODIES: OnceLock<Vec<FlexBody>> = OnceLock::new();
+    BODIES.get_or_init(|| {
+        vec![
+            soft_block(8),
+            fixture("bracket_hex20", 8, BodyFrame::Principal),
+            fixture("connecting_rod", 8, BodyFrame::Principal),
+            body_of(rectangle(6, 3, 0.3, [5.0, -2.0]), 8, BodyFrame::Principal),
+        ]
+    })
+}
+
+/// The same cases every time.
+pub fn seeded(cases: u32, seed: u64) -> ProptestConfig {
+    ProptestConfig {
+        cases,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(seed),
+        ..ProptestConfig::default()
+    }
+}
 
 /// A function of time with values from -1 to 1.
 #[derive(Debug, Clone)]
