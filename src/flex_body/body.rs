@@ -8,7 +8,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
-use crate::model::{GeometricStiffness, Nodes};
+use crate::model::{GeometricStiffness, Nodes, extents};
 use crate::units::UnitSystem;
 use faer::Mat;
 
@@ -82,6 +82,21 @@ impl FlexBody {
     /// Node numbers and positions in the body frame.
     pub fn nodes(&self) -> &Nodes {
         &self.parts.nodes
+    }
+
+    /// Largest extent of the nodes along an axis of the body frame. Unit: length.
+    pub fn extent(&self) -> f64 {
+        extents(&self.parts.nodes.positions).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Largest displacement of a node by mode `j` at unit amplitude.
+    ///
+    /// # Panics
+    /// When `j` is not below the number of modes.
+    pub fn largest_displacement(&self, j: usize) -> f64 {
+        let shape = &self.parts.modes.shape;
+        let square = |i: usize| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>();
+        (0..self.n_nodes()).map(square).fold(0.0, f64::max).sqrt()
     }
 
     /// Modes.

@@ -4,7 +4,6 @@ use super::Scheme;
 use crate::dynamics::{Balance, Configuration};
 use crate::flex_body::FlexBody;
 use crate::integration::Work;
-use crate::model::extents;
 use nalgebra::Vector3;
 
 /// The motion of a body over time. Numbers are in the units of the body.
@@ -51,16 +50,10 @@ impl Resolution {
 
     /// For `body`; `least`: the deflection, where it is given.
     pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
-        let extent = extents(&body.nodes().positions).into_iter().fold(0.0, f64::max);
-        let deflection = least.unwrap_or(Self::LEAST * extent);
-        let (shape, modes) = (&body.modes().shape, &body.modes().eigenvalue);
-        let root_energy = |(j, lambda): (usize, &f64)| {
-            let longest = (0..body.n_nodes())
-                .map(|i| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>())
-                .fold(0.0, f64::max)
-                .sqrt();
-            (0.5 * lambda).sqrt() * deflection / longest
-        };
+        let deflection = least.unwrap_or(Self::LEAST * body.extent());
+        let modes = &body.modes().eigenvalue;
+        let root_energy =
+            |(j, lambda): (usize, &f64)| (0.5 * lambda).sqrt() * deflection / body.largest_displacement(j);
         let root_energy = modes.iter().enumerate().map(root_energy).fold(f64::INFINITY, f64::min);
         Self { deflection, root_energy }
     }

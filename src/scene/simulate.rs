@@ -7,7 +7,7 @@ use crate::dynamics::{Configuration, EquationsOfMotion, Evaluation, Motion, Rota
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
 use crate::integration::{Explicit, Failure, Gauss, Method, System, integrate};
-use crate::model::{LoadKind, extents};
+use crate::model::LoadKind;
 use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -179,8 +179,7 @@ fn largest_deflection(body: &FlexBody, recording: &Recording) -> (f64, f64) {
     let component = |row: usize| -> f64 { q.iter().enumerate().map(|(j, q)| shape[(row, j)] * q).sum() };
     let deflections =
         (0..body.nodes().positions.len()).map(|i| Vector3::from_fn(|k, _| component(3 * i + k)).norm());
-    let extent = extents(&body.nodes().positions).into_iter().fold(0.0, f64::max);
-    (deflections.fold(0.0, f64::max) / extent, recording.time[at])
+    (deflections.fold(0.0, f64::max) / body.extent(), recording.time[at])
 }
 
 fn remarks(body: &FlexBody, scene: &Scene, recording: &Recording, at: f64) -> Vec<Diagnostic> {

@@ -83,6 +83,16 @@ impl<'c> Case<'c> {
         Ok(Self { body, scene, situation, loads, watched, memory })
     }
 
+    /// Sizes of the terms at tier 0 and, where they are wanted and the body holds all groups, at tier 1. Nothing without bounds.
+    fn norms(&self, tier_1: bool) -> Vec<Norms> {
+        let Ok(driven) = &self.situation.driven else { return Vec::new() };
+        let (invariants, eigenvalues) = (self.body.invariants(), &self.body.modes().eigenvalue);
+        let axis = driven.rotation.axis.as_ref();
+        let rigid = Norms::of_rigid(&invariants.inertia(), eigenvalues, axis);
+        let own = tier_1.then(|| Norms::of_invariants(invariants, eigenvalues, axis)).flatten();
+        [Some(rigid), own].into_iter().flatten().collect()
+    }
+
     pub fn bench(&self) -> Bench<'_> {
         let Self { body, scene, situation, loads, watched, memory } = self;
         Bench { body, scene, situation, loads, watched, memory: *memory }
@@ -92,26 +102,25 @@ impl<'c> Case<'c> {
 /// Trials by bounds, up to the first set of groups that passes. Where the rotation is that of a run, the models that cost a multiple of nf
 /// only are run; others are as dear as a measurement.
 pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
+    // Norms of the actual terms are eigenproblems of the size of the basis: once for every case.
+    let norms: Vec<Vec<Norms>> = cases.iter().map(|case| case.norms(tier_1)).collect();
     let mut trials = Vec::new();
     let only_w1 = Groups::NONE.with(Group::W1);
     for kept in sets().filter(|set| *set != Groups::ALL) {
-        let by_tier = cases.iter().map(|case| -> Result<Vec<Trial>> {
+        let by_tier = cases.iter().zip(&norms).map(|(case, norms)| -> Result<Vec<Trial>> {
             let bench = case.bench();
             let Bench { body, scene, situation, .. } = bench;
-            let (inertia, eigenvalues) = (body.invariants().inertia(), &body.modes().eigenvalue);
             let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
-            let axis = driven.rotation.axis.as_ref();
-            let of_run = scene.spin.is_some() && scene.run.duration.is_some() && axis.is_some();
+            let has_axis = driven.rotation.axis.is_some();
+            let of_run = scene.spin.is_some() && scene.run.duration.is_some() && has_axis;
             let held = body.invariants().groups;
             let runs = kept == Groups::NONE || kept == only_w1 && held.w1;
             if of_run && !runs {
                 return Ok(Vec::new());
             }
             let run = if of_run { bench.fine_motion(kept)? } else { None };
-            let rigid = Norms::of_rigid(&inertia, eigenvalues, axis);
-            let own = Norms::of_invariants(body.invariants(), eigenvalues, axis).filter(|_| tier_1);
-            let tiers = [Some(rigid), own].into_iter().flatten();
-            Ok(tiers.map(|norms| bench.bounded(&norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
+            let tiers = norms.iter();
+            Ok(tiers.map(|norms| bench.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
         });
         let by_case: Vec<Vec<Trial>> = by_tier.collect::<Result<_>>()?;
         let tiers = by_case.iter().map(Vec::len).min().unwrap_or(0);

@@ -6,7 +6,6 @@ use super::variation::{Rotation, Variation};
 use crate::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use crate::flex_body::FlexBody;
 use crate::invariants::Invariants;
-use crate::model::extents;
 use crate::scene::{AttachmentKind, Axes, Range, Scene};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::f64::consts::TAU;
@@ -176,17 +175,12 @@ fn turning(
 /// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more than what a load of the
 /// size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p (\[WP19\] 5.2).
 fn amplitudes(body: &FlexBody, scene: &Scene) -> Vec<f64> {
-    let (limits, shape) = (&scene.requirements.limits, &body.modes().shape);
-    let extent = extents(&body.nodes().positions).into_iter().fold(0.0, f64::max);
-    let deflection = limits.deflection.unwrap_or(LINEAR_RANGE * extent);
-    let longest = |j: usize| {
-        let square = |i: usize| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>();
-        (0..body.n_nodes()).map(square).fold(0.0, f64::max).sqrt()
-    };
+    let limits = &scene.requirements.limits;
+    let deflection = limits.deflection.unwrap_or(LINEAR_RANGE * body.extent());
     let alone = |j: usize| {
         let stress = limits.stress.as_ref().and_then(|(limit, modes)| Some(limit / modes.get(j)?));
         let own = limits.modes.iter().filter(|(mode, _)| *mode == j).map(|(_, amplitude)| *amplitude);
-        own.chain(stress).fold(deflection / longest(j), f64::min)
+        own.chain(stress).fold(deflection / body.largest_displacement(j), f64::min)
     };
     let eigenvalues = &body.modes().eigenvalue;
     let first = alone(0) * eigenvalues[0];

@@ -10,7 +10,6 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
-use crate::model::extents;
 use crate::scene::{
     ErrorHistory, History, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin,
     simulate,
@@ -280,7 +279,7 @@ impl Bench<'_> {
         let energy = most(&mut recording.balances.iter().map(|balance| balance.elastic)).sqrt();
         let paths = recording.paths.iter().flat_map(|path| &path.deflection);
         let deflection = match recording.paths.is_empty() {
-            true => recording.deflection * self.extent(),
+            true => recording.deflection * self.body.extent(),
             false => most(&mut paths.map(|d| d.norm())),
         };
         let share = |j: usize| {
@@ -295,10 +294,6 @@ impl Bench<'_> {
             }
         };
         (0..self.body.n_modes()).map(share).collect()
-    }
-
-    fn extent(&self) -> f64 {
-        extents(&self.body.nodes().positions).into_iter().fold(0.0, f64::max)
     }
 }
 
