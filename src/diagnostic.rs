@@ -176,6 +176,19 @@ codes! {
     CheckpointVersion = "FB709", Error, BadInput, "checkpoint of another format version", "read it with the flexbody version named in the file, or name another file";
     CheckpointForeign = "FB710", Error, BadInput, "checkpoint of another model", "name another file for this model";
     CheckpointTakenUp = "FB711", Note, Done, "search for modes goes on from a checkpoint", "nothing to do";
+    ExportLoses = "FB720", Error, BadInput, "format cannot hold all of the body", "--allow-loss writes the file without it";
+    ExportLost = "FB721", Warning, Done, "file that was written lacks a part of the body", "nothing to do if the simulation does not need it";
+    ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
+    ForeignIncomplete = "FB731", Error, BadInput, "file lacks what a body is made of", "write the file anew with the missing part";
+    ForeignChanged = "FB732", Note, Done, "modes of the file are no free-surface modes: rigid motion was taken out of them", "nothing to do: the body is the same, its coordinates are others";
+    ForeignDropped = "FB733", Warning, Done, "file lacks terms of the kinetic energy: the body does without them", "take a format that holds them";
+    AuditIdentity = "FB740", Error, CheckFailed, "identity of inertia data violated", "write the file anew with the program that made it, or with flexbody export";
+    AuditLumped = "FB741", Error, CheckFailed, "inertia comes from lumped masses", "condense the consistent mass matrix: flexbody convert";
+    AuditLayout = "FB742", Error, CheckFailed, "arrays are laid out in another order than the dialect has", "name the dialect to the reader, or write the file anew with flexbody export";
+    AuditDigits = "FB743", Error, CheckFailed, "digits were lost in writing", "write with 17 significant digits and exponents";
+    AuditUnits = "FB744", Error, CheckFailed, "numbers do not fit each other: units are mixed", "write masses, lengths and times in one system of units";
+    AuditCoupling = "FB745", Error, CheckFailed, "coupling of rigid and flexible motion is missing", "write the inertia couplings too";
+    AuditImplausible = "FB746", Error, CheckFailed, "numbers are not those of a body", "check what the file was made of";
     // FB8xx: usage
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";

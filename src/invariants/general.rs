@@ -289,7 +289,7 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
 
 /// J that gives I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small where the third moment
 /// is, and a needle keeps the digits of its small moment, J_ll + J_mm.
-fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
+pub(super) fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|k, l| {
         let (a, b) = (inertia[((k + 1) % 3, (k + 1) % 3)], inertia[((k + 2) % 3, (k + 2) % 3)]);
         if k == l { 0.5 * (a.min(b) + (a.max(b) - inertia[(k, k)])) } else { -inertia[(k, l)] }
@@ -353,7 +353,7 @@ pub(super) fn ibar_of(half: &Matrix3<f64>, c2: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// S of two modes that gives W2 = B_i' M B_j by W2_kk = S_ll + S_mm, W2_kl = -S_lk.
-fn s_of(w2: &Matrix3<f64>) -> Matrix3<f64> {
+pub(super) fn s_of(w2: &Matrix3<f64>) -> Matrix3<f64> {
     let half_trace = 0.5 * w2.trace();
     Matrix3::from_fn(|k, l| if k == l { half_trace - w2[(k, k)] } else { -w2[(l, k)] })
 }

@@ -1,0 +1,141 @@
+//! What a format is, and the registry.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::{Error, Result};
+use crate::flex_body::FlexBody;
+
+/// A format that other programs read.
+pub trait ExportFormat: Sync {
+    /// Name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// What reads it, in a few words.
+    fn reader(&self) -> &'static str;
+
+    /// Variants of the format, the usual one first; empty where there is a single one.
+    fn dialects(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Whether the file has places of the body that can be chosen ([`ExportOptions::points`]).
+    fn has_points(&self) -> bool {
+        false
+    }
+
+    /// What this format cannot hold of `body` with these options: fragments of sentences with the facts, in the order of importance.
+    /// What concerns the origin of the numbers only (certificate, lumped comparators, provenance) is in no format and is not told.
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String>;
+
+    /// The file. Called with options that the format has.
+    ///
+    /// # Errors
+    /// [`ExportLoses`](Code::ExportLoses) for a body of which no file of this format can be made.
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported>;
+}
+
+/// What can be asked of an export. What a format does not have is refused by [`export`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExportOptions {
+    /// Variant of the format, one of [`ExportFormat::dialects`]; none: the usual one.
+    pub dialect: Option<String>,
+    /// Which places of the body the file has.
+    pub points: Points,
+}
+
+/// Which places of the body a file has.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Points {
+    /// What the format needs: all nodes, or of a format with frames the interfaces where the body has some.
+    #[default]
+    Usual,
+    /// All nodes.
+    Nodes,
+    /// The reference points of the interfaces and the nodes of free ones.
+    Interfaces,
+    /// Nodes with these numbers.
+    Some(Vec<i64>),
+}
+
+/// What an export makes: the file, and others that belong beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exported {
+    /// The file itself.
+    pub file: Vec<u8>,
+    /// Further files, each with the extension that takes the place of that of the file.
+    pub beside: Vec<(&'static str, Vec<u8>)>,
+}
+
+impl Exported {
+    /// A single file.
+    pub fn single(file: Vec<u8>) -> Self {
+        Self { file, beside: Vec::new() }
+    }
+}
+
+/// Every format, in the order of the documentation.
+pub const FORMATS: &[&dyn ExportFormat] = &[];
+
+/// The format of that name.
+///
+/// # Errors
+/// [`Usage`](Code::Usage), with the names that there are.
+pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
+    FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("`{name}` is no export format");
+        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    })
+}
+
+/// Writes `body` in a format, with a warning for everything that the format cannot hold.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
+/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of [`ExportFormat::write`].
+pub fn export(
+    body: &FlexBody,
+    format: &dyn ExportFormat,
+    options: &ExportOptions,
+    allow_loss: bool,
+) -> Result<(Exported, Vec<Diagnostic>)> {
+    check_options(body, format, options)?;
+    let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
+    let losses: Vec<Diagnostic> = format
+        .losses(body, options)
+        .into_iter()
+        .map(|loss| Diagnostic::new(code, format!("{} cannot hold {loss}", format.name())))
+        .collect();
+    if !(allow_loss || losses.is_empty()) {
+        return Err(Error::new(losses));
+    }
+    Ok((format.write(body, options)?, losses))
+}
+
+fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {
+    let refuse =
+        |message: String, help: String| Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    let name = format.name();
+    if let Some(dialect) = &options.dialect
+        && !format.dialects().contains(&dialect.as_str())
+    {
+        let known = format.dialects().join(", ");
+        let help = if known.is_empty() { format!("{name} has no dialects") } else { known };
+        return refuse(format!("`{dialect}` is no dialect of {name}"), help);
+    }
+    if options.points != Points::Usual && !format.has_points() {
+        return refuse(format!("{name} has all nodes or none"), "leave --points out".to_owned());
+    }
+    if options.points == Points::Interfaces && body.interfaces().is_empty() {
+        return refuse("the body has no interfaces".to_owned(), "--points nodes, or node numbers".to_owned());
+    }
+    if let Points::Some(ids) = &options.points {
+        let strange = ids.iter().find(|&id| !body.nodes().ids.contains(id));
+        if let Some(id) = strange {
+            return refuse(
+                format!("the body has no node {id}"),
+                "flexbody inspect names the nodes".to_owned(),
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,7 @@
+//! A body in the formats of other programs: one file per format, `FlexBody` to bytes, behind the registry `FORMATS`.
+
+mod format;
+mod frames;
+
+pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
+pub use frames::{ExportFrame, frames};

@@ -1,0 +1,64 @@
+//! What a reader of another program's file is, and the registry.
+
+use super::{AuditCheck, ForeignBody};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::input::InputFile;
+
+/// A file of another program, read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Foreign {
+    /// Name of the format.
+    pub format: &'static str,
+    /// The variant that was detected, as the documentation calls it; empty where there is a single one.
+    pub dialect: String,
+    /// Why it is taken for that variant, and other facts that are no fault: sentences without a full stop.
+    pub notes: Vec<String>,
+    /// What must hold in files of this format: redundant arrays, digits, layout. What every body must fulfil is checked elsewhere.
+    pub checks: Vec<AuditCheck>,
+    /// The body.
+    pub body: ForeignBody,
+}
+
+/// A format that is read.
+pub trait ForeignFormat: Sync {
+    /// Name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// Whether the file can be of this format, by what stands at its beginning (of an HDF5 file by the names in it).
+    fn recognises(&self, file: &InputFile) -> bool;
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) with the line, [`ForeignIncomplete`](Code::ForeignIncomplete) for a file from
+    /// which not even shapes of arrays follow.
+    fn read(&self, file: &InputFile) -> Result<Foreign>;
+}
+
+/// Every format, in the order in which files are recognised.
+pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] = &[];
+
+/// The format of that name.
+///
+/// # Errors
+/// [`Usage`](Code::Usage), with the names that there are.
+pub fn find_foreign(name: &str) -> Result<&'static dyn ForeignFormat> {
+    FOREIGN_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = FOREIGN_FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("`{name}` is no format that is read");
+        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    })
+}
+
+/// The format of a file.
+///
+/// # Errors
+/// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is none of them.
+pub fn recognise(file: &InputFile) -> Result<&'static dyn ForeignFormat> {
+    FOREIGN_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
+        let names: Vec<&str> = FOREIGN_FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("the file is of no format that is read: {}", names.join(", "));
+        Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()).into()
+    })
+}

@@ -1,0 +1,9 @@
+//! Flexible-body files of other programs: read, audited, and taken as bodies.
+
+mod body;
+mod check;
+mod format;
+
+pub use body::{ForeignBody, ForeignFrame};
+pub use check::AuditCheck;
+pub use format::{FOREIGN_FORMATS, Foreign, ForeignFormat, find_foreign, recognise};
