@@ -2,6 +2,7 @@
 
 mod format;
 mod frames;
+mod losses;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
