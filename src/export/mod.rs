@@ -2,6 +2,7 @@
 
 mod format;
 mod frames;
+mod hdf5_file;
 mod losses;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
