@@ -73,7 +73,8 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] = &[&super::exudyn::Exudyn];
+pub const FORMATS: &[&dyn ExportFormat] =
+    &[&super::exudyn::Exudyn, &super::mbdyn::Mbdyn, &super::mbsim::Mbsim];
 
 /// The format of that name.
 ///

@@ -46,7 +46,8 @@ fn largest(a: &Mat<f64>, b: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f
         .fold(0.0, f64::max)
 }
 
-fn told_if(lost: f64, what: &str) -> Option<String> {
+/// The sentence about what is lost, unless it is rounding.
+pub(super) fn told_if(lost: f64, what: &str) -> Option<String> {
     (lost > ROUNDING).then(|| {
         format!(
             "{what}: up to {lost:.1e} of its Cauchy-Schwarz bound, from nodes with rotations or constraints"

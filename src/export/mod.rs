@@ -6,6 +6,8 @@ mod frames;
 mod hdf5_file;
 mod inertia;
 mod losses;
+mod mbdyn;
+mod mbsim;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
