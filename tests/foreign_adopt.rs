@@ -61,7 +61,7 @@ fn adopted(foreign: &Foreign) -> Result<Adopted, flexbody::error::Error> {
 }
 
 fn random(random: &mut Random, rows: usize, columns: usize) -> Mat<f64> {
-    Mat::from_fn(rows, columns, |_, _| random.uniform(-1.0, 1.0))
+    Mat::from_fn(rows, columns, |_, _| random.signed())
 }
 
 /// The rigid motions of the nodes (3n x 6).
@@ -101,7 +101,7 @@ fn free_surface_modes_are_taken_to_the_last_bit() {
 #[test]
 fn modes_of_any_frame_and_basis_give_the_same_body() {
     let (model, body) = block(7);
-    let mut numbers = Random::new(5);
+    let mut numbers = Random(5);
     let (nf, mass) = (body.n_modes(), model.scalar_mass().expect("a solid"));
     // Every mode with a rigid motion as large as itself, and all mixed with each other.
     let mix = random(&mut numbers, nf, nf) + Mat::<f64>::identity(nf, nf);

@@ -102,6 +102,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             name: given.name.clone(),
             files: vec![source],
             number: None,
+            // Nobody knows.
             n_dofs: 0,
             mass_structure: match invariants.general {
                 Some(_) => MassStructure::General,

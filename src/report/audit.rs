@@ -1,8 +1,8 @@
 //! An audit as text and as JSON.
 
-use super::identities::diagnostics_json;
 use super::numbers::significant;
-use crate::foreign::Audit;
+use crate::foreign::{Audit, AuditCheck};
+use crate::provenance::generator;
 use serde_json::{Value, json};
 
 /// Version of the JSON: a newer major breaks readers, a newer minor only adds keys.
@@ -45,17 +45,17 @@ pub fn audit_text(file: &str, audit: &Audit) -> String {
 
 /// The contract `schemas/audit.schema.json`.
 pub fn audit_json(file: &str, audit: &Audit) -> Value {
-    let check = |c: &crate::foreign::AuditCheck| {
+    let check = |c: &AuditCheck| {
         json!({
             "name": c.name, "formula": c.formula, "value": c.value, "limit": c.limit,
             "passed": c.passed(), "code": c.code.id(), "meaning": c.meaning,
         })
     };
-    let mut json = diagnostics_json(&audit.findings());
-    let more = json!({
+    json!({
         "format": "flexbody-audit",
         "format_major": VERSION.0,
         "format_minor": VERSION.1,
+        "generator": generator(),
         "file": file,
         "file_format": audit.format,
         "dialect": audit.dialect,
@@ -67,9 +67,6 @@ pub fn audit_json(file: &str, audit: &Audit) -> Value {
         "notes": audit.notes,
         "passed": audit.passed(),
         "checks": audit.checks.iter().map(check).collect::<Vec<_>>(),
-    });
-    if let (Some(all), Value::Object(more)) = (json.as_object_mut(), more) {
-        all.extend(more);
-    }
-    json
+        "findings": audit.findings(),
+    })
 }
