@@ -1,5 +1,6 @@
 //! A body in the formats of other programs: one file per format, `FlexBody` to bytes, behind the registry `FORMATS`.
 
+mod arrays;
 mod format;
 mod frames;
 mod losses;
