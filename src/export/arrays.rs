@@ -1,43 +1,11 @@
-//! Named arrays: the entries of the flex-body file in containers that need no HDF5. Nothing is lost.
+//! Named arrays with what they are: the entries of the flex-body file, as `json` and `npz` have them.
 
-use super::{ExportFormat, ExportOptions, Exported};
-use crate::error::Result;
-use crate::flex_body::FlexBody;
-use crate::store::{NamedArray, NamedAttributes, Numbers, contents};
+use crate::store::{NamedArray, NamedAttributes, Numbers};
 use serde::{Serialize, Serializer};
-use serde_json::ser::{Formatter, Serializer as JsonSerializer};
-use std::io::{self, Write};
-
-/// A JSON document.
-pub(super) struct Json;
-
-impl ExportFormat for Json {
-    fn name(&self) -> &'static str {
-        "json"
-    }
-
-    fn reader(&self) -> &'static str {
-        "any language: the entries of the flex-body file as JSON"
-    }
-
-    fn losses(&self, _: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        Vec::new()
-    }
-
-    fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {
-        let (attributes, arrays) = contents(body);
-        let mut file = Vec::new();
-        Document::new(&attributes, &arrays, true)
-            .serialize(&mut JsonSerializer::with_formatter(&mut file, KeyPerLine))
-            .expect("texts and finite numbers are valid JSON");
-        file.push(b'\n');
-        Ok(Exported::single(file))
-    }
-}
 
 /// Groups with their attributes, and arrays, by their paths in the flex-body file.
 #[derive(Serialize)]
-struct Document<'a> {
+pub(super) struct Document<'a> {
     attributes: Ordered<'a, Ordered<'a, &'a serde_json::Value>>,
     arrays: Ordered<'a, Entry<'a>>,
 }
@@ -54,7 +22,7 @@ struct Entry<'a> {
 
 impl<'a> Document<'a> {
     /// With the numbers of the arrays, or without.
-    fn new(attributes: &'a [NamedAttributes], arrays: &'a [NamedArray], values: bool) -> Self {
+    pub(super) fn new(attributes: &'a [NamedAttributes], arrays: &'a [NamedArray], values: bool) -> Self {
         let group = |group: &'a NamedAttributes| {
             (
                 group.path.as_str(),
@@ -108,18 +76,5 @@ impl<T: Serialize> Serialize for Nested<'_, T> {
                 serializer.collect_seq(self.1.chunks(row).map(|row| Nested(inner, row)))
             }
         }
-    }
-}
-
-/// Every key on a line of its own, every array on a single one.
-struct KeyPerLine;
-
-impl Formatter for KeyPerLine {
-    fn begin_object_key<W: Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
-        writer.write_all(if first { b"\n" } else { b",\n" })
-    }
-
-    fn end_object<W: Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
-        writer.write_all(b"\n}")
     }
 }

@@ -1,6 +1,5 @@
 //! What a format is, and the registry.
 
-use super::arrays::Json;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
@@ -74,7 +73,7 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] = &[&Json];
+pub const FORMATS: &[&dyn ExportFormat] = &[&super::json::Json, &super::exudyn::Exudyn];
 
 /// The format of that name.
 ///
