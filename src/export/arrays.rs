@@ -65,7 +65,8 @@ impl Serialize for Values<'_> {
     }
 }
 
-struct Nested<'a, T>(&'a [usize], &'a [T]);
+/// Numbers, nested row by row as their extents say.
+pub(super) struct Nested<'a, T>(pub &'a [usize], pub &'a [T]);
 
 impl<T: Serialize> Serialize for Nested<'_, T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {

@@ -1,5 +1,6 @@
 //! A body in the formats of other programs: one file per format, `FlexBody` to bytes, behind the registry `FORMATS`.
 
+mod adams_invariants;
 mod arrays;
 mod exudyn;
 mod format;
@@ -8,6 +9,7 @@ mod hdf5_file;
 mod inertia;
 mod json;
 mod losses;
+mod npz;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
