@@ -73,7 +73,12 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] = &[];
+pub const FORMATS: &[&dyn ExportFormat] = &[
+    &super::json::Json,
+    &super::npz::Npz,
+    &super::adams_invariants::AdamsInvariants,
+    &super::exudyn::Exudyn,
+];
 
 /// The format of that name.
 ///
