@@ -73,8 +73,14 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] =
-    &[&super::exudyn::Exudyn, &super::mbdyn::Mbdyn, &super::mbsim::Mbsim];
+pub const FORMATS: &[&dyn ExportFormat] = &[
+    &super::exudyn::Exudyn,
+    &super::mbdyn::Mbdyn,
+    &super::mbsim::Mbsim,
+    &super::adams_invariants::AdamsInvariants,
+    &super::npz::Npz,
+    &super::json::Json,
+];
 
 /// The format of that name.
 ///

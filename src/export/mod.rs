@@ -1,13 +1,17 @@
 //! A body in the formats of other programs: one file per format, `FlexBody` to bytes, behind the registry `FORMATS`.
 
+mod adams_invariants;
+mod arrays;
 mod exudyn;
 mod format;
 mod frames;
 mod hdf5_file;
 mod inertia;
+mod json;
 mod losses;
 mod mbdyn;
 mod mbsim;
+mod npz;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};

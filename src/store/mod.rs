@@ -3,6 +3,7 @@
 
 mod assemble;
 mod checkpoint;
+mod contents;
 mod derived;
 mod document;
 mod extents;
@@ -18,6 +19,7 @@ mod write;
 
 pub use crate::output::OutputSlot;
 pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
+pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
 pub use document::{format_markdown, format_schema};
 pub use read::{read, validate};
 pub use simulation::fill_simulation;
