@@ -38,7 +38,8 @@ fn equations_of_motion_keep_their_meaning() {
             body = stressed(body, &loads, 1.0, &mut random);
         }
         let in_other = body.in_units(&other()).expect("a body");
-        let (a, b) = (EquationsOfMotion::new(&body, Terms::ALL), EquationsOfMotion::new(&in_other, Terms::ALL));
+        let (a, b) =
+            (EquationsOfMotion::new(&body, Terms::ALL), EquationsOfMotion::new(&in_other, Terms::ALL));
         let (r, n) = (a.n_rigid(), a.n_velocities());
         // Unit of each entry of nu, and of the forces that do work on it.
         let translations = if r == 3 { 2 } else { 3 };
@@ -95,7 +96,8 @@ fn interfaces_and_identities_come_along_and_the_way_back_is_the_body() {
     let back = there.in_units(body.units()).expect("a body");
     let (a, b) = (body.coordinates().expect("there"), back.coordinates().expect("there"));
     for (one, two) in [(&a.stiffness, &b.stiffness), (&a.mass, &b.mass), (&a.of_modes, &b.of_modes)] {
-        let entries = (0..one.nrows()).flat_map(|i| (0..one.ncols()).map(move |j| (one[(i, j)], two[(i, j)])));
+        let entries =
+            (0..one.nrows()).flat_map(|i| (0..one.ncols()).map(move |j| (one[(i, j)], two[(i, j)])));
         assert!(worst(entries, one.norm_max()) < 1e-14);
     }
     let (a, b) = (&body.modes().shape, &back.modes().shape);
@@ -104,5 +106,8 @@ fn interfaces_and_identities_come_along_and_the_way_back_is_the_body() {
     let reference = |body: &FlexBody| body.interfaces()[0].reference.expect("a point");
     let pairs = reference(&body).into_iter().zip(reference(&back));
     assert!(worst(pairs, body.extent()) < 1e-14);
-    assert!(worst(reference(&body).into_iter().map(|x| 1e3 * x).zip(reference(&there)), 1e3 * body.extent()) < 1e-14);
+    assert!(
+        worst(reference(&body).into_iter().map(|x| 1e3 * x).zip(reference(&there)), 1e3 * body.extent())
+            < 1e-14
+    );
 }

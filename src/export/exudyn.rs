@@ -59,7 +59,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
         // Triangles are for pictures; a body knows no elements.
         array("trigList", Hdf5Contents::Integers(vec![0, 3], Vec::new())),
         Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
-        array("massMatrixReduced", Hdf5Contents::matrix(&told.i6)),
+        modal_mass(body, &told),
         array("stiffnessMatrixReduced", Hdf5Contents::matrix(&body.invariants().modal_stiffness)),
         array("infoList", Hdf5Contents::Integers(vec![6], info)),
         text("NodeType.RotationEulerParameters").named("rigidBodyNodeType").with("datatype", "str"),
@@ -74,6 +74,16 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
     all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
     all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
     all
+}
+
+/// m_ff; for a mass that does not commute with rotations with an attribute that says so, as no array of the file tells: m_ff and
+/// mPsiTildePsiTilde then need not agree. Exudyn does not look at it.
+fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
+    let entry = array("massMatrixReduced", Hdf5Contents::matrix(&told.i6));
+    match body.invariants().general {
+        Some(_) => entry.with("mass_structure", "general"),
+        None => entry,
+    }
 }
 
 /// What couples translation, rotation and modes. Row or column 3 j + a belongs to axis a of mode j.

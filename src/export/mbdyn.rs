@@ -81,12 +81,17 @@ fn is_exact(options: &ExportOptions) -> bool {
     options.dialect.as_deref() != Some(LEVEL_13)
 }
 
+/// Comment that tells readers of ours what no number of the file does.
+const GENERAL_MASS: &str =
+    "** GENERAL MASS: IT DOES NOT COMMUTE WITH ROTATIONS, RECORD GROUPS 9 AND 18 NEED NOT AGREE\n";
+
 /// Comments for people: where the numbers come from and what they are about.
 fn head(body: &FlexBody) -> String {
     let units = body.units();
     let name: String = body.source().name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let general = body.invariants().general.as_ref().map_or("", |_| GENERAL_MASS);
     format!(
-        "** {name}, written by {}\n** UNITS {}, {}, {}; ALL ABOUT THE ORIGIN OF THE NODES, WHICH IS THAT OF THE MODAL NODE\n",
+        "** {name}, written by {}\n** UNITS {}, {}, {}; ALL ABOUT THE ORIGIN OF THE NODES, WHICH IS THAT OF THE MODAL NODE\n{general}",
         generator(),
         units.length.name(),
         units.mass.name(),

@@ -4,8 +4,14 @@ mod adopt;
 mod audit;
 mod body;
 mod check;
+mod digits;
+mod exudyn;
 mod format;
 mod free_surface;
+mod hdf5_arrays;
+mod mbdyn;
+mod mbsim;
+mod redundant;
 
 pub use adopt::{Adopted, adopt};
 pub use audit::{Audit, audit};

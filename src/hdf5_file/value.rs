@@ -102,6 +102,11 @@ impl Element for i64 {
     const NAME: &'static str = "64-bit integers";
 }
 
+impl Element for i32 {
+    const TYPE: TypeDescriptor = TypeDescriptor::Integer(IntSize::U4);
+    const NAME: &'static str = "32-bit integers";
+}
+
 /// Values in row-major order, and the extents.
 pub(crate) type Array<T> = (Vec<T>, Vec<usize>);
 
