@@ -77,6 +77,9 @@ pub const FORMATS: &[&dyn ExportFormat] = &[
     &super::json::Json,
     &super::npz::Npz,
     &super::adams_invariants::AdamsInvariants,
+    &super::openradioss::OpenRadioss,
+    &super::chrono::Chrono,
+    &super::simscape::Simscape,
     &super::exudyn::Exudyn,
 ];
 
