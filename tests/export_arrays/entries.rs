@@ -1,10 +1,7 @@
-//! Exports that carry the entries of the flex-body file: `json` and `npz` hold every array and every attribute of it, bit by bit.
+//! `json` and `npz` hold every array and every attribute of the flex-body file, bit by bit.
 
-mod export_support;
-mod store_support;
-mod support;
-
-use export_support::{bodies, file, losses};
+use crate::export_support::{bodies, file, losses};
+use crate::store_support::wild_body;
 use flexbody::flex_body::FlexBody;
 use flexbody::store;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
@@ -12,7 +9,6 @@ use hdf5_metno as hdf5;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::io::Read;
-use store_support::wild_body;
 
 /// Shape and bits of an array; integers and floats differ.
 #[derive(Debug, Clone, PartialEq)]
