@@ -1,9 +1,14 @@
 //! Flexible-body files of other programs: read, audited, and taken as bodies.
 
+mod adopt;
+mod audit;
 mod body;
 mod check;
 mod format;
+mod free_surface;
 
+pub use adopt::{Adopted, adopt};
+pub use audit::{Audit, audit};
 pub use body::{ForeignBody, ForeignFrame};
 pub use check::AuditCheck;
 pub use format::{FOREIGN_FORMATS, Foreign, ForeignFormat, find_foreign, recognise};
