@@ -2,16 +2,21 @@
 
 mod adams_invariants;
 mod arrays;
+mod chrono;
 mod exudyn;
 mod format;
 mod frames;
 mod hdf5_file;
 mod inertia;
+mod interface_matrices;
 mod json;
 mod losses;
+mod mat5;
 mod mbdyn;
 mod mbsim;
 mod npz;
+mod openradioss;
+mod simscape;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
