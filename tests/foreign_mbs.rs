@@ -71,6 +71,14 @@ fn with_number(text: &str, group: usize, at: usize, change: impl Fn(f64) -> f64)
     text.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
 }
 
+/// Numbers of a record group.
+fn numbers(text: &str, group: usize) -> Vec<f64> {
+    let title = format!("** RECORD GROUP {group},");
+    let lines = text.lines().skip_while(|line| !line.starts_with(&title)).skip(1);
+    let words = lines.take_while(|line| !line.starts_with("**")).flat_map(str::split_whitespace);
+    words.map(|word| word.parse().expect("a number")).collect()
+}
+
 /// The text without some record groups.
 fn without(text: &str, groups: &[usize]) -> String {
     let mut drop = false;
@@ -144,6 +152,17 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     negative[0] *= -1.0;
     let negative = with_group(&no_coupling, "11, MASSES", &lumped_groups(&negative));
     assert_eq!(of(&negative), [("lumped_masses_positive", Lumped), carried]);
+
+    // Matrices of three rows by columns, as the manual calls them.
+    let mut columns = text.clone();
+    for (group, width) in [(14, nf), (15, nf), (16, 3 * nf), (17, nf * nf), (18, 3 * nf * nf)] {
+        let values: Vec<f64> = numbers(&text, group);
+        for at in 0..3 * width {
+            columns = with_number(&columns, group, at, |_| values[at % 3 * width + at / 3]);
+        }
+    }
+    let found = of(&columns);
+    assert!(!found.is_empty() && found.iter().all(|(_, code)| *code == Code::AuditLayout), "{found:?}");
 
     // Six decimals of everything, as of %f.
     let fixed = text.lines().map(|line| match line.starts_with("**") || line.starts_with("REV") {

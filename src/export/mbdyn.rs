@@ -85,13 +85,16 @@ fn is_exact(options: &ExportOptions) -> bool {
 const GENERAL_MASS: &str =
     "** GENERAL MASS: IT DOES NOT COMMUTE WITH ROTATIONS, RECORD GROUPS 9 AND 18 NEED NOT AGREE\n";
 
-/// Comments for people: where the numbers come from and what they are about.
+/// Comments for people: where the numbers come from and what they are about. MBDyn reads lines into a buffer of limited length.
 fn head(body: &FlexBody) -> String {
+    const LONGEST_NAME: usize = 200;
     let units = body.units();
-    let name: String = body.source().name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let printable = |c: char| if c.is_control() { ' ' } else { c };
+    let name: String = body.source().name.chars().map(printable).take(LONGEST_NAME).collect();
     let general = body.invariants().general.as_ref().map_or("", |_| GENERAL_MASS);
+    // A name alone could look like a record group.
     format!(
-        "** {name}, written by {}\n** UNITS {}, {}, {}; ALL ABOUT THE ORIGIN OF THE NODES, WHICH IS THAT OF THE MODAL NODE\n{general}",
+        "** BODY {name}, WRITTEN BY {}\n** UNITS {}, {}, {}; ALL ABOUT THE ORIGIN OF THE NODES, WHICH IS THAT OF THE MODAL NODE\n{general}",
         generator(),
         units.length.name(),
         units.mass.name(),

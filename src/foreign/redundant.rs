@@ -122,6 +122,20 @@ impl<'n> Redundant<'n> {
     }
 }
 
+/// Makes findings of another order of the entries out of checks that fail, where all of these hold in that order: `other` has the names of
+/// checks that the order is seen by, with their values in the other one.
+pub(super) fn in_other_order(checks: &mut [AuditCheck], other: &[(&str, f64)], meaning: &str) {
+    let failed = |name: &str| checks.iter().any(|check| check.name == name && !check.passed());
+    let seen: Vec<(&str, f64)> = other.iter().copied().filter(|(name, _)| failed(name)).collect();
+    if seen.iter().any(|(_, value)| value.is_nan() || *value > ROUNDING) {
+        return;
+    }
+    for check in checks.iter_mut().filter(|check| seen.iter().any(|(name, _)| *name == check.name)) {
+        check.code = Code::AuditLayout;
+        check.meaning = meaning.to_owned();
+    }
+}
+
 /// I9 of a body that does without W2 has no part that is symmetric in its axes, although the modes have mass.
 pub(super) fn lacks_w2(told: &Numbered) -> bool {
     let nf = told.i8.len();

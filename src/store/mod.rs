@@ -1,5 +1,4 @@
 //! The flex-body file: HDF5, one table for writer, reader, validator and documentation; the checkpoint of a search; the file of a simulation.
-//! The only room that names HDF5 for output.
 
 mod assemble;
 mod checkpoint;

@@ -3,7 +3,7 @@
 use crate::diagnostic::Code;
 use crate::error::Result;
 use crate::foreign::hdf5_arrays::Hdf5Arrays;
-use crate::foreign::redundant::{ROUNDING, Redundant, lacks_w2, relative, worst};
+use crate::foreign::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative, worst};
 use crate::foreign::{AuditCheck, Foreign, ForeignBody, ForeignFormat, ForeignFrame};
 use crate::input::InputFile;
 use crate::invariants::{Groups, Numbered};
@@ -231,28 +231,16 @@ impl Given {
         let by_axes = |axis: usize, mode: usize| axis * nf + mode;
         let other = self.numbered_with(by_axes);
         let redundant = Redundant::new(&other);
-        let wrong = |name: &str| checks.iter().any(|check| check.name == name && !check.passed());
-        let mixed = [
+        let seen_by = [
             ("phi_tilde_is_phi", self.phi_missed(by_axes)),
             ("x_psi_of_x_psi_tilde", redundant.i4_of_i8()),
             ("psi_tilde_psi_antisymmetric", redundant.i5_antisymmetric()),
             ("psi_tilde_psi_of_psi_tilde_psi_tilde", redundant.i5_of_i9()),
             ("modal_mass_of_psi_tilde_psi_tilde", redundant.i6_of_i9()),
         ];
-        // One that gets worse by the other order speaks against it.
-        let any = mixed.iter().any(|(name, by_other)| wrong(name) && *by_other <= ROUNDING);
-        let none = mixed.iter().all(|(name, by_other)| !wrong(name) || *by_other <= ROUNDING);
-        if !(any && none) {
-            return;
-        }
-        for check in checks.iter_mut().filter(|check| !check.passed()) {
-            if mixed.iter().any(|(name, _)| *name == check.name) {
-                check.code = Code::AuditLayout;
-                check.meaning =
-                    "rows and columns are ordered by axes, then modes; Exudyn takes them by modes, then axes"
-                        .to_owned();
-            }
-        }
+        let meaning =
+            "rows and columns are ordered by axes, then modes; Exudyn takes them by modes, then axes";
+        in_other_order(checks, &seen_by, meaning);
     }
 
     fn mtt_missed(&self) -> f64 {

@@ -15,8 +15,6 @@ pub(super) const COUPLING: [usize; 5] = [14, 15, 16, 17, 18];
 /// A body, and what was found on the way.
 pub(super) struct Read {
     pub(super) body: ForeignBody,
-    /// The invariants as they stand in the file: zeros where groups are missing.
-    pub(super) told: Numbered,
     pub(super) lumped: Option<Lumped>,
 }
 
@@ -25,28 +23,36 @@ pub(super) fn from_masses(records: &Records) -> bool {
     records.has(11) && !COUPLING.iter().any(|group| records.has(*group))
 }
 
+/// Groups of the coupling that are not there.
+pub(super) fn missing(records: &Records) -> Vec<String> {
+    COUPLING.iter().filter(|group| !records.has(**group)).map(usize::to_string).collect()
+}
+
 /// Mass, centre of mass and inertia come from group 12, or from lumped masses; `None` where both are missing.
 pub(super) fn body(records: &Records) -> Option<Read> {
     let nf = records.n_modes;
     let square = |values: &[f64]| Mat::from_fn(nf, nf, |i, j| values[i * nf + j]);
     let matrix = |group: usize| records.get(group).map(square);
     let lumped = lumped(records);
-    let mut told = match &lumped {
+    let mut inertia = match &lumped {
         Some(masses) if from_masses(records) => masses.told.clone(),
-        _ => file(records),
+        _ => file(records, Order::Rows),
     };
     // MBDyn leaves what group 12 says in its place.
     match (records.get(12), &lumped) {
-        (Some(values), _) => rigid(&mut told, values),
+        (Some(values), _) => rigid(&mut inertia, values),
         (None, Some(masses)) => {
-            (told.i1, told.i2, told.i7) = (masses.told.i1, masses.told.i2, masses.told.i7);
+            (inertia.i1, inertia.i2, inertia.i7) = (masses.told.i1, masses.told.i2, masses.told.i7);
         }
         (None, None) => return None,
     }
-    told.i6 = matrix(9)?;
+    inertia.i6 = matrix(9)?;
     let mut lacks: Vec<String> = Vec::new();
-    let mut inertia = told.clone();
-    if lacks_w2(&inertia) {
+    let missing = missing(records);
+    if !missing.is_empty() && !from_masses(records) {
+        lacks
+            .push(format!("the file lacks record groups {}: the body does without them", missing.join(", ")));
+    } else if lacks_w2(&inertia) {
         inertia.i9 = None;
         lacks.push("invariant 9 is zero: the body does without W2".to_owned());
     }
@@ -64,27 +70,48 @@ pub(super) fn body(records: &Records) -> Option<Read> {
         frames,
         lacks,
     };
-    Some(Read { body, told, lumped })
+    Some(Read { body, lumped })
+}
+
+/// Order of the entries of the matrices of three rows in groups 14 to 18.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    /// As MBDyn reads them.
+    Rows,
+    /// As its manual says.
+    Columns,
 }
 
 /// Groups 14 to 18 as they stand in the file.
-fn file(records: &Records) -> Numbered {
+fn file(records: &Records, order: Order) -> Numbered {
     let nf = records.n_modes;
-    let at = |group: usize, index: usize| records.get(group).map_or(0.0, |values| values[index]);
+    let at = |group: usize, a: usize, column: usize| {
+        let entry = |values: &[f64]| match order {
+            Order::Rows => values[a * (values.len() / 3) + column],
+            Order::Columns => values[3 * column + a],
+        };
+        records.get(group).map_or(0.0, entry)
+    };
+    let i9 = |row: usize, column: usize| at(18, row / nf, 3 * (row % nf * nf + column % nf) + column / nf);
+    let i5 = |row: usize, k: usize| at(17, row / nf, row % nf * nf + k);
+    // Large arrays are made only where the file has them.
     Numbered {
         i1: 0.0,
         i2: Vector3::zeros(),
-        i3: Mat::from_fn(3, nf, |a, j| at(14, a * nf + j)),
-        i4: Mat::from_fn(3, nf, |a, j| at(15, a * nf + j)),
-        i5: Some(Mat::from_fn(3 * nf, nf, |row, k| at(17, row * nf + k))),
+        i3: Mat::from_fn(3, nf, |a, j| at(14, a, j)),
+        i4: Mat::from_fn(3, nf, |a, j| at(15, a, j)),
+        i5: records.has(17).then(|| Mat::from_fn(3 * nf, nf, i5)),
         i6: Mat::zeros(nf, nf),
         i7: Matrix3::zeros(),
-        i8: (0..nf).map(|j| Matrix3::from_fn(|a, b| at(16, 3 * (a * nf + j) + b))).collect(),
-        i9: Some(Mat::from_fn(3 * nf, 3 * nf, |row, column| {
-            at(18, 3 * (row * nf + column % nf) + column / nf)
-        })),
-        groups: Groups::ALL,
+        i8: (0..nf).map(|j| Matrix3::from_fn(|a, b| at(16, a, 3 * j + b))).collect(),
+        i9: records.has(18).then(|| Mat::from_fn(3 * nf, 3 * nf, i9)),
+        groups: Groups { w1: records.has(16), ..Groups::ALL },
     }
+}
+
+/// The invariants that the file would tell in the order of columns, beside the same mass and modal mass.
+pub(super) fn by_columns(records: &Records, told: &Numbered) -> Numbered {
+    Numbered { i1: told.i1, i2: told.i2, i6: told.i6.clone(), i7: told.i7, ..file(records, Order::Columns) }
 }
 
 /// Mass, centre of mass, inertia about it.

@@ -1,10 +1,10 @@
 //! What the record groups must fulfil.
 
-use super::body::{COUPLING, Read, from_masses};
+use super::body::{COUPLING, Read, by_columns, from_masses, missing};
 use super::records::Records;
 use crate::diagnostic::Code;
 use crate::foreign::AuditCheck;
-use crate::foreign::redundant::{ROUNDING, Redundant, asymmetry, lacks_w2, relative, worst};
+use crate::foreign::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, relative, worst};
 
 /// Digits that a number may lack.
 const LOST: f64 = 1e-8;
@@ -15,7 +15,7 @@ const TERMS: f64 = 10.0;
 pub(super) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {
     let mut all = vec![digits(records)];
     all.extend(masses(records, read));
-    if COUPLING.iter().all(|group| records.has(*group)) {
+    if missing(records).is_empty() {
         all.extend(identities(records, read));
     } else if !from_masses(records) {
         all.push(coupling(records));
@@ -45,8 +45,7 @@ fn digits(records: &Records) -> AuditCheck {
 }
 
 fn coupling(records: &Records) -> AuditCheck {
-    let missing: Vec<String> =
-        COUPLING.iter().filter(|group| !records.has(**group)).map(usize::to_string).collect();
+    let missing = missing(records);
     AuditCheck {
         name: "coupling_there",
         formula: "record groups 14 to 18, share that is missing",
@@ -90,8 +89,9 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         .flat_map(|j| (0..nf).map(move |k| (j, k)))
         .map(|(j, k)| relative((own[(j, k)] - sums[(j, k)]).abs(), size(j, k)))
         .fold(0.0, worst);
-    let total = relative((read.told.i1 - lumped.told.i1).abs(), read.told.i1.abs());
-    let tensor = relative((read.told.i7 - lumped.told.i7).abs().max(), read.told.i7.abs().max());
+    let total = relative((read.body.inertia.i1 - lumped.told.i1).abs(), read.body.inertia.i1.abs());
+    let tensor =
+        relative((read.body.inertia.i7 - lumped.told.i7).abs().max(), read.body.inertia.i7.abs().max());
     let consistent = AuditCheck {
         name: "lumped_masses_carry_modes",
         formula: "record groups 9 and 12 = sums over the masses of record group 11",
@@ -107,7 +107,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
 
 /// What groups 9 and 14 to 18 tell twice.
 fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
-    let redundant = Redundant::new(&read.told);
+    let redundant = Redundant::new(&read.body.inertia);
     let limit = ROUNDING + TERMS * records.digits.rounding();
     let identity = |name, formula, value, meaning: &str| AuditCheck {
         name,
@@ -143,7 +143,7 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
             "pairs of modes couple to rotation in two ways: group 18 is transposed, or one of groups 17 and 18 has the other sign",
         ),
     ];
-    if !records.general && !lacks_w2(&read.told) {
+    if !records.general && read.body.inertia.i9.is_some() {
         let mut lumped = redundant.lumped(
             "modal_mass_of_i9",
             "modal mass = half the trace of -invariant 9_jk",
@@ -152,5 +152,17 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
         lumped.limit = limit;
         all.push(lumped);
     }
+    let columns = by_columns(records, &read.body.inertia);
+    let redundant = Redundant::new(&columns);
+    let seen_by = [
+        ("i4_of_i8", redundant.i4_of_i8()),
+        ("i5_antisymmetric", redundant.i5_antisymmetric()),
+        ("i9_symmetric", redundant.i9_symmetric()),
+        ("i5_of_i9", redundant.i5_of_i9()),
+        ("modal_mass_of_i9", redundant.i6_of_i9()),
+    ];
+    let meaning =
+        "groups 14 to 18 stand column by column, as the manual calls them; MBDyn reads them row by row";
+    in_other_order(&mut all, &seen_by, meaning);
     all
 }

@@ -145,7 +145,8 @@ impl Integrals {
 }
 
 fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ForeignFrame>> {
-    if !arrays.has(POSITIONS) {
+    // A place whose motion is not known is none.
+    if !(arrays.has(POSITIONS) && arrays.has(TRANSLATIONS)) {
         return Ok(Vec::new());
     }
     let positions = arrays.values::<f64>(POSITIONS)?.values;
@@ -162,14 +163,14 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ForeignFrame>> {
     if labels.len() != n {
         return Err(arrays.refuse(NUMBERS, &format!("expected {n} numbers, found {}", labels.len())));
     }
-    let mut shapes = |name: &str| arrays.has(name).then(|| arrays.matrix(name, 3 * n, nf)).transpose();
-    let (translations, rotations) = (shapes(TRANSLATIONS)?, shapes(ROTATIONS)?);
+    let translations = arrays.matrix(TRANSLATIONS, 3 * n, nf)?;
+    let rotations = arrays.has(ROTATIONS).then(|| arrays.matrix(ROTATIONS, 3 * n, nf)).transpose()?;
     let rows = |shapes: &Mat<f64>, i: usize| shapes.as_ref().subrows(3 * i, 3).to_owned();
     let frame = |(i, label): (usize, String)| ForeignFrame {
         label,
         interface: None,
         position: [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]],
-        translation: translations.as_ref().map_or_else(|| Mat::zeros(3, nf), |shapes| rows(shapes, i)),
+        translation: rows(&translations, i),
         rotation: rotations.as_ref().map(|shapes| rows(shapes, i)),
     };
     Ok(labels.into_iter().enumerate().map(frame).collect())
