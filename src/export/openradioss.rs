@@ -34,11 +34,8 @@ impl ExportFormat for OpenRadioss {
     }
 
     fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        let damping = if losses::is_damped(body) && rayleigh(body).is_none() {
-            Some("damping of the modes other than alpha M + beta K".to_owned())
-        } else {
-            None
-        };
+        let other = losses::is_damped(body) && rayleigh(body).is_none();
+        let damping = other.then(|| "damping of the modes other than alpha M + beta K".to_owned());
         [
             losses::plane(body),
             // Its velocities lack what the rotation makes of the deformation (`fxbodvp.F`).
@@ -99,7 +96,7 @@ impl Deck {
         let damping = losses::is_damped(body).then(|| rayleigh(body)).flatten();
         let mut deck = Self(String::new());
         deck.remark("flexible body of /FXBODY, written by flexbody");
-        deck.remark("   NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
+        deck.remark("  NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
         deck.integers(&[nf, 0, frames.len(), turning.into(), damping.is_some().into(), 0, 0], 7);
         deck.remark("nodes");
         deck.place(body, "the main node, which is not one of these,", &[0.0; 3]);
