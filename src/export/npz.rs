@@ -63,12 +63,10 @@ fn archive(members: Vec<(&str, Vec<u8>)>) -> zip::result::ZipResult<Vec<u8>> {
 /// One array in row-major order.
 fn npy<const N: usize>(kind: &str, shape: &[usize], values: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
     let extents: String = shape.iter().map(|extent| format!("{extent}, ")).collect();
-    let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({extents}), }}");
-    // The numbers begin at a multiple of 64.
-    while (PREFIX + header.len() + 1) % 64 != 0 {
-        header.push(' ');
-    }
-    header.push('\n');
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({extents}), }}");
+    // A line, after which the numbers begin at a multiple of 64.
+    let width = (PREFIX + header.len() + 1).next_multiple_of(64) - PREFIX - 1;
+    let header = format!("{header:<width$}\n");
     let length = u16::try_from(header.len()).expect("a few extents");
     let mut member = b"\x93NUMPY\x01\x00".to_vec();
     member.extend(length.to_le_bytes());

@@ -34,11 +34,8 @@ impl ExportFormat for OpenRadioss {
     }
 
     fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        let damping = if losses::is_damped(body) && rayleigh(body).is_none() {
-            Some("damping of the modes other than alpha M + beta K".to_owned())
-        } else {
-            None
-        };
+        let other = losses::is_damped(body) && rayleigh(body).is_none();
+        let damping = other.then(|| "damping of the modes other than alpha M + beta K".to_owned());
         [
             losses::plane(body),
             // Its velocities lack what the rotation makes of the deformation (`fxbodvp.F`).
@@ -99,11 +96,15 @@ impl Deck {
         let damping = losses::is_damped(body).then(|| rayleigh(body)).flatten();
         let mut deck = Self(String::new());
         deck.remark("flexible body of /FXBODY, written by flexbody");
-        deck.remark("   NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
+        deck.remark("  NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
         deck.integers(&[nf, 0, frames.len(), turning.into(), damping.is_some().into(), 0, 0], 7);
         deck.remark("nodes");
-        for frame in frames.iter().filter(|frame| frame.name.is_some()) {
-            deck.place(body, frame);
+        deck.place(body, "the main node, which is not one of these,", &[0.0; 3]);
+        for frame in frames {
+            if let Some(name) = &frame.name {
+                let which = format!("node {} of {}", frame.id, name.escape_default());
+                deck.place(body, &which, &frame.position);
+            }
         }
         let ids: Vec<i64> = frames.iter().map(|frame| frame.id).collect();
         deck.integers(&ids, 10);
@@ -187,12 +188,11 @@ impl Deck {
         writeln!(self.0, "# {text}").expect("writing to a String cannot fail");
     }
 
-    /// Where the deck must have the node of an interface.
-    fn place(&mut self, body: &FlexBody, frame: &ExportFrame) {
-        let frame_of = body.frame();
-        let [x, y, z] = (frame_of.origin + frame_of.axes * Vector3::from(frame.position)).into();
-        let name = frame.name.as_deref().unwrap_or_default().escape_default();
-        self.remark(&format!("node {} of {name} lies at {x:e} {y:e} {z:e} of the model", frame.id));
+    /// Where the deck must have a node.
+    fn place(&mut self, body: &FlexBody, which: &str, position: &[f64; 3]) {
+        let frame = body.frame();
+        let [x, y, z] = (frame.origin + frame.axes * Vector3::from(*position)).into();
+        self.remark(&format!("{which} lies at {x:e} {y:e} {z:e} of the model"));
     }
 
     fn integers<T: std::fmt::Display>(&mut self, values: &[T], per_line: usize) {

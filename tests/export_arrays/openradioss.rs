@@ -242,9 +242,9 @@ fn stiffness_damping_and_frequency_are_those_of_the_body_and_rigid_motion_strain
         assert!(near(fxb.highest, highest), "{name}");
         if let Some([alpha, beta]) = fxb.damping {
             damped += 1;
-            for j in 0..lambda.len() {
-                let own = 2.0 * body.modes().damping_ratio[j] * lambda[j].sqrt();
-                assert!((alpha + beta * lambda[j] - own).abs() <= 1e-9 * own, "{name}, mode {j}");
+            for (lambda, ratio) in lambda.iter().zip(&body.modes().damping_ratio) {
+                let own = 2.0 * ratio * lambda.sqrt();
+                assert!((alpha + beta * lambda - own).abs() <= 1e-9 * own, "{name}");
             }
         }
         let Motion { rotation, velocity, omega, .. } = motion(&mut random, body);

@@ -87,6 +87,7 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
         ));
         all.push(("a plane solid".to_owned(), free(rectangle(5, 2, 0.7, [1.0, 2.0]))));
         let (solid, general) = (soft_block(5), all[6].1.clone());
+        all.push(("soft block in short floats".to_owned(), solid.rounded_to_f32().expect("a body")));
         for groups in combinations() {
             all.push((format!("soft block with {groups:?}"), with_groups(&solid, groups)));
             all.push((format!("{} with {groups:?}", all[6].0), with_groups(&general, groups)));
