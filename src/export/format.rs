@@ -73,7 +73,7 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] = &[];
+pub const FORMATS: &[&dyn ExportFormat] = &[&super::Sid];
 
 /// The format of that name.
 ///

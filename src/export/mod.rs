@@ -3,6 +3,8 @@
 mod format;
 mod frames;
 mod losses;
+mod sid;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
+pub use sid::Sid;
