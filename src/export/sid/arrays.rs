@@ -60,9 +60,8 @@ fn blocks(nrow: usize, nf: usize, order: Blocks, of: impl Fn(usize, usize, usize
 pub(super) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
     let Numbered { i2, i3, i4, i5, i6, i7, i8, i9, .. } = body.invariants().numbered();
     let nf = body.n_modes();
-    let [acceleration, turn, spin] =
-        [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin]
-            .map(|kind| stiffness(body, &kind));
+    let [acceleration, turn, spin] = [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin]
+        .map(|kind| stiffness(body, &kind));
     let of = |k: &Option<Vec<Mat<f64>>>, component: usize, i: usize, j: usize| {
         k.as_ref().map_or(0.0, |k| k[component][(i, j)])
     };
@@ -81,9 +80,7 @@ pub(super) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
         if a == b { -0.5 * w1[k][(a, a)] } else { -w1[k][(a, b)] }
     };
     let mut ct = Taylor::constant("Ct", Mat::from_fn(nf, 3, |k, a| i3[(a, k)]));
-    ct.m1 = acceleration
-        .as_ref()
-        .map(|stiff| per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| stiff[a][(k, l)])));
+    ct.m1 = acceleration.as_ref().map(|stiff| per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| stiff[a][(k, l)])));
     let [first_moment, inertia_name] = dialect.moments;
     vec![
         Taylor::linear(
@@ -97,11 +94,7 @@ pub(super) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
             } else {
                 super::text::Structure::Full
             },
-            ..Taylor::linear(
-                inertia_name,
-                inertia(dialect, &i7),
-                per_mode(nf, |k| inertia(dialect, &w1[k])),
-            )
+            ..Taylor::linear(inertia_name, inertia(dialect, &i7), per_mode(nf, |k| inertia(dialect, &w1[k])))
         },
         ct,
         Taylor::linear(

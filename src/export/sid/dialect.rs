@@ -66,5 +66,4 @@ pub(super) const DIALECTS: [Dialect; 4] = [
 ];
 
 /// Their names.
-pub(super) const NAMES: [&str; 4] =
-    [DIALECTS[0].name, DIALECTS[1].name, DIALECTS[2].name, DIALECTS[3].name];
+pub(super) const NAMES: [&str; 4] = [DIALECTS[0].name, DIALECTS[1].name, DIALECTS[2].name, DIALECTS[3].name];

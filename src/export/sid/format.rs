@@ -6,7 +6,7 @@ use super::text::Text;
 use crate::error::Result;
 use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, plane};
 use crate::export::{ExportFormat, ExportOptions, Exported};
-use crate::flex_body::FlexBody;
+use crate::flex_body::{FlexBody, Group};
 use crate::model::{LoadKind, UnitLoad};
 
 /// SID_FEM text (Wallrapp, Standard Input Data of flexible members in multibody systems, 1993). The equations of SID have the inertia
@@ -76,10 +76,8 @@ fn file(body: &FlexBody, options: &ExportOptions, dialect: &Dialect) -> String {
 
 /// What the rest of the file does not tell: dialect, units, what Oe1 holds beside W2, name.
 fn comment(body: &FlexBody, dialect: &Dialect) -> String {
-    let mut facts = vec![
-        concat!("flexbody ", env!("CARGO_PKG_VERSION")).to_owned(),
-        format!("dialect {}", dialect.name),
-    ];
+    let mut facts =
+        vec![concat!("flexbody ", env!("CARGO_PKG_VERSION")).to_owned(), format!("dialect {}", dialect.name)];
     let units = body.units();
     if units.stated {
         let [length, mass, time] = [&units.length, &units.mass, &units.time].map(|unit| unit.name());
@@ -90,6 +88,11 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
     }
     if body.invariants().general.is_some() {
         facts.push("general mass".to_owned());
+    }
+    let groups = body.groups();
+    let without: Vec<&str> = Group::ALL.iter().filter(|g| !groups.has(**g)).map(|g| g.name()).collect();
+    if !without.is_empty() {
+        facts.push(format!("without {}", without.join(" ")));
     }
     let name = &body.source().name;
     if !name.is_empty() {

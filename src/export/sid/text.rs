@@ -114,10 +114,8 @@ impl<'d> Text<'d> {
                         continue;
                     }
                     let (middle, last) = if self.dialect.mode_last { (j, k) } else { (k, j) };
-                    let (key, value) = (
-                        format!("m1({:2},{:2},{:2})", i + 1, middle + 1, last + 1),
-                        self.number(value),
-                    );
+                    let (key, value) =
+                        (format!("m1({:2},{:2},{:2})", i + 1, middle + 1, last + 1), self.number(value));
                     self.value(inner, &key, value);
                 }
             }
