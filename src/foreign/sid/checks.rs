@@ -91,15 +91,6 @@ pub(super) fn checks(
             ),
         );
     }
-    if there(&["Gr", "Cr0"]) {
-        let rounding = gr_rounding + arrays.cr.rounding[0];
-        all.push(Missed { by: odd, scale: scale(bound_r, &[gr, arrays.cr.sizes()[0]]), rounding }.check(
-            "gr_skew_is_cr0",
-            "skew(Gr_k) = -(Cr0_k)~",
-            Code::AuditIdentity,
-            "the gyroscopic torque does not belong to the coupling of rotation and modes",
-        ));
-    }
     let (ge, cr1) = (arrays.ge.sizes()[0], arrays.cr.sizes()[1]);
     let ge_rounding = arrays.ge.rounding[0] + 2.0 * arrays.cr.rounding[1];
     let ge_scale = scale(bound_e, &[ge, cr1]);
@@ -116,6 +107,7 @@ pub(super) fn checks(
     if there(&["Oe0", "J1"]) {
         all.extend(constant_centrifugal(arrays, scale(bound_r, &[oe[0], arrays.inertia.sizes()[1]])));
     }
+    let mut two_masses = false;
     let mut spin_in_oe = declared.stiffened == Some(true) || declared.general;
     if there(&["Oe1"]) {
         all.push(symmetric_in_modes(
@@ -130,9 +122,27 @@ pub(super) fn checks(
             spin_in_oe |= !sum.passed();
             // Where the file says that there is more in Oe1, nothing has to fit.
             if !(declared.stiffened == Some(true) || declared.general) {
+                two_masses = !sum.passed();
                 all.push(sum);
             }
         }
+    }
+    if there(&["Gr", "Cr0"]) {
+        let rounding = gr_rounding + arrays.cr.rounding[0];
+        // Where Oe1 does not belong to Me either, the two come from two masses.
+        let (code, meaning) = if two_masses {
+            (
+                Code::AuditLumped,
+                "the gyroscopic torque and the coupling of rotation and modes come from different masses",
+            )
+        } else {
+            (
+                Code::AuditIdentity,
+                "the gyroscopic torque does not belong to the coupling of rotation and modes",
+            )
+        };
+        let missed = Missed { by: odd, scale: scale(bound_r, &[gr, arrays.cr.sizes()[0]]), rounding };
+        all.push(missed.check("gr_skew_is_cr0", "skew(Gr_k) = -(Cr0_k)~", code, meaning));
     }
     if arrays.ct.m1.is_some() {
         all.push(symmetric_in_modes(

@@ -77,8 +77,9 @@ impl<'t> Listed<'t> {
         let (mut comment, mut stated) = (String::new(), None);
         if line.key != "part" {
             let first = text.lines().nth(line.number - 1).unwrap_or("");
+            // `21 4 :No. nodes, No. modes:free text`
             let (counts, rest) = first.split_once(':').unwrap_or((first, ""));
-            comment = rest.trim().to_owned();
+            comment = rest.split_once(':').map_or(rest, |(_, text)| text).trim().to_owned();
             let counts: Vec<Option<usize>> =
                 counts.split_whitespace().map(|count| count.parse().ok()).collect();
             stated = match counts[..] {
