@@ -23,7 +23,7 @@ impl Array {
         };
         let (m0, m1) = (object.constant(shape), object.linear(shape, listed.nq, listed.modes));
         let sizes = [largest(&m0), m1.iter().flatten().map(largest).fold(0.0, f64::max)];
-        let rounding = [0, 1].map(|at| object.digits[at].rounding(file, sizes[at]));
+        let rounding = [0, 1].map(|at| file.rounding(sizes[at]));
         Self { m0, m1, rounding }
     }
 
@@ -74,7 +74,7 @@ impl Arrays {
         Self {
             nq: listed.nq,
             mass: listed.mass,
-            mass_rounding: listed.mass_digits.rounding(file, listed.mass.abs()),
+            mass_rounding: file.rounding(listed.mass.abs()),
             first_moment: array("mdcm"),
             inertia: array("j"),
             ct: array("ct"),

@@ -51,7 +51,6 @@ pub(super) struct Listed<'t> {
     /// Number of frames by the first line.
     pub(super) stated_frames: Option<usize>,
     pub(super) mass: f64,
-    pub(super) mass_digits: Digits,
     pub(super) nq: usize,
     /// (mode from 0, text).
     pub(super) mode_texts: Vec<(usize, &'t str)>,
@@ -147,7 +146,6 @@ impl<'t> Listed<'t> {
             comment,
             stated_frames: stated.map(|(nodes, _)| nodes),
             mass: refmod.mass,
-            mass_digits: refmod.digits,
             nq,
             mode_texts: refmod.texts,
             frames,
@@ -177,7 +175,7 @@ impl<'t> Listed<'t> {
 
     /// The digits of the whole file.
     pub(super) fn digits(&self) -> Digits {
-        self.all_objects().flat_map(|object| object.digits).fold(self.mass_digits, Digits::most)
+        self.all_objects().map(|object| object.digits).fold(Digits::default(), Digits::most)
     }
 
     /// Where `m1` has the mode: columns of one number tell, of three modes where there are three columns nothing does.
@@ -240,7 +238,6 @@ fn expect(lines: &Lines<'_>, line: &Line<'_>, key: &str) -> Result<(), Diagnosti
 
 struct Refmod<'t> {
     mass: f64,
-    digits: Digits,
     nq: usize,
     texts: Vec<(usize, &'t str)>,
 }
@@ -269,10 +266,8 @@ impl<'t> Refmod<'t> {
             }
         };
         let missing = |what: &str| lines.unreadable(end, format!("`refmod` has no `{what}`"));
-        let (mass, text) = mass.ok_or_else(|| missing("mass"))?;
-        let mut digits = Digits::default();
-        digits.see(text);
-        Ok(Self { mass, digits, nq: nq.ok_or_else(|| missing("nelastq"))?, texts })
+        let (mass, _) = mass.ok_or_else(|| missing("mass"))?;
+        Ok(Self { mass, nq: nq.ok_or_else(|| missing("nelastq"))?, texts })
     }
 }
 

@@ -25,8 +25,8 @@ pub(super) struct Taylor {
     structure: usize,
     m0: Vec<Entry>,
     m1: Vec<Entry>,
-    /// How `m0` and `m1` are written.
-    pub(super) digits: [Digits; 2],
+    /// How its entries are written.
+    pub(super) digits: Digits,
 }
 
 /// Where `m1` has the index of the mode.
@@ -54,7 +54,7 @@ impl Taylor {
         let (name, end) = (head.key.clone(), format!("end {}", head.key));
         let mut sizes: [Option<usize>; 6] = [None; 6];
         let (mut m0, mut m1) = (Vec::new(), Vec::new());
-        let mut digits = [Digits::default(); 2];
+        let mut digits = Digits::default();
         loop {
             let line = lines.next(&name)?;
             if line.key == end {
@@ -71,7 +71,7 @@ impl Taylor {
                 return Err(lines.unreadable(line.number, message));
             };
             let (value, text) = lines.number(&line)?;
-            digits[order].see(text);
+            digits.see(text);
             [&mut m0, &mut m1][order].push(Entry { index, line: line.number, value });
         }
         let of = |at: usize| {
