@@ -17,6 +17,7 @@ pub mod error;
 pub mod export;
 pub mod flex_body;
 pub mod foreign;
+mod hdf5_file;
 pub mod input;
 pub mod integration;
 pub mod invariants;

@@ -39,7 +39,7 @@ const BASE: &[&str] = &["diagnostic", "error"];
 
 /// Crates, or parts of crates, that only these rooms may name.
 const OWNED: &[(&[&str], &[&str])] = &[
-    (&["hdf5_metno"], &["input", "store", "export", "foreign"]),
+    (&["hdf5_metno"], &["hdf5_file", "input", "store", "export", "foreign"]),
     (&["faer", "sparse"], &["linalg"]),
     (&["metis_sys"], &["linalg"]),
     (&["clap"], &["cli"]),

@@ -4,7 +4,8 @@
 //! A case is a folder with a `model.toml`, or with a file `args` (one command-line argument per line), and
 //! `expected.txt`: what `flexbody convert` prints to stderr, warnings of a case that succeeds included. With a `scene.toml` it is what
 //! `flexbody simulate` prints of it, for four modes of the model of `fixtures/models` that the file `body` names; with a file `select` too,
-//! what `flexbody select` prints. A new case needs no code. `FLEXBODY_BLESS=1 cargo test --test bad_input` writes the reports; read the difference.
+//! what `flexbody select` prints; with a file `export` (arguments) what `flexbody export` prints. With a file `audit` (arguments) it is what
+//! `flexbody audit` finds. A new case needs no code. `FLEXBODY_BLESS=1 cargo test --test bad_input` writes the reports; read the difference.
 
 use flexbody::diagnostic::Code;
 use std::collections::BTreeSet;
@@ -41,6 +42,8 @@ fn convert(model: &str, body: &Path) {
 fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
     let (input_folder, output_folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let selects = case.join("select").exists();
+    let exports = fs::read_to_string(case.join("export")).ok();
+    let audits = fs::read_to_string(case.join("audit")).ok();
     let (option, file) = if selects { ("--report", "report.json") } else { ("--output", "body.flex.h5") };
     let output = output_folder.path().join(file);
     let before = entries(case);
@@ -48,13 +51,29 @@ fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
     if let Ok(model) = fs::read_to_string(case.join("body")) {
         let body = input_folder.path().join("body.flex.h5");
         convert(model.trim(), &body);
-        command.arg(if selects { "select" } else { "simulate" }).arg(body).args(["--scene", "scene.toml"]);
+        match &exports {
+            Some(arguments) => command.arg("export").arg(body).args(arguments.lines()),
+            None => command
+                .arg(if selects { "select" } else { "simulate" })
+                .arg(body)
+                .args(["--scene", "scene.toml"]),
+        };
+    } else if let Some(arguments) = &audits {
+        command.arg("audit").args(arguments.lines());
     } else {
         let inputs = fs::read_to_string(case.join("args")).unwrap_or_else(|_| "model.toml".to_owned());
         command.arg("convert").args(inputs.lines());
     }
-    let run = command.arg(option).arg(&output).current_dir(case).output().unwrap();
-    let report = String::from_utf8(run.stderr).unwrap();
+    if audits.is_none() {
+        command.arg(option).arg(&output);
+    }
+    let run = command.current_dir(case).output().unwrap();
+    let mut report = String::from_utf8(run.stderr).unwrap();
+    if audits.is_some() {
+        // What an audit finds is its result.
+        let found = String::from_utf8(run.stdout).unwrap();
+        report.push_str(found.find("error[").map_or("", |at| &found[at..]));
+    }
     if bless {
         fs::write(case.join("expected.txt"), &report).unwrap();
     }
@@ -77,7 +96,7 @@ fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
         wrong.push(format!("exit code {:?}, {promised} is promised", run.status.code()));
     }
     let left: Vec<PathBuf> = entries(output_folder.path());
-    if left.len() != usize::from(promised == 0) {
+    if left.len() != usize::from(promised == 0 && audits.is_none()) {
         wrong.push(format!("left on disk: {left:?}"));
     }
     if !bless && entries(case) != before {

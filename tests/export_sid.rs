@@ -4,9 +4,9 @@ mod support;
 
 use faer::Mat;
 use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::export::{ExportFormat, ExportOptions, Points, Sid, export};
+use flexbody::export::{ExportFormat, ExportOptions, Points, export, find_format};
 use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::foreign::{Foreign, ForeignFormat, SidFile};
+use flexbody::foreign::{Foreign, find_foreign};
 use flexbody::input::InputFile;
 use flexbody::invariants::BodyFrame;
 use flexbody::model::{GeometricStiffness, LoadKind, UnitLoad};
@@ -30,6 +30,10 @@ fn models() -> Vec<String> {
     names
 }
 
+fn sid() -> &'static dyn ExportFormat {
+    find_format("sid").expect("a format")
+}
+
 /// The body of a model, with random geometric stiffness for the motion of its frame in place of its own.
 fn strained(model: &str, random: &mut Random) -> FlexBody {
     let mut parts = fixture(model, MODES, BodyFrame::Model).into_parts();
@@ -42,7 +46,7 @@ fn dialect(name: &str) -> ExportOptions {
 }
 
 fn text(body: &FlexBody, options: &ExportOptions) -> String {
-    let (exported, _) = export(body, &Sid, options, true).expect("exports");
+    let (exported, _) = export(body, sid(), options, true).expect("exports");
     String::from_utf8(exported.file).expect("text")
 }
 
@@ -51,8 +55,9 @@ fn read(text: &str) -> Foreign {
     let path = folder.path().join("body.SID_FEM");
     std::fs::write(&path, text).expect("writes");
     let file = InputFile::open(&path).expect("opens");
-    assert!(SidFile.recognises(&file));
-    SidFile.read(&file).unwrap_or_else(|e| panic!("{e}"))
+    let format = find_foreign("sid").expect("a format");
+    assert!(format.recognises(&file));
+    format.read(&file).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// max |a - b| beside max |b|.
@@ -264,7 +269,7 @@ fn every_dialect_of_every_fixture_is_read_back_as_the_body() {
         let mut random = Random(3);
         let bodies = [plain, strained(&model, &mut random)];
         for (body, own_stiffness) in bodies.iter().zip([false, true]) {
-            for name in Sid.dialects() {
+            for name in sid().dialects() {
                 let options = dialect(name);
                 let foreign = read(&text(body, &options));
                 assert_eq!(foreign.dialect, *name, "{model}");
@@ -317,7 +322,7 @@ fn the_equations_of_the_file_are_those_of_the_body_to_first_order() {
         let own = fixture(&model, MODES, BodyFrame::Model);
         let mut random = Random(17);
         for body in [&own, &strained(&model, &mut random)] {
-            for name in Sid.dialects() {
+            for name in sid().dialects() {
                 let arrays = Arrays::new(&text(body, &dialect(name)), name, MODES);
                 // Undeformed and at rest of the modes: exact.
                 let rest = State { qd: vec![0.0; MODES], ..State::random(body, 0.0, &mut random) };
@@ -359,7 +364,7 @@ fn modal_forces_of_solids_are_exact_at_any_deformation() {
     for model in ["bracket_hex20", "cube_hex8", "gear_disc"] {
         let body = fixture(model, MODES, BodyFrame::Model);
         let mut random = Random(5);
-        for name in Sid.dialects() {
+        for name in sid().dialects() {
             let arrays = Arrays::new(&text(&body, &dialect(name)), name, MODES);
             for _ in 0..3 {
                 let state = State::random(&body, 0.3, &mut random);
@@ -385,7 +390,7 @@ fn bodies_without_groups_and_with_damping_are_written() {
     let mut parts = body.into_parts();
     parts.modes.damping_ratio = vec![0.02; MODES];
     let damped = FlexBody::new(parts).expect("valid parts");
-    for name in Sid.dialects() {
+    for name in sid().dialects() {
         let found = read(&text(&damped, &dialect(name))).body.modal_damping.expect("damping");
         for (j, eigenvalue) in damped.modes().eigenvalue.iter().enumerate() {
             assert_eq!(found[(j, j)], 2.0 * 0.02 * eigenvalue.sqrt());
@@ -404,7 +409,7 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
         [(Points::Usual, 2), (Points::Nodes, body.n_nodes()), (Points::Some(vec![some]), 1)]
     {
         let options = ExportOptions { dialect: None, points: points.clone() };
-        let losses = Sid.losses(&body, &options);
+        let losses = sid().losses(&body, &options);
         // Forces at the tip need its reference point.
         assert_eq!(losses.is_empty(), points == Points::Usual, "{losses:?}");
         let foreign = read(&text(&body, &options)).body;
@@ -430,14 +435,15 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
 
 #[test]
 fn what_cannot_be_held_is_told() {
-    let said = |model: &str| Sid.losses(&fixture(model, MODES, BodyFrame::Model), &ExportOptions::default());
+    let said =
+        |model: &str| sid().losses(&fixture(model, MODES, BodyFrame::Model), &ExportOptions::default());
     assert!(said("bracket_hex20").is_empty() && said("turbine_blade").is_empty());
     assert!(said("plane_frame").iter().any(|loss| loss.contains("plane")));
     assert!(said("frame_beams").iter().any(|loss| loss.contains("W0")), "{:?}", said("frame_beams"));
     let body = fixture("bracket_hex20", MODES, BodyFrame::Model);
     let body = stressed(body, &[LoadKind::Named("bolts".to_owned())], 1.0, &mut Random(2));
-    let refused = export(&body, &Sid, &ExportOptions::default(), false).expect_err("a load without a place");
+    let refused = export(&body, sid(), &ExportOptions::default(), false).expect_err("a load without a place");
     assert!(refused.to_string().contains("FB720") && refused.to_string().contains("bolts"), "{refused}");
-    let (_, warnings) = export(&body, &Sid, &ExportOptions::default(), true).expect("with the loss");
+    let (_, warnings) = export(&body, sid(), &ExportOptions::default(), true).expect("with the loss");
     assert_eq!(warnings.len(), 1);
 }

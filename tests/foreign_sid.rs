@@ -4,8 +4,8 @@ mod support;
 
 use flexbody::diagnostic::Code;
 use flexbody::error::Error;
-use flexbody::export::{ExportFormat, ExportOptions, Points, Sid, export};
-use flexbody::foreign::{Foreign, ForeignFormat, SidFile};
+use flexbody::export::{ExportOptions, Points, export, find_format};
+use flexbody::foreign::{Foreign, ForeignFormat, audit, find_foreign, recognise};
 use flexbody::input::InputFile;
 use flexbody::invariants::BodyFrame;
 use proptest::prelude::*;
@@ -17,24 +17,29 @@ use support::flexible::fixture;
 static FILES: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     let body = fixture("bracket_hex20", 3, BodyFrame::Model);
     let points = Points::Some(body.nodes().ids.iter().step_by(97).copied().collect());
+    let sid = find_format("sid").expect("a format");
     let write = |name: &&'static str| {
         let options = ExportOptions { dialect: Some((*name).to_owned()), points: points.clone() };
-        let (exported, losses) = export(&body, &Sid, &options, false).expect("nothing is lost");
+        let (exported, losses) = export(&body, sid, &options, false).expect("nothing is lost");
         assert!(losses.is_empty());
         (*name, String::from_utf8(exported.file).expect("text"))
     };
-    Sid.dialects().iter().map(write).collect()
+    sid.dialects().iter().map(write).collect()
 });
 
 fn file(dialect: &str) -> &'static str {
     &FILES.iter().find(|(name, _)| *name == dialect).expect("a dialect").1
 }
 
+fn reader() -> &'static dyn ForeignFormat {
+    find_foreign("sid").expect("a format")
+}
+
 fn try_read(bytes: &[u8]) -> Result<Foreign, Error> {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("body.SID_FEM");
     std::fs::write(&path, bytes).expect("writes");
-    SidFile.read(&InputFile::open(&path).map_err(Error::from)?)
+    reader().read(&InputFile::open(&path).map_err(Error::from)?)
 }
 
 fn read(text: &str) -> Foreign {
@@ -242,18 +247,6 @@ fn every_fault_gives_the_finding_that_names_it() {
             vec!["FB741 oe1_is_me"],
         ),
         (
-            "frames in millimetres",
-            |object, key, v| {
-                if object == "origin" && key.starts_with("m0") {
-                    scaled(key, v, 1000.0)
-                } else {
-                    same(key, v)
-                }
-            },
-            vec!["FB744 extent"],
-        ),
-        ("frequencies in radians", in_radians, vec!["FB744 frequencies"]),
-        (
             "forces at frames do other work",
             |object, key, v| {
                 if object == "phi" && key == "m0(1,2)" { scaled(key, v, 1.001) } else { same(key, v) }
@@ -283,6 +276,13 @@ fn every_fault_gives_the_finding_that_names_it() {
             assert!(finding.is_none_or(|finding| finding.message().contains(check.formula)));
         }
     }
+    // Of every format: lengths in two units.
+    let millimetres = read(&edited(text, |object, key, v| {
+        if object == "origin" && key.starts_with("m0") { scaled(key, v, 1000.0) } else { same(key, v) }
+    }));
+    let found = audit(&millimetres, 1e-6).findings();
+    assert!(found.iter().any(|finding| finding.code() == Code::AuditUnits), "{found:?}");
+    assert!(audit(&read(text), 1e-6).passed());
     assert!(read(&edited(text, in_radians)).checks.iter().any(|check| check.meaning.contains("2 pi")));
 }
 
@@ -372,8 +372,8 @@ fn samples_of_other_programs_have_the_findings_that_they_are_known_for() {
             continue;
         }
         let file = InputFile::open(&path).expect("opens");
-        assert!(SidFile.recognises(&file));
-        let foreign = SidFile.read(&file).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(recognise(&file).expect("a format").name(), "sid");
+        let foreign = reader().read(&file).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!((foreign.dialect.as_str(), foreign.body.n_modes()), (dialect, modes));
         assert_eq!(findings(&foreign), expected, "{name}");
         assert!(foreign.body.modal_damping.is_some());

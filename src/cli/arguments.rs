@@ -1,5 +1,8 @@
 //! What can be said on the command line.
 
+use crate::export::{ExportFormat, FORMATS};
+use crate::foreign::FOREIGN_FORMATS;
+use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -46,6 +49,77 @@ pub enum Command {
         after_help = "Examples:\n  flexbody trade rod.flex.h5 --scene tumble.toml --report trade.html\n  flexbody trade model.toml --modes 20 --scene tumble.toml --reference nodal --csv trade.csv"
     )]
     Trade(TradeArguments),
+    /// Write a body in the format of another program
+    #[command(
+        after_help = "Examples:\n  flexbody export rod.flex.h5 --to exudyn -o rod.hdf5\n  flexbody export rod.flex.h5 --to sid --dialect py-sid --points interfaces -o rod.SID_FEM"
+    )]
+    Export(ExportArguments),
+    /// Check a flexible-body file of another program: dialect, identities, digits, units, in plain words
+    #[command(after_help = "Example:\n  flexbody audit rod.SID_FEM")]
+    Audit(AuditArguments),
+}
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Format to write
+    #[arg(long, value_name = "FORMAT", value_parser = export_formats())]
+    pub to: String,
+    /// Variant of the format, of those named above [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub dialect: Option<String>,
+    /// Places of the body to write: nodes, interfaces, or node numbers with commas [default: the interfaces where the format has frames and the body interfaces, else all nodes]
+    #[arg(long, value_name = "POINTS")]
+    pub points: Option<String>,
+    /// Units to write in [default: those of the body]
+    #[arg(long, value_name = "L,M,T")]
+    pub to_units: Option<String>,
+    /// Write the file although the format cannot hold all of the body
+    #[arg(long)]
+    pub allow_loss: bool,
+    /// File to write; files that belong beside it have its name and another extension
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Names of the formats, each with what reads it and its dialects.
+fn export_formats() -> clap::builder::PossibleValuesParser {
+    let value = |format: &&dyn ExportFormat| {
+        let dialects = match format.dialects() {
+            [] => String::new(),
+            dialects => format!(" (dialects: {})", dialects.join(", ")),
+        };
+        PossibleValue::new(format.name()).help(format!("{}{dialects}", format.reader()))
+    };
+    FORMATS.iter().map(value).collect::<Vec<_>>().into()
+}
+
+/// Arguments of `audit`.
+#[derive(Debug, Args)]
+pub struct AuditArguments {
+    /// SID_FEM, MBDyn .fem, MBSim or Exudyn file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Format of the file [default: by its content]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats())]
+    pub from: Option<String>,
+    /// Identities pass up to this, relative to the size of their terms
+    #[arg(long, value_name = "REL", default_value_t = 1e-6, value_parser = positive)]
+    pub tolerance: f64,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Names of the formats that are read.
+fn foreign_formats() -> clap::builder::PossibleValuesParser {
+    FOREIGN_FORMATS.iter().map(|format| PossibleValue::new(format.name())).collect::<Vec<_>>().into()
 }
 
 /// Arguments of `trade`.
@@ -135,9 +209,12 @@ pub struct SimulateArguments {
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Manifest of the model (see docs/input.md)
-    #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "units", "dimension"])]
+    /// Manifest of the model (see docs/input.md); with --from the file of another program
+    #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
     pub model: Option<PathBuf>,
+    /// Take the body of a file of another program instead of making one
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "frame", "lumped", "lumped_modes", "scene", "checkpoint", "split"])]
+    pub from: Option<String>,
     /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
     pub stiffness: Option<PathBuf>,
@@ -150,8 +227,8 @@ pub struct ConvertArguments {
     /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub dofs: Option<PathBuf>,
-    /// Units of length, mass and time [default: m,kg,s, not checked]
-    #[arg(long, value_name = "L,M,T", requires = "stiffness")]
+    /// Units of length, mass and time of --stiffness or --from [default: m,kg,s, not checked]
+    #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
     /// 2 for a plane model, with x and y only [default: 3]
     #[arg(long, value_name = "N", requires = "stiffness", value_parser = clap::value_parser!(u8).range(2..=3))]

@@ -1,5 +1,6 @@
 //! `flexbody convert`.
 
+use super::adopt;
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
 use super::checkpoint::resume;
 use super::output::{Outcome, tell};
@@ -28,6 +29,9 @@ use crate::tailoring::{Tailoring, convert_for_scene};
 use crate::units::UnitSystem;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
+    if let Some(from) = &arguments.from {
+        return adopt::run(arguments, from);
+    }
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // What the command line says replaces what the manifest says.
@@ -371,6 +375,10 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
 
 fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
+        (Some(_), ..) if arguments.units.is_some() => {
+            let message = "--units are for --stiffness and --from: a manifest states its own";
+            Err(Diagnostic::new(Code::Usage, message).into())
+        }
         (Some(manifest), ..) => read_manifest(manifest),
         (None, Some(stiffness), Some(mass), Some(nodes)) => ModelFiles::from_arguments(
             stiffness,

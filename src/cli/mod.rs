@@ -1,10 +1,13 @@
 //! The command line: arguments, one file per command, progress. The only room that prints or exits; no arithmetic.
 
+mod adopt;
 mod arguments;
+mod audit;
 mod check;
 mod checkpoint;
 mod compare;
 mod convert;
+mod export;
 mod inspect;
 mod output;
 mod places;

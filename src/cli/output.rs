@@ -1,7 +1,7 @@
 //! Printing of results and diagnostics, and the exit code.
 
 use super::arguments::{Arguments, Command, Printing};
-use super::{check, compare, convert, inspect, select, simulate, trade};
+use super::{audit, check, compare, convert, export, inspect, select, simulate, trade};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{ExitCode, Result};
 use crate::report::diagnostics_json;
@@ -49,6 +49,8 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Select(arguments) => (arguments.printing, select::run(arguments)),
         Command::Simulate(arguments) => (arguments.printing, simulate::run(arguments)),
         Command::Trade(arguments) => (arguments.printing, trade::run(arguments)),
+        Command::Export(arguments) => (arguments.printing, export::run(arguments)),
+        Command::Audit(arguments) => (arguments.printing, audit::run(arguments)),
     };
     finish(printing, outcome)
 }

@@ -73,7 +73,16 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] = &[&super::Sid];
+pub const FORMATS: &[&dyn ExportFormat] = &[
+    &super::json::Json,
+    &super::npz::Npz,
+    &super::adams_invariants::AdamsInvariants,
+    &super::openradioss::OpenRadioss,
+    &super::chrono::Chrono,
+    &super::simscape::Simscape,
+    &super::exudyn::Exudyn,
+    &super::sid::Sid,
+];
 
 /// The format of that name.
 ///

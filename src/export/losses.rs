@@ -101,3 +101,12 @@ pub(super) fn internal_rows(body: &FlexBody) -> Option<String> {
     let internal = body.modes().internal.as_ref()?;
     Some(format!("{} rows of the modes that belong to no node", internal.shape.nrows()))
 }
+
+/// The groups of the kinetic energy, for a format with the inertia of the undeformed body; `w1` says what of W1 it lacks.
+pub(super) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Option<String> {
+    let groups = body.groups();
+    let held = [(groups.w1, w1), (groups.w2, "W2"), (groups.w3, "W3")];
+    let lost: Vec<&str> = held.into_iter().filter(|(held, _)| *held).map(|(_, name)| name).collect();
+    (!lost.is_empty())
+        .then(|| format!("how the deformation changes the inertia ({}): {why}", lost.join(", ")))
+}

@@ -1,10 +1,21 @@
 //! A body in the formats of other programs: one file per format, `FlexBody` to bytes, behind the registry `FORMATS`.
 
+mod adams_invariants;
+mod arrays;
+mod chrono;
+mod exudyn;
 mod format;
 mod frames;
+mod hdf5_file;
+mod inertia;
+mod interface_matrices;
+mod json;
 mod losses;
+mod mat5;
+mod npz;
+mod openradioss;
 mod sid;
+mod simscape;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
-pub use sid::Sid;

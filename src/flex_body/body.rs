@@ -21,7 +21,7 @@ pub struct FlexBody {
 impl FlexBody {
     /// Checks `parts` and makes a body of them.
     ///
-    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1, 1 <= nf <= 3n; every array has the shape that [`Parts`] states and
+    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1, 1 <= nf <= 3n (where the nodes are all of a model); every array has the shape that [`Parts`] states and
     /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
     /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
     /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty;

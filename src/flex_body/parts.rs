@@ -16,7 +16,7 @@ pub struct Source {
     pub files: Vec<SourceFile>,
     /// Which body of several in the same matrices it is, where these were split.
     pub number: Option<BodyNumber>,
-    /// Number of matrix rows of the FE model.
+    /// Number of matrix rows of the FE model; 0 where these are not known, and the nodes may be some of many.
     pub n_dofs: usize,
     /// `rotation-invariant`: M = Ms kron I3; `diagonal`: the same and diagonal; `general`: neither.
     pub mass_structure: MassStructure,

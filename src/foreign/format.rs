@@ -37,7 +37,7 @@ pub trait ForeignFormat: Sync {
 }
 
 /// Every format, in the order in which files are recognised.
-pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] = &[&super::SidFile];
+pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] = &[&super::sid::SidFile];
 
 /// The format of that name.
 ///

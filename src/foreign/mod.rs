@@ -1,11 +1,15 @@
 //! Flexible-body files of other programs: read, audited, and taken as bodies.
 
+mod adopt;
+mod audit;
 mod body;
 mod check;
 mod format;
+mod free_surface;
 mod sid;
 
+pub use adopt::{Adopted, adopt};
+pub use audit::{Audit, audit};
 pub use body::{ForeignBody, ForeignFrame};
 pub use check::AuditCheck;
 pub use format::{FOREIGN_FORMATS, Foreign, ForeignFormat, find_foreign, recognise};
-pub use sid::SidFile;

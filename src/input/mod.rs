@@ -20,7 +20,7 @@ mod walk;
 pub use bytes::InputFile;
 pub use compression::Compression;
 pub use manifest::read_manifest;
-pub use model_files::{InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles};
+pub use model_files::{InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, parse_units};
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use shapes::read_shapes;

@@ -157,7 +157,11 @@ impl ModelFiles {
     }
 }
 
-fn parse_units(text: &str) -> Result<UnitSystem> {
+/// Units as a command line names them: `length,mass,time`.
+///
+/// # Errors
+/// FB202 when they are not three known ones.
+pub fn parse_units(text: &str) -> Result<UnitSystem> {
     let names: Vec<&str> = text.split(',').map(str::trim).collect();
     let &[length, mass, time] = names.as_slice() else {
         let message = format!("units are `{text}`, expected length,mass,time as in `mm,t,s`");

@@ -6,10 +6,6 @@ use super::{CauchySchwarz, GeneralTerms, Groups, Invariants, s_of_modal_mass};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
-/// Where m_ff or W3 differ by more than this from what S gives, relative to their Cauchy-Schwarz bounds, they are information of their
-/// own: rounding of sums of products of numbers with 17 digits.
-const ROUNDING: f64 = 1e-12;
-
 /// The nine inertia invariants (MBDyn manual, technical appendix; Adams/Flex), with the signs of the code of MBDyn.
 ///
 /// With S_j the shape of mode j: I1 = m, I2 = c, I3_j = int S_j, I4_j = int x~ S_j, I5_jk = int S_j x S_k, I6_jk = int S_j . S_k,
@@ -61,12 +57,13 @@ impl Invariants {
         }
     }
 
-    /// The body with these invariants: the inverse of [`Invariants::numbered`], to rounding. C2 is that of I8. Where I5 or I6 are not
-    /// what I9 says of them the mass does not commute with rotations, and W0 = -C1~ is taken, which none of the nine tells.
+    /// The body with these invariants: the inverse of [`Invariants::numbered`], to rounding. C2 is that of I8. Where I5 or I6 differ by more
+    /// than `rounding` from what I9 says of them, relative to their Cauchy-Schwarz bounds, the mass does not commute with rotations, and
+    /// W0 = -C1~ is taken, which none of the nine tells.
     ///
     /// # Panics
     /// When the sizes disagree.
-    pub fn from_numbered(numbered: &Numbered, modal_stiffness: Mat<f64>) -> Self {
+    pub fn from_numbered(numbered: &Numbered, modal_stiffness: Mat<f64>, rounding: f64) -> Self {
         let nf = numbered.i8.len();
         let Numbered { i5, i6, i8, i9, .. } = numbered;
         let groups = Groups { w2: i9.is_some(), w3: i5.is_some(), ..numbered.groups };
@@ -100,7 +97,7 @@ impl Invariants {
             let worst = places
                 .map(|(i, j)| super::cauchy_schwarz::scaled(own[(i, j)] - told[(i, j)], scale(i, j)))
                 .fold(0.0, worst);
-            worst.is_nan() || worst > ROUNDING
+            worst.is_nan() || worst > rounding
         };
         let differs =
             apart(&solid.0, i6) || solid.1.zip(i5.as_ref()).is_some_and(|(own, told)| apart(&own, told));

@@ -275,7 +275,17 @@ impl ModelFacts {
     }
 
     /// What the structure of the mass matrix means for `exact`.
-    pub fn mass_in_words(&self) -> &'static str {
+    /// `21 nodes, 63 degrees of freedom, consistent mass`.
+    pub fn size_in_words(&self) -> String {
+        match self.n_dofs {
+            0 => format!("{} nodes or frames; mass as another program condensed it", self.n_nodes),
+            n_dofs => {
+                format!("{} nodes, {n_dofs} degrees of freedom, {}", self.n_nodes, self.mass_in_words())
+            }
+        }
+    }
+
+    fn mass_in_words(&self) -> &'static str {
         match self.mass_structure {
             "rotation-invariant" => "consistent mass",
             "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",

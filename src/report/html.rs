@@ -135,10 +135,8 @@ fn body(html: &mut String, facts: &Facts) {
             (
                 "Model",
                 format!(
-                    "{} nodes, {} degrees of freedom, {}{}{}",
-                    model.n_nodes,
-                    model.n_dofs,
-                    model.mass_in_words(),
+                    "{}{}{}",
+                    model.size_in_words(),
                     model.body.as_ref().map_or(String::new(), |b| format!(
                         "; body {} of {} in the matrices",
                         b.number, b.of

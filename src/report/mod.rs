@@ -1,5 +1,6 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies; audits.
 
+mod audit;
 mod bar_chart;
 mod clusters;
 mod comparison;
@@ -22,6 +23,7 @@ mod term_facts;
 mod text;
 mod trade;
 
+pub use audit::{audit_json, audit_text};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
 pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};

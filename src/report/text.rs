@@ -106,10 +106,7 @@ fn heading(page: &mut Page, facts: &Facts) {
     let (model, body) = (&facts.model, &facts.body);
     let units = &model.units;
     page.entry("body", &format!("{} ({})", plain(&model.name), units.in_words()));
-    page.entry(
-        "model",
-        &format!("{} nodes, {} degrees of freedom, {}", model.n_nodes, model.n_dofs, model.mass_in_words()),
-    );
+    page.entry("model", &model.size_in_words());
     if let Some(remark) = model.approximation {
         page.entry("", remark);
     }

@@ -1,12 +1,12 @@
 //! The checkpoint of a search for modes: a small HDF5 file of its own format, described in `docs/checkpoint.md`.
 
-use super::hdf5_value::{self, Sizes, Stored};
+use super::extents::{Sizes, dataset};
 use super::item::Extent;
-use super::read::open_sound;
-use super::write::{create, put_text, system_error};
+use super::write::system_error;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::Snapshot;
 use crate::error::Result;
+use crate::hdf5_file::{self as hdf5_file, Stored, create, open_sound, put_text};
 use crate::output::OutputSlot;
 use crate::provenance::{Fingerprint, generator};
 use faer::{Mat, MatRef};
@@ -108,7 +108,7 @@ pub fn read_checkpoint(path: impl AsRef<Path>) -> Result<Checkpoint> {
     let fail = |code, message: String| Diagnostic::new(code, message).in_file(path);
     let damaged =
         |what: String| fail(Code::CheckpointUnreadable, format!("cannot read the checkpoint: {what}"));
-    if hdf5_value::text(&file, "format").ok().flatten().as_deref() != Some(FORMAT) {
+    if hdf5_file::text(&file, "format").ok().flatten().as_deref() != Some(FORMAT) {
         return Err(damaged(format!("it has no attribute `format` = `{FORMAT}`")).into());
     }
     let version = int(&file, "format_version").map_err(damaged)?;
@@ -127,12 +127,12 @@ fn load(file: &hdf5::File, bytes: u64) -> std::result::Result<Checkpoint, String
     let [rows, vectors, block, converged] =
         [size(file, "rows")?, size(file, "vectors")?, size(file, "block")?, size(file, "converged")?];
     let (model, stated) = (text(file, "model")?, text(file, "sha256")?);
-    let shift = required("shift", hdf5_value::float(file, "shift"))?;
+    let shift = required("shift", hdf5_file::float(file, "shift"))?;
     let mut stored = Stored::new(bytes);
     let mut floats = |name: &str, shape: &[usize]| {
         let extents: Vec<Extent> = shape.iter().map(|&size| Extent::Fixed(size)).collect();
         let group = file.as_group().map_err(|e| e.to_string())?;
-        let found = hdf5_value::dataset::<f64>(&group, name, &extents, &mut Sizes::default(), &mut stored);
+        let found = dataset::<f64>(&group, name, &extents, &mut Sizes::default(), &mut stored);
         required(name, found).map(|(values, _)| values)
     };
     let eigenvalues = floats("eigenvalue", &[vectors])?;
@@ -162,11 +162,11 @@ fn size(file: &hdf5::File, name: &str) -> std::result::Result<usize, String> {
 }
 
 fn int(file: &hdf5::File, name: &str) -> std::result::Result<i64, String> {
-    required(name, hdf5_value::int(file, name))
+    required(name, hdf5_file::int(file, name))
 }
 
 fn text(file: &hdf5::File, name: &str) -> std::result::Result<String, String> {
-    required(name, hdf5_value::text(file, name))
+    required(name, hdf5_file::text(file, name))
 }
 
 fn required<T>(name: &str, value: std::result::Result<Option<T>, String>) -> std::result::Result<T, String> {

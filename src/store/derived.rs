@@ -1,6 +1,6 @@
 //! Entries that follow from others: what the file says against what the body gives.
 
-use super::hdf5_value::index;
+use super::extents::index;
 use super::item::{DERIVED_TOLERANCE, Group, Origin, Per, SHORT_TOLERANCE};
 use super::scan::{Scan, key, place};
 use super::schema::TABLE;

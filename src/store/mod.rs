@@ -3,10 +3,10 @@
 
 mod assemble;
 mod checkpoint;
+mod contents;
 mod derived;
 mod document;
-mod hdf5_value;
-mod heap;
+mod extents;
 mod item;
 mod names;
 mod read;
@@ -19,6 +19,7 @@ mod write;
 
 pub use crate::output::OutputSlot;
 pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
+pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
 pub use document::{format_markdown, format_schema};
 pub use read::{read, validate};
 pub use simulation::fill_simulation;

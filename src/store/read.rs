@@ -4,11 +4,10 @@ use super::assemble::assemble;
 use super::derived::check_derived;
 use super::scan::Scan;
 use super::schema::{FORMAT, MAJOR};
-use super::{hdf5_value, heap};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
-use hdf5::file::Sizeof;
+use crate::hdf5_file::{self as hdf5_file, open_sound};
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -54,35 +53,9 @@ pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
     Ok((file, bytes))
 }
 
-/// Opens an HDF5 file whose texts can be read without harm; `what` it should be, and the code when it is not HDF5.
-pub(super) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
-    let unreadable = |code, why: String| {
-        Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
-    };
-    let meta = std::fs::metadata(path).map_err(|e| unreadable(Code::FileUnreadable, e.to_string()))?;
-    if !meta.is_file() {
-        return Err(unreadable(Code::FileUnreadable, "it is not a regular file".to_owned()));
-    }
-    let broken_heap = std::fs::File::open(path).and_then(|mut file| heap::first_broken(&mut file));
-    if let Some(position) = broken_heap.map_err(|e| unreadable(Code::FileUnreadable, e.to_string()))? {
-        let why = format!("the text heap at byte {position} is damaged");
-        return Err(unreadable(foreign, why));
-    }
-    // Without a lock: no file of this program changes once it has its name, and some file systems know no locks.
-    let opened = hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path);
-    let file = opened.map_err(|e| unreadable(foreign, e.to_string()))?;
-    // The check of the heaps knows 8-byte sizes only; nothing else is in use.
-    let sizes = file.create_plist().and_then(|p| p.get_sizes());
-    if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
-        let why = "its addresses or sizes do not have 8 bytes".to_owned();
-        return Err(unreadable(foreign, why));
-    }
-    Ok((file, meta.len()))
-}
-
 fn check_format(file: &hdf5::File, path: &Path) -> Result<()> {
     let fail = |code, message: String| Err(Diagnostic::new(code, message).in_file(path).into());
-    match hdf5_value::text(file, "format") {
+    match hdf5_file::text(file, "format") {
         Ok(Some(format)) if format == FORMAT => {}
         Ok(Some(format)) => {
             return fail(
@@ -98,9 +71,9 @@ fn check_format(file: &hdf5::File, path: &Path) -> Result<()> {
         }
         Err(problem) => return fail(Code::BodyUnreadable, format!("attribute `format`: {problem}")),
     }
-    match hdf5_value::int(file, "format_major") {
+    match hdf5_file::int(file, "format_major") {
         Ok(Some(major)) if major > MAJOR => {
-            let writer = match hdf5_value::text(file, "generator") {
+            let writer = match hdf5_file::text(file, "generator") {
                 Ok(Some(generator)) => generator,
                 _ => "an unnamed program".to_owned(),
             };

@@ -1,7 +1,7 @@
 //! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing that
 //! the file declares before it is checked against the rest.
 
-use super::hdf5_value::{self as hdf5_value, Sizes, Stored};
+use super::extents::{Sizes, dataset, index};
 use super::item::{Group, Item, Kind, Origin, Per};
 use super::names;
 use super::schema::TABLE;
@@ -9,6 +9,7 @@ use super::schema::terms::{DROPPED, KEPT};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::flex_body::{Group as TermGroup, Groups, Storage};
+use crate::hdf5_file::{self as hdf5_file, Stored};
 use crate::units::UnitSystem;
 use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -117,10 +118,10 @@ impl Scan {
     /// Looks up the instances of a group that occurs several times; groups of the same kind have the same ones.
     fn list(&mut self, file: &hdf5::File, group: &Group) {
         let parent = group.parent();
-        let links = match hdf5_value::open_group(file, parent).and_then(|g| hdf5_value::members(&g)) {
+        let links = match hdf5_file::open_group(file, parent).and_then(|g| hdf5_file::members(&g)) {
             Ok(links) => links,
             // A file of an older minor version.
-            Err(found) if group.since() > 0 && found == hdf5_value::NOTHING => Vec::new(),
+            Err(found) if group.since() > 0 && found == hdf5_file::NOTHING => Vec::new(),
             Err(found) => return self.add(format!("{parent}: expected a group, found {found}")),
         };
         let first = TABLE.iter().find(|g| g.per == group.per).map_or(parent, |g| g.parent());
@@ -139,10 +140,10 @@ impl Scan {
 
     fn group(&mut self, file: &hdf5::File, group: &Group, link: Option<&str>) {
         let path = place(group, link);
-        let opened = match hdf5_value::open_group(file, &path) {
+        let opened = match hdf5_file::open_group(file, &path) {
             Ok(opened) => opened,
             // Of a body that has none of it, or in a file of an older minor version.
-            Err(found) if group.since() > 0 && link.is_none() && found == hdf5_value::NOTHING => return,
+            Err(found) if group.since() > 0 && link.is_none() && found == hdf5_file::NOTHING => return,
             Err(found) => return self.add(format!("{path}: expected a group, found {found}")),
         };
         let mut sizes = self.sizes;
@@ -183,34 +184,32 @@ impl Scan {
             Kind::Floats(shape) => {
                 let stored = &mut self.stored;
                 let values = match item.is_short(self.storage) {
-                    false => hdf5_value::dataset::<f64>(place, item.name, shape, sizes, stored)?,
-                    true => hdf5_value::dataset::<f32>(place, item.name, shape, sizes, stored)?
+                    false => dataset::<f64>(place, item.name, shape, sizes, stored)?,
+                    true => dataset::<f32>(place, item.name, shape, sizes, stored)?
                         .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims)),
                 };
                 let Some((values, dims)) = values else { return Ok(None) };
                 match values.iter().position(|v| !v.is_finite()) {
-                    Some(i) => Err(format!(
-                        "expected finite numbers, found {} at {}",
-                        values[i],
-                        hdf5_value::index(i, &dims)
-                    )),
+                    Some(i) => {
+                        Err(format!("expected finite numbers, found {} at {}", values[i], index(i, &dims)))
+                    }
                     None => Ok(Some(Value::Floats(values))),
                 }
             }
             Kind::Ints(shape) => {
-                let values = hdf5_value::dataset::<i64>(place, item.name, shape, sizes, &mut self.stored)?;
+                let values = dataset::<i64>(place, item.name, shape, sizes, &mut self.stored)?;
                 Ok(values.map(|(values, _)| Value::Ints(values)))
             }
-            Kind::Text => Ok(hdf5_value::text(place, item.name)?.map(Value::Text)),
-            Kind::Int => Ok(hdf5_value::int(place, item.name)?.map(Value::Int)),
-            Kind::Float => match hdf5_value::float(place, item.name)? {
+            Kind::Text => Ok(hdf5_file::text(place, item.name)?.map(Value::Text)),
+            Kind::Int => Ok(hdf5_file::int(place, item.name)?.map(Value::Int)),
+            Kind::Float => match hdf5_file::float(place, item.name)? {
                 Some(v) if !v.is_finite() => Err(format!("expected a finite number, found {v}")),
                 v => Ok(v.map(Value::Float)),
             },
             Kind::Named => {
                 let mut values = Vec::new();
-                for name in hdf5_value::attribute_names(place)? {
-                    match hdf5_value::float(place, &name) {
+                for name in hdf5_file::attribute_names(place)? {
+                    match hdf5_file::float(place, &name) {
                         Ok(Some(v)) if v.is_finite() => values.push((name, v)),
                         Ok(v) => return Err(format!("{name}: expected a finite number, found {v:?}")),
                         Err(e) => return Err(format!("{name}: {e}")),
@@ -272,9 +271,9 @@ impl Scan {
         if item.shape().is_none() {
             return;
         }
-        let Ok(Some(dataset)) = hdf5_value::open_dataset(place, item.name) else { return };
+        let Ok(Some(dataset)) = hdf5_file::open_dataset(place, item.name) else { return };
         for attribute in ["units", "symbol", "description"] {
-            match hdf5_value::text(&dataset, attribute) {
+            match hdf5_file::text(&dataset, attribute) {
                 Ok(Some(found)) => {
                     let expected = self.units.as_ref().map(|u| item.units.concrete(u));
                     if let Some(expected) = expected.filter(|e| attribute == "units" && *e != found) {

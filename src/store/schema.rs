@@ -159,7 +159,7 @@ const SOURCE: &[Item] = &[
     })
     .added(2),
     attribute("n_nodes", Int, ONE, "nodes of the body", |v| count(v.body.nodes.len())).derived(""),
-    attribute("n_dofs", Int, ONE, "rows of the FE matrices", |v| count(v.body.source.n_dofs)),
+    attribute("n_dofs", Int, ONE, "rows of the FE matrices; 0: not known, the body comes from another program", |v| count(v.body.source.n_dofs)),
     attribute(
         "mass_structure",
         Text,

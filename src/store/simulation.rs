@@ -2,9 +2,10 @@
 
 use super::names;
 use super::value::Units;
-use super::write::{create, make, put_text, system_error};
+use super::write::system_error;
 use crate::dynamics::Balance;
 use crate::error::Result;
+use crate::hdf5_file::{create, make, put_text};
 use crate::output::OutputSlot;
 use crate::provenance::generator;
 use crate::scene::{Recording, Scheme};

@@ -1,9 +1,9 @@
 //! What lies in a file, as JSON, without its numbers.
 
-use super::hdf5_value;
 use super::read::open_checked;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
+use crate::hdf5_file;
 use hdf5::types::TypeDescriptor;
 use hdf5::{LinkType, LocationType};
 use hdf5_metno as hdf5;
@@ -64,10 +64,10 @@ fn attributes(place: &hdf5::Location) -> hdf5::Result<Map<String, Value>> {
     for name in place.attr_names()? {
         let value = match place.attr(&name)?.dtype()?.to_descriptor() {
             Ok(TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_)) => {
-                hdf5_value::int(place, &name).map(|v| json!(v))
+                hdf5_file::int(place, &name).map(|v| json!(v))
             }
-            Ok(TypeDescriptor::Float(_)) => hdf5_value::float(place, &name).map(|v| json!(v)),
-            _ => hdf5_value::text(place, &name).map(|v| json!(v)),
+            Ok(TypeDescriptor::Float(_)) => hdf5_file::float(place, &name).map(|v| json!(v)),
+            _ => hdf5_file::text(place, &name).map(|v| json!(v)),
         };
         if let Ok(value) = value {
             out.insert(name, value);

@@ -8,10 +8,8 @@ use super::value::{Value, View};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
+use crate::hdf5_file::{create, make, put_text};
 use crate::output::OutputSlot;
-use hdf5::file::LibraryVersion;
-use hdf5::plist::group_create::{AttrCreationOrder, LinkCreationOrder};
-use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -65,17 +63,6 @@ pub(super) fn system_error(text: &str) -> std::io::Error {
     number.map_or_else(|| std::io::Error::other(text), std::io::Error::from_raw_os_error)
 }
 
-/// An empty file at a temporary `path`.
-pub(super) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
-    hdf5::File::with_options()
-        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else knows the file, and
-        // a process started meanwhile would inherit a lock and hold it on the finished file.
-        .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
-        // Time stamps would make equal bodies differ.
-        .with_fcpl(|p| p.obj_track_times(false))
-        .create(path)
-}
-
 fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     let file = create(path)?;
     for group in TABLE {
@@ -100,17 +87,6 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     }
     file.flush()?;
     file.close()
-}
-
-/// Makes a group that keeps the order of its members and attributes, and no time stamps.
-pub(super) fn make(parent: &hdf5::Group, name: &str) -> hdf5::Result<hdf5::Group> {
-    parent
-        .create_group_builder()
-        .obj_track_times(false)
-        .with_gcpl(|p| {
-            p.link_creation_order(LinkCreationOrder::Indexed).attr_creation_order(AttrCreationOrder::Indexed)
-        })
-        .create(name)
 }
 
 fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<()> {
@@ -162,11 +138,6 @@ fn describe(dataset: &hdf5::Dataset, item: &Item, view: &View<'_>) -> hdf5::Resu
     put_text(dataset, "units", &item.units.concrete(&view.body.units))?;
     put_text(dataset, "symbol", item.symbol)?;
     put_text(dataset, "description", item.description)
-}
-
-pub(super) fn put_text(place: &hdf5::Location, name: &str, text: &str) -> hdf5::Result<()> {
-    let text: VarLenUnicode = text.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-    place.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&text)
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 
 use super::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
 use super::body::Declared;
+use super::frequencies::frequencies;
 use super::layout::{Blocks, Layout};
 use super::parse::Listed;
-use super::plausible;
+
 use crate::diagnostic::Code;
 use crate::foreign::AuditCheck;
 use faer::Mat;
@@ -153,21 +154,16 @@ pub(super) fn checks(
             "the geometric stiffness for acceleration is no symmetric matrix",
         ));
     }
-    for (name, formula, array) in [
-        ("me_symmetric", "Me = Me'", &arrays.me),
-        ("ke_symmetric", "Ke = Ke'", &arrays.ke),
-        ("de_symmetric", "De = De'", &arrays.de),
-        ("j_symmetric", "J0 = J0'", &arrays.inertia),
-    ] {
-        let a = &array.m0;
-        if a.nrows() == a.ncols() {
-            let by = worst(a.nrows(), a.ncols(), |i, j| a[(i, j)] - a[(j, i)]);
-            let missed = Missed { by, scale: largest(a), rounding: 2.0 * array.rounding[0] };
-            all.push(missed.check(name, formula, Code::AuditIdentity, "a matrix that is symmetric is not"));
-        }
-    }
+    let de = &arrays.de.m0;
+    let missed = Missed {
+        by: worst(nq, nq, |i, j| de[(i, j)] - de[(j, i)]),
+        scale: largest(de),
+        rounding: 2.0 * arrays.de.rounding[0],
+    };
+    let meaning = "the damping matrix is not symmetric";
+    all.push(missed.check("de_symmetric", "De = De'", Code::AuditIdentity, meaning));
     all.extend(of_frames(listed, frames));
-    all.extend(plausible::checks(listed, arrays, frames));
+    all.extend(frequencies(listed, arrays));
     Found { checks: all, spin_in_oe }
 }
 

@@ -5,10 +5,10 @@ mod body;
 mod checks;
 mod digits;
 mod format;
+mod frequencies;
 mod layout;
 mod lines;
 mod parse;
-mod plausible;
 mod taylor;
 
 pub use format::SidFile;

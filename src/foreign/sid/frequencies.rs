@@ -1,6 +1,6 @@
-//! Whether the numbers of a file are in the same units.
+//! Frequencies in the texts of the modes, beside those of the matrices.
 
-use super::arrays::{Arrays, FrameArrays};
+use super::arrays::Arrays;
 use super::parse::Listed;
 use crate::diagnostic::Code;
 use crate::foreign::AuditCheck;
@@ -9,16 +9,8 @@ use std::f64::consts::TAU;
 /// Frequencies in texts are often those of the model before its reduction.
 const FREQUENCY: f64 = 0.01;
 
-/// Factor between the radius of gyration and the distance of the farthest frame that no shape of a body explains: millimetres beside
-/// metres are ten times that.
-const EXTENT: f64 = 100.0;
-
 /// Entries of Ke beside the diagonal, relative to it, with which the diagonal still gives frequencies.
 const DIAGONAL: f64 = 1e-6;
-
-pub(super) fn checks(listed: &Listed<'_>, arrays: &Arrays, frames: &[FrameArrays]) -> Vec<AuditCheck> {
-    frequencies(listed, arrays).into_iter().chain(extent(arrays, frames)).collect()
-}
 
 /// The frequency of a text such as `Eigen Mode 1 : 9.089 Hz` in the unit of the text, half a unit of its last digit, and whether it is in
 /// radians.
@@ -39,7 +31,8 @@ fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
     })
 }
 
-fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditCheck> {
+/// The text that is farthest off; `None` where no mode has a frequency in its text, or modes are coupled by Ke.
+pub(super) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditCheck> {
     let (ke, me, nq) = (&arrays.ke.m0, &arrays.me.m0, arrays.nq);
     let coupled = (0..nq).any(|i| {
         (0..nq).any(|j| i != j && ke[(i, j)].abs() > DIAGONAL * (ke[(i, i)] * ke[(j, j)]).abs().sqrt())
@@ -77,33 +70,6 @@ fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditCheck> {
         meaning: format!(
             "the text of mode {} has another frequency than stiffness and mass, by the factor {factor}",
             mode + 1
-        ),
-    })
-}
-
-/// The radius of gyration about the origin, and the distance of the centre of mass, beside the farthest frame.
-fn extent(arrays: &Arrays, frames: &[FrameArrays]) -> Option<AuditCheck> {
-    let distance = |frame: &FrameArrays| frame.origin.m0.col(0).norm_l2();
-    let farthest = frames.iter().map(distance).fold(0.0, f64::max);
-    let gyration = (0.5 * arrays.j0().trace() / arrays.mass).sqrt();
-    let centre = arrays.first_moment.m0.col(0).norm_l2() / arrays.mass.abs();
-    // A single frame says nothing of the extent; bodies without mass are another finding.
-    if frames.len() < 2 || !(farthest > 0.0 && gyration > 0.0 && gyration.is_finite()) {
-        return None;
-    }
-    let (what, ratio) = match (farthest / gyration, farthest / centre) {
-        (inertia, centre) if centre < 1.0 / EXTENT && inertia > 1.0 / EXTENT => ("centre of mass", centre),
-        (inertia, _) => ("radius of gyration", inertia),
-    };
-    Some(AuditCheck {
-        name: "extent",
-        formula: "|log10(distance of the farthest frame / sqrt(tr J0 / (2 mass)))|, and of the centre of mass",
-        value: ratio.log10().abs(),
-        limit: EXTENT.log10(),
-        code: Code::AuditUnits,
-        meaning: format!(
-            "the farthest frame is {farthest:.3e} from the origin, {ratio:.1e} times the distance of the {what} by J, mdCM and mass: \
-             lengths or masses are in two units"
         ),
     })
 }

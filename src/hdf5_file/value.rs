@@ -2,7 +2,6 @@
 //!
 //! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
 
-use super::item::Extent;
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
@@ -17,20 +16,10 @@ const LONGEST_FIXED_TEXT: usize = 65536;
 /// Chunks may be larger than a small dataset, but the library reserves memory for one whole chunk.
 const SMALL_CHUNK: usize = 1 << 20;
 
-/// Extents known so far; the first dataset that has one decides.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sizes {
-    nodes: Option<usize>,
-    modes: Option<usize>,
-    pub interface_nodes: Option<usize>,
-    pub internal_rows: Option<usize>,
-    coordinates: Option<usize>,
-}
-
 /// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
 /// data many times over end here.
 #[derive(Debug)]
-pub(super) struct Stored {
+pub(crate) struct Stored {
     left: u64,
 }
 
@@ -41,10 +30,10 @@ impl Stored {
 }
 
 /// What [`open_group`] finds where no group is.
-pub(super) const NOTHING: &str = "nothing";
+pub(crate) const NOTHING: &str = "nothing";
 
 /// Opens a group by its absolute path through hard links only: a file must not lead out of itself.
-pub(super) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> {
+pub(crate) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> {
     let mut group = file.as_group().map_err(|e| e.to_string())?;
     for name in path.split('/').filter(|name| !name.is_empty()) {
         if !has(&group, name)? {
@@ -56,7 +45,7 @@ pub(super) fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, S
 }
 
 /// Names of the members of a group, in creation order where the file tracks it.
-pub(super) fn members(group: &hdf5::Group) -> Result<Vec<String>, String> {
+pub(crate) fn members(group: &hdf5::Group) -> Result<Vec<String>, String> {
     group
         .member_names_by(IndexType::CreationOrder, IterationOrder::Increasing)
         .or_else(|_| group.member_names_by(IndexType::Name, IterationOrder::Increasing))
@@ -64,7 +53,7 @@ pub(super) fn members(group: &hdf5::Group) -> Result<Vec<String>, String> {
 }
 
 /// Names of the attributes, in creation order where the file tracks it.
-pub(super) fn attribute_names(place: &hdf5::Location) -> Result<Vec<String>, String> {
+pub(crate) fn attribute_names(place: &hdf5::Location) -> Result<Vec<String>, String> {
     place
         .attr_names_by(IndexType::CreationOrder, IterationOrder::Increasing)
         .or_else(|_| place.attr_names())
@@ -85,7 +74,7 @@ fn has(group: &hdf5::Group, name: &str) -> Result<bool, String> {
 }
 
 /// Opens a dataset of a group.
-pub(super) fn open_dataset(place: &hdf5::Group, name: &str) -> Result<Option<hdf5::Dataset>, String> {
+pub(crate) fn open_dataset(place: &hdf5::Group, name: &str) -> Result<Option<hdf5::Dataset>, String> {
     if !has(place, name).map_err(|found| format!("expected a dataset, found {found}"))? {
         return Ok(None);
     }
@@ -93,7 +82,7 @@ pub(super) fn open_dataset(place: &hdf5::Group, name: &str) -> Result<Option<hdf
 }
 
 /// Element types of datasets.
-pub(super) trait Element: hdf5::H5Type + Copy + Default {
+pub(crate) trait Element: hdf5::H5Type + Copy + Default {
     const TYPE: TypeDescriptor;
     const NAME: &'static str;
 }
@@ -114,15 +103,14 @@ impl Element for i64 {
 }
 
 /// Values in row-major order, and the extents.
-pub(super) type Array<T> = (Vec<T>, Vec<usize>);
+pub(crate) type Array<T> = (Vec<T>, Vec<usize>);
 
-/// Reads a dataset of the stated shape, with its extents.
-pub(super) fn dataset<T: Element>(
+/// Reads a dataset, with its extents. `fit` judges these and gives the number of elements.
+pub(crate) fn dataset<T: Element>(
     place: &hdf5::Group,
     name: &str,
-    shape: &[Extent],
-    sizes: &mut Sizes,
     stored: &mut Stored,
+    fit: impl FnOnce(&[usize]) -> Result<usize, String>,
 ) -> Result<Option<Array<T>>, String> {
     let Some(dataset) = open_dataset(place, name)? else { return Ok(None) };
     let found = dataset.dtype().and_then(|t| t.to_descriptor());
@@ -131,7 +119,7 @@ pub(super) fn dataset<T: Element>(
         return Err(format!("expected {}, found type {found}", T::NAME));
     }
     let dims = dataset.get_shape().map_err(|e| format!("expected a shape, found {e}"))?;
-    let elements = sizes.fit(shape, &dims)?;
+    let elements = fit(&dims)?;
     storage(&dataset, elements, size_of::<T>(), stored)?;
     let mut values = Vec::new();
     values
@@ -142,52 +130,13 @@ pub(super) fn dataset<T: Element>(
     Ok(Some((values, dims)))
 }
 
-impl Sizes {
-    /// Checks `dims` against the table and what is known; learns what is not. Returns the number of elements.
-    fn fit(&mut self, shape: &[Extent], dims: &[usize]) -> Result<usize, String> {
-        let mut learnt = *self;
-        let fits = shape.len() == dims.len()
-            && shape.iter().zip(dims).all(|(extent, &size)| size > 0 && learnt.fits(*extent, size));
-        if !fits {
-            let expected: Vec<_> = shape.iter().map(|e| self.show(*e)).collect();
-            return Err(format!("expected shape [{}], found {dims:?}", expected.join(", ")));
-        }
-        let elements = dims.iter().try_fold(1usize, |product, &d| product.checked_mul(d));
-        // 2^48 values are beyond any memory; below it products with sizes of types cannot overflow.
-        let elements = elements
-            .filter(|&e| e < 1 << 48)
-            .ok_or_else(|| format!("expected a shape that fits into memory, found {dims:?}"))?;
-        *self = learnt;
-        Ok(elements)
-    }
-
-    fn fits(&mut self, extent: Extent, size: usize) -> bool {
-        match extent {
-            Extent::Fixed(expected) => size == expected,
-            Extent::Nodes => size == *self.nodes.get_or_insert(size),
-            Extent::Modes => size == *self.modes.get_or_insert(size),
-            Extent::ThreeModes => size.is_multiple_of(3) && size / 3 == *self.modes.get_or_insert(size / 3),
-            Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
-            Extent::InternalRows => size == *self.internal_rows.get_or_insert(size),
-            Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
-        }
-    }
-
-    fn show(&self, extent: Extent) -> String {
-        let known = |name: &str, size: Option<usize>| match size {
-            Some(size) => format!("{name} = {size}"),
-            None => name.to_owned(),
-        };
-        match extent {
-            Extent::Fixed(size) => size.to_string(),
-            Extent::Nodes => known("n", self.nodes),
-            Extent::Modes => known("nf", self.modes),
-            Extent::ThreeModes => known("3 nf", self.modes.map(|nf| 3 * nf)),
-            Extent::InterfaceNodes => known("k", self.interface_nodes),
-            Extent::InternalRows => known("m", self.internal_rows),
-            Extent::Coordinates => known("nc", self.coordinates),
-        }
-    }
+/// Number of elements of an array with these extents.
+pub(crate) fn elements(dims: &[usize]) -> Result<usize, String> {
+    let elements = dims.iter().try_fold(1usize, |product, &d| product.checked_mul(d));
+    // 2^48 values are beyond any memory; below it products with sizes of types cannot overflow.
+    elements
+        .filter(|&e| e < 1 << 48)
+        .ok_or_else(|| format!("expected a shape that fits into memory, found {dims:?}"))
 }
 
 /// Refuses data that lie in other files, and sizes that the stored bytes cannot hold.
@@ -238,7 +187,7 @@ fn attribute(
 }
 
 /// Reads a text attribute of fixed or variable length.
-pub(super) fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>, String> {
+pub(crate) fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>, String> {
     const EXPECTED: &str = "a text attribute";
     let Some((attribute, kind)) = attribute(place, name, EXPECTED)? else { return Ok(None) };
     let bytes = match kind {
@@ -261,7 +210,7 @@ pub(super) fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>,
 }
 
 /// Reads an integer attribute.
-pub(super) fn int(place: &hdf5::Location, name: &str) -> Result<Option<i64>, String> {
+pub(crate) fn int(place: &hdf5::Location, name: &str) -> Result<Option<i64>, String> {
     let Some((attribute, kind)) = attribute(place, name, "an integer attribute")? else { return Ok(None) };
     match kind {
         TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) => {
@@ -272,7 +221,7 @@ pub(super) fn int(place: &hdf5::Location, name: &str) -> Result<Option<i64>, Str
 }
 
 /// Reads a float attribute.
-pub(super) fn float(place: &hdf5::Location, name: &str) -> Result<Option<f64>, String> {
+pub(crate) fn float(place: &hdf5::Location, name: &str) -> Result<Option<f64>, String> {
     let Some((attribute, kind)) = attribute(place, name, "a float attribute")? else { return Ok(None) };
     match kind {
         TypeDescriptor::Float(_) => {
@@ -280,19 +229,4 @@ pub(super) fn float(place: &hdf5::Location, name: &str) -> Result<Option<f64>, S
         }
         other => Err(format!("expected a float attribute, found type {other}")),
     }
-}
-
-/// `[2, 0, 5]` of a row-major position.
-pub(super) fn index(mut position: usize, dims: &[usize]) -> String {
-    let mut index: Vec<usize> = dims
-        .iter()
-        .rev()
-        .map(|&d| {
-            let i = position % d;
-            position /= d;
-            i
-        })
-        .collect();
-    index.reverse();
-    format!("{index:?}")
 }

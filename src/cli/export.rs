@@ -1,0 +1,77 @@
+//! `flexbody export`.
+
+use super::arguments::ExportArguments;
+use super::output::{Outcome, tell};
+use super::places::refuse_replacing;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::export::{ExportOptions, Points, export, find_format};
+use crate::input::parse_units;
+use crate::output::OutputSlot;
+use crate::report::diagnostics_json;
+use crate::store;
+use std::path::PathBuf;
+
+pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
+    let format = find_format(&arguments.to)?;
+    let options = ExportOptions {
+        dialect: arguments.dialect.clone(),
+        points: arguments.points.as_deref().map_or(Ok(Points::Usual), points)?,
+    };
+    let units = arguments.to_units.as_deref().map(parse_units).transpose()?;
+    let inputs = [&arguments.body];
+    refuse_replacing(inputs.into_iter(), std::iter::once(&arguments.output))?;
+    let slot = OutputSlot::prepare(&arguments.output)?;
+
+    let mut body = store::read(&arguments.body)?;
+    if let Some(units) = units {
+        body = body.in_units(&units)?;
+    }
+    let (exported, losses) = export(&body, format, &options, arguments.allow_loss)
+        .map_err(|error| error.in_file(&arguments.body))?;
+    tell(arguments.printing, &losses);
+    let beside: Vec<(PathBuf, Vec<u8>)> = exported
+        .beside
+        .into_iter()
+        .map(|(extension, bytes)| (arguments.output.with_extension(extension), bytes))
+        .collect();
+    let taken: Vec<&PathBuf> = inputs.into_iter().chain(std::iter::once(&arguments.output)).collect();
+    refuse_replacing(taken.into_iter(), beside.iter().map(|(path, _)| path))?;
+    let mut written = vec![(arguments.output.clone(), exported.file.len())];
+    slot.fill(&exported.file)?;
+    let mut slots = vec![slot];
+    for (path, bytes) in beside {
+        written.push((path.clone(), bytes.len()));
+        let slot = OutputSlot::prepare(path)?;
+        slot.fill(&bytes)?;
+        slots.push(slot);
+    }
+    slots.into_iter().try_for_each(OutputSlot::commit)?;
+
+    let line = |(path, size): &(PathBuf, usize)| {
+        format!("{}, {} bytes: {} for {}\n", path.display(), size, format.name(), format.reader())
+    };
+    let mut json = diagnostics_json(&losses);
+    json["files"] = written
+        .iter()
+        .map(|(path, size)| serde_json::json!({ "path": path.display().to_string(), "bytes": size }))
+        .collect();
+    json["format"] = format.name().into();
+    Ok(Outcome { text: written.iter().map(line).collect(), json: format!("{json:#}"), passed: true })
+}
+
+/// `nodes`, `interfaces`, or node numbers with commas.
+fn points(text: &str) -> Result<Points> {
+    match text {
+        "nodes" => return Ok(Points::Nodes),
+        "interfaces" => return Ok(Points::Interfaces),
+        _ => {}
+    }
+    let numbers: Option<Vec<i64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers.map(Points::Some).ok_or_else(|| {
+        let message = format!("`{text}` names no points of the body");
+        Diagnostic::new(Code::Usage, message)
+            .with_help("nodes, interfaces, or node numbers with commas")
+            .into()
+    })
+}

@@ -1,0 +1,252 @@
+//! Free-surface mass-normalised modes from any modes, with nothing but their invariants (theory 5.2).
+
+use super::adopt::ANY_BODY;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::invariants::{Expected, GeneralTerms, Groups, Invariants, identities};
+use crate::linalg::{dense_cholesky, symmetric_eigen};
+use faer::Mat;
+
+/// A mode of which less than this part of its squared M-norm is left without rigid motion is a rigid motion.
+const RIGID: f64 = 1e-10;
+
+/// How far the modes are from mass-normalised free-surface modes, the worst of the identities that say so; `None` when they are such modes.
+pub(super) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
+    let nf = invariants.n_modes();
+    let eigenvalues: Vec<f64> = (0..nf).map(|j| invariants.modal_stiffness[(j, j)]).collect();
+    let expected =
+        Expected { mass_normalised: true, free_surface: true, eigenvalues: Some(&eigenvalues), ..ANY_BODY };
+    let ascending = eigenvalues.is_sorted() && eigenvalues.first().is_some_and(|first| *first > 0.0);
+    let about_modes = ["modal_mass_identity", "c1_zero", "c2_zero", "modal_stiffness_diagonal"];
+    let missed = identities(invariants, &expected)
+        .into_iter()
+        .filter(|check| about_modes.contains(&check.name) && !check.passed)
+        .map(|check| check.value)
+        .fold(0.0, f64::max);
+    (missed > 0.0 || !ascending).then_some(missed)
+}
+
+/// The change of modes psi' = (Psi - R A) X with the rigid motions R and X of the small eigenproblem.
+pub(super) struct FreeSurface {
+    /// A (6 x nf): rigid motion in each mode.
+    rigid: Mat<f64>,
+    /// X (nf x nf').
+    modes: Mat<f64>,
+    /// Modes of the file that are rigid motions (from 0).
+    dropped: Vec<usize>,
+}
+
+impl FreeSurface {
+    /// # Errors
+    /// [`ForeignIncomplete`](Code::ForeignIncomplete).
+    pub(super) fn new(invariants: &Invariants) -> Result<Self> {
+        let refuse = |message: &str| Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
+        let nf = invariants.n_modes();
+        let mass = mass_matrix(invariants);
+        let of_rigid = mass.as_ref().submatrix(0, 0, 6, 6).to_owned();
+        let Some(lower) = dense_cholesky(of_rigid) else {
+            return refuse("the mass matrix of rigid motion is not positive definite");
+        };
+        let whitened = solve_lower(&lower, &mass.as_ref().submatrix(0, 6, 6, nf).to_owned());
+        let left = |i: usize, j: usize| {
+            mass[(6 + i, 6 + j)] - (0..6).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
+        };
+        let (dropped, kept): (Vec<usize>, Vec<usize>) =
+            (0..nf).partition(|&j| left(j, j) <= RIGID * mass[(6 + j, 6 + j)]);
+        let elastic = Mat::from_fn(kept.len(), kept.len(), |i, j| left(kept[i], kept[j]));
+        let Some(factor) = dense_cholesky(elastic).filter(|_| !kept.is_empty()) else {
+            return refuse(
+                "modes are rigid motions or depend on each other: their mass matrix is not positive definite",
+            );
+        };
+        let stiffness =
+            Mat::from_fn(kept.len(), kept.len(), |i, j| invariants.modal_stiffness[(kept[i], kept[j])]);
+        let half = solve_lower(&factor, &stiffness);
+        let small = solve_lower(&factor, &half.transpose().to_owned());
+        let eigen = symmetric_eigen(small.as_ref());
+        let Some(eigen) = eigen.filter(|eigen| eigen.values.first().is_some_and(|first| *first > 0.0)) else {
+            return refuse("the stiffness of the modes is not positive definite beside their mass");
+        };
+        let of_kept = solve_upper(&factor, &eigen.vectors);
+        let mut modes = Mat::zeros(nf, kept.len());
+        for j in 0..kept.len() {
+            // The largest part of each new mode keeps its sign.
+            let largest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+            let sign = of_kept.col(j).iter().fold(0.0, largest).signum();
+            for (i, &row) in kept.iter().enumerate() {
+                modes[(row, j)] = sign * of_kept[(i, j)];
+            }
+        }
+        Ok(Self { rigid: solve_upper(&lower, &whitened), modes, dropped })
+    }
+
+    /// What is to be said.
+    pub(super) fn note(&self, missed: f64) -> Diagnostic {
+        let mut message = format!(
+            "modes of the file are no mass-normalised free-surface modes (by {missed:.1e}): they were made such"
+        );
+        if !self.dropped.is_empty() {
+            let numbers: Vec<String> = self.dropped.iter().map(|j| (j + 1).to_string()).collect();
+            message.push_str(&format!("; rigid motions left out: {}", numbers.join(", ")));
+        }
+        Diagnostic::new(Code::ForeignChanged, message)
+    }
+
+    /// X'A X.
+    pub(super) fn congruent(&self, a: &Mat<f64>) -> Mat<f64> {
+        let full = self.modes.transpose() * a * &self.modes;
+        Mat::from_fn(full.nrows(), full.ncols(), |i, j| 0.5 * (full[(i, j)] + full[(j, i)]))
+    }
+
+    /// A X: what is taken from each new mode.
+    fn taken(&self) -> Mat<f64> {
+        &self.rigid * &self.modes
+    }
+
+    pub(super) fn shapes(&self, shape: &Mat<f64>, positions: &[[f64; 3]]) -> Mat<f64> {
+        let (new, taken) = (shape * &self.modes, self.taken());
+        Mat::from_fn(new.nrows(), new.ncols(), |row, j| {
+            let (x, k) = (positions[row / 3], row % 3);
+            let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+            new[(row, j)] - taken[(k, j)] - (taken[(3 + l, j)] * x[m] - taken[(3 + m, j)] * x[l])
+        })
+    }
+
+    /// Rotations of the frames that have some.
+    pub(super) fn rotations(&self, rotation: &Mat<f64>, turns: &[bool]) -> Mat<f64> {
+        let (new, taken) = (rotation * &self.modes, self.taken());
+        Mat::from_fn(new.nrows(), new.ncols(), |row, j| {
+            if turns[row / 3] { new[(row, j)] - taken[(3 + row % 3, j)] } else { 0.0 }
+        })
+    }
+
+    /// The invariants in the new modes. Where M does not commute with rotations, what S does not tell of W3 is taken as that of the modes,
+    /// none of it as that of the rigid motion in them.
+    pub(super) fn invariants(&self, old: &Invariants) -> Invariants {
+        let nf = old.n_modes();
+        let taken = self.taken();
+        let t = Mat::from_fn(6 + nf, self.modes.ncols(), |i, j| match i.checked_sub(6) {
+            None => -taken[(i, j)],
+            Some(mode) => self.modes[(mode, j)],
+        });
+        let mut new = with_rigid(old).with_basis(t.as_ref());
+        if let Some(general) = &old.general {
+            let (own, mut w3) = (w3_of_s(old), w3_of_s(&new));
+            let count = new.n_modes();
+            for a in 0..3 {
+                let beside = Mat::from_fn(nf, nf, |i, j| general.w3[(a * nf + i, j)] - own[(a * nf + i, j)]);
+                let change = self.modes.transpose() * beside * &self.modes;
+                (0..count).for_each(|i| (0..count).for_each(|j| w3[(a * count + i, j)] += change[(i, j)]));
+            }
+            let (w0, modal_mass) = (new.w0(), Mat::identity(count, count));
+            new.general = Some(GeneralTerms { w0, w3, modal_mass, plane: false });
+        }
+        new.with_groups(old.groups)
+    }
+}
+
+/// W3 by its formula from S.
+fn w3_of_s(invariants: &Invariants) -> Mat<f64> {
+    let solid = Invariants { general: None, groups: Groups::ALL, ..invariants.clone() };
+    solid.w3().expect("held")
+}
+
+/// [m I, -c~, C1; ., I0, C2; ., ., m_ff]: M in the six rigid motions and the modes.
+fn mass_matrix(invariants: &Invariants) -> Mat<f64> {
+    let (c1, c2, modal) = (&invariants.c1, invariants.c2(), invariants.modal_mass());
+    let (lever, inertia) = (invariants.first_moment.cross_matrix(), invariants.inertia());
+    let nf = invariants.n_modes();
+    Mat::from_fn(6 + nf, 6 + nf, |i, j| match (i.min(j), i.max(j)) {
+        (a, b) if b < 3 => invariants.mass * f64::from(a == b),
+        (a, b) if a < 3 && b < 6 => -lever[(a, b - 3)],
+        (a, b) if b < 6 => inertia[(a - 3, b - 3)],
+        (a, b) if a < 3 => c1[(a, b - 6)],
+        (a, b) if a < 6 => c2[(a - 3, b - 6)],
+        _ => modal[(i - 6, j - 6)],
+    })
+}
+
+/// The sign of the permutation (a, b, c) of (0, 1, 2); 0 where an index repeats.
+fn permutation(a: usize, b: usize, c: usize) -> f64 {
+    match (3 + b - a) % 3 {
+        0 => 0.0,
+        1 if c == 3 - a - b => 1.0,
+        2 if c == 3 - a - b => -1.0,
+        _ => 0.0,
+    }
+}
+
+/// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes before the others.
+fn with_rigid(old: &Invariants) -> Invariants {
+    let nf = old.n_modes();
+    let (m, c, j) = (old.mass, &old.first_moment, &old.second_moment);
+    let axes = || 0..3;
+    let delta = |a: usize, b: usize| f64::from(a == b);
+    // (e_d x c)_l.
+    let turned = |l: usize, d: usize| axes().map(|i| permutation(l, d, i) * c[i]).sum::<f64>();
+    let c1 = Mat::from_fn(3, 6 + nf, |k, p| match p {
+        0..3 => m * delta(k, p),
+        3..6 => turned(k, p - 3),
+        _ => old.c1[(k, p - 6)],
+    });
+    let ibar = |k: usize, l: usize, p: usize| match p {
+        0..3 => delta(l, p) * c[k],
+        3..6 => axes().map(|i| permutation(l, p - 3, i) * j[(k, i)]).sum(),
+        _ => old.ibar[k][l][p - 6],
+    };
+    // u_k' Ms v_l of motions in this order: translations, rotations, modes.
+    let product = |k: usize, l: usize, p: usize, q: usize| match (p, q) {
+        (0..3, 0..3) => delta(k, p) * delta(l, q) * m,
+        (0..3, 3..6) => delta(k, p) * turned(l, q - 3),
+        (0..3, _) => delta(k, p) * old.c1[(l, q - 6)],
+        (3..6, 3..6) => {
+            let entry = |a: usize, b: usize| permutation(k, p - 3, a) * permutation(l, q - 3, b) * j[(a, b)];
+            axes().flat_map(|a| axes().map(move |b| (a, b))).map(|(a, b)| entry(a, b)).sum()
+        }
+        (3..6, _) => axes().map(|i| permutation(k, p - 3, i) * old.ibar[i][l][q - 6]).sum(),
+        _ => old.s[k][l][(p - 6, q - 6)],
+    };
+    let rank = |p: usize| (p / 3).min(2);
+    let s = |k: usize, l: usize| {
+        Mat::from_fn(6 + nf, 6 + nf, |p, q| {
+            if rank(p) <= rank(q) { product(k, l, p, q) } else { product(l, k, q, p) }
+        })
+    };
+    Invariants {
+        mass: m,
+        first_moment: *c,
+        second_moment: *j,
+        c1,
+        ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| (0..6 + nf).map(|p| ibar(k, l, p)).collect())),
+        s: [0, 1, 2].map(|k| [0, 1, 2].map(|l| s(k, l))),
+        modal_stiffness: Mat::from_fn(6 + nf, 6 + nf, |p, q| {
+            if p < 6 || q < 6 { 0.0 } else { old.modal_stiffness[(p - 6, q - 6)] }
+        }),
+        general: None,
+        groups: Groups::ALL,
+    }
+}
+
+/// L^-1 B.
+fn solve_lower(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+    let mut x = b.clone();
+    for j in 0..x.ncols() {
+        for i in 0..x.nrows() {
+            let before: f64 = (0..i).map(|k| lower[(i, k)] * x[(k, j)]).sum();
+            x[(i, j)] = (x[(i, j)] - before) / lower[(i, i)];
+        }
+    }
+    x
+}
+
+/// L^-T B.
+fn solve_upper(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+    let mut x = b.clone();
+    for j in 0..x.ncols() {
+        for i in (0..x.nrows()).rev() {
+            let after: f64 = (i + 1..x.nrows()).map(|k| lower[(k, i)] * x[(k, j)]).sum();
+            x[(i, j)] = (x[(i, j)] - after) / lower[(i, i)];
+        }
+    }
+    x
+}

@@ -1,0 +1,144 @@
+//! Every format that is read, on every body of the fixtures: what was written comes back, is recognised, and passes its audit.
+
+mod support;
+
+use faer::Mat;
+use flexbody::export::{ExportFormat, ExportOptions, FORMATS, Points, export};
+use flexbody::flex_body::FlexBody;
+use flexbody::foreign::{Adopted, Foreign, ForeignFormat, adopt, audit, find_foreign, recognise};
+use flexbody::input::InputFile;
+use flexbody::invariants::{BodyFrame, Invariants, primary_differences};
+use flexbody::provenance::SourceFile;
+use std::path::Path;
+use support::flexible::fixture;
+
+/// Bodies of the fixtures: all models in the principal frame, some in that of the model, where the origin is not the centre of mass.
+fn bodies() -> Vec<(String, FlexBody)> {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models");
+    let mut names: Vec<String> = std::fs::read_dir(models)
+        .expect("fixtures")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    let mut bodies: Vec<_> =
+        names.iter().map(|name| (name.clone(), fixture(name, 6, BodyFrame::Principal))).collect();
+    for name in ["connecting_rod", "turbine_blade", "frame_beams", "plane_frame"] {
+        bodies.push((format!("{name} in its model frame"), fixture(name, 6, BodyFrame::Model)));
+    }
+    bodies
+}
+
+/// Every format that is written and read, with each of its dialects.
+fn readable() -> Vec<(&'static dyn ExportFormat, &'static dyn ForeignFormat, Option<&'static str>)> {
+    let mut all = Vec::new();
+    for format in FORMATS.iter().copied() {
+        let Ok(reader) = find_foreign(format.name()) else { continue };
+        match format.dialects() {
+            [] => all.push((format, reader, None)),
+            dialects => all.extend(dialects.iter().map(|dialect| (format, reader, Some(*dialect)))),
+        }
+    }
+    all
+}
+
+fn written(body: &FlexBody, format: &dyn ExportFormat, dialect: Option<&str>, folder: &Path) -> InputFile {
+    let points = if format.has_points() { Points::Nodes } else { Points::Usual };
+    let options = ExportOptions { dialect: dialect.map(str::to_owned), points };
+    let (exported, _) = export(body, format, &options, true).expect("written");
+    let (again, _) = export(body, format, &options, true).expect("written");
+    assert!(exported == again, "equal bodies give equal bytes");
+    let path = folder.join("body.file");
+    std::fs::write(&path, &exported.file).expect("a place");
+    InputFile::open(&path).expect("readable")
+}
+
+fn taken(foreign: &Foreign) -> Adopted {
+    let source = SourceFile::new("body", Path::new("body.file"), "0".repeat(64));
+    adopt(foreign, source, flexbody::units::UnitSystem::default()).expect("a body")
+}
+
+/// What no foreign format tells of a general mass: W0 beyond C1.
+fn without_w0(invariants: &Invariants) -> Invariants {
+    let mut told = invariants.clone();
+    if let Some(general) = &mut told.general {
+        general.w0 = Invariants { general: None, ..invariants.clone() }.w0();
+        general.plane = false;
+    }
+    told
+}
+
+fn difference(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
+    if *a == *b { 0.0 } else { (a - b).norm_max() / a.norm_max().max(b.norm_max()) }
+}
+
+#[test]
+fn what_is_written_comes_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let formats = readable();
+    assert_eq!(formats.len(), 8, "sid in four dialects, mbdyn in two, mbsim, exudyn");
+    let mut wrong = Vec::new();
+    for (name, body) in bodies() {
+        for (format, reader, dialect) in &formats {
+            let what = format!("{name} as {} {}", format.name(), dialect.unwrap_or(""));
+            let mut complain = |text: String| wrong.push(format!("{what}: {text}"));
+            let file = written(&body, *format, *dialect, folder.path());
+            assert_eq!(recognise(&file).expect("known").name(), reader.name(), "{what}");
+            let foreign = reader.read(&file).expect(&what);
+            // A file without coupling says so in its audit, and what it has is right.
+            let coupled = *dialect != Some("level13");
+            let found = audit(&foreign, 1e-11);
+            for finding in found.findings().iter().filter(|_| coupled) {
+                complain(finding.to_string());
+            }
+            if !coupled && found.passed() {
+                complain("the missing coupling is not found".to_owned());
+            }
+            let Adopted { body: back, diagnostics } = taken(&foreign);
+            if diagnostics.iter().any(|d| d.code() == flexbody::diagnostic::Code::ForeignChanged) {
+                complain("the modes were changed".to_owned());
+            }
+            let (own, told) = (body.invariants(), back.invariants());
+            for (quantity, apart) in primary_differences(&without_w0(own), told) {
+                if apart.is_nan() || apart > 1e-12 {
+                    complain(format!("{quantity} differs by {apart:.1e}"));
+                }
+            }
+            let at: Vec<usize> = body
+                .nodes()
+                .ids
+                .iter()
+                .map(|id| back.nodes().ids.iter().position(|other| other == id).expect("every node"))
+                .collect();
+            let ordered =
+                |a: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |row, j| a[(3 * at[row / 3] + row % 3, j)]);
+            if difference(&body.modes().shape, &ordered(&back.modes().shape)) > 1e-15 {
+                complain("the shapes differ".to_owned());
+            }
+            for one in back.geometric_stiffness() {
+                match body.geometric_stiffness().iter().find(|other| other.load == one.load) {
+                    Some(other) if back.invariants().groups == body.groups() || format.name() != "sid" => {
+                        if difference(&one.matrix, &other.matrix) > 1e-13 {
+                            complain(format!("geometric stiffness for {} differs", one.load));
+                        }
+                    }
+                    Some(_) => {}
+                    None => complain(format!("geometric stiffness for {} comes from nowhere", one.load)),
+                }
+            }
+            if let Some(damping) = &back.modes().modal_damping {
+                let ratios =
+                    |j: usize| 2.0 * body.modes().damping_ratio[j] * body.modes().eigenvalue[j].sqrt();
+                let nf = body.n_modes();
+                let own = body
+                    .modes()
+                    .modal_damping
+                    .clone()
+                    .unwrap_or_else(|| Mat::from_fn(nf, nf, |i, j| if i == j { ratios(j) } else { 0.0 }));
+                if difference(damping, &own) > 1e-14 {
+                    complain("the damping differs".to_owned());
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} problems:\n{}", wrong.len(), wrong.join("\n"));
+}
