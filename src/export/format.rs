@@ -75,6 +75,7 @@ impl Exported {
 /// Every format, in the order of the documentation.
 pub const FORMATS: &[&dyn ExportFormat] = &[
     &super::exudyn::Exudyn,
+    &super::sid::Sid,
     &super::mbdyn::Mbdyn,
     &super::mbsim::Mbsim,
     &super::openradioss::OpenRadioss,

@@ -16,6 +16,7 @@ mod mbdyn;
 mod mbsim;
 mod npz;
 mod openradioss;
+mod sid;
 mod simscape;
 
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};

@@ -38,7 +38,7 @@ pub trait ForeignFormat: Sync {
 
 /// Every format, in the order in which files are recognised.
 pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] =
-    &[&super::mbdyn::Mbdyn, &super::mbsim::Mbsim, &super::exudyn::Exudyn];
+    &[&super::sid::SidFile, &super::mbdyn::Mbdyn, &super::mbsim::Mbsim, &super::exudyn::Exudyn];
 
 /// The format of that name.
 ///

@@ -12,6 +12,7 @@ mod hdf5_arrays;
 mod mbdyn;
 mod mbsim;
 mod redundant;
+mod sid;
 
 pub use adopt::{Adopted, adopt};
 pub use audit::{Audit, audit};

@@ -1,0 +1,14 @@
+//! SID_FEM text of any dialect, read from the description of the format alone, and everything that its redundant arrays must fulfil.
+
+mod arrays;
+mod body;
+mod checks;
+mod digits;
+mod format;
+mod frequencies;
+mod layout;
+mod lines;
+mod parse;
+mod taylor;
+
+pub use format::SidFile;
