@@ -67,6 +67,11 @@ impl<'a> InterfaceMatrices<'a> {
             let whole = combine(half.as_ref(), weighted.as_ref().transpose());
             Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]))
         });
+        let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
+        if !damping.as_ref().is_none_or(finite) {
+            let what = "their damping leaves the range of double precision".to_owned();
+            return refuse(what, "--to-units");
+        }
         Ok(Self { frames, stiffness: &coordinates.stiffness, mass: &coordinates.mass, damping })
     }
 }

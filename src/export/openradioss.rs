@@ -61,7 +61,13 @@ impl ExportFormat for OpenRadioss {
             let help = format!("number the nodes from 1 to {LARGEST}, or choose others by --points");
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
-        Ok(Exported::single(Deck::of(body, &frames).into_bytes()))
+        let deck = Deck::of(body, &frames);
+        if !deck.finite {
+            let message =
+                "openradioss needs products of the body's numbers that leave the range of double precision";
+            return Err(Diagnostic::new(Code::ExportLoses, message).with_help("--to-units").into());
+        }
+        Ok(Exported::single(deck.text.into_bytes()))
     }
 }
 
@@ -87,14 +93,18 @@ fn rayleigh(body: &FlexBody) -> Option<[f64; 2]> {
 }
 
 /// The file as it grows.
-struct Deck(String);
+struct Deck {
+    text: String,
+    /// Whether products of the body's numbers stay in the range of double precision.
+    finite: bool,
+}
 
 impl Deck {
-    fn of(body: &FlexBody, frames: &[ExportFrame]) -> String {
+    fn of(body: &FlexBody, frames: &[ExportFrame]) -> Self {
         let (nf, invariants) = (body.n_modes(), body.invariants());
         let turning = frames.iter().any(|frame| frame.rotation.is_some());
         let damping = losses::is_damped(body).then(|| rayleigh(body)).flatten();
-        let mut deck = Self(String::new());
+        let mut deck = Self { text: String::new(), finite: true };
         deck.remark("flexible body of /FXBODY, written by flexbody");
         deck.remark("  NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
         deck.integers(&[nf, 0, frames.len(), turning.into(), damping.is_some().into(), 0, 0], 7);
@@ -144,7 +154,7 @@ impl Deck {
         deck.remark("stiffness of the local modes");
         deck.numbers(diagonal(&invariants.modal_stiffness));
         deck.products(body, 3 * sets);
-        deck.0
+        deck
     }
 
     /// Products of the rigid modes with the mass, and of both kinds of modes with mass and stiffness.
@@ -185,7 +195,7 @@ impl Deck {
 
     /// Lines that begin with # are passed over.
     fn remark(&mut self, text: &str) {
-        writeln!(self.0, "# {text}").expect("writing to a String cannot fail");
+        writeln!(self.text, "# {text}").expect("writing to a String cannot fail");
     }
 
     /// Where the deck must have a node.
@@ -198,8 +208,8 @@ impl Deck {
     fn integers<T: std::fmt::Display>(&mut self, values: &[T], per_line: usize) {
         for line in values.chunks(per_line) {
             line.iter()
-                .for_each(|value| write!(self.0, "{value:>8}").expect("writing to a String cannot fail"));
-            self.0.push('\n');
+                .for_each(|value| write!(self.text, "{value:>8}").expect("writing to a String cannot fail"));
+            self.text.push('\n');
         }
     }
 
@@ -207,14 +217,18 @@ impl Deck {
     fn numbers(&mut self, values: impl IntoIterator<Item = f64>) {
         let mut on_line = 0;
         for value in values {
+            if !value.is_finite() {
+                self.finite = false;
+                return;
+            }
             if on_line == 5 {
-                self.0.push('\n');
+                self.text.push('\n');
                 on_line = 0;
             }
-            write!(self.0, "{:>WIDTH$}", number(value)).expect("writing to a String cannot fail");
+            write!(self.text, "{:>WIDTH$}", number(value)).expect("writing to a String cannot fail");
             on_line += 1;
         }
-        self.0.push('\n');
+        self.text.push('\n');
     }
 }
 

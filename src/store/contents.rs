@@ -43,7 +43,7 @@ pub struct NamedAttributes {
 
 /// Every array and every attribute of the flex-body file of `body` (`docs/format.md`), in the order of the file.
 ///
-/// Floats that the file stores in 32 bits are there with their rounded values.
+/// Of a body with 32-bit floats these are rounded as in the file; what follows from them is not rounded again.
 pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
     let (mut attributes, mut arrays) = (Vec::new(), Vec::new());
     for group in TABLE {

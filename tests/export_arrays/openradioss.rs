@@ -1,7 +1,8 @@
 //! `openradioss`: the data file of /FXBODY, read as `hm_read_fxb.F` does, its energies and forces put together as the engine does.
 
-use crate::export_support::{bodies, file};
+use crate::export_support::{bodies, exported, file};
 use crate::readers::Deck;
+use crate::store_support::wild_body;
 use crate::support::general::raw_fixture;
 use crate::support::mesh::entries;
 use crate::support::random::Random;
@@ -156,7 +157,12 @@ fn the_kinetic_energy_of_any_motion_of_the_undeformed_body_is_that_of_the_body()
             let Motion { rotation, velocity, omega, qd } = motion(&mut random, body);
             let rates = fxb.rates(&rotation, &(rotation * velocity), &(rotation * omega));
             let coupling = velocity.dot(&omega.cross(&invariants.first_moment));
-            let modes = velocity.dot(&(&c1 * &qd)) + omega.dot(&(&c2 * &qd)) + 0.5 * qd.dot(&(&m_ff * &qd));
+            // Mass-normalised: what is beside the diagonal is the rounding of the body.
+            assert!(
+                (&m_ff - DMatrix::identity(qd.len(), qd.len())).amax() <= body.storage().rounding().max(1e-9)
+            );
+            let normal: f64 = (0..qd.len()).map(|j| m_ff[(j, j)] * qd[j] * qd[j]).sum();
+            let modes = velocity.dot(&(&c1 * &qd)) + omega.dot(&(&c2 * &qd)) + 0.5 * normal;
             let own = 0.5 * invariants.mass * velocity.norm_squared()
                 + coupling
                 + 0.5 * omega.dot(&(invariants.inertia() * omega))
@@ -201,6 +207,43 @@ fn nodes_move_with_the_body_and_its_modes() {
             }
         }
     }
+}
+
+/// Each by itself, whatever its size: half a unit of the eleventh digit, or of the tenth where exponents have three.
+#[test]
+fn every_number_is_rounded_to_its_own_digits() {
+    let wild = (0..30).map(|seed| {
+        let mut parts = wild_body(seed, 3, 4, 0, 0).into_parts();
+        parts.nodes.ids = vec![1, 99_999_999, 7];
+        (format!("seed {seed}"), FlexBody::new(parts).expect("a body"), 5e-10)
+    });
+    let mut refused = 0;
+    for (name, body, rounding) in bodies().iter().cloned().map(|(name, body)| (name, body, 5e-11)).chain(wild)
+    {
+        let done = match exported(&body, "openradioss", None) {
+            Ok(done) => done,
+            Err(error) => {
+                // The products of huge numbers, of bodies of no sense.
+                assert!(
+                    error.diagnostics()[0].message().ends_with("the range of double precision"),
+                    "{error}"
+                );
+                refused += 1;
+                continue;
+            }
+        };
+        let fxb = read(&done.file);
+        for (node, place) in frames(&body, &Points::Usual).iter().enumerate() {
+            for (j, k) in (0..body.n_modes()).flat_map(|j| [0, 1, 2].map(|k| (j, k))) {
+                let (found, own) = (fxb.local[j][node][k], place.translation[(k, j)]);
+                assert!(
+                    (found - own).abs() <= rounding * own.abs() + f64::MIN_POSITIVE * f64::EPSILON,
+                    "{name}: {found:e} for {own:e}"
+                );
+            }
+        }
+    }
+    assert!((1..20).contains(&refused), "{refused} of 30");
 }
 
 /// A spinning body pulls its modes by -[w1 I, w2 I, w3 I] W1'/2 w: the accelerations of the ends of the axes make that of the file.
