@@ -1,5 +1,6 @@
 //! What a format is, and the registry.
 
+use super::embedded::Embedded;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
@@ -73,7 +74,7 @@ impl Exported {
 }
 
 /// Every format, in the order of the documentation.
-pub const FORMATS: &[&dyn ExportFormat] = &[];
+pub const FORMATS: &[&dyn ExportFormat] = &[&Embedded];
 
 /// The format of that name.
 ///
