@@ -11,6 +11,7 @@ enum { modes = CONSTANT(MODES), velocities = CONSTANT(VELOCITIES), frames = CONS
 typedef OF(real) real;
 
 const size_t real_bytes = sizeof(real);
+const size_t velocities_count = velocities;
 const size_t inputs = modes + 2 * velocities + 9;
 const size_t outputs = 1 + 4 * velocities + 2 + frames * (3 + 3 + 1 + 9 + 3 + velocities);
 
@@ -21,6 +22,14 @@ int open_body(const void *data, size_t size)
     return OF(open)(&e, data, size);
 }
 
+/* Accelerations at a state, as below, alone: what is timed. */
+void accelerate(const void *state, void *acceleration)
+{
+    const real *in = (const real *)state;
+    OF(set)(&e, in, in + modes);
+    OF(accelerations)(&e, in + modes + velocities, (real *)acceleration);
+}
+
 /* q, nu, applied forces, gravity, force, torque -> all results, one behind the other. */
 void evaluate(const void *state, void *results)
 {
@@ -28,8 +37,8 @@ void evaluate(const void *state, void *results)
     real *out = (real *)results;
     const real *applied = in + modes + velocities, *gravity = applied + velocities;
     OF(set)(&e, in, in + modes);
-    *out++ = (real)OF(accelerations)(&e, applied, out + 1);
-    out += velocities;
+    out[0] = (real)OF(accelerations)(&e, applied, out + 1);
+    out += 1 + velocities;
     OF(balance)(&e, applied, out);
     out += velocities;
     OF(momenta)(&e, out);

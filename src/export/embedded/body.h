@@ -423,7 +423,7 @@ static inline void flexbody_move(flexbody_evaluation *e)
     flexbody_real spin[FLEXBODY_PAIRS]; /* w_a w_b, summed over both orders of different axes */
     for (size_t pair = 0; pair < FLEXBODY_PAIRS; ++pair) {
         const size_t a = flexbody_pair[pair][0], b = flexbody_pair[pair][1];
-        spin[pair] = (a == b ? 1 : 2) * w[a] * w[b];
+        spin[pair] = a == b ? w[a] * w[b] : 2 * w[a] * w[b];
     }
 #endif
 #if FLEXBODY_HAS_W1
@@ -688,19 +688,18 @@ static inline int flexbody_motion_of(const flexbody_evaluation *e, size_t frame,
     if (frame >= FLEXBODY_FRAMES)
         return FLEXBODY_NO_FRAME;
     const int32_t *parts = FLEXBODY_PARTS(e) + 3 * frame;
-    if (!turning) {
-        motion->rows = FLEXBODY_ARRAY(e, FRAME_TRANSLATION) + frame * FLEXBODY_TRANSLATIONS * FLEXBODY_MODES;
-        motion->axes = flexbody_translation_axis;
-        motion->count = FLEXBODY_TRANSLATIONS;
-    } else {
-        if (parts[0] < 0)
-            return FLEXBODY_NO_ORIENTATION;
+    motion->rows = FLEXBODY_ARRAY(e, FRAME_TRANSLATION) + frame * FLEXBODY_TRANSLATIONS * FLEXBODY_MODES;
+    motion->axes = flexbody_translation_axis;
+    motion->count = FLEXBODY_TRANSLATIONS;
+    if (turning && parts[0] < 0)
+        return FLEXBODY_NO_ORIENTATION;
 #if FLEXBODY_ROTATIONS > 0
+    if (turning) {
         motion->rows = FLEXBODY_ARRAY(e, FRAME_ROTATION) + (size_t)parts[0] * FLEXBODY_AXES * FLEXBODY_MODES;
-#endif
         motion->axes = flexbody_axis;
         motion->count = FLEXBODY_AXES;
     }
+#endif
     motion->second[0] = motion->second[1] = motion->second[2] = NULL;
 #if FLEXBODY_SECONDS > 0
     const flexbody_real *next = FLEXBODY_ARRAY(e, FRAME_SECOND) + (size_t)parts[1] * FLEXBODY_MODES * FLEXBODY_MODES;
