@@ -125,7 +125,9 @@ fn row(nf: usize) -> String {
         let work = || {
             for state in states.iter().cycle().take(calls) {
                 evaluation.set(&state[..nf], &state[nf..6 + 2 * nf]);
-                evaluation.accelerations(&state[6 + 2 * nf..][..6 + nf], &mut acceleration).expect("a body with mass");
+                evaluation
+                    .accelerations(&state[6 + 2 * nf..][..6 + nf], &mut acceleration)
+                    .expect("a body with mass");
                 std::hint::black_box(&acceleration);
             }
         };
@@ -149,9 +151,10 @@ fn row(nf: usize) -> String {
             ratios[at].push(seconds / library);
         }
     }
-    let cells = times.into_iter().zip(ratios).map(|(times, ratios)| {
-        format!("{:.2} ({:.2})", median(times) * 1e6, median(ratios))
-    });
+    let cells = times
+        .into_iter()
+        .zip(ratios)
+        .map(|(times, ratios)| format!("{:.2} ({:.2})", median(times) * 1e6, median(ratios)));
     let cells: Vec<String> = cells.collect();
     let [double, _, float, _] = &programs;
     format!(
@@ -188,6 +191,7 @@ fn main() {
         let page = std::fs::read_to_string(&path).expect("the page");
         let (before, rest) = page.split_once("<!-- times -->\n").expect("a place for the table");
         let (_, after) = rest.split_once("<!-- end of times -->").expect("an end of the table");
-        std::fs::write(&path, format!("{before}<!-- times -->\n{text}<!-- end of times -->{after}")).expect("writable");
+        std::fs::write(&path, format!("{before}<!-- times -->\n{text}<!-- end of times -->{after}"))
+            .expect("writable");
     }
 }

@@ -45,8 +45,7 @@ fn exported(body: &FlexBody, dialect: &str, points: &Points) -> Exported {
 }
 
 fn run(command: &mut Command) -> Output {
-    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}; the C compiler is `cc`"));
-    output
+    command.output().unwrap_or_else(|error| panic!("{command:?}: {error}; the C compiler is `cc`"))
 }
 
 #[track_caller]
@@ -105,11 +104,14 @@ impl Compiled {
 
     /// The results at the states, `bytes` per number.
     fn results(&self, states: &[Vec<f64>], bytes: usize) -> Vec<f64> {
-        let number = |v: &f64| if bytes == 8 { v.to_le_bytes().to_vec() } else { (*v as f32).to_le_bytes().to_vec() };
+        let number =
+            |v: &f64| if bytes == 8 { v.to_le_bytes().to_vec() } else { (*v as f32).to_le_bytes().to_vec() };
         std::fs::write(self.path("states"), states.concat().iter().flat_map(number).collect::<Vec<u8>>())
             .expect("writable");
-        let output =
-            run(Command::new(self.path("driver")).arg(self.path("body.bin")).arg("0").arg(self.path("states")));
+        let output = run(Command::new(self.path("driver"))
+            .arg(self.path("body.bin"))
+            .arg("0")
+            .arg(self.path("states")));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let read = |raw: &[u8]| match bytes {
             8 => f64::from_le_bytes(raw.try_into().expect("eight")),
@@ -159,9 +161,8 @@ fn state(random: &mut Random, body: &FlexBody) -> Vec<f64> {
 fn point(body: &FlexBody, all: &[ExportFrame], frame: &ExportFrame) -> BodyPoint {
     let alone = all.iter().filter(|other| other.name == frame.name).count() == 1;
     let interface = body.interfaces().iter().find(|interface| Some(&interface.name) == frame.name.as_ref());
-    let reference = interface
-        .filter(|_| alone)
-        .and_then(|interface| BodyPoint::interface(body, interface, Terms::ALL));
+    let reference =
+        interface.filter(|_| alone).and_then(|interface| BodyPoint::interface(body, interface, Terms::ALL));
     reference.unwrap_or_else(|| {
         let node = body.nodes().ids.iter().position(|id| *id == frame.id).expect("a node");
         BodyPoint::node(body, node)
@@ -265,10 +266,10 @@ const ROUNDINGS: f64 = 500.0;
 #[track_caller]
 fn assert_same(name: &str, body: &FlexBody, dialect: &str, flags: &[&str]) {
     let points = some_points(body);
-    let (bytes, rounding) = if dialect == "float" { (4, 0.5 * f64::from(f32::EPSILON)) } else { (8, 0.5 * f64::EPSILON) };
+    let (bytes, rounding) =
+        if dialect == "float" { (4, 0.5 * f64::from(f32::EPSILON)) } else { (8, 0.5 * f64::EPSILON) };
     let compiled = Compiled::new(exported(body, dialect, &points), flags);
     let error = error(&compiled, body, &points, bytes);
-    println!("{name}, {dialect}: {error:.1e}");
     assert!(error < ROUNDINGS * rounding, "{name}, {dialect}: {error:.1e}");
 }
 

@@ -201,17 +201,20 @@ static inline void flexbody_product(size_t stride, const flexbody_real *restrict
 #endif
 }
 
-/* a'b of n numbers, in eight sums that a compiler may keep in vector registers. */
+/* a'b of n numbers, in four sums that a compiler may keep in a vector register. */
 static inline flexbody_real flexbody_dot(size_t n, const flexbody_real *restrict a, const flexbody_real *restrict b)
 {
-    flexbody_real sum[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+    flexbody_real s0 = 0, s1 = 0, s2 = 0, s3 = 0;
     size_t i = 0;
-    for (; i + 8 <= n; i += 8)
-        for (size_t lane = 0; lane < 8; ++lane)
-            sum[lane] += a[i + lane] * b[i + lane];
-    for (size_t lane = 0; i < n; ++i, ++lane)
-        sum[lane] += a[i] * b[i];
-    return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+    for (; i + 4 <= n; i += 4) {
+        s0 += a[i] * b[i];
+        s1 += a[i + 1] * b[i + 1];
+        s2 += a[i + 2] * b[i + 2];
+        s3 += a[i + 3] * b[i + 3];
+    }
+    for (; i < n; ++i)
+        s0 += a[i] * b[i];
+    return (s0 + s2) + (s1 + s3);
 }
 
 /* y += factor x of nf numbers. */

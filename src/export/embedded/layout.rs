@@ -111,7 +111,11 @@ pub(super) const ARRAYS: &[Described] = &[
     ),
     array("frame_parts", "3 x n", "i32, described below; as `frame_number`"),
     array("frame_position", "T x n", "undeformed position of each frame"),
-    array("frame_translation", "nf x T n", "displacement of each frame in each mode: a column per frame and axis"),
+    array(
+        "frame_translation",
+        "nf x T n",
+        "displacement of each frame in each mode: a column per frame and axis",
+    ),
     array(
         "frame_rotation",
         "nf x A k",

@@ -3,8 +3,7 @@
 use super::arrays::{Array, Content, Numbers, loads};
 use super::header::{expected, header};
 use super::layout::{
-    ALIGNMENT, ARRAYS, BYTE_ORDER, CHECKED_FROM, MAGIC, VERSION, fixed_header, header_bytes,
-    header_offset,
+    ALIGNMENT, ARRAYS, BYTE_ORDER, CHECKED_FROM, MAGIC, VERSION, fixed_header, header_bytes, header_offset,
 };
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -95,7 +94,8 @@ fn bytes(body: &FlexBody, content: &Content, precision: usize) -> Result<(Vec<u8
         refused(format!("embedded cannot hold {} bytes, 4 GiB at most", file.len()), "fewer --points")
     })?;
 
-    let mut put = |name: &str, bytes: &[u8]| file[header_offset(name)..][..bytes.len()].copy_from_slice(bytes);
+    let mut put =
+        |name: &str, bytes: &[u8]| file[header_offset(name)..][..bytes.len()].copy_from_slice(bytes);
     put("magic", &MAGIC);
     put("byte_order", &BYTE_ORDER.to_le_bytes());
     put("version", &VERSION.to_le_bytes());
