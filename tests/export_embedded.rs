@@ -310,7 +310,7 @@ fn a_body_without_some_terms_has_neither_their_numbers_nor_their_forces() {
         let full = exported(&body, "double", &Points::Some(Vec::new())).file.len();
         for groups in combinations() {
             let partial = with_groups(&body, groups);
-            assert_same(&format!("{groups:?}"), &partial, "double", &["-O1"]);
+            assert_same(&format!("{groups:?}"), &partial, "double", &["-O0"]);
             let (nf, axes) = (body.n_modes(), if body.dimension() == 2 { 1 } else { 3 });
             let pairs = if axes == 3 { 6 } else { 1 };
             let mut dropped = 0;
@@ -407,11 +407,9 @@ fn craig_bampton_bodies_have_frames_at_their_interfaces() {
 
 #[test]
 fn sanitizers_find_nothing() {
-    let flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
-    for body in kinds() {
-        let body = laden(body, &mut Random(3));
-        assert_same("sanitized", &body, "double", &flags);
-        assert_same("sanitized", &body, "float", &flags);
+    let flags = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    for (body, dialect) in kinds().into_iter().zip(["float", "double", "double", "float"]) {
+        assert_same("sanitized", &laden(body, &mut Random(3)), dialect, &flags);
     }
 }
 
@@ -429,7 +427,7 @@ const DAMAGED: i32 = 7;
 fn other_and_damaged_files_are_refused() {
     let body = fixture("frame_beams", 6, BodyFrame::Model);
     let points = some_points(&body);
-    let flags = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let compiled = Compiled::new(exported(&body, "double", &points), &flags);
     let file = &compiled.exported.file;
     assert_eq!(compiled.opened(file, 0), OK);
@@ -472,7 +470,7 @@ fn other_and_damaged_files_are_refused() {
 #[test]
 fn indices_that_lead_nowhere_are_refused() {
     let body = laden(fixture("robot_link", 6, BodyFrame::Model), &mut Random(5));
-    let flags = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let compiled = Compiled::new(exported(&body, "double", &Points::Usual), &flags);
     let file = &compiled.exported.file;
     let u32_at = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("four"));
@@ -499,7 +497,7 @@ fn any_name_makes_a_header_that_compiles() {
         let mut parts = fixture("hex8_edges", 4, BodyFrame::Model).into_parts();
         parts.source.name = name.to_owned();
         let body = FlexBody::new(parts).expect("valid parts");
-        let compiled = Compiled::new(exported(&body, "double", &Points::Nodes), &["-O1"]);
+        let compiled = Compiled::new(exported(&body, "double", &Points::Nodes), &["-O0"]);
         assert!(error(&compiled, &body, &Points::Nodes, 8) < ROUNDINGS * 0.5 * f64::EPSILON);
     }
 }

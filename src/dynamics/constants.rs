@@ -13,8 +13,6 @@ pub(crate) struct Constants {
     pub rigid: Vec<f64>,
     /// What is linear in q, a row each: W0 (translation by translation, T A rows), W1 (P rows, where it is held), C1 (T), C2 (A).
     pub linear: Mat<f64>,
-    /// Whether `linear` has W1.
-    pub has_w1: bool,
     /// E of each pair (6.7), less geometric stiffness for spin (7.4).
     pub w2: Option<Mat<f64>>,
     /// W3' of each axis, with geometric stiffness for angular acceleration.
@@ -55,7 +53,6 @@ impl EquationsOfMotion {
         Constants {
             rigid: [self.mass].into_iter().chain(moment).chain(inertia).collect(),
             linear: Mat::from_fn(rows.len(), nf, |row, j| self.row(rows[row])[j]),
-            has_w1,
             w2: stacked(&self.w2, self.pairs.len()),
             w3: stacked(&self.w3, self.axes.len()),
             w3_skew: stacked(&self.w3_skew, self.axes.len()),
