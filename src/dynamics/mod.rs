@@ -2,6 +2,7 @@
 //! Forces, momenta, energies, accelerations and Jacobians, without an allocation per evaluation; and its motion as a system to integrate.
 
 mod accelerations;
+mod constants;
 mod cost;
 mod equations;
 mod evaluation;
@@ -19,6 +20,7 @@ mod snapshot;
 mod terms;
 
 pub use accelerations::{NotPositiveDefinite, Prescribed};
+pub(crate) use constants::Constants;
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
 pub use load_jacobian::{LoadAxes, LoadJacobian};

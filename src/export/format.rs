@@ -84,6 +84,7 @@ pub const FORMATS: &[&dyn ExportFormat] = &[
     &super::adams_invariants::AdamsInvariants,
     &super::npz::Npz,
     &super::json::Json,
+    &super::embedded::Embedded,
 ];
 
 /// The format of that name.

@@ -3,6 +3,7 @@
 mod adams_invariants;
 mod arrays;
 mod chrono;
+mod embedded;
 mod exudyn;
 mod format;
 mod frames;
@@ -19,5 +20,6 @@ mod openradioss;
 mod sid;
 mod simscape;
 
+pub use embedded::embedded_markdown;
 pub use format::{ExportFormat, ExportOptions, Exported, FORMATS, Points, export, find_format};
 pub use frames::{ExportFrame, frames};
