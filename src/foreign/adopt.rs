@@ -190,6 +190,16 @@ fn stacked<'f>(
     Mat::from_fn(3 * frames.len(), nf, |row, j| rows(&frames[row / 3]).map_or(0.0, |rows| rows[(row % 3, j)]))
 }
 
+/// The diagonal of K_ff, ascending: rounding may have exchanged what is repeated.
+fn eigenvalues(invariants: &Invariants) -> Vec<f64> {
+    let mut largest = 0.0f64;
+    let mut next = |j: usize| {
+        largest = largest.max(invariants.modal_stiffness[(j, j)]);
+        largest
+    };
+    (0..invariants.n_modes()).map(&mut next).collect()
+}
+
 /// |K x - lambda x| of each unit vector x, relative to lambda.
 fn residuals(invariants: &Invariants, eigenvalue: &[f64]) -> Vec<f64> {
     let k = &invariants.modal_stiffness;

@@ -1,14 +1,14 @@
 //! With how many digits a file of text writes its numbers.
 
-/// Digits of numbers as they are written.
+/// How the numbers of a file, or of a part of it, are written.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Digits {
-    /// Most decimals of numbers without an exponent.
-    decimals: usize,
-    /// Whether a number has an exponent.
+    /// Most decimals of numbers without an exponent, where there are such.
+    fixed: Option<u32>,
+    /// Whether there are numbers with one.
     exponents: bool,
     /// Most significant digits of any number.
-    significant: usize,
+    significant: u32,
     /// Numbers that are not zero.
     count: usize,
 }
@@ -17,34 +17,50 @@ pub(super) struct Digits {
 const FEW: usize = 20;
 
 impl Digits {
-    /// Takes a number into account.
+    /// Takes a number as it is written into account.
     pub(super) fn see(&mut self, text: &str) {
-        let mantissa = text.split(['e', 'E']).next().unwrap_or("");
-        let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count();
+        let mantissa = text.split(['e', 'E', 'd', 'D']).next().unwrap_or("");
+        let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count() as u32;
         let significant = digits(mantissa.trim_start_matches(['+', '-', '0', '.']));
         self.significant = self.significant.max(significant);
         self.count += usize::from(significant > 0);
         if mantissa.len() < text.len() {
             self.exponents = true;
         } else {
-            self.decimals = self.decimals.max(mantissa.split_once('.').map_or(0, |(_, part)| digits(part)));
+            let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| digits(decimals));
+            self.fixed = self.fixed.max(Some(decimals));
         }
     }
 
-    /// Half a unit of the last digit of a number of size one, as far as the file shows it.
-    pub(super) fn rounding(&self) -> f64 {
-        if self.count < FEW {
-            return 0.0;
+    /// The most of both.
+    pub(super) fn most(self, other: Self) -> Self {
+        Self {
+            fixed: self.fixed.max(other.fixed),
+            exponents: self.exponents || other.exponents,
+            significant: self.significant.max(other.significant),
+            count: self.count + other.count,
         }
-        let places = if self.exponents { self.significant.saturating_sub(1) } else { self.decimals };
-        0.5 * 0.1f64.powi(i32::try_from(places).unwrap_or(i32::MAX))
+    }
+
+    /// Whether there are too few numbers to tell how many digits the program writes.
+    pub(super) fn are_few(self) -> bool {
+        self.count < FEW
     }
 
     /// `6 decimals without exponents`, `7 significant digits`.
-    pub(super) fn words(&self) -> String {
-        match self.exponents {
-            true => format!("{} significant digits", self.significant),
-            false => format!("{} decimals without exponents", self.decimals),
+    pub(super) fn words(self) -> String {
+        match self.fixed.filter(|_| !self.exponents) {
+            Some(decimals) => format!("{decimals} decimals without exponents"),
+            None => format!("{} significant digits", self.significant),
+        }
+    }
+
+    /// Half a unit of the last digit of an array whose largest number is `size`: short numbers of a file with long ones are exact.
+    pub(super) fn rounding(self, size: f64) -> f64 {
+        let half = |digits: u32| 0.5 * 0.1f64.powi(digits.min(400) as i32);
+        match self.fixed.filter(|_| !self.exponents) {
+            Some(decimals) => half(decimals),
+            None => half(self.significant) * 10.0 * size,
         }
     }
 }
@@ -53,17 +69,19 @@ impl Digits {
 mod tests {
     use super::*;
 
-    fn of(texts: &[&str]) -> Digits {
-        let mut digits = Digits::default();
-        texts.iter().cycle().take(texts.len() * FEW).for_each(|text| digits.see(text));
-        digits
-    }
-
     #[test]
-    fn rounding_is_half_a_unit_of_the_last_digit() {
-        assert!((of(&["0.123456", "1.5", "-12.000001"]).rounding() - 5e-7).abs() < 1e-20);
-        assert!((of(&["1.23456E+03", "-0.00e+00"]).rounding() - 5e-6).abs() < 1e-18);
-        assert!(of(&["7", "1e-05", "0.12345678901234567"]).rounding() < 1e-15);
-        assert_eq!(of(&["0.0", "0"]).rounding(), 0.0);
+    fn half_a_unit_of_the_last_digit() {
+        let of = |texts: &[&str]| {
+            let mut digits = Digits::default();
+            texts.iter().for_each(|text| digits.see(text));
+            digits
+        };
+        let six = of(&["0.123456", "1.5", "-12.000001"]);
+        assert!((six.rounding(3.0) - 5e-7).abs() < 1e-20);
+        let scientific = of(&["1.23456D+03", "-0.00D+00"]);
+        assert!((scientific.rounding(1.0) - 5e-6).abs() < 1e-18);
+        let full = of(&["7", "1e-05", "0.12345678901234567"]);
+        assert!(full.rounding(7.0) < 1e-15);
+        assert!(full.are_few() && !of(&["1.5"; FEW]).are_few() && of(&["0.0"; FEW]).are_few());
     }
 }

@@ -1,6 +1,6 @@
 //! Free-surface mass-normalised modes from any modes, with nothing but their invariants (theory 5.2).
 
-use super::adopt::ANY_BODY;
+use super::adopt::{ANY_BODY, DIGITS};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::invariants::{Expected, GeneralTerms, Groups, Invariants, identities};
@@ -16,7 +16,8 @@ pub(super) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
     let eigenvalues: Vec<f64> = (0..nf).map(|j| invariants.modal_stiffness[(j, j)]).collect();
     let expected =
         Expected { mass_normalised: true, free_surface: true, eigenvalues: Some(&eigenvalues), ..ANY_BODY };
-    let ascending = eigenvalues.is_sorted() && eigenvalues.first().is_some_and(|first| *first > 0.0);
+    let nearly = |pair: &[f64]| pair[0] - pair[1] <= DIGITS * pair[0];
+    let ascending = eigenvalues.first().is_some_and(|first| *first > 0.0) && eigenvalues.windows(2).all(nearly);
     let about_modes = ["modal_mass_identity", "c1_zero", "c2_zero", "modal_stiffness_diagonal"];
     let missed = identities(invariants, &expected)
         .into_iter()

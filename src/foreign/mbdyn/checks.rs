@@ -25,7 +25,7 @@ pub(super) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {
             name: "damping_symmetric",
             formula: "record group 13 = its transpose",
             value: asymmetry(damping),
-            limit: ROUNDING + TERMS * records.digits.rounding(),
+            limit: ROUNDING + TERMS * records.rounding(),
             code: Code::AuditIdentity,
             meaning: "damping of a mode by another depends on their order".to_owned(),
         });
@@ -37,7 +37,7 @@ fn digits(records: &Records) -> AuditCheck {
     AuditCheck {
         name: "digits",
         formula: "half a unit of the last digit of numbers of size one",
-        value: records.digits.rounding(),
+        value: records.rounding(),
         limit: LOST,
         code: Code::AuditDigits,
         meaning: format!("numbers are written with {}", records.digits.words()),
@@ -96,7 +96,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         name: "lumped_masses_carry_modes",
         formula: "record groups 9 and 12 = sums over the masses of record group 11",
         value: worst(modal, worst(total, tensor)),
-        limit: ROUNDING + TERMS * records.digits.rounding(),
+        limit: ROUNDING + TERMS * records.rounding(),
         code: Code::AuditLumped,
         meaning: format!(
             "the coupling of rigid motion and modes comes from {n} lumped masses, which are not the mass matrix of the modes: modal mass differs by {modal:.1e}, mass by {total:.1e}, inertia by {tensor:.1e}"
@@ -108,7 +108,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
 /// What groups 9 and 14 to 18 tell twice.
 fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
     let redundant = Redundant::new(&read.body.inertia);
-    let limit = ROUNDING + TERMS * records.digits.rounding();
+    let limit = ROUNDING + TERMS * records.rounding();
     let identity = |name, formula, value, meaning: &str| AuditCheck {
         name,
         formula,

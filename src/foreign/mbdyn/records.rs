@@ -183,6 +183,11 @@ impl Records {
         Ok(())
     }
 
+    /// Half a unit of the last digit of a number of size one, as far as the file shows it.
+    pub(super) fn rounding(&self) -> f64 {
+        if self.digits.are_few() { 0.0 } else { self.digits.rounding(1.0) }
+    }
+
     /// Numbers of a group.
     pub(super) fn get(&self, group: usize) -> Option<&[f64]> {
         self.numbers.get(&group).map(Vec::as_slice)

@@ -1,6 +1,6 @@
 //! The arrays of the body, dense, and how exactly they are written.
 
-use super::digits::Digits;
+use crate::foreign::digits::Digits;
 use super::parse::{Frame, Listed};
 use super::taylor::Taylor;
 use faer::Mat;

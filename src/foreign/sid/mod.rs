@@ -3,7 +3,6 @@
 mod arrays;
 mod body;
 mod checks;
-mod digits;
 mod format;
 mod frequencies;
 mod layout;

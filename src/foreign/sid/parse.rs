@@ -1,6 +1,6 @@
 //! The structure of the file: `part`, `new modal`, `refmod`, `frame` and the objects.
 
-use super::digits::Digits;
+use crate::foreign::digits::Digits;
 use super::lines::{Line, Lines};
 use super::taylor::{ModeIndex, Taylor};
 use crate::diagnostic::{Code, Diagnostic};

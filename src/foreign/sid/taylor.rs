@@ -1,6 +1,6 @@
 //! An object of the file: sizes and the entries that are listed.
 
-use super::digits::Digits;
+use crate::foreign::digits::Digits;
 use super::lines::{Line, Lines};
 use crate::diagnostic::Diagnostic;
 use faer::Mat;
