@@ -46,7 +46,7 @@ impl ForeignFormat for Exudyn {
         arrays.require(&REQUIRED)?;
         let (rows, nf) = arrays.extents("modeBasis")?;
         let n = rows / 3;
-        if rows % 3 != 0 {
+        if !rows.is_multiple_of(3) {
             return Err(arrays.refuse("modeBasis", &format!("expected three rows per node, found {rows}")));
         }
         let shapes = arrays.matrix("modeBasis", rows, nf)?;

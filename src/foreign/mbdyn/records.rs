@@ -171,7 +171,7 @@ impl Records {
             let line = words.at();
             match words.take_line() {
                 Some(title) if title.starts_with("**") && !title.starts_with(GROUP) => {}
-                Some(title) if title.is_empty() => {}
+                Some("") => {}
                 _ => return Err(words.refuse_at(line, format!("{WHAT}: mode {} has no title", mode + 1))),
             }
             let values = words.numbers(of_mode, WHAT)?;

@@ -151,7 +151,7 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ForeignFrame>> {
     }
     let positions = arrays.values::<f64>(POSITIONS)?.values;
     let n = positions.len() / 3;
-    if positions.len() % 3 != 0 {
+    if !positions.len().is_multiple_of(3) {
         return Err(
             arrays.refuse(POSITIONS, &format!("expected three numbers per node, found {}", positions.len()))
         );
