@@ -83,8 +83,10 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
         let [length, mass, time] = [&units.length, &units.mass, &units.time].map(|unit| unit.name());
         facts.push(format!("units {length} {mass} {time}"));
     }
-    if body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin) {
-        facts.push("geometric stiffness for spin".to_owned());
+    for kind in [LoadKind::Spin, LoadKind::AngularAcceleration] {
+        if body.geometric_stiffness().iter().any(|one| one.load.kind == kind) {
+            facts.push(format!("geometric stiffness for {}", kind.name().replace('_', " ")));
+        }
     }
     if body.invariants().general.is_some() {
         facts.push("general mass".to_owned());

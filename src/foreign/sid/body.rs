@@ -19,6 +19,8 @@ pub(super) struct Declared {
     pub(super) units: Option<UnitSystem>,
     /// Whether Oe1 has geometric stiffness, where the line tells.
     pub(super) stiffened: Option<bool>,
+    /// Whether Cr1 has geometric stiffness, as far as the line tells.
+    pub(super) turned: bool,
     /// Whether the mass is one that does not commute with rotations.
     pub(super) general: bool,
     /// Whether W2 is left out on purpose.
@@ -36,6 +38,7 @@ impl Declared {
             for fact in facts.split(", ") {
                 match fact {
                     "geometric stiffness for spin" => found.stiffened = Some(true),
+                    "geometric stiffness for angular acceleration" => found.turned = true,
                     "general mass" => found.general = true,
                     fact if fact.starts_with("without ") => {
                         found.without_w2 = fact.split(' ').any(|group| group == "W2");
@@ -68,7 +71,8 @@ pub(super) fn body(
     let nq = arrays.nq;
     let (mut notes, mut stiffness) = (Vec::new(), Vec::new());
     let i8 = |k: usize| 0.5 * (arrays.j1(k) - arrays.cr0(k).cross_matrix());
-    let i5 = coupling(arrays, &mut stiffness, &mut notes);
+    let general = declared.general && !declared.turned;
+    let i5 = coupling(arrays, general, &mut stiffness, &mut notes);
     let oe1 =
         |k: usize, l: usize, pair: usize| 0.5 * (arrays.oe.linear(l, k, pair) + arrays.oe.linear(k, l, pair));
     let i9 = match (&arrays.oe.m1, spin_in_oe) {
@@ -125,14 +129,18 @@ pub(super) fn body(
 }
 
 /// W3 from Cr1: its skew part; what is symmetric in the modes is geometric stiffness for angular
-/// acceleration.
+/// acceleration, or W3 too of a mass that does not commute with rotations (`general`).
 fn coupling(
     arrays: &Arrays,
+    general: bool,
     stiffness: &mut Vec<GeometricStiffness<Mat<f64>>>,
     notes: &mut Vec<String>,
 ) -> Option<Mat<f64>> {
     let nq = arrays.nq;
     arrays.cr.m1.as_ref()?;
+    if general {
+        return Some(Mat::from_fn(3 * nq, nq, |row, k| arrays.cr.linear(row % nq, k, row / nq)));
+    }
     let even = |a: usize| second(nq, |k, l| arrays.cr.linear(l, k, a));
     let size = arrays.cr.sizes()[1];
     let rounding = ROUNDING * size + 2.0 * arrays.cr.rounding[1];
@@ -159,7 +167,8 @@ fn centrifugal(nq: usize, oe1: impl Fn(usize, usize, usize) -> f64, i5: Option<&
             3 => 4,
             _ => 5,
         };
-        let w3 = i5.map_or(0.0, |i5| i5[((3 - a - b) * nq + k, l)]);
+        let c = (3 - a - b) * nq;
+        let w3 = i5.map_or(0.0, |i5| 0.5 * (i5[(c + k, l)] - i5[(c + l, k)]));
         0.5 * (oe1(k, l, pair) - if (a + 1) % 3 == b { w3 } else { -w3 })
     })
 }

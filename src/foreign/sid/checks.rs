@@ -109,7 +109,7 @@ pub(super) fn checks(
         all.extend(constant_centrifugal(arrays, scale(bound_r, &[oe[0], arrays.inertia.sizes()[1]])));
     }
     let mut two_masses = false;
-    let mut spin_in_oe = declared.stiffened == Some(true) || declared.general;
+    let mut spin_in_oe = declared.stiffened == Some(true);
     if there(&["Oe1"]) {
         all.push(symmetric_in_modes(
             &arrays.oe,
@@ -120,7 +120,7 @@ pub(super) fn checks(
         ));
         if oe[1] > 0.0 {
             let sum = trace(arrays, scale(bound_e, &[oe[1]]));
-            spin_in_oe |= !sum.passed();
+            spin_in_oe |= !(sum.passed() || declared.general);
             // Where the file says that there is more in Oe1, nothing has to fit.
             if !(declared.stiffened == Some(true) || declared.general) {
                 two_masses = !sum.passed();
