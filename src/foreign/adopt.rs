@@ -75,8 +75,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             .map(|one| GeometricStiffness { matrix: change.congruent(&one.matrix), load: one.load })
             .collect();
     }
-    let eigenvalue: Vec<f64> =
-        (0..invariants.n_modes()).map(|j| invariants.modal_stiffness[(j, j)]).collect();
+    let eigenvalue = eigenvalues(&invariants);
     let damping_ratio = match &damping {
         Some(d) => {
             eigenvalue.iter().enumerate().map(|(j, l)| (0.5 * d[(j, j)] / l.sqrt()).max(0.0)).collect()

@@ -17,7 +17,8 @@ pub(super) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
     let expected =
         Expected { mass_normalised: true, free_surface: true, eigenvalues: Some(&eigenvalues), ..ANY_BODY };
     let nearly = |pair: &[f64]| pair[0] - pair[1] <= DIGITS * pair[0];
-    let ascending = eigenvalues.first().is_some_and(|first| *first > 0.0) && eigenvalues.windows(2).all(nearly);
+    let ascending =
+        eigenvalues.first().is_some_and(|first| *first > 0.0) && eigenvalues.windows(2).all(nearly);
     let about_modes = ["modal_mass_identity", "c1_zero", "c2_zero", "modal_stiffness_diagonal"];
     let missed = identities(invariants, &expected)
         .into_iter()

@@ -186,6 +186,6 @@ mod tests {
     fn what_is_checked_starts_behind_the_checksum() {
         assert_eq!(header_offset("checksum") + 4, CHECKED_FROM);
         assert_eq!(fixed_header() % 8, 0);
-        assert!(HEADER.iter().all(|(name, kind, _)| header_offset(name) % kind.bytes() == 0));
+        assert!(HEADER.iter().all(|(name, kind, _)| header_offset(name).is_multiple_of(kind.bytes())));
     }
 }

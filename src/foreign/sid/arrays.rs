@@ -1,8 +1,8 @@
 //! The arrays of the body, dense, and how exactly they are written.
 
-use crate::foreign::digits::Digits;
 use super::parse::{Frame, Listed};
 use super::taylor::Taylor;
+use crate::foreign::digits::Digits;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,9 +1,9 @@
 //! The structure of the file: `part`, `new modal`, `refmod`, `frame` and the objects.
 
-use crate::foreign::digits::Digits;
 use super::lines::{Line, Lines};
 use super::taylor::{ModeIndex, Taylor};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::foreign::digits::Digits;
 use std::path::Path;
 
 /// Objects of the body in the order of the format, lower case, with other names that are in use.

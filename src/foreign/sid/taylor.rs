@@ -1,8 +1,8 @@
 //! An object of the file: sizes and the entries that are listed.
 
-use crate::foreign::digits::Digits;
 use super::lines::{Line, Lines};
 use crate::diagnostic::Diagnostic;
+use crate::foreign::digits::Digits;
 use faer::Mat;
 
 /// An entry, indices from 0; of `m0` the third is not used.
