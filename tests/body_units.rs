@@ -57,7 +57,9 @@ fn equations_of_motion_keep_their_meaning() {
             _ => modal / time,
         };
         let energy = mass * length * length / (time * time);
-        let q: Vec<f64> = (0..a.n_modes()).map(|_| 1e-2 * random.signed()).collect();
+        // Small deflections: the geometric stiffness is a random one.
+        let amplitude = |j: usize| 1e-6 * body.extent() / body.largest_displacement(j);
+        let q: Vec<f64> = (0..a.n_modes()).map(|j| amplitude(j) * random.signed()).collect();
         let nu: Vec<f64> = (0..n).map(|_| random.signed()).collect();
         let applied: Vec<f64> = (0..n).map(|_| random.signed()).collect();
         let (mut first, mut second) = (Evaluation::new(&a), Evaluation::new(&b));
@@ -73,9 +75,9 @@ fn equations_of_motion_keep_their_meaning() {
             assert!((one * energy / two - 1.0).abs() < 1e-11, "{name}: {one:e} {two:e}");
         }
         let mut accelerations = [vec![0.0; n], vec![0.0; n]];
-        first.accelerations(&applied, &mut accelerations[0]).expect("a body");
+        first.accelerations(&applied, &mut accelerations[0]).expect(name);
         let force = |i: usize| energy / (unit(i) * time);
-        second.accelerations(&scaled(&applied, &force), &mut accelerations[1]).expect("a body");
+        second.accelerations(&scaled(&applied, &force), &mut accelerations[1]).expect(name);
         let [one, two] = accelerations;
         let expected = scaled(&one, &|i| unit(i) / time);
         for (i, (expected, found)) in expected.iter().zip(&two).enumerate() {

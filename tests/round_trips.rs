@@ -8,6 +8,7 @@ use flexbody::flex_body::FlexBody;
 use flexbody::foreign::{Adopted, Foreign, ForeignFormat, adopt, audit, find_foreign, recognise};
 use flexbody::input::InputFile;
 use flexbody::invariants::{BodyFrame, Invariants, primary_differences};
+use flexbody::model::LoadKind;
 use flexbody::provenance::SourceFile;
 use std::path::Path;
 use support::flexible::fixture;
@@ -87,7 +88,11 @@ fn what_is_written_comes_back() {
             // A file without coupling says so in its audit, and what it has is right.
             let coupled = *dialect != Some("level13");
             let found = audit(&foreign, 1e-11);
-            for finding in found.findings().iter().filter(|_| coupled) {
+            // What MBSim keeps of a mass that does not commute with rotations is a body of no mass.
+            let lossless = format.losses(&body, &ExportOptions::default()).is_empty();
+            let whole =
+                coupled && (body.invariants().general.is_none() || lossless || format.name() != "mbsim");
+            for finding in found.findings().iter().filter(|_| whole) {
                 complain(finding.to_string());
             }
             if !coupled && found.passed() {
@@ -98,30 +103,38 @@ fn what_is_written_comes_back() {
                 complain("the modes were changed".to_owned());
             }
             let (own, told) = (body.invariants(), back.invariants());
+            let general = own.general.is_some();
             for (quantity, apart) in primary_differences(&without_w0(own), told) {
+                // Of S and W3 of such a mass the formats keep what their equations have, each its own part; and say so.
+                if general && ["S", "W3"].contains(&quantity.as_str()) {
+                    if quantity == "W3" && apart > 1e-12 && lossless {
+                        complain(format!("W3 is lost by {apart:.1e}, which is not told"));
+                    }
+                    continue;
+                }
                 if apart.is_nan() || apart > 1e-12 {
                     complain(format!("{quantity} differs by {apart:.1e}"));
                 }
             }
-            let at: Vec<usize> = body
-                .nodes()
-                .ids
-                .iter()
-                .map(|id| back.nodes().ids.iter().position(|other| other == id).expect("every node"))
-                .collect();
-            let ordered =
-                |a: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |row, j| a[(3 * at[row / 3] + row % 3, j)]);
-            if difference(&body.modes().shape, &ordered(&back.modes().shape)) > 1e-15 {
+            let apart =
+                |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
+            let positions = body.nodes().positions.iter().zip(&back.nodes().positions);
+            let moved = positions.map(apart).fold(0.0, f64::max) / body.extent();
+            if back.n_nodes() != body.n_nodes() || moved > 1e-15 {
+                complain(format!("{} nodes of {}, moved by {moved:.1e}", back.n_nodes(), body.n_nodes()));
+                continue;
+            }
+            if difference(&body.modes().shape, &back.modes().shape) > 1e-15 {
                 complain("the shapes differ".to_owned());
             }
-            for one in back.geometric_stiffness() {
+            // SID knows W2 and the geometric stiffness for spin as one: it comes back as the latter, and the equations are the same.
+            let joined = back.groups() != body.groups();
+            for one in
+                back.geometric_stiffness().iter().filter(|one| !(joined && one.load.kind == LoadKind::Spin))
+            {
                 match body.geometric_stiffness().iter().find(|other| other.load == one.load) {
-                    Some(other) if back.invariants().groups == body.groups() || format.name() != "sid" => {
-                        if difference(&one.matrix, &other.matrix) > 1e-13 {
-                            complain(format!("geometric stiffness for {} differs", one.load));
-                        }
-                    }
-                    Some(_) => {}
+                    Some(other) if difference(&one.matrix, &other.matrix) <= 1e-13 => {}
+                    Some(_) => complain(format!("geometric stiffness for {} differs", one.load)),
                     None => complain(format!("geometric stiffness for {} comes from nowhere", one.load)),
                 }
             }

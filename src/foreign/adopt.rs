@@ -1,6 +1,6 @@
 //! A body of a file of another program as a body of ours.
 
-use super::free_surface::{FreeSurface, is_free_surface};
+use super::free_surface::{FreeSurface, beside_diagonal, is_free_surface};
 use super::{Foreign, ForeignBody, ForeignFrame};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -76,6 +76,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             .collect();
     }
     let eigenvalue = eigenvalues(&invariants);
+    let rigid_noise = beside_diagonal(&invariants);
     let damping_ratio = match &damping {
         Some(d) => {
             eigenvalue.iter().enumerate().map(|(j, l)| (0.5 * d[(j, j)] / l.sqrt()).max(0.0)).collect()
@@ -130,7 +131,8 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
                 "read from a {} file: the FE matrices are not known; residuals are those of the reduced matrices",
                 foreign.format
             ),
-            rigid_noise: 0.0,
+            // What digits of K leave of the modes, as far as the file shows it.
+            rigid_noise,
             rigid_residual: 0.0,
             guarantee: None,
         },
