@@ -68,7 +68,9 @@ fn run_case(case: &Path, id: &str, bless: bool) -> Vec<String> {
         command.arg(option).arg(&output);
     }
     let run = command.current_dir(case).output().unwrap();
-    let mut report = String::from_utf8(run.stderr).unwrap();
+    // Bodies of a case have a folder of this run.
+    let folder = format!("{}/", input_folder.path().display());
+    let mut report = String::from_utf8(run.stderr).unwrap().replace(&folder, "");
     if audits.is_some() {
         // What an audit finds is its result.
         let found = String::from_utf8(run.stdout).unwrap();

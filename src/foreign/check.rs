@@ -27,12 +27,8 @@ impl AuditCheck {
 
     /// The finding.
     pub fn finding(&self) -> Option<Diagnostic> {
-        let message = || {
-            format!(
-                "{}: {} is missed by {:.2e}, {:.0e} passes",
-                self.meaning, self.formula, self.value, self.limit
-            )
-        };
+        let message =
+            || format!("{} ({}: {:.2e}, limit {:.0e})", self.meaning, self.formula, self.value, self.limit);
         (!self.passed()).then(|| Diagnostic::new(self.code, message()))
     }
 }
