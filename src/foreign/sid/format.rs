@@ -37,7 +37,9 @@ impl ForeignFormat for SidFile {
         let frames: Vec<FrameArrays> =
             listed.frames.iter().map(|frame| FrameArrays::new(frame, &listed, digits)).collect();
         let layout = Layout::detect(&listed, &arrays);
-        let declared = Declared::of(&listed.comment);
+        let mut declared = Declared::of(&listed.comment);
+        // A file with geometric stiffness for acceleration has that for spin too.
+        declared.stiffened = declared.stiffened.or((arrays.ct.sizes()[1] > 0.0).then_some(true));
         let found = checks(&listed, &arrays, &frames, &layout, &declared);
         let (body, mut notes) = body(&listed, &arrays, frames, &declared, found.spin_in_oe);
         notes.insert(0, layout.reason);
