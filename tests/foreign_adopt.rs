@@ -183,6 +183,7 @@ fn what_is_no_body_is_refused_in_words() {
     refused(&|b| b.inertia.i1 = -1.0, Code::ForeignIncomplete, "m > 0");
     refused(&|b| b.inertia.i7[(0, 0)] = f64::NAN, Code::ForeignIncomplete, "no NaN");
     refused(&|b| b.modal_stiffness[(0, 0)] *= -1.0, Code::ForeignIncomplete, "not positive definite beside");
+    refused(&|b| b.inertia.i3[(0, 1)] = 1e3, Code::ForeignIncomplete, "mode 2 and rigid motion together");
     refused(
         &|b| {
             b.inertia.i6 = Mat::from_fn(3, 3, |_, _| 1.0);

@@ -60,7 +60,10 @@ impl FreeSurface {
     /// # Errors
     /// [`ForeignIncomplete`](Code::ForeignIncomplete).
     pub(super) fn new(invariants: &Invariants) -> Result<Self> {
-        let refuse = |message: &str| Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
+        let refuse = |message: &str| {
+            let help = "flexbody audit says what is wrong with the file; write it anew";
+            Err(Diagnostic::new(Code::ForeignIncomplete, message).with_help(help).into())
+        };
         let nf = invariants.n_modes();
         let mass = mass_matrix(invariants);
         let of_rigid = mass.as_ref().submatrix(0, 0, 6, 6).to_owned();
@@ -71,6 +74,12 @@ impl FreeSurface {
         let left = |i: usize, j: usize| {
             mass[(6 + i, 6 + j)] - (0..6).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
         };
+        if let Some(j) = (0..nf).find(|&j| left(j, j) < -RIGID * mass[(6 + j, 6 + j)]) {
+            return refuse(&format!(
+                "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass do not belong together",
+                j + 1
+            ));
+        }
         let (dropped, kept): (Vec<usize>, Vec<usize>) =
             (0..nf).partition(|&j| left(j, j) <= RIGID * mass[(6 + j, 6 + j)]);
         let elastic = Mat::from_fn(kept.len(), kept.len(), |i, j| left(kept[i], kept[j]));
