@@ -87,6 +87,7 @@ fn what_a_format_does_not_have_is_refused_by_name() {
         ("--to fmu", "possible values"),
         ("--to sid --dialect simpack", "`simpack` is no dialect of sid"),
         ("--to json --dialect double", "`double` is no dialect of json"),
+        ("--to sid --mbdyn-level 13", "`level13` is no dialect of sid"),
         ("--to json --points nodes", "json has all nodes or none"),
         ("--to sid --points 999999", "the body has no node 999999"),
         ("--to sid --points here", "`here` names no points"),
@@ -153,7 +154,7 @@ fn an_audit_says_what_is_wrong_and_exits_with_1() {
     let place = folder.path();
     prepare(place);
     assert_eq!(
-        code(&run(place, "export body.flex.h5 --to mbdyn --dialect level13 --allow-loss -o body.fem")),
+        code(&run(place, "export body.flex.h5 --to mbdyn --mbdyn-level 13 --allow-loss -o body.fem")),
         0
     );
     let found = run(place, "audit body.fem");

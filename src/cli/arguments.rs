@@ -71,6 +71,9 @@ pub struct ExportArguments {
     /// Variant of the format, of those named above [default: the first]
     #[arg(long, value_name = "NAME")]
     pub dialect: Option<String>,
+    /// With --to mbdyn: the last record group that the reader knows; short for --dialect level13 or level19
+    #[arg(long, value_name = "LEVEL", value_parser = ["13", "19"], conflicts_with = "dialect")]
+    pub mbdyn_level: Option<String>,
     /// Places of the body to write: nodes, interfaces, or node numbers with commas [default: the interfaces where the format has frames and the body interfaces, else all nodes]
     #[arg(long, value_name = "POINTS")]
     pub points: Option<String>,

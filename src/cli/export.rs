@@ -14,8 +14,9 @@ use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let format = find_format(&arguments.to)?;
+    let level = arguments.mbdyn_level.as_ref().map(|level| format!("level{level}"));
     let options = ExportOptions {
-        dialect: arguments.dialect.clone(),
+        dialect: arguments.dialect.clone().or(level),
         points: arguments.points.as_deref().map_or(Ok(Points::Usual), points)?,
     };
     let units = arguments.to_units.as_deref().map(parse_units).transpose()?;

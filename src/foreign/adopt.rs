@@ -215,7 +215,7 @@ fn not_in_file(group: Group, format: &str) -> TermDecision {
         tier: 0,
         bound: f64::INFINITY,
         limit: f64::INFINITY,
-        reason: format!("not in the {format} file"),
+        reason: format!("not told by the {format} file"),
     }
 }
 
