@@ -6,7 +6,7 @@ use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com}
 use super::numbers::{plain, significant};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
-use crate::flex_body::{FlexBody, Group};
+use crate::flex_body::{FlexBody, Frame, Group};
 use crate::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -72,12 +72,21 @@ pub struct BodyComparison {
 /// are aligned inside each cluster of close eigenvalues ([`align`](crate::invariants::align), plain product of the
 /// nodal components), and positions, shapes and every primary invariant are compared. Otherwise only what needs no
 /// common node is: mass, centre of mass, inertia, frequencies, and the norms of the invariants over clusters of
-/// modes, which no choice of signs or basis changes.
+/// modes, which no choice of signs or basis changes. A body that comes from a file of another program does not know where its frame is in the
+/// model; with such a one the body frames are taken as the same.
 ///
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) when units or numbers of modes differ.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
+    let placed = is_placed(a) && is_placed(b);
+    let (in_own_a, in_own_b);
+    let (a, b) = if placed {
+        (a, b)
+    } else {
+        (in_own_a, in_own_b) = (in_own_frame(a)?, in_own_frame(b)?);
+        (&in_own_a, &in_own_b)
+    };
     let mut comparison = BodyComparison {
         a: a.source().name.clone(),
         b: b.source().name.clone(),
@@ -95,6 +104,10 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         Some(order) => comparison.mode_by_mode(&pair, &order, tolerances),
         None => comparison.norms_only(&pair, tolerances.invariants),
     }
+    if !placed {
+        let note = "a body comes from a file of another program, which does not tell where its frame is in the model: the body frames are taken as the same";
+        comparison.notes.push(note.to_owned());
+    }
     comparison.say_what_is_dropped(a, b);
     if a.storage() != b.storage() {
         comparison.notes.push("one of the bodies is rounded to 32-bit floats".to_owned());
@@ -106,6 +119,18 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     }
     comparison.passed = comparison.rows.iter().all(|row| row.passed);
     Ok(comparison)
+}
+
+/// Whether it is known where in the model the body frame is.
+fn is_placed(body: &FlexBody) -> bool {
+    body.source().n_dofs > 0
+}
+
+/// The body with its frame as that of the model.
+fn in_own_frame(body: &FlexBody) -> Result<FlexBody> {
+    let mut parts = body.parts().clone();
+    parts.frame = Frame { origin: Vector3::zeros(), axes: Matrix3::identity() };
+    FlexBody::new(parts)
 }
 
 fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
