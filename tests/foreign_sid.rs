@@ -8,10 +8,12 @@ use flexbody::export::{ExportOptions, Points, export, find_format};
 use flexbody::foreign::{Foreign, ForeignFormat, audit, find_foreign, recognise};
 use flexbody::input::InputFile;
 use flexbody::invariants::BodyFrame;
+use flexbody::model::LoadKind;
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;
-use support::flexible::fixture;
+use support::flexible::{fixture, stressed};
+use support::random::Random;
 
 /// A solid of three modes with a few frames, in every dialect.
 static FILES: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
@@ -295,6 +297,24 @@ fn in_radians(_: &str, key: &str, v: &str) -> Option<(String, String)> {
         }
         None => same(key, v),
     }
+}
+
+/// What no first line tells: a Ct of order 1 has geometric stiffness, and then Oe1 has some too; without it Oe1 that is not Me is a finding.
+#[test]
+fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
+    let sid = find_format("sid").expect("a format");
+    let findings_of = |kinds: &[LoadKind]| {
+        let plain = fixture("bracket_hex20", 3, BodyFrame::Model);
+        let size = 0.1 * plain.modes().eigenvalue[0];
+        let body = stressed(plain, kinds, size, &mut Random(7));
+        let (exported, _) = export(&body, sid, &ExportOptions::default(), true).expect("written");
+        let text = String::from_utf8(exported.file).expect("text");
+        let undeclared: Vec<&str> = text.lines().skip(1).collect();
+        let foreign = read(&undeclared.join("\n"));
+        (findings(&foreign), foreign.body.geometric_stiffness.len())
+    };
+    assert_eq!(findings_of(&[LoadKind::Spin, LoadKind::Acceleration]), (Vec::new(), 9));
+    assert_eq!(findings_of(&[LoadKind::Spin]), (vec!["FB741 oe1_is_me".to_owned()], 6));
 }
 
 #[test]
