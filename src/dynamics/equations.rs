@@ -89,7 +89,7 @@ impl EquationsOfMotion {
     /// Taken as they are meant: m_ff that is the identity to 1e-12 (with arrays of 32-bit floats to their rounding) is the identity; K_ff and D whose entries beside the diagonal are
     /// below 1e-10 of sqrt(a_ii a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
     pub fn new(body: &FlexBody, terms: Terms) -> Self {
-        let (invariants, modes, nf) = (body.invariants(), body.modes(), body.n_modes());
+        let (invariants, nf) = (body.invariants(), body.n_modes());
         let plane = body.dimension() == 2;
         let (rigid, axes, pairs): (&[usize], &[usize], &[(usize, usize)]) =
             if plane { (&[0, 1, 5], &[2], &PAIRS[2..3]) } else { (&[0, 1, 2, 3, 4, 5], &[0, 1, 2], &PAIRS) };
@@ -159,13 +159,7 @@ impl EquationsOfMotion {
         };
         let accelerated =
             geometric(LoadKind::Acceleration).map(|along| stacked(if plane { 2 } else { 3 }, &along));
-        let of_ratios = |i: usize, j: usize| {
-            if i == j { 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt() } else { 0.0 }
-        };
-        let damping = match &modes.modal_damping {
-            Some(damping) => ModalMatrix::new(damping.as_ref(), STIFFNESS_ROUNDING),
-            None => ModalMatrix::new(Mat::from_fn(nf, nf, of_ratios).as_ref(), STIFFNESS_ROUNDING),
-        };
+        let damping = ModalMatrix::new(body.damping().as_ref(), STIFFNESS_ROUNDING);
         let inertia = invariants.inertia();
         Self {
             rigid,

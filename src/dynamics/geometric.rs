@@ -6,7 +6,7 @@ use faer::Mat;
 
 /// Entries (component, i, j) of the geometric stiffness for a kind of load, zero for components that are not given; `None` where
 /// none is.
-pub(super) fn geometric_stiffness<'b>(
+pub(crate) fn geometric_stiffness<'b>(
     body: &'b FlexBody,
     kind: &LoadKind,
 ) -> Option<impl Fn(usize, usize, usize) -> f64 + use<'b>> {

@@ -23,6 +23,7 @@ pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub(crate) use constants::Constants;
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
+pub(crate) use geometric::geometric_stiffness;
 pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Place, Surroundings};
 pub use nodal::{

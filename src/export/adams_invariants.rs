@@ -90,7 +90,7 @@ fn quantities(body: &FlexBody) -> Vec<Quantity> {
         (0..nf).flat_map(|j| (0..nf).flat_map(move |k| block(j, k))).collect()
     });
     let i7: Vec<f64> = told.i7.transpose().iter().copied().collect();
-    let damping = losses::is_damped(body).then(|| rows(&losses::damping_matrix(body)));
+    let damping = losses::is_damped(body).then(|| rows(&body.damping()));
     let stiffness = rows(&body.invariants().modal_stiffness);
     let one = |name, title, formula, units, shape: &[usize], values| Quantity {
         name,

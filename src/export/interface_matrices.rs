@@ -63,7 +63,7 @@ impl<'a> InterfaceMatrices<'a> {
         }
         let damping = losses::is_damped(body).then(|| {
             let weighted = combine(coordinates.mass.as_ref(), coordinates.of_modes.as_ref());
-            let half = combine(weighted.as_ref(), losses::damping_matrix(body).as_ref());
+            let half = combine(weighted.as_ref(), body.damping().as_ref());
             let whole = combine(half.as_ref(), weighted.as_ref().transpose());
             Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]))
         });

@@ -60,15 +60,6 @@ pub(super) fn is_damped(body: &FlexBody) -> bool {
     body.modes().modal_damping.is_some() || body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0)
 }
 
-/// D (nf x nf): the modal damping of the body or, where it has none, diag(2 zeta_j omega_j). Unit: 1/time.
-pub(super) fn damping_matrix(body: &FlexBody) -> Mat<f64> {
-    let modes = body.modes();
-    let of_ratio = |j: usize| 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt();
-    modes.modal_damping.clone().unwrap_or_else(|| {
-        Mat::from_fn(body.n_modes(), body.n_modes(), |i, j| if i == j { of_ratio(j) } else { 0.0 })
-    })
-}
-
 /// Damping, for a format without.
 pub(super) fn damping(body: &FlexBody) -> Option<String> {
     is_damped(body).then(|| "the damping of the modes".to_owned())

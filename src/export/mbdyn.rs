@@ -66,7 +66,7 @@ impl ExportFormat for Mbdyn {
         file.matrix(10, "MODAL STIFFNESS MATRIX", &body.invariants().modal_stiffness);
         file.rigid(&told);
         if losses::is_damped(body) {
-            file.matrix(13, "MODAL DAMPING MATRIX", &losses::damping_matrix(body));
+            file.matrix(13, "MODAL DAMPING MATRIX", &body.damping());
         }
         if is_exact(options) {
             file.coupling(&told);

@@ -121,7 +121,7 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
             .named("shape function shape function integral"),
     ];
     if losses::is_damped(body) {
-        all.push(Hdf5Contents::matrix(&losses::damping_matrix(body)).named("damping matrix"));
+        all.push(Hdf5Contents::matrix(&body.damping()).named("damping matrix"));
     }
     let translation = |row: usize, j: usize| places[row / 3].translation[(row % 3, j)];
     all.extend([

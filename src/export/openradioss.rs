@@ -81,7 +81,7 @@ const WIDTH: usize = 16;
 fn rayleigh(body: &FlexBody) -> Option<[f64; 2]> {
     /// Of what rounding leaves of a projected matrix.
     const ROUNDING: f64 = 1e-9;
-    let (d, lambda) = (losses::damping_matrix(body), &body.modes().eigenvalue);
+    let (d, lambda) = (body.damping(), &body.modes().eigenvalue);
     let last = lambda.len() - 1;
     let slope = (d[(last, last)] - d[(0, 0)]) / (lambda[last] - lambda[0]);
     let beta = if slope.is_finite() { slope } else { 0.0 };

@@ -8,7 +8,7 @@ use crate::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, Modes, Parts, Source,
     Storage, TermDecision,
 };
-use crate::invariants::{BodyFrame, Expected, Invariants, identities};
+use crate::invariants::{BodyFrame, Expected, Invariants, identities, symmetrise};
 use crate::model::Nodes;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
@@ -43,7 +43,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
     }
     let stiffness = mean(&given.modal_stiffness);
     let mut invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS);
-    symmetrise(&mut invariants);
+    restore_symmetries(&mut invariants);
     if let Some(broken) = identities(&invariants, &ANY_BODY).into_iter().find(|check| {
         matches!(check.name, "finite" | "mass_positive" | "second_moment_psd") && check.value > BROKEN
     }) {
@@ -165,18 +165,10 @@ fn mean(a: &Mat<f64>) -> Mat<f64> {
 }
 
 /// What files of few digits leave of symmetries that every body has.
-fn symmetrise(invariants: &mut Invariants) {
+fn restore_symmetries(invariants: &mut Invariants) {
     let j = invariants.second_moment;
     invariants.second_moment = (j + j.transpose()) * 0.5;
-    for k in 0..3 {
-        for l in k..3 {
-            let half = |i: usize, j: usize, s: &[[Mat<f64>; 3]; 3]| 0.5 * (s[k][l][(i, j)] + s[l][k][(j, i)]);
-            let nf = invariants.n_modes();
-            let upper = Mat::from_fn(nf, nf, |i, j| half(i, j, &invariants.s));
-            invariants.s[l][k] = upper.transpose().to_owned();
-            invariants.s[k][l] = upper;
-        }
-    }
+    symmetrise(&mut invariants.s);
     if let Some(general) = &mut invariants.general {
         general.modal_mass = mean(&general.modal_mass);
     }

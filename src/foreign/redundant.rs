@@ -165,4 +165,4 @@ pub(super) fn worst(a: f64, b: f64) -> f64 {
 }
 
 /// (a, b, c) in cyclic order.
-pub(super) const CYCLIC: [(usize, usize, usize); 3] = [(1, 2, 0), (2, 0, 1), (0, 1, 2)];
+const CYCLIC: [(usize, usize, usize); 3] = [(1, 2, 0), (2, 0, 1), (0, 1, 2)];

@@ -359,7 +359,7 @@ pub(super) fn s_of(w2: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// Makes S_lk = S_kl' exact again after a transformation that rounds.
-pub(super) fn symmetrise(s: &mut [[Mat<f64>; 3]; 3]) {
+pub(crate) fn symmetrise(s: &mut [[Mat<f64>; 3]; 3]) {
     let mean =
         |a: &Mat<f64>, b: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + b[(j, i)]));
     let [[s00, s01, s02], [s10, s11, s12], [s20, s21, s22]] = s;

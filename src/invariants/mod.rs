@@ -29,6 +29,7 @@ pub use condense::condense;
 pub use condense_linear::{condense_linear, condense_lumped_linear};
 pub use derived::Derived;
 pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_general_frame, choose_plane_frame};
+pub(crate) use general::symmetrise;
 pub use general::{GENERAL_REMARK, RigidMotion, condense_general, condense_general_linear};
 pub use groups::{Group, Groups};
 pub(crate) use groups::{ibar_of_c2, s_of_modal_mass};

@@ -274,7 +274,6 @@ impl ModelFacts {
         (self.storage == "f32").then_some("shapes and inertia of the modes rounded to 32-bit floats")
     }
 
-    /// What the structure of the mass matrix means for `exact`.
     /// `21 nodes, 63 degrees of freedom, consistent mass`.
     pub fn size_in_words(&self) -> String {
         match self.n_dofs {
@@ -285,6 +284,7 @@ impl ModelFacts {
         }
     }
 
+    /// What the structure of the mass matrix means for `exact`.
     fn mass_in_words(&self) -> &'static str {
         match self.mass_structure {
             "rotation-invariant" => "consistent mass",

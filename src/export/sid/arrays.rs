@@ -2,7 +2,8 @@
 
 use super::dialect::{Blocks, Dialect};
 use super::text::Taylor;
-use crate::export::losses::{damping_matrix, is_damped};
+use crate::dynamics::geometric_stiffness;
+use crate::export::losses::is_damped;
 use crate::export::{ExportFrame, frames};
 use crate::flex_body::FlexBody;
 use crate::invariants::Numbered;
@@ -15,15 +16,9 @@ const INERTIA: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1
 
 /// (K + K') / 2 of the components of a kind of load, `None` where not one is given.
 fn stiffness(body: &FlexBody, kind: &LoadKind) -> Option<Vec<Mat<f64>>> {
-    let nf = body.n_modes();
-    let mut found = vec![Mat::zeros(nf, nf); kind.components().len()];
-    let mut given = false;
-    for one in body.geometric_stiffness().iter().filter(|one| one.load.kind == *kind) {
-        given = true;
-        let k = &one.matrix;
-        found[one.load.component] = Mat::from_fn(nf, nf, |i, j| 0.5 * (k[(i, j)] + k[(j, i)]));
-    }
-    given.then_some(found)
+    let (nf, entry) = (body.n_modes(), geometric_stiffness(body, kind)?);
+    let of = |component: usize| Mat::from_fn(nf, nf, |i, j| entry(component, i, j));
+    Some((0..kind.components().len()).map(of).collect())
 }
 
 fn per_mode(nf: usize, of_mode: impl FnMut(usize) -> Mat<f64>) -> Vec<Mat<f64>> {
@@ -113,11 +108,7 @@ pub(super) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
         ),
         Taylor::zero("ksigma", nf, 1),
         Taylor::symmetric("Ke", body.invariants().modal_stiffness.clone()),
-        if is_damped(body) {
-            Taylor::symmetric("De", damping_matrix(body))
-        } else {
-            Taylor::zero("De", nf, nf)
-        },
+        if is_damped(body) { Taylor::symmetric("De", body.damping()) } else { Taylor::zero("De", nf, nf) },
     ]
 }
 

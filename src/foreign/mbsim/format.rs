@@ -3,10 +3,10 @@
 use crate::diagnostic::Code;
 use crate::error::Result;
 use crate::foreign::hdf5_arrays::Hdf5Arrays;
-use crate::foreign::redundant::{CYCLIC, ROUNDING, asymmetry, relative, worst};
+use crate::foreign::redundant::{ROUNDING, asymmetry, relative, worst};
 use crate::foreign::{AuditCheck, Foreign, ForeignBody, ForeignFormat, ForeignFrame};
 use crate::input::InputFile;
-use crate::invariants::{Groups, Numbered};
+use crate::invariants::{Groups, Invariants, Numbered};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -115,32 +115,20 @@ impl Integrals {
 
     fn numbered(&self) -> Numbered {
         let nf = self.nf();
-        let ibar = |a: usize, b: usize, j: usize| self.position_shape[(3 * a + b, j)];
-        let trace = |j: usize| (0..3).map(|c| ibar(c, c, j)).sum::<f64>();
-        let sum = |j: usize, k: usize| (0..3).map(|c| self.s(c, c, j, k)).sum::<f64>();
-        let on = |a: usize, b: usize, value: f64| if a == b { value } else { 0.0 };
-        let second = Matrix3::from_fn(|i, j| self.second[(i, j)]);
-        Numbered {
-            i1: self.mass,
-            i2: self.first,
-            i3: self.shape.clone(),
-            i4: Mat::from_fn(3, nf, |c, j| {
-                let (a, b, _) = CYCLIC[c];
-                ibar(a, b, j) - ibar(b, a, j)
-            }),
-            i5: Some(Mat::from_fn(3 * nf, nf, |row, k| {
-                let (a, b, _) = CYCLIC[row / nf];
-                self.s(a, b, row % nf, k) - self.s(b, a, row % nf, k)
-            })),
-            i6: Mat::from_fn(nf, nf, sum),
-            i7: Matrix3::identity() * second.trace() - second,
-            i8: (0..nf).map(|j| Matrix3::from_fn(|a, b| on(a, b, trace(j)) - ibar(b, a, j))).collect(),
-            i9: Some(Mat::from_fn(3 * nf, 3 * nf, |row, column| {
-                let (a, j, b, k) = (row / nf, row % nf, column / nf, column % nf);
-                self.s(b, a, j, k) - on(a, b, sum(j, k))
-            })),
+        let ibar = |a: usize, b: usize| (0..nf).map(|j| self.position_shape[(3 * a + b, j)]).collect();
+        let s = |a: usize, b: usize| Mat::from_fn(nf, nf, |j, k| self.s(a, b, j, k));
+        let body = Invariants {
+            mass: self.mass,
+            first_moment: self.first,
+            second_moment: Matrix3::from_fn(|i, j| self.second[(i, j)]),
+            c1: self.shape.clone(),
+            ibar: [0, 1, 2].map(|a| [0, 1, 2].map(|b| ibar(a, b))),
+            s: [0, 1, 2].map(|a| [0, 1, 2].map(|b| s(a, b))),
+            modal_stiffness: Mat::zeros(nf, nf),
+            general: None,
             groups: Groups::ALL,
-        }
+        };
+        body.numbered()
     }
 }
 

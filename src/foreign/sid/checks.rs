@@ -8,6 +8,7 @@ use super::parse::Listed;
 
 use crate::diagnostic::Code;
 use crate::foreign::AuditCheck;
+use crate::foreign::redundant::worst as larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -167,22 +168,10 @@ pub(super) fn checks(
     Found { checks: all, spin_in_oe }
 }
 
+/// The largest magnitude. A NaN, from numbers beyond the range of double precision, passes nothing.
 fn worst(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
-    let mut most = 0.0f64;
-    for i in 0..rows {
-        for j in 0..columns {
-            let v = f(i, j).abs();
-            // A NaN, from numbers beyond the range of double precision, passes nothing.
-            most = if v.is_nan() {
-                f64::NAN
-            } else if most.is_nan() {
-                most
-            } else {
-                most.max(v)
-            };
-        }
-    }
-    most
+    let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+    places.map(|(i, j)| f(i, j).abs()).fold(0.0, larger)
 }
 
 /// Digits that were lost in writing.
@@ -365,7 +354,7 @@ fn symmetric_in_modes(
     let of_column = |c: usize| {
         worst(array.m0.nrows(), array.m0.nrows(), |k, l| array.linear(l, k, c) - array.linear(k, l, c))
     };
-    let by = columns.map(of_column).fold(0.0, |most: f64, v| if v.is_nan() { v } else { most.max(v) });
+    let by = columns.map(of_column).fold(0.0, larger);
     Missed { by, scale, rounding: 2.0 * array.rounding[1] }.check(name, formula, Code::AuditIdentity, meaning)
 }
 
@@ -439,7 +428,7 @@ fn of_frames(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<AuditCheck> {
             let by = (0..nq).fold(0.0, |most: f64, k| {
                 let skew = skew(&psi.m0, k);
                 let now = worst(3, 3, |i, j| ap.linear(k, i, j) - skew[(i, j)]);
-                if now.is_nan() { now } else { most.max(now) }
+                larger(most, now)
             });
             let scale = psi.sizes()[0].max(ap.sizes()[1]);
             Some(Missed { by, scale, rounding: psi.rounding[0] + ap.rounding[1] })
