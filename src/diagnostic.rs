@@ -160,6 +160,8 @@ codes! {
     SpinSoftens = "FB542", Warning, Done, "spin at which a body without geometric stiffness is too soft", "convert the model with [[geometric_stiffness]] for spin";
     PhaseDrifts = "FB543", Warning, Done, "errors that grow with time although amplitudes are bounded", "check a run as long as the longest that the model is for: phases run apart with angular velocity times duration";
     ResonanceDropped = "FB544", Warning, Done, "a dropped mode near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
+    RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
+    StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -76,11 +76,10 @@ impl<'a> SimulationFacts<'a> {
             let of = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
             EnergyFacts { kinetic: of(|b| b.kinetic), elastic: of(|b| b.elastic), work: of(|b| b.work) }
         };
-        let largest =
-            |vectors: &mut dyn Iterator<Item = Vector3<f64>>| vectors.map(|v| v.norm()).fold(0.0, f64::max);
-        let points = recording.paths.iter().map(|path| PointFacts {
+        let extremes = &recording.extremes;
+        let points = recording.paths.iter().zip(&extremes.watched).map(|(path, peak)| PointFacts {
             name: &path.name,
-            largest_deflection: largest(&mut path.deflection.iter().copied()),
+            largest_deflection: peak.value,
             last_place: path.place.last().copied().unwrap_or_default().into(),
         });
         Self {
@@ -104,8 +103,8 @@ impl<'a> SimulationFacts<'a> {
             angular_momentum_drift: angular,
             first: energies(recording.balances.first()),
             last: energies(recording.balances.last()),
-            largest_spin: largest(&mut recording.states.iter().map(|state| state.omega)),
-            largest_deflection: recording.deflection,
+            largest_spin: extremes.spin,
+            largest_deflection: extremes.deflection.value,
             points: points.collect(),
             diagnostics: &run.diagnostics,
             wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
