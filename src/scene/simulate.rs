@@ -1,7 +1,7 @@
 //! The simulation of a scene.
 
 use super::surroundings::SceneForces;
-use super::{Path, Recording, Resolution, Scene, Scheme};
+use super::{Path, Recording, Resolution, Scene, Scheme, Setting, Stage};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{Configuration, EquationsOfMotion, Evaluation, Motion, RotationVector, Surroundings};
 use crate::error::{Error, Result};
@@ -38,7 +38,8 @@ pub fn simulate(
     memory: Option<u64>,
     mut watch: impl FnMut(f64),
 ) -> Result<(Recording, Vec<Diagnostic>)> {
-    let body = &*damped(body, scene)?;
+    let stage = Stage::new(body, scene)?;
+    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
     let Some(duration) = scene.run.duration else {
         let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
         return Err(diagnostic.with_help("give `duration` in [run]").into());
@@ -60,7 +61,8 @@ pub fn simulate(
         time: Vec::with_capacity(time.len()),
         states: Vec::with_capacity(time.len()),
         balances: Vec::with_capacity(time.len()),
-        reactions: scene.spin.is_some().then(Vec::new),
+        reactions: scene.prescribes().then(Vec::new),
+        setting: Setting::new(body, scene),
         paths: scene
             .watched
             .iter()
@@ -94,18 +96,16 @@ pub fn simulate(
     recording.work = method.work();
     let (deflection, at) = largest_deflection(body, &recording);
     recording.deflection = deflection;
-    let found = remarks(body, scene, &recording, at);
+    let found = [stage.found, remarks(body, scene, &recording, at)].concat();
     Ok((recording, found))
 }
 
-/// The body with the damping of the scene where it has none of its own.
+/// The body, in the frame of the scene, with the damping of the scene where it has none of its own.
 pub(crate) fn damped<'b>(body: &'b FlexBody, scene: &Scene) -> Result<Cow<'b, FlexBody>> {
     let modes = body.modes();
     match scene.requirements.damping {
         Some(ratio) if modes.modal_damping.is_none() && modes.damping_ratio.iter().all(|&r| r == 0.0) => {
-            let mut parts = body.clone().into_parts();
-            parts.modes.damping_ratio.fill(ratio);
-            Ok(Cow::Owned(FlexBody::new(parts)?))
+            Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
         }
         _ => Ok(Cow::Borrowed(body)),
     }
