@@ -12,8 +12,8 @@ use flexbody::linalg::{gram, multiply};
 use flexbody::model::FeModel;
 use flexbody::progress::SILENT;
 use flexbody::scene::{
-    History, Initial, Measure, OtherModes, OutputErrors, Resolution, Run, Scene, Scheme, Spin, Tolerance,
-    Trace, trace, trace_at,
+    Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Run, Scene, Scheme, Spin,
+    Tolerance, Trace, trace, trace_at,
 };
 use nalgebra::Vector3;
 use support::flexible::soft_block;
@@ -28,13 +28,19 @@ fn scene(duration: f64) -> Scene {
             scheme: Scheme::Adaptive { tolerance: 1e-9 },
             terms: Terms::ALL,
         },
-        initial: Initial { angular_velocity: Vector3::new(0.02, 0.1, 0.01), ..Initial::default() },
+        initial: Initial {
+            angular_velocity: Vector3::new(0.02, 0.1, 0.01),
+            axes: Axes::Body,
+            ..Initial::default()
+        },
         gravity: None,
         loads: Vec::new(),
         spin: None,
+        carried: None,
         watched: Vec::new(),
         requirements: Default::default(),
         source: None,
+        resolved: false,
     }
 }
 
@@ -134,6 +140,7 @@ fn watched_points_and_reactions_count_relative_to_their_largest() {
     let body = soft_block(4);
     let spin = Spin {
         axis: Vector3::z(),
+        axes: Axes::Body,
         rate: History::Sine { amplitude: 0.05, frequency: 0.1, phase: 0.0 },
         hold: true,
     };

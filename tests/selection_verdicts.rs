@@ -124,9 +124,11 @@ fn idle(requirements: Requirements) -> Scene {
         gravity: None,
         loads: Vec::new(),
         spin: None,
+        carried: None,
         watched: Vec::new(),
         requirements,
         source: None,
+        resolved: false,
     }
 }
 

@@ -22,7 +22,7 @@ fn fastest_history(scene: &Scene) -> f64 {
         History::Sine { amplitude, frequency, .. } if *amplitude != 0.0 => frequency.abs(),
         _ => 0.0,
     };
-    histories.chain(scene.spin.iter().map(|spin| &spin.rate)).map(frequency).fold(0.0, f64::max)
+    histories.chain(scene.driving()).map(frequency).fold(0.0, f64::max)
 }
 
 /// Longest explicit step for the histories of a scene that lasts `duration`.

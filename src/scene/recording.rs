@@ -1,7 +1,7 @@
 //! What a simulation leaves.
 
-use super::{Drift, Extremes, Scheme};
-use crate::dynamics::{Balance, Configuration};
+use super::{Drift, Extremes, Scene, Scheme};
+use crate::dynamics::{Balance, Configuration, Orientation, RotationVector};
 use crate::flex_body::FlexBody;
 use crate::integration::Work;
 use nalgebra::Vector3;
@@ -21,7 +21,9 @@ pub struct Recording {
     pub states: Vec<Configuration>,
     /// Energies, momenta, work and impulses at every instant.
     pub balances: Vec<Balance>,
-    /// Force and torque about the origin of the frame, body axes, that the prescribed motion takes; none without.
+    /// What the numbers mean.
+    pub setting: Setting,
+    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes; none without.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
     /// Paths of the watched points.
     pub paths: Vec<Path>,
@@ -29,6 +31,44 @@ pub struct Recording {
     pub work: Work,
     /// The largest of everything, also between the instants.
     pub extremes: Extremes,
+}
+
+/// What a recording is about: its frame, and what the body is exposed to.
+///
+/// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model and turn with the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// What carries the body.
+    pub carrier: Option<String>,
+    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the reference point of what carries it.
+    pub origin: Vector3<f64>,
+    /// Gravity at the start, axes of the model.
+    pub gravity: Option<Vector3<f64>>,
+    /// Eigenvalues of the body as it is carried; empty where nothing carries it. Unit: 1/time^2.
+    pub eigenvalues: Vec<f64>,
+}
+
+impl Setting {
+    /// Of a body in its stage.
+    pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
+        let start = RotationVector(scene.initial.rotation).axes();
+        let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
+        let eigenvalues = carrier.as_ref().and_then(|_| body.eigenvalues_in_frame());
+        Self {
+            carrier,
+            origin: body.frame().origin,
+            gravity: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
+            eigenvalues: eigenvalues.unwrap_or_default(),
+        }
+    }
+
+    /// What the origin of the frame is, in words.
+    pub fn origin_in_words(&self) -> String {
+        match &self.carrier {
+            Some(carrier) => format!("reference point of {carrier}"),
+            None => "centre of mass of the undeformed body".to_owned(),
+        }
+    }
 }
 
 /// The least deformation that counts: errors are relative to the largest of the motion, or to this where that is less.
@@ -62,7 +102,7 @@ pub struct Path {
     pub name: String,
     /// Place at every instant, world axes.
     pub place: Vec<Vector3<f64>>,
-    /// Deflection from the undeformed body, body axes.
+    /// Deflection from the undeformed body, axes of the model.
     pub deflection: Vec<Vector3<f64>>,
 }
 

@@ -100,11 +100,10 @@ impl Bench<'_> {
         let duration = self.situation.duration.value;
         let modes = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
         let histories = self.scene.loads.iter().map(|load| &load.history);
-        let tones =
-            histories.chain(self.scene.spin.iter().map(|spin| &spin.rate)).map(|history| match history {
-                History::Sine { frequency, .. } => TAU * frequency,
-                _ => 0.0,
-            });
+        let tones = histories.chain(self.scene.driving()).map(|history| match history {
+            History::Sine { frequency, .. } => TAU * frequency,
+            _ => 0.0,
+        });
         let mut breaks = self.scene.spin.as_ref().map_or(Vec::new(), |spin| spin.rate.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);

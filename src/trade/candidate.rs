@@ -100,8 +100,9 @@ impl Candidate {
     }
 }
 
-/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference.
-pub(super) fn candidates(sources: &[Source], motion: &Trace) -> Vec<Candidate> {
+/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference. Bodies that are `carried` keep all
+/// groups.
+pub(super) fn candidates(sources: &[Source], motion: &Trace, carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {
         let nf = of.body().n_modes();
@@ -135,7 +136,8 @@ pub(super) fn candidates(sources: &[Source], motion: &Trace) -> Vec<Candidate> {
         }
     }
     for candidate in &mut all {
-        candidate.groups = candidate.groups.and(sources[candidate.source].body().groups());
+        let held = sources[candidate.source].body().groups();
+        candidate.groups = if carried { held } else { candidate.groups.and(held) };
     }
     let mut distinct: Vec<Candidate> = Vec::with_capacity(all.len());
     for candidate in all {

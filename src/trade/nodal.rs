@@ -46,6 +46,9 @@ impl<'m> NodalReference<'m> {
         if scene.spin.is_some() {
             return Err(refused("the nodal equations know no prescribed spin"));
         }
+        if scene.carried.is_some() {
+            return Err(refused("the nodal equations carry no interface"));
+        }
         if scene.requirements.damping.is_some() && model.damping().is_none() {
             return Err(refused(NodalError::DampingOfModes));
         }
@@ -96,7 +99,7 @@ impl<'m> NodalReference<'m> {
                 let factor = load.history.at(time).0;
                 let in_world = |v: &Vector3<f64>| match load.axes {
                     Axes::World => v * factor,
-                    Axes::Body => evaluation.axes() * v * factor,
+                    Axes::Model | Axes::Body => evaluation.axes() * v * factor,
                 };
                 let (force, torque) = (in_world(&load.force), in_world(&load.torque));
                 evaluation.add_force(*node, &force);

@@ -9,7 +9,7 @@ use crate::flex_body::FlexBody;
 use crate::integration::Work;
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
-use crate::scene::{Measure, OutputErrors, Scene, Tolerance, Trace, trace, trace_at};
+use crate::scene::{Measure, OutputErrors, Scene, Stage, Tolerance, Trace, trace, trace_at};
 use crate::store;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -133,14 +133,18 @@ pub fn trade(
     let Some(source) = sources.first() else {
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
     };
-    // Groups are what candidates differ in.
-    let mut scene = scene.clone();
-    scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
     watch(Event::Phase("reference"));
-    nodal.map(|model| NodalReference::refuse(model, &scene)).transpose()?;
+    nodal.map(|model| NodalReference::refuse(model, scene)).transpose()?;
+    let stage = Stage::new(source.body(), scene)?;
+    let staged = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
+    let (sources, source) = (&staged[..], &staged[0]);
+    // Groups are what candidates differ in.
+    let mut scene = stage.scene.into_owned();
+    scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
     let full = |part| watch(Event::Fraction(part));
-    let (motion, diagnostics) = trace(source.body(), &scene, settings.memory, full)?;
+    let (motion, said) = trace(source.body(), &scene, settings.memory, full)?;
     refuse_too_much(sources, &motion, settings.memory)?;
+    let diagnostics = [stage.found, said].concat();
     let nodal = match nodal {
         Some(model) => {
             watch(Event::Phase("nodal reference"));
@@ -152,7 +156,7 @@ pub fn trade(
     let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref() };
 
     watch(Event::Phase("errors"));
-    let all = candidates(sources, &motion);
+    let all = candidates(sources, &motion, scene.carried.is_some());
     let (count, done) = (all.len() as f64, AtomicUsize::new(0));
     let step = |done: &AtomicUsize| {
         let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
