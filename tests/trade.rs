@@ -30,6 +30,7 @@ fn tumble(spin: f64, turns: f64) -> Scene {
         run: Run {
             duration: Some(turns * std::f64::consts::TAU / spin),
             outputs: 60,
+            most_steps: Run::MOST_STEPS,
             scheme: Scheme::Adaptive { tolerance: 1e-10 },
             terms: Terms::ALL,
         },

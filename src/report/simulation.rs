@@ -93,21 +93,21 @@ impl<'a> SimulationFacts<'a> {
             let of = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
             EnergyFacts { kinetic: of(|b| b.kinetic), elastic: of(|b| b.elastic), work: of(|b| b.work) }
         };
-        let largest =
-            |vectors: &mut dyn Iterator<Item = Vector3<f64>>| vectors.map(|v| v.norm()).fold(0.0, f64::max);
-        let of_axis = |k: usize| recording.states.iter().map(|state| state.omega[k].abs()).fold(0.0, f64::max);
         let setting = &recording.setting;
-        let reactions = || recording.reactions.iter().flatten();
+        let largest = |of: fn(&(Vector3<f64>, Vector3<f64>)) -> f64| {
+            recording.reactions.iter().flatten().map(of).fold(0.0, f64::max)
+        };
         let hertz = |lambda: &f64| lambda.max(0.0).sqrt() / TAU * units.hertz();
         let carried = setting.carrier.as_deref().map(|by| CarriedFacts {
             by,
             frequency_hz: setting.eigenvalues.iter().map(hertz).collect(),
-            largest_force: largest(&mut reactions().map(|(force, _)| *force)),
-            largest_torque: largest(&mut reactions().map(|(_, torque)| *torque)),
+            largest_force: largest(|(force, _)| force.norm()),
+            largest_torque: largest(|(_, torque)| torque.norm()),
         });
-        let points = recording.paths.iter().map(|path| PointFacts {
+        let extremes = &recording.extremes;
+        let points = recording.paths.iter().zip(&extremes.watched).map(|(path, peak)| PointFacts {
             name: &path.name,
-            largest_deflection: largest(&mut path.deflection.iter().copied()),
+            largest_deflection: peak.value,
             last_place: path.place.last().copied().unwrap_or_default().into(),
         });
         Self {
@@ -131,9 +131,9 @@ impl<'a> SimulationFacts<'a> {
             angular_momentum_drift: angular,
             first: energies(recording.balances.first()),
             last: energies(recording.balances.last()),
-            largest_spin: largest(&mut recording.states.iter().map(|state| state.omega)),
-            largest_deflection: recording.deflection,
-            largest_spin_components: [0, 1, 2].map(of_axis),
+            largest_spin: extremes.spin,
+            largest_deflection: extremes.deflection.value,
+            largest_spin_components: extremes.spin_about.into(),
             gravity: setting.gravity.map(Into::into),
             carried,
             frame_origin: setting.origin_in_words(),

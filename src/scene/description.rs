@@ -90,10 +90,17 @@ pub struct Run {
     pub duration: Option<f64>,
     /// Instants recorded after the first, evenly spaced.
     pub outputs: usize,
+    /// Steps that the integration may take; a run that needs more is refused.
+    pub most_steps: u64,
     /// Integration method.
     pub scheme: Scheme,
     /// Terms of the equations of motion.
     pub terms: Terms,
+}
+
+impl Run {
+    /// Steps that an integration may take unless the scene says otherwise: some minutes to an hour, with the number of modes.
+    pub const MOST_STEPS: u64 = 20_000_000;
 }
 
 /// Integration methods ([`crate::integration`]).

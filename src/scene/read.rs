@@ -15,7 +15,7 @@ use std::path::Path;
 use toml::de::DeValue;
 
 const TOP: &[&str] = &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch"];
-const RUN: &[&str] = &["duration", "outputs", "method", "tolerance", "order", "step", "terms"];
+const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
 const INITIAL: &[&str] = &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode"];
 const MODE: &[&str] = &["number", "amplitude", "rate"];
 const LOAD: &[&str] = &["node", "interface", "force", "torque", "axes", "history"];
@@ -105,23 +105,26 @@ fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
         true => positive(walk, table, "duration", &span).map(Some),
         false => Some(None),
     };
-    let outputs = match table.get("outputs") {
-        None => Some(OUTPUTS),
+    let mut count = |key: &str, default: i64, most: i64| match table.get(key) {
+        None => Some(default),
         Some(value) => {
-            let count = integer(value).filter(|count| (1..=MOST_OUTPUTS).contains(count));
+            let count = integer(value).filter(|count| (1..=most).contains(count));
             if count.is_none() {
-                walk.wrong(value.span(), format!("`outputs` is not a number from 1 to {MOST_OUTPUTS}"));
+                walk.wrong(value.span(), format!("`{key}` is not a number from 1 to {most}"));
             }
             count
         }
     };
+    let outputs = count("outputs", OUTPUTS, MOST_OUTPUTS);
+    let most_steps = count("most_steps", Run::MOST_STEPS as i64, i64::MAX);
     let terms = match table.get("terms") {
         None => Some(Terms::ALL),
         Some(value) => terms(walk, value),
     };
     let scheme = scheme(walk, table, &span);
     let outputs = usize::try_from(outputs?).ok()?;
-    Some(Run { duration: duration?, outputs, scheme: scheme?, terms: terms? })
+    let most_steps = most_steps? as u64;
+    Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms: terms? })
 }
 
 fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {

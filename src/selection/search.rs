@@ -83,7 +83,7 @@ impl Search<'_> {
 
     /// Modes by what they do, most first.
     fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
-        let mut of_cases = self.cases.iter().map(|(bench, measure)| bench.shares(measure.recording()));
+        let mut of_cases = self.cases.iter().map(|(bench, measure)| bench.shares(measure.trace()));
         choice.shares = of_cases.next().unwrap_or_default();
         for other in of_cases {
             for (share, other) in choice.shares.iter_mut().zip(other) {

@@ -138,14 +138,13 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
             watch(Event::Phase("reference motion"));
             let mut references = Vec::new();
             for case in &cases {
-                let (reference, said) = case.bench().motion(body, whole)?;
+                let (reference, said) = case.bench().motion(whole)?;
                 diagnostics.extend(said);
                 references.push(reference);
             }
             let measures = references.iter().map(|reference| Measure::new(body, reference));
             let tried: Vec<_> = cases.iter().map(Case::bench).zip(measures).collect();
-            let speeds = references.iter().flat_map(|one| one.states.iter().map(|state| state.omega.norm()));
-            let largest = speeds.fold(0.0, f64::max);
+            let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
             if situation.spin.value > SLACK_OF_RANGE * largest
                 && scene.requirements.motion.angular_velocity.is_some()
             {

@@ -96,7 +96,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
         ("energy_drift", drift.energy),
         ("linear_momentum_drift", drift.linear),
         ("angular_momentum_drift", drift.angular),
-        ("largest_deflection", recording.deflection),
+        ("largest_deflection", recording.extremes.deflection.value),
     ] {
         number(name, value)?;
     }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::flex_body::{FlexBody, LumpedBody, MassStructure};
 use crate::linalg::{gram, multiply};
 use crate::model::FeModel;
-use crate::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Recording, Scene, Stage};
+use crate::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 
@@ -123,7 +123,7 @@ impl Source {
         measure: &Measure<'_>,
         body: &FlexBody,
         modes: &[usize],
-        motion: &Recording,
+        motion: &Trace,
     ) -> Option<ErrorHistory> {
         let Some(shared) = &self.shared else { return Some(measure.of_subset(motion, modes)) };
         let shared = Mat::from_fn(modes.len(), shared.ncols(), |i, j| shared[(modes[i], j)]);

@@ -182,6 +182,7 @@ impl Doing {
             run: Run {
                 duration: Some(duration),
                 outputs: self.outputs,
+                most_steps: Run::MOST_STEPS,
                 scheme: Scheme::Adaptive { tolerance: 1e-10 },
                 terms: Terms::ALL,
             },
