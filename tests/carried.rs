@@ -188,9 +188,8 @@ fn carried_frames_of_beams_keep_what_is_linear_in_the_modes() {
     let product = model.pencil().apply_mass(modes.as_ref());
     let (own, expected) = (carried.invariants().modal_mass(), modes.transpose() * &product);
     assert!((&own - &expected).norm_max() < 1e-10 * expected.norm_max());
-    let along = |k: usize, j: usize| -> f64 {
-        (0..model.nodes().len()).map(|i| product[(3 * i + k, j)]).sum()
-    };
+    let along =
+        |k: usize, j: usize| -> f64 { (0..model.nodes().len()).map(|i| product[(3 * i + k, j)]).sum() };
     let expected = Mat::from_fn(3, modes.ncols(), along);
     assert!((&carried.invariants().c1 - &expected).norm_max() < 1e-10 * expected.norm_max());
 }
@@ -402,7 +401,8 @@ fn clamped_static(folder: &Path, gravity: Vector3<f64>, held: &[i64]) -> (Vec<i6
 fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     let folder = bolted_bracket();
     let place = folder.path();
-    let words = ["convert", "model.toml", "--basis", "craig-bampton", "--modes", "12", "-o", "b.flex.h5", "--quiet"];
+    let words =
+        ["convert", "model.toml", "--basis", "craig-bampton", "--modes", "12", "-o", "b.flex.h5", "--quiet"];
     done(place, &words);
     let scene = "gravity = [0, 0, -9810]\n[run]\nduration = 0.05\noutputs = 5\n[damping]\nratio = 0.5\n\
                  [carried]\ninterface = \"bolt_base\"\n[[watch]]\nnode = 20000\n";
@@ -423,7 +423,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     let described = read_scene(place.join("scene.toml")).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     let own = recording.paths[0].deflection[5];
-    assert!((own - expected).norm() < 5e-3 * expected.norm(), "{own}, {expected}");
+    assert!((own - expected).norm() < 2e-3 * expected.norm(), "{own}, {expected}");
     let weight = 9810.0 * body.invariants().mass;
     let force = recording.reactions.as_ref().expect("a reaction")[5].0;
     assert!((force.z / weight - 1.0).abs() < 1e-6 && force.x.abs() + force.y.abs() < 1e-6 * weight);

@@ -43,9 +43,11 @@ fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Sc
         gravity: None,
         loads: ends.map(load).to_vec(),
         spin: None,
+        carried: None,
         watched: ends.map(Point::Node).to_vec(),
         requirements: Requirements { damping: Some(0.05), ..Requirements::default() },
         source: None,
+        resolved: false,
     }
 }
 

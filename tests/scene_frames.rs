@@ -24,7 +24,8 @@ fn block() -> RawModel {
     let mesh = Mesh::from_cells(Kind::Hex8, &grid([4, 2, 2]), |[x, y, z]| {
         [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
     });
-    let ids: Vec<i64> = (0..mesh.nodes.len()).filter(|&i| mesh.nodes[i][0] < 0.1).map(|i| i as i64 + 1).collect();
+    let ids: Vec<i64> =
+        (0..mesh.nodes.len()).filter(|&i| mesh.nodes[i][0] < 0.1).map(|i| i as i64 + 1).collect();
     let turned = mesh.moved(&Random(11).rotation(), [2.0, -3.0, 1.0]);
     let mut raw = turned.assemble(&rubber, MassRule::Consistent).raw_model();
     raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("foot", ids) }];
@@ -49,14 +50,18 @@ const LOADS: &str = "[[load]]\nnode = 3\nforce = [2e-3, 1e-3, -3e-3]\nhistory = 
 /// Free, spun and carried.
 fn golden() -> [(&'static str, Scene); 4] {
     let head = "gravity = [0.02, -0.01, -0.05]\n[run]\nduration = 8\noutputs = 40\ntolerance = 1e-12\n";
-    let free = "[initial]\norigin = [1, 2, 3]\nvelocity = [0.1, -0.2, 0.3]\nrotation = [0.4, -0.3, 0.8]\nangular_velocity = [0.05, 0.3, -0.1]\n\
-                mode = [{ number = 2, amplitude = 0.01 }]\n";
+    let free = "[initial]\norigin = [1, 2, 3]\nvelocity = [0.1, -0.2, 0.3]\nrotation = [0.4, -0.3, 0.8]\nangular_velocity = [0.05, 0.3, -0.1]\n";
     let seen = free.replace("angular_velocity", "axes = \"world\"\nangular_velocity");
     let spun = "[initial]\nrotation = [0.4, -0.3, 0.8]\n[spin]\naxis = [1, 2, -1]\nrate = { to = 0.4, duration = 4 }\nhold = true\n";
     let carried = "[initial]\nrotation = [0.4, -0.3, 0.8]\n[carried]\ninterface = \"foot\"\n[carried.spin]\naxis = [1, 2, -1]\nthrough = [2, -3, 1]\n\
                    rate = { to = 0.3, duration = 4 }\n[carried.translation]\ndirection = [1, 0, 1]\nvelocity = { amplitude = 0.05, frequency = 0.2 }\n";
-    [("free", free.to_owned()), ("free, in world axes", seen), ("spun", spun.to_owned()), ("carried", carried.to_owned())]
-        .map(|(name, middle)| (name, scene(&format!("{head}{middle}{LOADS}{POINTS}"))))
+    [
+        ("free", free.to_owned()),
+        ("free, in world axes", seen),
+        ("spun", spun.to_owned()),
+        ("carried", carried.to_owned()),
+    ]
+    .map(|(name, middle)| (name, scene(&format!("{head}{middle}{LOADS}{POINTS}"))))
 }
 
 /// Largest differences of places, deflections, attitudes, spins and reactions, relative to their largest.

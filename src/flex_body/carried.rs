@@ -231,7 +231,8 @@ impl FlexBody {
                 Ok(Place { reference: Vector3::from(self.nodes().positions[node]), motion })
             }
             Carrier::Interface(name) => {
-                let Some(interface) = self.interfaces().iter().find(|interface| interface.name == *name) else {
+                let Some(interface) = self.interfaces().iter().find(|interface| interface.name == *name)
+                else {
                     let all: Vec<&str> = self.interfaces().iter().map(|i| i.name.as_str()).collect();
                     let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
                     return unknown(format!("the body has no interface `{name}`: {known}"));

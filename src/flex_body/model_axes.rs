@@ -54,7 +54,8 @@ impl FlexBody {
 
 /// Rows of vectors, three per vector: they stand first, and are labelled with the directions 1, 2, 3.
 fn vectors(internal: &InternalRows) -> usize {
-    let complete = |dofs: &[[i64; 2]]| dofs.len() == 3 && (0..3).all(|k| dofs[k] == [dofs[0][0], (k + 1) as i64]);
+    let complete =
+        |dofs: &[[i64; 2]]| dofs.len() == 3 && (0..3).all(|k| dofs[k] == [dofs[0][0], (k + 1) as i64]);
     3 * internal.dofs.chunks(3).take_while(|dofs| complete(dofs)).count()
 }
 
@@ -103,10 +104,7 @@ fn shifted(
 }
 
 /// Geometric stiffness for loads along the columns of `axes` (present axes).
-fn along(
-    given: &[GeometricStiffness<Mat<f64>>],
-    axes: &Matrix3<f64>,
-) -> Vec<GeometricStiffness<Mat<f64>>> {
+fn along(given: &[GeometricStiffness<Mat<f64>>], axes: &Matrix3<f64>) -> Vec<GeometricStiffness<Mat<f64>>> {
     let mut all = Vec::new();
     for GeometricStiffness { load, matrix } in given {
         let factors = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);

@@ -44,7 +44,8 @@ impl Invariants {
             (0..3, 3..6) => delta(k, p) * turned(l, q - 3),
             (0..3, _) => delta(k, p) * old.c1[(l, q - 6)],
             (3..6, 3..6) => {
-                let entry = |a: usize, b: usize| permutation(k, p - 3, a) * permutation(l, q - 3, b) * j[(a, b)];
+                let entry =
+                    |a: usize, b: usize| permutation(k, p - 3, a) * permutation(l, q - 3, b) * j[(a, b)];
                 axes().flat_map(|a| axes().map(move |b| (a, b))).map(|(a, b)| entry(a, b)).sum()
             }
             (3..6, _) => axes().map(|i| permutation(k, p - 3, i) * old.ibar[i][l][q - 6]).sum(),

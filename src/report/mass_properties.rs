@@ -72,7 +72,8 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
 
 /// The angle between the body axes and those of the model, degrees.
 fn turned_degrees(axes: &Matrix3<f64>) -> f64 {
-    let skew = Vector3::new(axes[(2, 1)] - axes[(1, 2)], axes[(0, 2)] - axes[(2, 0)], axes[(1, 0)] - axes[(0, 1)]);
+    let skew =
+        Vector3::new(axes[(2, 1)] - axes[(1, 2)], axes[(0, 2)] - axes[(2, 0)], axes[(1, 0)] - axes[(0, 1)]);
     skew.norm().atan2(axes.trace() - 1.0).to_degrees()
 }
 

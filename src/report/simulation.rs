@@ -359,7 +359,11 @@ impl<'a> SimulationFacts<'a> {
         let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
         chart("Drift of the energy", vec![line("less work", lost)], energy);
         let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
-        chart("Angular velocity, axes of the model", components(&omega), format!("rad {}^-1", self.units.time()));
+        chart(
+            "Angular velocity, axes of the model",
+            components(&omega),
+            format!("rad {}^-1", self.units.time()),
+        );
         chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
         for path in paths {
             let title = format!("Deflection of {}, axes of the model", path.name);
@@ -367,7 +371,11 @@ impl<'a> SimulationFacts<'a> {
         }
         if let Some(reactions) = reactions {
             let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
-            chart("Torque of the prescribed motion, axes of the model", components(&torques), self.unit(1, 2, -2));
+            chart(
+                "Torque of the prescribed motion, axes of the model",
+                components(&torques),
+                self.unit(1, 2, -2),
+            );
         }
     }
 

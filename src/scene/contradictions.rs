@@ -7,7 +7,9 @@ use toml::de::DeValue;
 /// Complains about everything that another part of the scene would silently take the place of.
 pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
     let spin = table_of(top, "spin");
-    let holds = spin.and_then(|spin| spin.get("hold")).is_some_and(|value| matches!(value.get_ref(), DeValue::Boolean(true)));
+    let holds = spin
+        .and_then(|spin| spin.get("hold"))
+        .is_some_and(|value| matches!(value.get_ref(), DeValue::Boolean(true)));
     let carried = top.contains_key("carried");
     let by = match (carried, spin) {
         (true, _) => Some("[carried] prescribes the motion of the body"),
@@ -35,7 +37,9 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
     let is_list = |table: &Table, key: &str| {
         table.get(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Array(_)))
     };
-    for (name, keys) in [("motion", &["angular_velocity", "angular_acceleration"][..]), ("attachment", &["inertia"])] {
+    for (name, keys) in
+        [("motion", &["angular_velocity", "angular_acceleration"][..]), ("attachment", &["inertia"])]
+    {
         let Some(table) = table_of(top, name) else { continue };
         if let (Some(value), false) = (table.get("axes"), keys.iter().any(|key| is_list(table, key))) {
             let message = format!("`axes` of [{name}] is given, but there are no components along them");

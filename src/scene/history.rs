@@ -74,9 +74,8 @@ impl History {
                 let inner = times.iter().copied().filter(|&t| from < t && t < to);
                 let ends: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
                 // Lines between the ends: trapezoids are exact.
-                let piece = |ends: &[f64]| {
-                    0.5 * (self.at(ends[0]).0 + self.at(ends[1]).0) * (ends[1] - ends[0])
-                };
+                let piece =
+                    |ends: &[f64]| 0.5 * (self.at(ends[0]).0 + self.at(ends[1]).0) * (ends[1] - ends[0]);
                 let sum: f64 = ends.windows(2).map(piece).sum();
                 if time < 0.0 { -sum } else { sum }
             }
@@ -118,9 +117,7 @@ impl History {
             (value, rate) = (value.max(at.abs()), rate.max(slope.abs()));
         }
         match self {
-            Self::Sine { amplitude, frequency, .. } => {
-                (amplitude.abs(), amplitude.abs() * TAU * frequency)
-            }
+            Self::Sine { amplitude, frequency, .. } => (amplitude.abs(), amplitude.abs() * TAU * frequency),
             // Half way up it rises at twice the mean rate.
             Self::Ramp { start, duration, .. } if 0.0 < start + duration && *start < end => {
                 let middle = (start + 0.5 * duration).clamp(0.0, end);

@@ -1,8 +1,8 @@
 //! Reads `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
-use super::read_requirements::{self, requirements};
 use super::contradictions::contradictions;
 use super::read_carried::carried;
+use super::read_requirements::{self, requirements};
 use super::{Axes, History, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
 use crate::diagnostic::Code;
 use crate::dynamics::Terms;

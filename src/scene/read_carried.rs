@@ -21,12 +21,9 @@ pub(super) fn carried(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) ->
     };
     let (spin_table, translation_table) = (part("spin"), part("translation"));
     let spin = spin_table.map(|found| found.map(|(table, span)| spin(walk, table, span)));
-    let translation = translation_table.map(|found| found.map(|(table, span)| translation(walk, table, span)));
-    Some(Carried {
-        by: by?,
-        spin: transposed(spin.ok()?)?,
-        translation: transposed(translation.ok()?)?,
-    })
+    let translation =
+        translation_table.map(|found| found.map(|(table, span)| translation(walk, table, span)));
+    Some(Carried { by: by?, spin: transposed(spin.ok()?)?, translation: transposed(translation.ok()?)? })
 }
 
 fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<CarriedSpin> {
@@ -62,7 +59,9 @@ fn translation(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option
     let [(key, drive)] = given[..] else {
         let message = match given.is_empty() {
             true => "[carried.translation] has none of `displacement`, `velocity` and `acceleration`",
-            false => "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`",
+            false => {
+                "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
+            }
         };
         walk.wrong(span, message.to_owned());
         return None;

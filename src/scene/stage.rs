@@ -197,7 +197,9 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
         {
             tell(format!("the load at {place} is zero all the time"), leave);
         } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
-            let message = format!("the load at {place} bends nothing: {place} is carried, and the reaction takes the load");
+            let message = format!(
+                "the load at {place} bends nothing: {place} is carried, and the reaction takes the load"
+            );
             tell(message, Some("load another place of the body, or let nothing carry this one"));
         }
     }

@@ -2,9 +2,7 @@
 
 use super::{Axes, Carried, Load, Point, Scene, Spin};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::dynamics::{
-    BodyPoint, Evaluation, Orientation, Place, Prescribed, RotationVector, Surroundings,
-};
+use crate::dynamics::{BodyPoint, Evaluation, Orientation, Place, Prescribed, RotationVector, Surroundings};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
 use nalgebra::{Matrix3, Vector3};

@@ -68,7 +68,8 @@ impl Search<'_> {
 
     /// The first set of groups whose motion is within a part of the tolerances.
     fn cheapest(&self, budget: f64, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
-        let smaller = sets_in(self.cases[0].0.scene).filter(|set| *set != choice.groups && set.and(choice.groups) == *set);
+        let smaller = sets_in(self.cases[0].0.scene)
+            .filter(|set| *set != choice.groups && set.and(choice.groups) == *set);
         for groups in smaller.collect::<Vec<_>>() {
             let trial = self.measured(&choice.modes, groups, budget)?;
             let passed = trial.passed();

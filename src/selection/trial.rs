@@ -52,7 +52,7 @@ impl Trial {
     }
 }
 
-/// A body and a scene that trials are made with.
+/// A body and a scene that trials are made with, both on their [`Stage`](crate::scene::Stage).
 pub struct Bench<'a> {
     /// The body, with the damping of the scene.
     pub body: &'a FlexBody,

@@ -125,7 +125,12 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     let velocities = states.iter().map(|s| &s.velocity);
     frame.vectors("velocity", of(0, 1, -1), "velocity of the origin, world axes", velocities)?;
     let rates = states.iter().map(|s| &s.omega);
-    frame.vectors("angular_velocity", of(0, 0, -1), "angular velocity of the frame, axes of the model, turning with the body", rates)?;
+    frame.vectors(
+        "angular_velocity",
+        of(0, 0, -1),
+        "angular velocity of the frame, axes of the model, turning with the body",
+        rates,
+    )?;
 
     let modes = group("modes")?;
     let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
