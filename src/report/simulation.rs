@@ -93,18 +93,15 @@ impl<'a> SimulationFacts<'a> {
             let of = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
             EnergyFacts { kinetic: of(|b| b.kinetic), elastic: of(|b| b.elastic), work: of(|b| b.work) }
         };
+        let extremes = &recording.extremes;
         let setting = &recording.setting;
-        let largest = |of: fn(&(Vector3<f64>, Vector3<f64>)) -> f64| {
-            recording.reactions.iter().flatten().map(of).fold(0.0, f64::max)
-        };
         let hertz = |lambda: &f64| lambda.max(0.0).sqrt() / TAU * units.hertz();
         let carried = setting.carrier.as_deref().map(|by| CarriedFacts {
             by,
             frequency_hz: setting.eigenvalues.iter().map(hertz).collect(),
-            largest_force: largest(|(force, _)| force.norm()),
-            largest_torque: largest(|(_, torque)| torque.norm()),
+            largest_force: extremes.reaction.0,
+            largest_torque: extremes.reaction.1,
         });
-        let extremes = &recording.extremes;
         let points = recording.paths.iter().zip(&extremes.watched).map(|(path, peak)| PointFacts {
             name: &path.name,
             largest_deflection: peak.value,

@@ -27,6 +27,8 @@ pub struct Extremes {
     pub spin: f64,
     /// Components |omega_k| of it along the body axes.
     pub spin_about: Vector3<f64>,
+    /// Force and torque that the prescribed motion takes; zero without.
+    pub reaction: (f64, f64),
     /// How well what cannot change did not.
     pub drift: Drift,
 }
@@ -58,6 +60,7 @@ pub(super) struct Survey<'b> {
     internal: Peak,
     spin: Peak,
     spin_about: [Peak; 3],
+    reaction: [Peak; 2],
     differences: Differences,
 }
 
@@ -76,6 +79,7 @@ impl<'b> Survey<'b> {
             internal: Peak::default(),
             spin: Peak::default(),
             spin_about: [Peak::default(); 3],
+            reaction: [Peak::default(); 2],
             differences: Differences::default(),
         }
     }
@@ -93,6 +97,12 @@ impl<'b> Survey<'b> {
             peak.see(time, point.deflection(q).norm());
         }
         self.amplitudes.iter_mut().zip(q).for_each(|(peak, q)| peak.see(time, q.abs()));
+    }
+
+    /// Sees what the prescribed motion takes.
+    pub fn see_reaction(&mut self, time: f64, (force, torque): &(Vector3<f64>, Vector3<f64>)) {
+        self.reaction[0].see(time, force.norm());
+        self.reaction[1].see(time, torque.norm());
     }
 
     /// Sees energies and momenta at the end of a step.
@@ -122,6 +132,7 @@ impl<'b> Survey<'b> {
             internal,
             spin: self.spin.value,
             spin_about: Vector3::from(self.spin_about.map(|peak| peak.value)),
+            reaction: (self.reaction[0].value, self.reaction[1].value),
             drift: self.differences.drift(internal, size, least_energy),
         }
     }

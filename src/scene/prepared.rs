@@ -1,6 +1,7 @@
 //! A scene made ready to be integrated.
 
 use super::effort::{Effort, longest_step};
+use super::extremes::Survey;
 use super::surroundings::SceneForces;
 use super::{Scene, Scheme};
 use crate::diagnostic::{Code, Diagnostic};
@@ -13,9 +14,9 @@ use std::borrow::Cow;
 /// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by much, or it would not be stable.
 pub(super) const PARTS: usize = 6;
 
-/// A body in a scene, both on their [`Stage`](super::Stage), ready to be integrated.
+/// A body, with the damping of its scene, in this scene; both in one frame and ready to be integrated.
 pub(super) struct Prepared<'a> {
-    pub body: Cow<'a, FlexBody>,
+    pub body: &'a FlexBody,
     pub scene: &'a Scene,
     forces: SceneForces<'a>,
     pub watched: Vec<BodyPoint>,
@@ -58,17 +59,41 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// FB212 where the scene does not fit the body; FB550 and FB551, before any work.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
-        let body = damped(body, scene)?;
         let Some(duration) = scene.run.duration else {
             let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
             return Err(diagnostic.with_help("give `duration` in [run]").into());
         };
-        let (forces, watched) = SceneForces::new(&body, scene)?;
-        let equations = EquationsOfMotion::new(&body, scene.run.terms);
-        let start = start(&body, scene, &forces);
-        let (scheme, effort) = Effort::plan(&body, scene, duration)?;
+        let (forces, watched) = SceneForces::new(body, scene)?;
+        let equations = EquationsOfMotion::new(body, scene.run.terms);
+        let start = start(body, scene, &forces);
+        let (scheme, effort) = Effort::plan(body, scene, duration)?;
         effort.refuse_too_much(scene)?;
         Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
+    }
+
+    /// Shows a place of the motion, between those that are written, to `survey`.
+    ///
+    /// # Errors
+    /// Where the body has no motion at this state.
+    pub fn survey(
+        &self,
+        survey: &mut Survey<'_>,
+        sight: Sight,
+        time: f64,
+        state: &[f64],
+        motion: &mut Motion<'_>,
+    ) -> std::result::Result<(), Failure> {
+        let (_, q) = motion.shape(state);
+        survey.see_shape(time, q, self.equations.elastic_energy(q));
+        if sight == Sight::Within && !self.scene.prescribes() {
+            return Ok(());
+        }
+        let now = motion.evaluate(time, state)?;
+        survey.see_reaction(time, &now.reaction());
+        if sight == Sight::End {
+            survey.see_balance(time, &now.balance(), &now.configuration().omega);
+        }
+        Ok(())
     }
 
     /// Integrates over `instants` and shows the motion, at so many parts of every explicit step.

@@ -1,7 +1,7 @@
 //! The simulation of a scene.
 
 use super::extremes::Survey;
-use super::prepared::{PARTS, Prepared};
+use super::prepared::{PARTS, Prepared, damped};
 use super::{Extremes, Path, Recording, Scene, Setting, Stage};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{Evaluation, Motion};
@@ -35,43 +35,37 @@ pub fn simulate(
     mut watch: impl FnMut(f64),
 ) -> Result<(Recording, Vec<Diagnostic>)> {
     let stage = Stage::new(body, scene)?;
+    let body = &*damped(&stage.body, &stage.scene)?;
     let scene = &*stage.scene;
-    let run = Prepared::new(&stage.body, scene)?;
-    refuse_too_much(&run.body, scene, memory)?;
+    let run = Prepared::new(body, scene)?;
+    refuse_too_much(body, scene, memory)?;
     let outputs = scene.run.outputs;
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
     let mut recording = Recording {
         scene: scene.name.clone(),
-        body: run.body.source().name.clone(),
+        body: body.source().name.clone(),
         scheme: run.scheme,
         time: Vec::with_capacity(time.len()),
         states: Vec::with_capacity(time.len()),
         balances: Vec::with_capacity(time.len()),
         reactions: scene.prescribes().then(Vec::new),
-        setting: Setting::new(&run.body, scene),
+        setting: Setting::new(body, scene),
         paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
         work: Work::default(),
         extremes: Extremes::default(),
     };
     let undeformed = Evaluation::new(&run.equations);
     let rest: Vec<Vector3<f64>> = run.watched.iter().map(|point| point.place(&undeformed)).collect();
-    let mut survey = Survey::new(&run.body, &run.watched);
+    let mut survey = Survey::new(body, &run.watched);
     let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
-        let (_, q) = motion.shape(state);
-        survey.see_shape(time, q, run.equations.elastic_energy(q));
-        if sight == Sight::Within {
-            return Ok(());
+        if sight != Sight::Instant {
+            watch(time / run.duration);
+            return run.survey(&mut survey, sight, time, state, motion);
         }
         let now = motion.evaluate(time, state)?;
-        let (balance, configuration) = (now.balance(), now.configuration());
-        survey.see_balance(time, &balance, &configuration.omega);
-        if sight == Sight::End {
-            watch(time / run.duration);
-            return Ok(());
-        }
         recording.time.push(time);
-        recording.states.push(configuration);
-        recording.balances.push(balance);
+        recording.states.push(now.configuration());
+        recording.balances.push(now.balance());
         if let Some(reactions) = &mut recording.reactions {
             reactions.push(now.reaction());
         }
@@ -85,7 +79,7 @@ pub fn simulate(
     let finished = run.integrate(&time, PARTS, record)?;
     recording.work = finished.work;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [stage.found, remarks(&run.body, scene, &recording.extremes)].concat();
+    let found = [stage.found, remarks(body, scene, &recording.extremes)].concat();
     Ok((recording, found))
 }
 

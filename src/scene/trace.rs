@@ -1,7 +1,7 @@
 //! A continuous motion, as errors are measured along it.
 
 use super::extremes::Survey;
-use super::prepared::{Finished, PARTS, Prepared, Stop};
+use super::prepared::{Finished, PARTS, Prepared, Stop, damped};
 use super::simulate::remarks;
 use super::{Extremes, Resolution, Scene, Scheme, Stage};
 use crate::diagnostic::Diagnostic;
@@ -71,12 +71,13 @@ pub fn trace(
     mut watch: impl FnMut(f64),
 ) -> Result<(Trace, Vec<Diagnostic>)> {
     let stage = Stage::new(body, scene)?;
+    let body = &*damped(&stage.body, &stage.scene)?;
     let scene = &*stage.scene;
-    let run = Prepared::new(&stage.body, scene)?;
-    let (modes, watched) = (run.body.n_modes(), run.watched.len());
-    let most = memory.map_or(f64::INFINITY, |bytes| bytes as f64 / Trace::bytes_of_instant(modes, watched));
+    let run = Prepared::new(body, scene)?;
+    let bytes = Trace::bytes_of_instant(body.n_modes(), run.watched.len());
+    let most = memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
     let mut tracer = Tracer::new(&run);
-    let mut survey = Survey::new(&run.body, &run.watched);
+    let mut survey = Survey::new(body, &run.watched);
     let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if sight == Sight::Instant {
             return Ok(());
@@ -84,18 +85,14 @@ pub fn trace(
         if tracer.trace.time.len() as f64 >= most {
             return Err(Stop::Memory { time });
         }
-        let elastic = tracer.see(time, state, motion)?;
-        survey.see_shape(time, motion.shape(state).1, elastic);
-        if sight == Sight::End {
-            let now = motion.evaluate(time, state)?;
-            survey.see_balance(time, &now.balance(), &now.configuration().omega);
-            watch(time / run.duration);
-        }
+        watch(time / run.duration);
+        tracer.see(time, state, motion)?;
+        run.survey(&mut survey, sight, time, state, motion)?;
         Ok(())
     };
     let finished = run.integrate(&[0.0, run.duration], PARTS, look)?;
     let extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [stage.found.clone(), remarks(&run.body, scene, &extremes)].concat();
+    let found = [stage.found, remarks(body, scene, &extremes)].concat();
     Ok((tracer.finish(finished, extremes), found))
 }
 
@@ -107,7 +104,8 @@ pub fn trace(
 /// As [`simulate`].
 pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Trace> {
     let stage = Stage::new(body, scene)?;
-    let run = Prepared::new(&stage.body, &stage.scene)?;
+    let body = &*damped(&stage.body, &stage.scene)?;
+    let run = Prepared::new(body, &stage.scene)?;
     let mut tracer = Tracer::new(&run);
     let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if sight == Sight::Instant {
@@ -140,32 +138,26 @@ impl<'r> Tracer<'r> {
             extremes: Extremes::default(),
             work: Work::default(),
             size: (0.0, 0.0),
-            resolution: Resolution::new(&run.body, scene.requirements.tolerance.least_deflection),
+            resolution: Resolution::new(run.body, scene.requirements.tolerance.least_deflection),
         };
         Self { run, trace }
     }
 
-    /// Sees the motion at a place; its elastic energy.
-    fn see(
-        &mut self,
-        time: f64,
-        state: &[f64],
-        motion: &mut Motion<'_>,
-    ) -> std::result::Result<f64, Failure> {
+    /// Sees the motion at a place.
+    fn see(&mut self, time: f64, state: &[f64], motion: &mut Motion<'_>) -> std::result::Result<(), Failure> {
         let (attitude, q) = motion.shape(state);
-        let elastic = self.run.equations.elastic_energy(q);
         let trace = &mut self.trace;
         trace.time.push(time);
         trace.attitude.push(attitude);
         trace.q.push(q.to_vec());
-        trace.elastic.push(elastic);
+        trace.elastic.push(self.run.equations.elastic_energy(q));
         for (path, point) in trace.deflections.iter_mut().zip(&self.run.watched) {
             path.push(point.deflection(q));
         }
         if let Some(reactions) = &mut trace.reactions {
             reactions.push(motion.evaluate(time, state)?.reaction());
         }
-        Ok(elastic)
+        Ok(())
     }
 
     fn finish(self, finished: Finished, extremes: Extremes) -> Trace {

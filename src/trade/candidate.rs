@@ -100,8 +100,8 @@ impl Candidate {
     }
 }
 
-/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference. Bodies that are `carried` keep
-/// all groups.
+/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference. Bodies that are `carried` keep all
+/// groups.
 pub(super) fn candidates(sources: &[Source], motion: &Trace, carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {

@@ -143,8 +143,8 @@ pub fn trade(
     scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
     let full = |part| watch(Event::Fraction(part));
     let (motion, said) = trace(source.body(), &scene, settings.memory, full)?;
-    let diagnostics = [stage.found, said].concat();
     refuse_too_much(sources, &motion, settings.memory)?;
+    let diagnostics = [stage.found, said].concat();
     let nodal = match nodal {
         Some(model) => {
             watch(Event::Phase("nodal reference"));
