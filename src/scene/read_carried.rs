@@ -50,7 +50,9 @@ fn translation(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option
         walk.wrong(span.clone(), "key `direction` is missing in [carried.translation]".to_owned());
     }
     let direction = direction(walk, table, "direction");
-    let kinds: [(&str, fn(History) -> Drive); 3] = [
+    /// What a history drives.
+    type Driven = fn(History) -> Drive;
+    let kinds: [(&str, Driven); 3] = [
         ("displacement", Drive::Displacement),
         ("velocity", Drive::Velocity),
         ("acceleration", Drive::Acceleration),
