@@ -191,7 +191,10 @@ impl FlexBody {
         // `residual vector: 98 % bore force x`.
         let made_for = |provenance: &str| provenance.split_once(" % ").is_some_and(|(_, load)| named(load));
         let modes = self.modes();
-        self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
+        // All motions of the model, but rigid ones.
+        let complete = self.n_modes() + 6 >= self.source().n_dofs && self.source().n_dofs > 0;
+        complete
+            || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
             || modes.truncation.iter().any(|one| named(&one.load))
             || modes.provenance.iter().any(|one| made_for(one))
     }
