@@ -52,7 +52,7 @@ impl Trial {
     }
 }
 
-/// A body and a scene that trials are made with.
+/// A body and a scene that trials are made with, both on their [`Stage`](crate::scene::Stage).
 pub struct Bench<'a> {
     /// The body, with the damping of the scene.
     pub body: &'a FlexBody,
@@ -104,7 +104,7 @@ impl Bench<'_> {
             History::Sine { frequency, .. } => TAU * frequency,
             _ => 0.0,
         });
-        let mut breaks = self.scene.spin.as_ref().map_or(Vec::new(), |spin| spin.rate.breaks());
+        let mut breaks = self.scene.rotation().map_or(Vec::new(), |(_, rate)| rate.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);
         let ends: Vec<f64> = ends.collect();
