@@ -4,7 +4,7 @@ use super::arguments::SelectArguments;
 use super::convert::{read_loads, responses_to};
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
-use super::resources::memory_left;
+use super::resources::{longest, memory_left};
 use super::watcher::Watcher;
 use crate::basis::{BasisChoice, FreeSurface, ModeSettings};
 use crate::convert::ConvertSettings;
@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
-    reports.into_iter().try_for_each(OutputSlot::commit)?;
+    OutputSlot::commit_all(reports)?;
     Ok(Outcome {
         text: facts.render(Format::Text),
         json: facts.render(Format::Json),
@@ -72,6 +72,7 @@ fn converted(
         modes: ModeSettings {
             wanted: Wanted::Lowest(wanted),
             memory: memory_left(None),
+            longest: longest(arguments.allow_long),
             ..ModeSettings::default()
         },
         basis: BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),
