@@ -118,7 +118,7 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         .with_help("ask for fewer modes or a lower frequency, or say --allow-long"),
         EigenFailure::TooLarge => Diagnostic::new(
             Code::MemoryShort,
-            "the node graph has more than 2^31 entries, too many for the ordering",
+            "the ordering fails: it is out of memory, or the node graph has more than 2^31 entries",
         ),
     };
     diagnostic.into()
