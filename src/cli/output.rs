@@ -45,6 +45,8 @@ pub fn run(arguments: &Arguments) -> ExitCode {
     use_threads(match &arguments.command {
         Command::Convert(arguments) => arguments.threads,
         Command::Trade(arguments) => arguments.threads,
+        Command::Select(arguments) => arguments.threads,
+        Command::Simulate(arguments) => arguments.threads,
         _ => None,
     });
     let (printing, outcome) = match &arguments.command {
