@@ -48,14 +48,17 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
     let formats = ["exudyn", "simscape", "sid", "npz", "json"];
     for format in formats {
         let file = format!("b.{format}");
-        let output = run(folder.path(), &["export", "b.flex.h5", "--to", format, "-o", &file, "--allow-loss"]);
+        let output =
+            run(folder.path(), &["export", "b.flex.h5", "--to", format, "-o", &file, "--allow-loss"]);
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success() || said.contains("invalid value"), "{format}: {said}");
     }
     let scene = "[run]\nduration = 1e-3\noutputs = 5\n[[watch]]\ninterface = \"left/right\"\n";
     std::fs::write(folder.path().join("scene.toml"), scene).expect("a scene");
-    let output =
-        run(folder.path(), &["simulate", "b.flex.h5", "--scene", "scene.toml", "-o", "m.h5", "--csv", "m.csv"]);
+    let output = run(
+        folder.path(),
+        &["simulate", "b.flex.h5", "--scene", "scene.toml", "-o", "m.h5", "--csv", "m.csv"],
+    );
     assert!(output.status.success(), "{output:?}");
     let bytes = std::fs::read(folder.path().join("m.h5")).expect("the motion");
     assert!(bytes.windows(12).any(|w| w == b"left%2Fright"), "one group of this name");

@@ -70,7 +70,11 @@ fn a_limit_of_address_space_gives_a_result_or_exit_code_4() {
             if code == Some(ExitCode::Resources as i32) && !enough {
                 assert!(said.contains("error[FB601]"), "{arguments:?}, {kilobytes}: {said}");
             } else {
-                assert!(matches!(code, Some(0 | 1)), "{arguments:?}, {kilobytes}: {:?} {said}", output.status);
+                assert!(
+                    matches!(code, Some(0 | 1)),
+                    "{arguments:?}, {kilobytes}: {:?} {said}",
+                    output.status
+                );
             }
             for made in ["new.flex.h5", "new.html", "motion.h5", "new.hdf5"] {
                 let _ = std::fs::remove_file(folder.path().join(made));
@@ -95,7 +99,11 @@ fn a_limit_of_file_size_is_a_short_disk_and_leaves_nothing() {
         for blocks in [0, 1, 8] {
             let output = run(folder.path(), &format!("ulimit -f {blocks}"), arguments);
             let said = String::from_utf8_lossy(&output.stderr);
-            assert_eq!(output.status.code(), Some(ExitCode::Resources as i32), "{arguments:?} {blocks}: {said}");
+            assert_eq!(
+                output.status.code(),
+                Some(ExitCode::Resources as i32),
+                "{arguments:?} {blocks}: {said}"
+            );
             assert!(said.contains("error[FB602]"), "{arguments:?} {blocks}: {said}");
             assert_eq!(members(folder.path()), before, "{arguments:?} {blocks}");
         }
@@ -154,12 +162,20 @@ fn so_many_modes_that_it_takes_hours_are_refused_before_the_search() {
     assert!(said.contains("--allow-long"), "{said}");
     assert!(members(folder.path()).is_empty());
     // What memory does not hold is refused whatever is allowed.
-    let output = run(folder.path(), "true", &["convert", model, "-o", "b.h5", "--memory-limit", "1G", "--modes", "6000", "--allow-long"]);
+    let output = run(
+        folder.path(),
+        "true",
+        &["convert", model, "-o", "b.h5", "--memory-limit", "1G", "--modes", "6000", "--allow-long"],
+    );
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(ExitCode::Resources as i32), "{said}");
     assert!(said.contains("error[FB601]"), "{said}");
     // A small model has few modes, and they are soon found.
-    let output = run(folder.path(), "true", &["convert", fixture("cube_hex8").to_str().expect("our path"), "-o", "b.h5", "--modes", "1000000000"]);
+    let output = run(
+        folder.path(),
+        "true",
+        &["convert", fixture("cube_hex8").to_str().expect("our path"), "-o", "b.h5", "--modes", "1000000000"],
+    );
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("FB509"), "{said}");
 }

@@ -185,7 +185,11 @@ impl std::fmt::Display for Plan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let precision = if self.precision == Precision::Double { "double" } else { "single" };
         let (factor, all) = (gigabytes(self.factor_bytes), gigabytes(self.bytes));
-        write!(f, "factor of {factor} in {precision} precision, {:.2e} operations, {all} in all", self.flops)?;
+        write!(
+            f,
+            "factor of {factor} in {precision} precision, {:.2e} operations, {all} in all",
+            self.flops
+        )?;
         match (self.seconds / 60.0).round() {
             minutes if minutes >= 1.0 => write!(f, "; about {minutes} min for the modes on one processor"),
             _ => Ok(()),
