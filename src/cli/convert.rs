@@ -374,6 +374,12 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
 }
 
 fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
+    let mut files = stated_files(arguments)?;
+    files.allow_implausible |= arguments.allow_implausible;
+    Ok(files)
+}
+
+fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
         (Some(_), ..) if arguments.units.is_some() => {
             let message = "--units are for --stiffness and --from: a manifest states its own";

@@ -1,10 +1,14 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
+use super::density::{Densities, check_density};
+use super::exchanged::check_exchanged_matrices;
 use super::geometric_stiffness::{check_loads, missing_components};
 use super::interface::resolve_references;
 use super::layout::{Layout, layout, name_some};
+use super::local_mass::{LocalMass, check_exchanged, check_speed};
 use super::magnitude::check_magnitudes;
 use super::mass_structure::{MassForm, mass_form};
+use super::node_pairs::check_mass_pairs;
 use super::placeless::{check_massless, misplaced, recover};
 use super::rigid::{centre_and_length, extents, rigid_count, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
@@ -166,6 +170,10 @@ pub(super) fn finish(
     number: Option<BodyNumber>,
     mut found: Vec<Diagnostic>,
 ) -> Result<CheckedModel> {
+    found.extend(check_exchanged_matrices(&body));
+    stop_on_error(&mut found)?;
+    check_mass_pairs(&body, &mut found);
+    stop_on_error(&mut found)?;
     let digits = body.raw.mass.digits;
     let form = match mass_form(&body.mass, &body.rows, block_tolerance(digits)) {
         Ok(form) => Some(form),
@@ -201,9 +209,24 @@ pub(super) fn finish(
     }
     let diagonal_mass = is_diagonal(&body.mass);
     note_structure(&body, &form, diagonal_mass, &mut found);
-    check_plausibility(&form.scalar, &body.nodes, &body.raw, &mut found);
+    check_local_mass(&body, &form, diagonal_mass, &mut found);
+    stop_on_error(&mut found)?;
     let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found })
+}
+
+/// Where the mass sits, and whether density and speed of sound are those of matter.
+fn check_local_mass(body: &Assembled, form: &MassForm, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
+    let local = LocalMass::new(body, &form.scalar);
+    if !diagonal_mass {
+        check_exchanged(body, &local, found);
+    }
+    let before = found.len();
+    let density = check_density(body, Densities::new(body, &local, diagonal_mass), &local, found);
+    if found.len() == before {
+        check_plausibility(&form.scalar, &body.nodes, &body.raw, found);
+    }
+    check_speed(body, &local, density, found);
 }
 
 fn is_diagonal(m: &SymmetricMatrix) -> bool {
@@ -458,7 +481,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Densities between aerogel and osmium, for the box around the nodes.
+/// Densities between aerogel and osmium, for the box around the nodes: all that is known of bodies other than solids.
 const DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {

@@ -2,12 +2,16 @@
 
 mod checks;
 mod damping;
+mod density;
+mod exchanged;
 mod fe_model;
 mod geometric_stiffness;
 mod interface;
 mod layout;
+mod local_mass;
 mod magnitude;
 mod mass_structure;
+mod node_pairs;
 mod nodes;
 mod placeless;
 mod raw;
