@@ -122,7 +122,7 @@ impl Job<'_> {
         watcher: &Watcher,
     ) -> Result<Done> {
         let Self { arguments, .. } = *self;
-        let CheckedModel { model, mut diagnostics } = checked;
+        let CheckedModel { model, mut diagnostics, .. } = checked;
         let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, &model)).transpose()?;
         let basis = basis(arguments, self.loads, &model).inspect_err(|_| {
             watcher.clear();

@@ -3,7 +3,7 @@
 //! For a field u = x of unit dilation, x' K x is twice the strain energy: 9 V times the bulk modulus of a solid, E A L of a bar, without
 //! any bending or shear, so that beams and shells count with what they are stretched by. Since K leaves translations free it is the
 //! sum over the nodes of e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i. Divided by the mass it is the square of a speed
-//! of sound: (x' K x) / (d m) is three times the bulk modulus over density in solids, E / density in bars.
+//! of sound: (x' K x) / (d m) is three times the bulk modulus over density in solids, a third of Young's in bars.
 
 use super::checks::Assembled;
 use super::node_pairs::neighbours;
@@ -145,11 +145,11 @@ impl LocalMass {
     }
 }
 
-/// A warning for masses that belong to another node.
-pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut Vec<Diagnostic>) {
+/// A warning for masses that belong to another node; how many pairs there are.
+pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut Vec<Diagnostic>) -> usize {
     let pairs = local.exchanged(body);
     if pairs.is_empty() {
-        return;
+        return 0;
     }
     let number = |i: usize| body.rows.number(&body.nodes, i);
     let named: Vec<String> =
@@ -160,6 +160,7 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
         super::layout::name_some(&named)
     );
     found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.raw.mass.path));
+    pairs.len()
 }
 
 /// A warning when the speed of sound is that of no matter; `density` (SI) where it is known.

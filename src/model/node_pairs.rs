@@ -82,12 +82,13 @@ fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize)
 }
 
 /// An error when the mass couples nodes that the stiffness does not, which no order of the same elements does. A warning only where the
-/// pairs are those of mass elements, or where the user wants it so.
-pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) {
+/// pairs are those of mass elements, or where the user wants it so. Returns how many pairs the mass couples, and how many of them the
+/// stiffness does not.
+pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) -> [usize; 2] {
     let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
     let MassPairs { count, foreign } = MassPairs::new(stiffness, mass, rows);
     if foreign.is_empty() {
-        return;
+        return [count, 0];
     }
     let number = |vertex: u32| rows.number(nodes, vertex as usize);
     let named: Vec<String> =
@@ -103,20 +104,19 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let report = |code| Diagnostic::new(code, message.as_str()).in_file(&raw.mass.path);
     if raw.allow_implausible {
         found.push(report(Code::MassPairs));
+    } else if let Some(order) = other_order(body) {
+        found.push(report(Code::MassOrder).with_help(order));
     } else if are_mass_elements(mass, rows, count, &foreign) {
         let help = "each of these nodes shares mass with each other, as of a mass element or a mass spread over nodes: nothing to do if the model has one";
         found.push(report(Code::MassPairs).with_help(help));
     } else {
-        let order = other_order(body);
-        found.push(match order {
-            Some(order) => report(Code::MassOrder).with_help(order),
-            None => report(Code::MassOrder),
-        });
+        found.push(report(Code::MassOrder));
     }
+    [count, foreign.len()]
 }
 
 /// Whether the pairs fall into groups within which the mass couples every node with every other, as when a mass is spread over them. One
-/// node coupled with several others is no such group: that is what two exchanged nodes leave.
+/// node coupled with several others is no such group, nor are several single pairs: that is what two exchanged nodes leave.
 fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign: &[[u32; 2]]) -> bool {
     if foreign.len() * 4 > count {
         // Every other mass would belong to such elements. A single pair in a tiny model may be one.
@@ -147,12 +147,13 @@ fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign:
             at += 1;
         }
         let pairs = own.iter().map(|vertex| pairs_of[vertex].len()).sum::<usize>() / 2;
+        let single = pairs == 1 && foreign.len() > 1;
         let star = pairs > 1 && own.iter().any(|vertex| pairs_of[vertex].len() == pairs);
         let complete = |&vertex: &u32| {
             let coupled = by_mass(mass, &diagonal, rows, vertex as usize);
             coupled.iter().filter(|other| seen.get(other) == Some(&group)).count() == own.len() - 1
         };
-        if star || !own.iter().all(complete) {
+        if single || star || !own.iter().all(complete) {
             return false;
         }
     }
