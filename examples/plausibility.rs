@@ -100,14 +100,29 @@ fn read(folder: &Path) -> RawModel {
         return read_model(&read_manifest(manifest).expect("a manifest")).expect("a model");
     }
     let path = |name: &str| folder.join(name);
-    let matrix = |name: &str| [format!("{name}.mtx.gz"), format!("{name}.mtx")].map(|n| path(&n)).into_iter().find(|p| p.exists()).expect("a matrix");
+    let matrix = |name: &str| {
+        [format!("{name}.mtx.gz"), format!("{name}.mtx")]
+            .map(|n| path(&n))
+            .into_iter()
+            .find(|p| p.exists())
+            .expect("a matrix")
+    };
     let meta: serde_json::Value = std::fs::read_to_string(path("meta.json"))
         .map_or(serde_json::Value::Null, |text| serde_json::from_str(&text).expect("JSON"));
     let units = meta["units"].as_str().map(|units| units.split(", ").take(3).collect::<Vec<_>>().join(","));
-    let files =
-        ModelFiles::from_arguments(matrix("K"), matrix("M"), path("nodes.csv"), Some(path("dofs.csv")), units.as_deref());
+    let files = ModelFiles::from_arguments(
+        matrix("K"),
+        matrix("M"),
+        path("nodes.csv"),
+        Some(path("dofs.csv")),
+        units.as_deref(),
+    );
     let files = files.expect("units");
-    let plane = std::fs::read_to_string(path("dofs.csv")).expect("labels").lines().skip(1).all(|line| !line.ends_with(",3"));
+    let plane = std::fs::read_to_string(path("dofs.csv"))
+        .expect("labels")
+        .lines()
+        .skip(1)
+        .all(|line| !line.ends_with(",3"));
     read_model(&ModelFiles { dimension: if plane { 2 } else { 3 }, ..files }).expect("a model")
 }
 
@@ -117,7 +132,10 @@ fn told(raw: RawModel) -> (BTreeSet<&'static str>, Option<Plausibility>) {
         Ok(checked) => (checked.diagnostics, Some(checked.plausibility)),
         Err(error) => (error.into_diagnostics(), None),
     };
-    (diagnostics.iter().map(|d| d.code()).filter(|code| JUDGING.contains(code)).map(Code::id).collect(), facts)
+    (
+        diagnostics.iter().map(|d| d.code()).filter(|code| JUDGING.contains(code)).map(Code::id).collect(),
+        facts,
+    )
 }
 
 fn codes(found: &BTreeSet<&'static str>) -> String {
@@ -206,7 +224,8 @@ impl Exchanges {
 
 fn row(folder: &Path) -> String {
     let folder_name = folder.file_name().expect("a folder").to_string_lossy().into_owned();
-    let name = NAMES.iter().find(|(known, _)| *known == folder_name).map_or(folder_name.as_str(), |(_, name)| name);
+    let name =
+        NAMES.iter().find(|(known, _)| *known == folder_name).map_or(folder_name.as_str(), |(_, name)| name);
     let raw = read(folder);
     let (right, facts) = told(raw.clone());
     let facts = facts.expect("a sound model");
@@ -228,21 +247,31 @@ fn row(folder: &Path) -> String {
     // Only nodes with as many rows change places.
     for i in (1..n).rev() {
         let j = random.below(i + 1);
-        if rows[shuffled[i]].len() == rows[i].len() && rows[shuffled[j]].len() == rows[i].len() && rows[j].len() == rows[i].len() {
+        if rows[shuffled[i]].len() == rows[i].len()
+            && rows[shuffled[j]].len() == rows[i].len()
+            && rows[j].len() == rows[i].len()
+        {
             shuffled.swap(i, j);
         }
     }
     let reversed: Vec<usize> = (0..n).rev().collect();
-    let reversed_alone: Vec<usize> = if reversed.iter().enumerate().all(|(i, &j)| rows[i].len() == rows[j].len()) { reversed } else { (0..n).collect() };
+    let reversed_alone: Vec<usize> =
+        if reversed.iter().enumerate().all(|(i, &j)| rows[i].len() == rows[j].len()) {
+            reversed
+        } else {
+            (0..n).collect()
+        };
     let (mut far, mut near) = (Exchanges::default(), Exchanges::default());
-    let vertex: BTreeMap<u32, usize> = rows.iter().enumerate().flat_map(|(i, own)| own.iter().map(move |&row| (row, i))).collect();
+    let vertex: BTreeMap<u32, usize> =
+        rows.iter().enumerate().flat_map(|(i, own)| own.iter().map(move |&row| (row, i))).collect();
     for _ in 0..EXCHANGES {
         far.tries(&raw, &rows, [random.below(n), random.below(n)]);
         let a = random.below(n);
         let coupled = raw.stiffness.matrix.column(rows[a][0] as usize).0;
         near.tries(&raw, &rows, [a, vertex[&coupled[random.below(coupled.len())]]]);
     }
-    let largest = |changes: &[&Vec<f64>]| changes.iter().flat_map(|c| c.iter()).fold(0.0f64, |m, &c| m.max(c));
+    let largest =
+        |changes: &[&Vec<f64>]| changes.iter().flat_map(|c| c.iter()).fold(0.0f64, |m, &c| m.max(c));
     let passes = largest(&[&far.unseen, &near.unseen]);
     let least = far.seen.iter().chain(&near.seen).fold(f64::INFINITY, |m, &c| m.min(c));
     format!(

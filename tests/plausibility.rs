@@ -3,8 +3,8 @@
 
 mod support;
 
-use flexbody::diagnostic::{Code, ExitCode};
-use flexbody::error::Error;
+use flexbody::diagnostic::Code;
+use flexbody::error::{Error, ExitCode};
 use flexbody::linalg::CscMatrix;
 use flexbody::model::{Coupling, DofLabel, FeModel, NodeSet, Plausibility, RawModel, Reference};
 use flexbody::units::UnitSystem;
@@ -70,7 +70,11 @@ fn refused(raw: RawModel) -> Error {
 fn rows_of_nodes(raw: &RawModel) -> Vec<Vec<u32>> {
     let implied = || {
         let d = raw.dimension;
-        raw.nodes.ids.iter().flat_map(|&node| (1..=d).map(move |direction| DofLabel { node, direction })).collect()
+        raw.nodes
+            .ids
+            .iter()
+            .flat_map(|&node| (1..=d).map(move |direction| DofLabel { node, direction }))
+            .collect()
     };
     let labels: Vec<DofLabel> = raw.dofs.clone().unwrap_or_else(implied);
     let mut rows: BTreeMap<i64, BTreeMap<u8, u32>> = BTreeMap::new();
@@ -136,7 +140,17 @@ fn nothing_is_told_of_the_right_order_and_units() {
 
 #[test]
 fn a_random_order_of_the_mass_is_refused() {
-    for name in ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8", "frame_beams", "mems_gyroscope", "plane_frame", "satellite", "shell_folded"] {
+    for name in [
+        "bar_c3d8r",
+        "bracket_hex20",
+        "connecting_rod",
+        "cube_hex8",
+        "frame_beams",
+        "mems_gyroscope",
+        "plane_frame",
+        "satellite",
+        "shell_folded",
+    ] {
         let raw = raw_fixture(name);
         let error = refused(with_mass_moved(&raw, &Random(7).permutation(rows_of_nodes(&raw).len())));
         assert!(error.has(Code::MassOrder), "{name}: {error}");
@@ -148,7 +162,14 @@ fn a_random_order_of_the_mass_is_refused() {
 /// exchange changes little.
 #[test]
 fn two_exchanged_nodes_are_told() {
-    for (name, all) in [("cube_hex8", true), ("bar_c3d8r", true), ("frame_beams", true), ("shell_folded", true), ("connecting_rod", false), ("bracket_hex20", false)] {
+    for (name, all) in [
+        ("cube_hex8", true),
+        ("bar_c3d8r", true),
+        ("frame_beams", true),
+        ("shell_folded", true),
+        ("connecting_rod", false),
+        ("bracket_hex20", false),
+    ] {
         let raw = raw_fixture(name);
         let rows = rows_of_nodes(&raw);
         let node_of: BTreeMap<u32, usize> =
@@ -165,7 +186,8 @@ fn two_exchanged_nodes_are_told() {
             tried += 1;
             let wrong = exchanged(&raw, a, b);
             if told(wrong.clone()).is_empty() {
-                let sum = |raw: &RawModel| -> f64 { raw.mass.matrix.column(rows[a][0] as usize).1.iter().sum() };
+                let sum =
+                    |raw: &RawModel| -> f64 { raw.mass.matrix.column(rows[a][0] as usize).1.iter().sum() };
                 missed.push((sum(&wrong) / sum(&raw) - 1.0).abs());
             }
         }
@@ -177,18 +199,27 @@ fn two_exchanged_nodes_are_told() {
 #[test]
 fn nodes_of_one_element_that_are_exchanged_are_named() {
     // A corner and the middle of an edge that belong to one element alone: K couples them with the same nodes.
-    let raw = Mesh::block(Kind::Hex20, [3, 1, 1], [3.0, 1.0, 1.0]).assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let raw = Mesh::block(Kind::Hex20, [3, 1, 1], [3.0, 1.0, 1.0])
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
     let at = |x: [f64; 3]| raw.nodes.positions.iter().position(|p| *p == x).expect("a node");
     let (corner, middle) = (at([0.0, 0.0, 0.0]), at([0.5, 0.0, 0.0]));
     assert_eq!(told(raw.clone()), []);
     let checked = FeModel::from_raw(exchanged(&raw, corner, middle)).expect("a warning only");
     let found = checked.diagnostics.iter().find(|d| d.code() == Code::MassesExchanged).expect("told");
-    assert!(found.message().contains(&format!("{} and {}", corner.min(middle) + 1, corner.max(middle) + 1)), "{found}");
+    assert!(
+        found.message().contains(&format!("{} and {}", corner.min(middle) + 1, corner.max(middle) + 1)),
+        "{found}"
+    );
 }
 
 #[test]
 fn mass_of_another_mesh_with_as_many_nodes_is_refused() {
-    let block = |cells| Mesh::block(Kind::Hex8, cells, [3.0, 2.0, 1.0]).assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let block = |cells| {
+        Mesh::block(Kind::Hex8, cells, [3.0, 2.0, 1.0])
+            .assemble(&Material::STEEL, MassRule::Consistent)
+            .raw_model()
+    };
     let (one, other) = (block([2, 3, 5]), block([5, 3, 2]));
     let mixed = RawModel { mass: other.mass, ..one };
     assert!(refused(mixed).has(Code::MassOrder));
@@ -202,14 +233,18 @@ fn other_orders_of_rows_are_recognised() {
         let mut moved = raw.clone();
         moved.mass.matrix = raw.mass.matrix.permuted(&place);
         let error = refused(moved);
-        let found = error.diagnostics().iter().find(|d| d.code() == Code::MassOrder).expect("told").help().to_owned();
+        let found =
+            error.diagnostics().iter().find(|d| d.code() == Code::MassOrder).expect("told").help().to_owned();
         found
     };
     let reversed = help((0..n).map(|row| n - 1 - row).collect());
     assert!(reversed.contains("reverse"), "{reversed}");
     let blocked = help((0..n).map(|row| (row % 3) * (n / 3) + row / 3).collect());
     assert!(blocked.contains("direction"), "{blocked}");
-    assert!(help(Random(5).permutation(n as usize).into_iter().map(|row| row as u32).collect()).contains("same analysis"));
+    assert!(
+        help(Random(5).permutation(n as usize).into_iter().map(|row| row as u32).collect())
+            .contains("same analysis")
+    );
 }
 
 /// A mass that hangs on several nodes without stiffness between them couples each of them with each other.
@@ -241,17 +276,27 @@ fn what_a_person_has_looked_at_is_a_warning() {
 #[test]
 fn densities_and_speeds_are_those_of_the_material() {
     let bulk = |young: f64, poisson: f64| young / (3.0 * (1.0 - 2.0 * poisson));
-    for (name, density, young, poisson) in [("cube_hex8", 2700.0, 7e10, 0.33), ("bar_c3d8r", 7850.0, 2.1e11, 0.3)] {
+    for (name, density, young, poisson) in
+        [("cube_hex8", 2700.0, 7e10, 0.33), ("bar_c3d8r", 7850.0, 2.1e11, 0.3)]
+    {
         let facts = facts(raw_fixture(name));
         let quartiles = facts.densities.expect("solid elements").quartiles;
         assert!(quartiles.iter().all(|found| (found / density - 1.0).abs() < 1e-9), "{name}: {quartiles:?}");
         let speed = (3.0 * bulk(young, poisson) / density).sqrt();
         let found = facts.sound_speed.expect("stretched");
-        assert!((found.whole / speed - 1.0).abs() < 1e-9 && (found.median / speed - 1.0).abs() < 1e-9, "{name}: {found:?}");
+        assert!(
+            (found.whole / speed - 1.0).abs() < 1e-9 && (found.median / speed - 1.0).abs() < 1e-9,
+            "{name}: {found:?}"
+        );
     }
-    for (name, density, spread) in [("connecting_rod", 7.85e-9, 0.02), ("bracket_hex20", 7.85e-9, 0.05), ("robot_link", 2.7e-9, 0.01)] {
+    for (name, density, spread) in
+        [("connecting_rod", 7.85e-9, 0.02), ("bracket_hex20", 7.85e-9, 0.05), ("robot_link", 2.7e-9, 0.01)]
+    {
         let [lower, median, upper] = facts(raw_fixture(name)).densities.expect("solid elements").quartiles;
-        assert!((median / density - 1.0).abs() < spread && upper / lower < 1.2, "{name}: {lower} {median} {upper}");
+        assert!(
+            (median / density - 1.0).abs() < spread && upper / lower < 1.2,
+            "{name}: {lower} {median} {upper}"
+        );
     }
     // Bars: the speed of sound along them; nothing is known of their density.
     let frame = facts(raw_fixture("frame_beams"));
@@ -284,7 +329,8 @@ fn densities_of_no_matter_are_refused() {
         assert!(FeModel::from_raw(RawModel { allow_implausible: true, ..raw }).is_ok(), "{case}");
     }
     let error = refused(in_units(&bracket, ["mm", "kg", "s"]));
-    let help = error.diagnostics().iter().find(|d| d.code() == Code::DensityImplausible).expect("told").help();
+    let help =
+        error.diagnostics().iter().find(|d| d.code() == Code::DensityImplausible).expect("told").help();
     assert!(help.contains("mm, t, s"), "{help}");
     // Without stated units there is nothing to compare with.
     let unstated = RawModel { units: UnitSystem::default(), ..with_mass_times(&bracket, 1e-3) };
@@ -299,7 +345,10 @@ fn speeds_of_sound_of_no_matter_are_told() {
         ("the same of beams", with_stiffness_times(&raw_fixture("frame_beams"), 1e-6)),
         ("the same of shells", with_stiffness_times(&raw_fixture("shell_folded"), 1e-6)),
         ("the same of a plane frame", with_stiffness_times(&raw_fixture("plane_frame"), 1e-6)),
-        ("newtons beside kilograms and millimetres", in_units(&with_mass_times(&bracket, 1e3), ["mm", "kg", "s"])),
+        (
+            "newtons beside kilograms and millimetres",
+            in_units(&with_mass_times(&bracket, 1e3), ["mm", "kg", "s"]),
+        ),
         ("frame of 7.85 for 7850", with_mass_times(&raw_fixture("frame_beams"), 1e-3)),
     ];
     for (case, raw) in cases {
@@ -309,10 +358,24 @@ fn speeds_of_sound_of_no_matter_are_told() {
 
 #[test]
 fn exchanged_matrices_are_named_as_such() {
-    for name in ["bar_c3d8r", "connecting_rod", "cube_hex8", "frame_beams", "frame_lumped", "hex8_edges", "mpc_block", "plane_frame", "shell_folded"] {
+    for name in [
+        "bar_c3d8r",
+        "connecting_rod",
+        "cube_hex8",
+        "frame_beams",
+        "frame_lumped",
+        "hex8_edges",
+        "mpc_block",
+        "plane_frame",
+        "shell_folded",
+    ] {
         let raw = raw_fixture(name);
         let error = refused(RawModel { stiffness: raw.mass.clone(), mass: raw.stiffness.clone(), ..raw });
-        assert_eq!(error.diagnostics().iter().filter(|d| d.code() == Code::MatricesExchanged).count(), 1, "{name}: {error}");
+        assert_eq!(
+            error.diagnostics().iter().filter(|d| d.code() == Code::MatricesExchanged).count(),
+            1,
+            "{name}: {error}"
+        );
         assert_eq!(error.exit_code(), ExitCode::BadInput, "{name}");
     }
 }

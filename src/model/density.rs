@@ -98,7 +98,7 @@ pub struct Densities {
 
 impl Densities {
     /// Of a body in space; `None` where too few nodes belong to solid elements alone.
-    pub fn new(body: &Assembled, local: &LocalMass, diagonal_mass: bool) -> Option<Self> {
+    pub(super) fn new(body: &Assembled, local: &LocalMass, diagonal_mass: bool) -> Option<Self> {
         let n = body.nodes.len();
         if body.rows.dimension != 3 {
             return None;
@@ -221,7 +221,8 @@ fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64>
     }
     let count = positions.len() as f64;
     let middle = positions.iter().sum::<Vector3<f64>>() / count;
-    let covariance = positions.iter().map(|x| (x - middle) * (x - middle).transpose()).sum::<Matrix3<f64>>() / count;
+    let covariance =
+        positions.iter().map(|x| (x - middle) * (x - middle).transpose()).sum::<Matrix3<f64>>() / count;
     let root = covariance.determinant().max(0.0).sqrt();
     let ball = (covariance.trace() / 3.0).powf(1.5);
     if root <= ball * if positions.len() == 4 { FLAT_FOUR } else { FLAT } {
@@ -264,8 +265,7 @@ pub(super) fn check_density(
         units.length.name(),
         units.mass.name()
     );
-    let code =
-        if body.raw.allow_implausible { Code::InertiaImplausible } else { Code::DensityImplausible };
+    let code = if body.raw.allow_implausible { Code::InertiaImplausible } else { Code::DensityImplausible };
     let fitting = fitting_units(quartiles[1], local.sound_speed(3)?.median);
     let diagnostic = Diagnostic::new(code, message);
     found.push(match fitting.as_slice() {

@@ -29,7 +29,9 @@ fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
     for row in 0..displacements {
         let (columns, values) = matrix.row(row);
         let (mut sums, mut size) = ([0.0; 3], 0.0);
-        for (&column, &value) in columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < displacements) {
+        for (&column, &value) in
+            columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < displacements)
+        {
             sums[column as usize % d] += value;
             size += value.abs();
         }

@@ -78,8 +78,7 @@ impl LocalMass {
             }
             (dilation, (mass, diagonal))
         };
-        let (dilation, (mass, diagonal)) =
-            (0..n).into_par_iter().with_min_len(1024).map(of_node).unzip();
+        let (dilation, (mass, diagonal)) = (0..n).into_par_iter().with_min_len(1024).map(of_node).unzip();
         Self { dilation, mass, diagonal }
     }
 
@@ -111,7 +110,8 @@ impl LocalMass {
                 continue;
             }
             let expected = |i: usize| density * self.dilation[i];
-            let size = group.iter().fold(0.0f64, |size, &i| size.max(self.mass[i].abs()).max(expected(i).abs()));
+            let size =
+                group.iter().fold(0.0f64, |size, &i| size.max(self.mass[i].abs()).max(expected(i).abs()));
             let off = |mass: f64, i: usize| (mass - expected(i)).abs() / size;
             let wrong: Vec<usize> = group.into_iter().filter(|&i| off(self.mass[i], i) > MISFITS).collect();
             for (at, &i) in wrong.iter().enumerate() {
@@ -138,7 +138,8 @@ impl LocalMass {
         let keys: Vec<u64> = (0..nodes.len()).into_par_iter().with_min_len(1024).map(key).collect();
         let mut groups: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
         keys.iter().enumerate().for_each(|(i, &key)| groups.entry(key).or_default().push(i));
-        let same = |group: &Vec<usize>| group.len() > 1 && group.iter().all(|&i| around(i) == around(group[0]));
+        let same =
+            |group: &Vec<usize>| group.len() > 1 && group.iter().all(|&i| around(i) == around(group[0]));
         let mut groups: Vec<Vec<usize>> = groups.into_values().filter(same).collect();
         groups.sort();
         groups
@@ -152,8 +153,7 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
         return 0;
     }
     let number = |i: usize| body.rows.number(&body.nodes, i);
-    let named: Vec<String> =
-        pairs.iter().map(|&[i, j]| format!("{} and {}", number(i), number(j))).collect();
+    let named: Vec<String> = pairs.iter().map(|&[i, j]| format!("{} and {}", number(i), number(j))).collect();
     let message = format!(
         "{} pairs of nodes of the same elements have masses that fit their stiffness only when exchanged: {}",
         pairs.len(),

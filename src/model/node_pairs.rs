@@ -177,18 +177,39 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
     let transposed = |row: usize| rows.nodes * (row % per_node) + row / per_node;
     // The internal row that each row of the mass file would stand for.
     let orders: [(bool, &dyn Fn(usize) -> usize, &str); 5] = [
-        (true, &|row| by_label[row], "the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix another order: write both in one"),
-        (true, &|row| row, "the rows of the mass matrix follow the node table, those of the stiffness matrix another order: write both in one"),
-        (true, &|row| internal(n - 1 - row), "the rows of the mass matrix stand in the reverse order of those of the stiffness matrix: write both in one"),
-        (per_node * rows.nodes == n, &|row| internal(blocked(row)), "the rows of the mass matrix are those of the first direction for all nodes, then the second, and so on; those of the stiffness matrix go node by node: write both in one order"),
-        (per_node * rows.nodes == n, &|row| internal(transposed(row)), "the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction: write both in one order"),
+        (
+            true,
+            &|row| by_label[row],
+            "the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix another order: write both in one",
+        ),
+        (
+            true,
+            &|row| row,
+            "the rows of the mass matrix follow the node table, those of the stiffness matrix another order: write both in one",
+        ),
+        (
+            true,
+            &|row| internal(n - 1 - row),
+            "the rows of the mass matrix stand in the reverse order of those of the stiffness matrix: write both in one",
+        ),
+        (
+            per_node * rows.nodes == n,
+            &|row| internal(blocked(row)),
+            "the rows of the mass matrix are those of the first direction for all nodes, then the second, and so on; those of the stiffness matrix go node by node: write both in one order",
+        ),
+        (
+            per_node * rows.nodes == n,
+            &|row| internal(transposed(row)),
+            "the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction: write both in one order",
+        ),
     ];
     let fits = |to: &dyn Fn(usize) -> usize| {
         let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();
         let mut tied: HashMap<usize, Vec<u32>> = HashMap::new();
         (0..n).all(|row| {
             let own = place[row];
-            let near = tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
+            let near =
+                tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
             mass.row(row).0.iter().all(|&column| {
                 let other = place[column as usize];
                 other == own || near.binary_search(&(other as u32)).is_ok()
