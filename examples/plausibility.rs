@@ -58,8 +58,8 @@ see stands here; the table below has its figures on every model of the fixtures 
 * e needs no element: since K leaves translations free, the sum of e over the nodes is x'Kx, twice the energy of a unit dilation. It is 9 V times the bulk modulus of a
   solid and E A L of a bar, without bending or shear, whatever the elements are. In a body of one material e/m is the same for all nodes, corners of quadratic
   elements with their negative row sums included, up to the distortion of the elements.
-* Elements are found as the largest sets of nodes that K couples all with each other. Volumes and shares of mass are exact for affine elements with 4, 6, 8, 10, 20 and
-  27 nodes; nodes with anything else around them (rotations, bars, other sets) are not judged, nor are quadratic elements with a diagonal mass.
+* Elements are found as the largest sets of nodes that K couples all with each other. Volumes and shares of mass are exact for affine elements with 4, 6, 8, 10 and
+  20 nodes, off by some percent for curved ones; nodes with anything else around them (rotations, bars, other sets) are not judged, nor are quadratic elements with a diagonal mass.
 * The checks of units need `[model.units]`. `allow_implausible = true` in `[model]`, or `--allow-implausible`, turns FB433 and FB437 into warnings.
 
 What stays invisible: the order of a **diagonal** M, which couples nothing (e/m from node to node is no help: slivers among linear tetrahedra spread it by

@@ -3,7 +3,8 @@
 //! No element is given, but K couples all nodes of an element with each other: elements are the largest sets of nodes of which each is
 //! coupled with each (cliques). Of a set that is an affine image of one of the usual elements the volume is a known multiple of the
 //! root of the determinant of the covariance of its positions, and each node has a known part of its mass. Beams, shells, bars and
-//! everything else have no such sets, or are left out by what marks them.
+//! everything else have no such sets, or are left out by what marks them. Curved elements count with their corners, which changes their
+//! volume by some percent.
 
 use super::checks::Assembled;
 use super::local_mass::LocalMass;
@@ -29,62 +30,30 @@ const CLIQUES: usize = 200;
 const FLAT: f64 = 1e-6;
 const FLAT_FOUR: f64 = 0.02;
 
-/// Largest relative deviation of a node from where an affine element has it.
-const PLACE: f64 = 0.35;
+/// Largest deviation of the squared Mahalanobis distance of a corner from that of an affine element.
+const CORNER: f64 = 1.0;
 
-/// Nodes of one kind in an element: how many, the squared Mahalanobis distance of each from the middle, and the part of the mass
-/// that the row sum of the consistent mass gives each.
-struct Class {
-    nodes: usize,
-    distance: f64,
-    part: f64,
-}
+/// Distance of the middle of an edge from the middle between its ends, relative to their distance, in a curved element.
+const CURVED: f64 = 0.2;
 
-/// A solid element: its volume is `volume` times the root of the determinant of the covariance of its nodes.
+/// A solid element with `nodes` nodes, `corners` of them corners and the others the middles of edges: its volume is `volume` times the root of
+/// the determinant of the covariance of the corners, and the row sums of the consistent mass give each corner and each
+/// middle these parts of its mass.
 struct Element {
     nodes: usize,
+    corners: usize,
     volume: f64,
-    classes: &'static [Class],
+    corner: f64,
+    middle: f64,
 }
 
-const ELEMENTS: [Element; 6] = [
-    Element { nodes: 4, volume: 8.0 / 3.0, classes: &[Class { nodes: 4, distance: 3.0, part: 0.25 }] },
+const ELEMENTS: [Element; 5] = [
+    Element { nodes: 4, corners: 4, volume: 8.0 / 3.0, corner: 0.25, middle: 0.0 },
     // 3 sqrt(3): a triangle of three nodes times a line of two.
-    Element {
-        nodes: 6,
-        volume: 5.196_152_422_706_632,
-        classes: &[Class { nodes: 6, distance: 3.0, part: 1.0 / 6.0 }],
-    },
-    Element { nodes: 8, volume: 8.0, classes: &[Class { nodes: 8, distance: 3.0, part: 0.125 }] },
-    // (1/6) / sqrt(0.15^3 / 4).
-    Element {
-        nodes: 10,
-        volume: 5.737_753_217_235_137,
-        classes: &[
-            Class { nodes: 4, distance: 5.0, part: -0.05 },
-            Class { nodes: 6, distance: 5.0 / 3.0, part: 0.2 },
-        ],
-    },
-    // 8 / sqrt(0.8^3).
-    Element {
-        nodes: 20,
-        volume: 11.180_339_887_498_949,
-        classes: &[
-            Class { nodes: 8, distance: 3.75, part: -0.125 },
-            Class { nodes: 12, distance: 2.5, part: 1.0 / 6.0 },
-        ],
-    },
-    // 8 / sqrt((2/3)^3).
-    Element {
-        nodes: 27,
-        volume: 14.696_938_456_699_069,
-        classes: &[
-            Class { nodes: 8, distance: 4.5, part: 1.0 / 216.0 },
-            Class { nodes: 12, distance: 3.0, part: 4.0 / 216.0 },
-            Class { nodes: 6, distance: 1.5, part: 16.0 / 216.0 },
-            Class { nodes: 1, distance: 0.0, part: 64.0 / 216.0 },
-        ],
-    },
+    Element { nodes: 6, corners: 6, volume: 5.196_152_422_706_632, corner: 1.0 / 6.0, middle: 0.0 },
+    Element { nodes: 8, corners: 8, volume: 8.0, corner: 0.125, middle: 0.0 },
+    Element { nodes: 10, corners: 4, volume: 8.0 / 3.0, corner: -0.05, middle: 0.2 },
+    Element { nodes: 20, corners: 8, volume: 8.0, corner: -0.125, middle: 1.0 / 6.0 },
 ];
 
 /// Densities of the elements of a body.
@@ -105,15 +74,10 @@ impl Densities {
         }
         let count = n.min(SAMPLED);
         let sampled = (0..count).into_par_iter().map(|s| s * n / count);
-        let volumes: Vec<(usize, Around)> = sampled.map(|i| (i, around(body, i, diagonal_mass))).collect();
-        let of = |(i, around): &(usize, Around)| match around {
-            Around::Elements(volume) => Some(local.mass[*i] / volume),
-            Around::Unknown | Around::Other => None,
-        };
-        let mut densities: Vec<f64> = volumes.iter().filter_map(of).collect();
+        let of = |i: usize| Some(local.mass[i] / around(body, i, diagonal_mass)?);
+        let mut densities: Vec<f64> = sampled.map(of).collect::<Vec<_>>().into_iter().flatten().collect();
         let judged = densities.len();
-        let others = volumes.iter().filter(|(_, around)| matches!(around, Around::Other)).count();
-        if judged < 4 || judged * 10 < count || judged < others {
+        if judged < 4 || judged * 20 < count {
             return None;
         }
         densities.sort_by(f64::total_cmp);
@@ -122,17 +86,8 @@ impl Densities {
     }
 }
 
-/// What surrounds a node.
-enum Around {
-    /// Solid elements; its part of their volumes.
-    Elements(f64),
-    /// Too much to be taken apart.
-    Unknown,
-    /// Something that is no solid element.
-    Other,
-}
-
-fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Around {
+/// The node's part of the volumes of the solid elements around it; `None` where there is something else, or too much to be taken apart.
+fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let Assembled { nodes, rows, stiffness, .. } = body;
     let coupled = |i: usize| neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
     let n = nodes.len();
@@ -140,13 +95,10 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Around {
     let mut near = coupled(node);
     near.retain(|&j| (j as usize) < n);
     if turns(node as u32) || near.iter().any(|&j| turns(j)) || near.is_empty() {
-        return Around::Other;
+        return None;
     }
-    if near.len() > COUPLED {
-        return Around::Unknown;
-    }
-    if near.iter().all(|&j| is_bar(body, node, j as usize)) {
-        return Around::Other;
+    if near.len() > COUPLED || near.iter().all(|&j| is_bar(body, node, j as usize)) {
+        return None;
     }
     let mask = |i: &u32| {
         let others = coupled(*i as usize);
@@ -155,21 +107,16 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Around {
     };
     let adjacent: Vec<u64> = near.iter().map(mask).collect();
     let mut cliques = Vec::new();
-    let all = if near.len() == 64 { u64::MAX } else { (1u64 << near.len()) - 1 };
-    if !maximal_cliques(&adjacent, 0, all, 0, &mut cliques) {
-        return Around::Unknown;
+    if !maximal_cliques(&adjacent, 0, (1 << near.len()) - 1, 0, &mut cliques) {
+        return None;
     }
-    let mut volume = 0.0;
-    for clique in cliques {
+    let part = |clique: u64| {
         let members = (0..near.len()).filter(|bit| clique >> bit & 1 == 1).map(|bit| near[bit] as usize);
         let positions: Vec<Vector3<f64>> =
             std::iter::once(node).chain(members).map(|i| Vector3::from(nodes.positions[i])).collect();
-        match part_of_first(&positions, diagonal_mass) {
-            Some(part) => volume += part,
-            None => return Around::Other,
-        }
-    }
-    Around::Elements(volume)
+        part_of_first(&positions, diagonal_mass)
+    };
+    cliques.into_iter().map(part).sum()
 }
 
 /// Whether K couples two nodes along the line between them only.
@@ -216,34 +163,40 @@ fn maximal_cliques(
 /// diagonal mass is spread over the nodes of quadratic elements in more than one way.
 fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64> {
     let element = ELEMENTS.iter().find(|element| element.nodes == positions.len())?;
-    if diagonal_mass && element.classes.len() > 1 {
+    let linear = element.corners == element.nodes;
+    if diagonal_mass && !linear {
         return None;
     }
-    let count = positions.len() as f64;
-    let middle = positions.iter().sum::<Vector3<f64>>() / count;
-    let covariance =
-        positions.iter().map(|x| (x - middle) * (x - middle).transpose()).sum::<Matrix3<f64>>() / count;
+    let at_corner = |i: &usize| linear || !is_middle(positions, *i);
+    let corners: Vec<Vector3<f64>> = (0..positions.len()).filter(at_corner).map(|i| positions[i]).collect();
+    if corners.len() != element.corners {
+        return None;
+    }
+    let count = corners.len() as f64;
+    let middle = corners.iter().sum::<Vector3<f64>>() / count;
+    let arms: Vec<Vector3<f64>> = corners.iter().map(|x| x - middle).collect();
+    let covariance = arms.iter().map(|r| r * r.transpose()).sum::<Matrix3<f64>>() / count;
     let root = covariance.determinant().max(0.0).sqrt();
     let ball = (covariance.trace() / 3.0).powf(1.5);
-    if root <= ball * if positions.len() == 4 { FLAT_FOUR } else { FLAT } {
+    if root <= ball * if linear && corners.len() == 4 { FLAT_FOUR } else { FLAT } {
         return None;
     }
     let inverse = covariance.try_inverse()?;
-    let mut nodes = [0; 4];
-    let mut first = None;
-    for x in positions {
-        let distance = (x - middle).dot(&(inverse * (x - middle)));
-        let off = |class: &Class| (distance - class.distance).abs();
-        let class = (0..element.classes.len())
-            .min_by(|&a, &b| off(&element.classes[a]).total_cmp(&off(&element.classes[b])))?;
-        if off(&element.classes[class]) > PLACE * 3.0 {
-            return None;
-        }
-        nodes[class] += 1;
-        first.get_or_insert(class);
+    if arms.iter().any(|r| (r.dot(&(inverse * r)) - 3.0).abs() > CORNER) {
+        return None;
     }
-    let complete = element.classes.iter().zip(nodes).all(|(class, nodes)| class.nodes == nodes);
-    complete.then_some(element.volume * root * element.classes[first?].part)
+    let part = if at_corner(&0) { element.corner } else { element.middle };
+    Some(element.volume * root * part)
+}
+
+/// Whether a node lies in the middle between two others.
+fn is_middle(positions: &[Vector3<f64>], node: usize) -> bool {
+    let x = positions[node];
+    let others = |i: usize| (i + 1..positions.len()).map(move |j| (i, j));
+    (0..positions.len()).flat_map(others).filter(|&(i, j)| i != node && j != node).any(|(i, j)| {
+        let (a, b) = (positions[i], positions[j]);
+        ((a + b) / 2.0 - x).norm() < CURVED * (a - b).norm()
+    })
 }
 
 /// An error for densities that no matter has; returns the density in SI where it is known.
