@@ -218,19 +218,19 @@ pub(super) fn check_density(
         units.length.name(),
         units.mass.name()
     );
-    let code = if body.raw.allow_implausible { Code::InertiaImplausible } else { Code::DensityImplausible };
-    let fitting = fitting_units(quartiles[1], local.sound_speed(3)?.median);
-    let diagnostic = Diagnostic::new(code, message);
-    found.push(match fitting.as_slice() {
-        [] => diagnostic,
-        some => {
-            let help = format!(
-                "the numbers are those of matter in {}: check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant",
-                some.join(", or in ")
-            );
-            diagnostic.with_help(help)
-        }
-    });
+    if body.raw.allow_implausible {
+        found.push(Diagnostic::new(Code::InertiaImplausible, message));
+        return None;
+    }
+    let mut diagnostic = Diagnostic::new(Code::DensityImplausible, message);
+    let speed = local.sound_speed(3).map_or(0.0, |speed| speed.median);
+    let fitting = fitting_units(quartiles[1], speed).join(", or in ");
+    if !fitting.is_empty() {
+        diagnostic = diagnostic.with_help(format!(
+            "the numbers are those of matter in {fitting}: check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant"
+        ));
+    }
+    found.push(diagnostic);
     None
 }
 

@@ -1,9 +1,9 @@
 //! The mass of every node beside the stiffness around it: speeds of sound, and masses that belong to another node.
 //!
-//! For a field u = x of unit dilation, x' K x is twice the strain energy: 9 V times the bulk modulus of a solid, E A L of a bar, without
-//! any bending or shear, so that beams and shells count with what they are stretched by. Since K leaves translations free it is the
-//! sum over the nodes of e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i. Divided by the mass it is the square of a speed
-//! of sound: (x' K x) / (d m) is three times the bulk modulus over density in solids, a third of Young's in bars.
+//! e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i is the stiffness along the lines to the nodes around a node, times the squares
+//! of their lengths. Summed over an isotropic solid with Lame's constants l and m it is (6 l + 9 m) V, whatever the elements are, and
+//! E A L of a bar: bending does not count, so that beams and shells count with what they are stretched by. Divided by d times the mass it
+//! is the square of a speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
 
 use super::checks::Assembled;
 use super::node_pairs::neighbours;
@@ -30,7 +30,7 @@ const MISFITS: f64 = 0.3;
 
 /// What belongs to each node.
 pub(super) struct LocalMass {
-    /// e_i: its part of x' K x.
+    /// e_i.
     pub dilation: Vec<f64>,
     /// Row sum of the mass over the nodes, the mean of the directions.
     pub mass: Vec<f64>,
@@ -41,7 +41,7 @@ pub(super) struct LocalMass {
 /// Speeds of sound of a body in the units of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoundSpeed {
-    /// From the stretching of the whole body and its whole mass.
+    /// From the sums over the body.
     pub whole: f64,
     /// The median over the nodes, which point masses and stiff connections leave alone.
     pub median: f64,
@@ -155,8 +155,7 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
     let number = |i: usize| body.rows.number(&body.nodes, i);
     let named: Vec<String> = pairs.iter().map(|&[i, j]| format!("{} and {}", number(i), number(j))).collect();
     let message = format!(
-        "{} pairs of nodes of the same elements have masses that fit their stiffness only when exchanged: {}",
-        pairs.len(),
+        "masses of nodes of the same elements fit their stiffness only when exchanged: {}",
         super::layout::name_some(&named)
     );
     found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.raw.mass.path));
@@ -177,9 +176,9 @@ pub(super) fn check_speed(
     let heavy = density.filter(|density| *density > HEAVY);
     let slowest = if heavy.is_some() { SLOWEST_OF_HEAVY } else { SPEEDS.0 };
     if whole.min(median) > SPEEDS.1 || whole.max(median) < slowest {
-        let of = heavy.map_or(String::new(), |density| format!(" of matter of {density:.0} kg/m^3"));
+        let matter = heavy.map_or(String::new(), |density| format!(" in matter of {density:.0} kg/m^3"));
         let message = format!(
-            "stiffness, mass and coordinates give a speed of sound{of} of {median:.3e} m/s (median of the nodes; {whole:.3e} m/s of the whole body)"
+            "stiffness, mass and coordinates give a speed of sound of {median:.3e} m/s{matter} (median of the nodes; {whole:.3e} m/s of the whole body)"
         );
         found.push(Diagnostic::new(Code::SpeedImplausible, message));
     }

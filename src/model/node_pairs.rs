@@ -98,7 +98,7 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) ->
         Some(_) => named.join(", ") + ", ...",
     };
     let message = format!(
-        "mass couples {count} pairs of nodes, of which stiffness leaves {} uncoupled: {some}",
+        "mass couples {count} pairs of nodes, {} of which stiffness does not couple: {some}",
         foreign.len()
     );
     let report = |code| Diagnostic::new(code, message.as_str()).in_file(&raw.mass.path);
