@@ -71,7 +71,7 @@ largest such change on each model is in the table); any order where K is full, a
 pounds and slinches shows in solids that are heavy enough, not in beams and shells.
 
 `M in random order`, `reversed` and the exchanges move whole nodes (with as many rows); the exchanges are up to sixty random pairs each (fewer in large models), those that do not change M left out. Changes are
-Frobenius norms relative to that of M. A code after a number says how many were told by it. Reversing a regular block leaves M as it was.
+Frobenius norms relative to that of M. A code after a number says how many were told by it. Reversing a regular block leaves M as it was; models whose nodes have different numbers of rows are not reversed.
 
 ";
 
