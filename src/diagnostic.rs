@@ -135,6 +135,13 @@ codes! {
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
     InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
+    MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows stand in another order, or it is another mesh's", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so";
+    MassPairs = "FB434", Warning, Done, "mass matrix couples nodes that the stiffness matrix does not", "nothing to do if the model is meant so; else write K and M in the same order";
+    MassesExchanged = "FB435", Warning, Done, "masses of nodes seem to be exchanged", "write K and M in the same order of nodes";
+    SpeedImplausible = "FB436", Warning, Done, "speed of sound of no known matter: stiffness, mass and lengths do not fit the stated units", "check that density, Young's modulus and coordinates are all in the units of the manifest";
+    DensityImplausible = "FB437", Error, BadInput, "density of no known matter: mass and coordinates do not fit the stated units", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
+    MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass";
+    InterfaceFar = "FB439", Warning, Done, "reference point of an interface is far from its nodes", "reference points are in model axes and in the unit of length of the nodes";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";

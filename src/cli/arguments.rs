@@ -248,6 +248,9 @@ pub struct ConvertArguments {
     /// 2 for a plane model, with x and y only [default: 3]
     #[arg(long, value_name = "N", requires = "stiffness", value_parser = clap::value_parser!(u8).range(2..=3))]
     pub dimension: Option<u8>,
+    /// Warn only of densities that no matter has, and of mass between nodes that no stiffness joins
+    #[arg(long, conflicts_with = "from")]
+    pub allow_implausible: bool,
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,

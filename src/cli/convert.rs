@@ -118,7 +118,7 @@ impl Job<'_> {
         watcher: &Watcher,
     ) -> Result<Done> {
         let Self { arguments, .. } = *self;
-        let CheckedModel { model, mut diagnostics } = checked;
+        let CheckedModel { model, mut diagnostics, .. } = checked;
         let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, &model)).transpose()?;
         let basis = basis(arguments, self.loads, &model).inspect_err(|_| {
             watcher.clear();
@@ -371,6 +371,12 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
 }
 
 fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
+    let mut files = stated_files(arguments)?;
+    files.allow_implausible |= arguments.allow_implausible;
+    Ok(files)
+}
+
+fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
         (Some(_), ..) if arguments.units.is_some() => {
             let message = "--units are for --stiffness and --from: a manifest states its own";

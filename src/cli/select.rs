@@ -63,7 +63,7 @@ fn converted(
 ) -> Result<(FlexBody, Vec<Diagnostic>)> {
     let files = read_manifest(&arguments.body)?;
     refuse_replacing(files.paths().into_iter(), arguments.report.iter())?;
-    let CheckedModel { model, mut diagnostics } = FeModel::from_raw(read_model(&files)?)?;
+    let CheckedModel { model, mut diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
     let loads = match files.residual_vectors.is_empty() {
         true => responses_to(scene),
         false => files.residual_vectors.clone(),

@@ -15,7 +15,7 @@ mod geometric_stiffness;
 mod interface;
 
 const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
-const MODEL: &[&str] = &["name", "dimension", "units"];
+const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs"];
 
@@ -39,6 +39,7 @@ impl Walk<'_> {
             self.string(table, "name")
         });
         let dimension = model_keys.and_then(|table| self.dimension(table)).unwrap_or(3);
+        let allow_implausible = model_keys.and_then(|table| self.allow_implausible(table)).unwrap_or(false);
         let units = match model_keys.and_then(|table| self.table(table, "units")) {
             Some((table, span)) => self.units(table, span)?,
             None => UnitSystem::default(),
@@ -72,6 +73,7 @@ impl Walk<'_> {
             name: name.unwrap_or_else(|| stem(self.path)),
             dimension,
             units,
+            allow_implausible,
             stiffness: MatrixLocation::parse(stiffness?).relative_to(folder),
             mass: MatrixLocation::parse(mass?).relative_to(folder),
             nodes: folder.join(nodes?),
@@ -96,6 +98,17 @@ impl Walk<'_> {
             }
             None => {
                 self.mistyped("dimension", value, "2 or 3");
+                None
+            }
+        }
+    }
+
+    fn allow_implausible(&mut self, table: &Table) -> Option<bool> {
+        let value = table.get("allow_implausible")?;
+        match value.get_ref() {
+            DeValue::Boolean(allowed) => Some(*allowed),
+            _ => {
+                self.mistyped("allow_implausible", value, "true or false");
                 None
             }
         }

@@ -16,6 +16,8 @@ pub struct ModelFiles {
     pub dimension: u8,
     /// Units of the numbers in the files.
     pub units: UnitSystem,
+    /// Whether findings that a person has looked at are warnings: see [`RawModel`](crate::model::RawModel).
+    pub allow_implausible: bool,
     /// Stiffness matrix K.
     pub stiffness: MatrixLocation,
     /// Mass matrix M.
@@ -144,6 +146,7 @@ impl ModelFiles {
             name: stem(&stiffness.path),
             dimension: 3,
             units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
+            allow_implausible: false,
             stiffness,
             mass: MatrixLocation::parse(mass),
             nodes: nodes.into(),

@@ -64,6 +64,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         interfaces,
         damping,
         geometric_stiffness,
+        allow_implausible: files.allow_implausible,
         sources: sources(files, &fingerprints),
         diagnostics,
     })

@@ -1,10 +1,14 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
+use super::density::{Densities, check_density};
+use super::exchanged::check_exchanged_matrices;
 use super::geometric_stiffness::{check_loads, missing_components};
 use super::interface::resolve_references;
 use super::layout::{Layout, layout, name_some};
+use super::local_mass::{LocalMass, SoundSpeed, check_exchanged, check_speed};
 use super::magnitude::check_magnitudes;
 use super::mass_structure::{MassForm, mass_form};
+use super::node_pairs::check_mass_pairs;
 use super::placeless::{check_massless, misplaced, recover};
 use super::rigid::{centre_and_length, extents, rigid_count, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
@@ -26,6 +30,23 @@ pub struct CheckedModel {
     pub model: FeModel,
     /// Warnings and notes, in the order found.
     pub diagnostics: Vec<Diagnostic>,
+    /// What they say of the place and the size of the mass was judged by.
+    pub plausibility: Plausibility,
+}
+
+/// How the mass fits the stiffness and the positions; in the units of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plausibility {
+    /// Pairs of nodes that the mass couples.
+    pub mass_pairs: usize,
+    /// Those of them that the stiffness does not couple.
+    pub foreign_pairs: usize,
+    /// Pairs of nodes whose masses fit their stiffness only when exchanged.
+    pub exchanged_pairs: usize,
+    /// Speeds of sound; none where no motion stretches the body.
+    pub sound_speed: Option<SoundSpeed>,
+    /// Densities of solid elements; none where too few are recognised.
+    pub densities: Option<Densities>,
 }
 
 /// Checks `raw` and brings it into the internal order.
@@ -166,6 +187,10 @@ pub(super) fn finish(
     number: Option<BodyNumber>,
     mut found: Vec<Diagnostic>,
 ) -> Result<CheckedModel> {
+    found.extend(check_exchanged_matrices(&body));
+    stop_on_error(&mut found)?;
+    let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, &mut found);
+    stop_on_error(&mut found)?;
     let digits = body.raw.mass.digits;
     let form = match mass_form(&body.mass, &body.rows, block_tolerance(digits)) {
         Ok(form) => Some(form),
@@ -201,9 +226,35 @@ pub(super) fn finish(
     }
     let diagonal_mass = is_diagonal(&body.mass);
     note_structure(&body, &form, diagonal_mass, &mut found);
-    check_plausibility(&form.scalar, &body.nodes, &body.raw, &mut found);
+    let plausibility = Plausibility {
+        mass_pairs,
+        foreign_pairs,
+        ..check_local_mass(&body, &form, diagonal_mass, &mut found)
+    };
+    stop_on_error(&mut found)?;
     let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
-    Ok(CheckedModel { model, diagnostics: found })
+    Ok(CheckedModel { model, diagnostics: found, plausibility })
+}
+
+/// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted here.
+fn check_local_mass(
+    body: &Assembled,
+    form: &MassForm,
+    diagonal_mass: bool,
+    found: &mut Vec<Diagnostic>,
+) -> Plausibility {
+    let local = LocalMass::new(body, &form.scalar);
+    // Lumping has moved mass between the nodes of an element.
+    let exchanged_pairs = if diagonal_mass { 0 } else { check_exchanged(body, &local, found) };
+    let before = found.len();
+    let densities = Densities::new(body, &local, diagonal_mass);
+    let density = check_density(body, densities, &local, found);
+    if found.len() == before {
+        check_plausibility(&form.scalar, &body.nodes, &body.raw, found);
+    }
+    check_speed(body, &local, density, found);
+    let sound_speed = local.sound_speed(body.rows.dimension);
+    Plausibility { mass_pairs: 0, foreign_pairs: 0, exchanged_pairs, sound_speed, densities }
 }
 
 fn is_diagonal(m: &SymmetricMatrix) -> bool {
@@ -458,7 +509,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Densities between aerogel and osmium, for the box around the nodes.
+/// Densities between aerogel and osmium, for the box around the nodes: all that is known of bodies other than solids.
 const DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {

@@ -15,6 +15,11 @@ const COLLINEAR: f64 = 1e-6;
 /// a rule. Rotations about a point so far away lose four digits.
 const FARTHEST: f64 = 100.0;
 
+/// Distance from the middle of its nodes, relative to how far these reach, beyond which a reference point is asked about; nodes closer
+/// together than this part of the body count as if they reached so far.
+const REACH: f64 = 3.0;
+const SMALLEST: f64 = 0.05;
+
 /// How the nodes of an interface and its reference point follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coupling {
@@ -119,10 +124,30 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                     );
                     let help = "it is in model axes and in the unit of length of the nodes";
                     found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+                } else {
+                    let own = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect::<Vec<_>>();
+                    found.extend(far_reference(name, x, &own, size));
                 }
             }
         }
     }
+}
+
+/// A warning for a reference point that lies far from the nodes beside their own size, in a body of this size.
+fn far_reference(name: &str, reference: [f64; 3], nodes: &[[f64; 3]], size: f64) -> Option<Diagnostic> {
+    let (centre, radius) = match nodes {
+        [] => return None,
+        [only] => (*only, 0.0),
+        _ => centre_and_length(nodes),
+    };
+    let away = (Vector3::from(reference) - Vector3::from(centre)).norm();
+    let reach = radius.max(SMALLEST * size);
+    (away > REACH * reach).then(|| {
+        let message = format!(
+            "reference point of interface `{name}` is {away:.3e} away from the middle of its nodes, which reach {radius:.3e} from there, in a body of {size:.3e}"
+        );
+        Diagnostic::new(Code::InterfaceFar, message)
+    })
 }
 
 /// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations along the axes, in the

@@ -60,6 +60,8 @@ pub struct RawModel {
     pub damping: Option<Damping<RawMatrix>>,
     /// Geometric stiffness of unit loads, with the rows of K and M.
     pub geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>,
+    /// Whether findings that a person has looked at are warnings: densities that no matter has, mass between nodes that no stiffness joins.
+    pub allow_implausible: bool,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Vec<SourceFile>,
     /// Warnings and notes of the readers; never an error.
@@ -85,6 +87,7 @@ impl RawModel {
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),
+            allow_implausible: false,
             sources: Vec::new(),
             diagnostics: Vec::new(),
         }

@@ -89,6 +89,20 @@ impl Rows {
         }
     }
 
+    /// The rows of a [`vertex`](Self::vertex), ascending.
+    pub(super) fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = usize> {
+        let (after, d) = (self.displacements(), self.dimension);
+        let up_to = |node: usize| after + self.rotations.partition_point(|&(own, _)| (own as usize) < node);
+        let (first, second) = match vertex.checked_sub(self.nodes + self.vectors.len()) {
+            Some(other) => {
+                (after + self.rotations.len() + other..after + self.rotations.len() + other + 1, 0..0)
+            }
+            None if self.rotations.is_empty() || vertex >= self.nodes => (d * vertex..d * vertex + d, 0..0),
+            None => (d * vertex..d * vertex + d, up_to(vertex)..up_to(vertex + 1)),
+        };
+        first.chain(second)
+    }
+
     /// Label of a row.
     pub(super) fn label(&self, nodes: &Nodes, row: usize) -> DofLabel {
         let (after, d) = (self.displacements(), self.dimension);
