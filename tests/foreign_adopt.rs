@@ -42,6 +42,7 @@ fn foreign(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Foreig
         dialect: String::new(),
         notes: Vec::new(),
         checks: Vec::new(),
+        unsound: Vec::new(),
         body: ForeignBody {
             name: "block".to_owned(),
             units: None,
