@@ -69,7 +69,8 @@ pub(super) const DIALECTS: [Dialect; 4] = [
         gr: Blocks::Mode,
         ge: Blocks::Mode,
         mode_last: true,
-        triangle: true,
+        // FEMBeam lists one triangle, but its reader mirrors none: of J it would lose the products of inertia above the diagonal.
+        triangle: false,
         named_modal: false,
         exponent: 'E',
         ..FEMBS

@@ -56,14 +56,15 @@ impl Sizes {
     }
 
     /// Whether the modes move no centre of mass, as free modes do, of which Cr0 is zero too.
-    fn are_free(&self) -> bool {
-        self.ct0 == 0.0 && self.mdcm1 == 0.0 && self.cr0 == 0.0
+    fn are_free(&self, arrays: &Arrays) -> bool {
+        let [bound_t, bound_r, _] = arrays.bounds();
+        self.ct0.max(self.mdcm1) <= NOTHING * bound_t && self.cr0 <= NOTHING * bound_r
     }
 }
 
 /// Whether Cr0 is zero as of free modes, so that a skew part of Gr is a fault of Gr.
 pub(super) fn is_free(arrays: &Arrays, layout: &Layout) -> bool {
-    Sizes::of(arrays, layout).are_free()
+    Sizes::of(arrays, layout).are_free(arrays)
 }
 
 impl Missing {
@@ -77,7 +78,7 @@ impl Missing {
 
         found.say("Ct", sizes.ct0, &[(is(sizes.mdcm1, bound_t), "mdCM1 is not")]);
         found.say("mdCM1", sizes.mdcm1, &[(is(sizes.ct0, bound_t), "Ct is not")]);
-        if !sizes.are_free() {
+        if !sizes.are_free(arrays) {
             found.say("Cr0", sizes.cr0, &[(gr_skew, "Gr has a skew part")]);
         }
         found.say("Gr", sizes.gr0, &[(j1, "J1 is not"), (cr0, "Cr0 is not")]);
