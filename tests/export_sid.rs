@@ -440,7 +440,9 @@ fn the_part_has_a_name_in_the_dialects_that_have_one() {
     for (name, word) in [("Rotor = 2, left", "= Rotor_2,_left"), ("", "=")] {
         parts.source.name = name.to_owned();
         let body = FlexBody::new(parts.clone()).expect("valid parts");
-        for (dialect_name, named) in [("fembs", true), ("py-sid", true), ("morembs", false), ("fembeam", false)] {
+        for (dialect_name, named) in
+            [("fembs", true), ("py-sid", true), ("morembs", false), ("fembeam", false)]
+        {
             let text = text(&body, &dialect(dialect_name));
             let line = text.lines().nth(2).expect("a third line").trim();
             let rest = line.strip_prefix("new modal").expect("the part").trim();

@@ -225,12 +225,14 @@ fn shapes_are_read_as_mbdyn_reads_them() {
     let text = fem();
     let own = read(text.as_bytes(), "mbdyn").expect("readable").body;
     let is_title = |line: &str| line.starts_with("**    NORMAL MODE SHAPE");
-    let blank = |line: &'static str| move |old: &str| if is_title(old) { line.to_owned() } else { old.to_owned() };
+    let blank =
+        |line: &'static str| move |old: &str| if is_title(old) { line.to_owned() } else { old.to_owned() };
     for title in ["", "** "] {
         let lines: Vec<String> = text.lines().map(blank(title)).collect();
         assert_eq!(read(lines.join("\n").as_bytes(), "mbdyn").expect("readable").body, own);
     }
-    let touching = |line: &str| if line.starts_with("**") { line.to_owned() } else { line.replace(" -", "-") };
+    let touching =
+        |line: &str| if line.starts_with("**") { line.to_owned() } else { line.replace(" -", "-") };
     let lines: Vec<String> = text.lines().map(touching).collect();
     assert_ne!(lines.join("\n") + "\n", text);
     let found = read(lines.join("\n").as_bytes(), "mbdyn").expect("readable");

@@ -323,9 +323,10 @@ fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
 fn value_of(text: &str, object: &str, key: &str) -> f64 {
     let (_, rest) = text.split_once(&format!("\n           {object}\n")).expect("an object");
     let (inside, _) = rest.split_once(&format!("end {object}")).expect("its end");
-    let found = inside.lines().filter_map(|line| line.split_once('=')).find(|(name, _)| {
-        name.split_whitespace().collect::<String>() == key
-    });
+    let found = inside
+        .lines()
+        .filter_map(|line| line.split_once('='))
+        .find(|(name, _)| name.split_whitespace().collect::<String>() == key);
     found.map_or(0.0, |(_, v)| value(v.trim()))
 }
 
@@ -390,8 +391,18 @@ fn ge_with_the_symmetric_part_of_cr1_is_named() {
 #[test]
 fn axes_that_are_no_rotation_are_refused() {
     let cases: [(Change, &str); 2] = [
-        (|object, key, v| if (object, key) == ("AP", "m0(2,2)") { scaled(key, v, -1.0) } else { same(key, v) }, "mirror image"),
-        (|object, key, v| if (object, key) == ("AP", "m0(2,2)") { scaled(key, v, 1.1) } else { same(key, v) }, "not orthonormal"),
+        (
+            |object, key, v| {
+                if (object, key) == ("AP", "m0(2,2)") { scaled(key, v, -1.0) } else { same(key, v) }
+            },
+            "mirror image",
+        ),
+        (
+            |object, key, v| {
+                if (object, key) == ("AP", "m0(2,2)") { scaled(key, v, 1.1) } else { same(key, v) }
+            },
+            "not orthonormal",
+        ),
     ];
     for (change, words) in cases {
         let foreign = read(&edited(file("fembs"), change));
@@ -400,6 +411,21 @@ fn axes_that_are_no_rotation_are_refused() {
         let error = adopt(&foreign, source, UnitSystem::default()).expect_err(words);
         assert!(error.has(Code::ForeignUnsound) && error.to_string().contains(words), "{error}");
     }
+}
+
+/// Axes of a frame that are a rotation are sound; that they are not taken is said.
+#[test]
+fn turned_axes_of_a_frame_are_noted() {
+    let note = |foreign: &Foreign| {
+        foreign.notes.iter().any(|note| note.contains("axes other than those of the body"))
+    };
+    assert!(!note(&read(file("fembs"))));
+    let turned = read(&edited(file("fembs"), |object, key, v| match (object, key) {
+        ("AP", "m0(1,1)" | "m0(2,2)") => scaled(key, v, -1.0),
+        _ => same(key, v),
+    }));
+    assert_eq!(findings(&turned), Vec::<String>::new());
+    assert!(note(&turned), "{:?}", turned.notes);
 }
 
 #[test]

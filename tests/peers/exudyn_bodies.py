@@ -12,7 +12,8 @@ K, M and the same modes (`FEMinterface`), matrices turned into the body frame. B
 
 * tumbling: a free body with a spin near a principal axis and bent modes; the classical Runge-Kutta method, rotation vector;
 * rotor: the frame is brought to a spin about its z axis by a joint; Euler parameters as in the file, generalized-alpha method;
-* loads: a force and a couple along fixed axes of the world rise at an interface (equal weights of its nodes) of the body at rest, which is free.
+* loads: a force at an interface (equal weights of its nodes) and a couple, two opposite forces at nodes of it, rise along fixed axes of the world
+  at the body, which is free and spins. (From rest Exudyn's rotation vector loses digits as long as it turns by very little in a step.)
 
 Differences are the largest over all recorded instants: of places over the radius of gyration, of direction cosines, of modal amplitudes over the
 largest. `flexbody simulate` runs at a tolerance of 1e-12. With half the step the difference must fall by the order of the method: what is left is the
@@ -65,6 +66,11 @@ class Body:
             self.inertia, self.mass = f["invariants/I0"][()], f["invariants/mass"][0]
             self.interface = LOADED[name]
             self.loaded_ids = f[f"interfaces/{self.interface}/node_id"][()]
+        # The two nodes of the interface that are farthest apart along the axis of its largest extent.
+        among = self.positions[np.isin(self.ids, self.loaded_ids)]
+        ids = self.ids[np.isin(self.ids, self.loaded_ids)]
+        along = among[:, np.argmax(np.ptp(among, axis=0))]
+        self.pair = [(int(ids[np.argmin(along)]), 1.0), (int(ids[np.argmax(along)]), -1.0)]
         self.shapes = shapes.reshape(MODES, -1).T.copy()
         self.loaded = ObjectFFRFreducedOrderInterface()
         self.loaded.LoadFromFile(str(export))
@@ -115,10 +121,11 @@ class Scene:
             self.velocity = np.array([0.1, 0.2, -0.1]) * 0.2 * first * body.length
             self.q = 0.03 * np.sqrt(np.trace(body.inertia) / 2) * body.lam[0] / body.lam
         else:
-            self.omega, self.velocity, self.q = np.zeros(3), np.zeros(3), np.zeros(MODES)
+            spinning = name == "loads"
+            self.omega, self.velocity, self.q = np.array([0.3, -0.5, 1.0]) * self.rate * spinning, np.zeros(3), np.zeros(MODES)
         # Such that the body turns by about a radian.
         self.force = np.array([0.3, -0.2, 0.5]) * 0.02 * body.mass * body.length * first**2
-        self.couple = np.array([-0.2, 0.4, 0.3]) * 0.02 * body.mass * body.length**2 * first**2
+        self.pair = np.array([-0.2, 0.4, 0.3]) * 0.02 * body.mass * body.length * first**2
 
     def ours(self, folder):
         """Places, axes and amplitudes by `flexbody simulate`."""
@@ -128,8 +135,10 @@ class Scene:
             lines += [f"[initial]\nvelocity = {self.velocity.tolist()}\nangular_velocity = {self.omega.tolist()}\nmode = [{modes}]"]
         elif self.name == "loads":
             rise = f"{{ from = 0, to = 1, duration = {self.duration / 2!r} }}"
-            lines += [f'[[load]]\ninterface = "{self.body.interface}"\nforce = {self.force.tolist()}\ntorque = {self.couple.tolist()}'
-                      f'\naxes = "world"\nhistory = {rise}']
+            loads = [(f'interface = "{self.body.interface}"', self.force)]
+            loads += [(f"node = {node}", sign * self.pair) for node, sign in self.body.pair]
+            lines += [f"[initial]\nangular_velocity = {self.omega.tolist()}"]
+            lines += [f'[[load]]\n{at}\nforce = {force.tolist()}\naxes = "world"\nhistory = {rise}' for at, force in loads]
         else:
             half = self.duration / 2
             lines += [f"[spin]\naxis = [0, 0, 1]\nrate = {{ to = {float(self.rate)!r}, duration = {half!r} }}\nhold = true"]
@@ -146,15 +155,14 @@ class Scene:
         return x - np.sin(2 * np.pi * x) / (2 * np.pi)
 
     def load(self, system, made):
-        """Force and couple at the mean of the nodes of the interface."""
+        """The force at the mean of the nodes of the interface, and the couple."""
         place = {node: i for i, node in enumerate(self.body.ids)}
-        nodes = [place[node] for node in self.body.loaded_ids]
-        share = [1 / len(nodes)] * len(nodes)
-        at = system.AddMarker(eii.MarkerSuperElementRigid(
-            bodyNumber=made["oFFRFreducedOrder"], offset=[0, 0, 0], meshNodeNumbers=nodes, weightingFactors=share))
         grown = lambda mbs, t, vector: [self.rise(t) * v for v in vector]
-        system.AddLoad(eii.LoadForceVector(markerNumber=at, loadVector=list(self.force), loadVectorUserFunction=grown))
-        system.AddLoad(eii.LoadTorqueVector(markerNumber=at, loadVector=list(self.couple), loadVectorUserFunction=grown))
+        for nodes, force in [(self.body.loaded_ids, self.force)] + [([node], sign * self.pair) for node, sign in self.body.pair]:
+            at = system.AddMarker(eii.MarkerSuperElementPosition(
+                bodyNumber=made["oFFRFreducedOrder"], meshNodeNumbers=[place[node] for node in nodes],
+                weightingFactors=[1 / len(nodes)] * len(nodes)))
+            system.AddLoad(eii.LoadForceVector(markerNumber=at, loadVector=list(force), loadVectorUserFunction=grown))
 
     def angle(self, t):
         """Integral of the rate: a smooth rise over half the scene, then constant."""

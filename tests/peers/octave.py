@@ -98,12 +98,13 @@ def fembeam(flexbody, folder):
     told = octave(folder, text)
     with h5py.File(path) as f:
         get = lambda name: f["invariants/" + name][()]
-        mass, inertia, w1, w2, w3, lam = get("mass")[0], get("I0"), get("W1"), get("W2"), get("W3"), f["modes/eigenvalue"][()]
-    nf = len(lam)
+        mass, inertia, w1, w2, w3, stiffness = get("mass")[0], get("I0"), get("W1"), get("W2"), get("W3"), get("modal_stiffness")
+        modal_mass = get("modal_mass")
+    nf = len(stiffness)
     i5 = w3.reshape(3, nf, nf)  # axis, l, k
     # Derivatives by q_l stand last: J1_l = W1_l, Cr1(k, a) = I5_l(a, k), Ge mode-blocked 2 I5.
     own = {
-        "mass": np.array([[mass]]), "I0": inertia, "Me": np.eye(nf), "Ke": np.diag(lam),
+        "mass": np.array([[mass]]), "I0": inertia, "Me": modal_mass, "Ke": stiffness,
         "I1": w1.reshape(3, 3, nf), "Cr1": i5.transpose(2, 0, 1),
         "Ge": 2 * i5.transpose(2, 1, 0).reshape(nf, 3 * nf),
         "Oe1": np.stack([-w2.reshape(3, nf, 3, nf)[a, :, a, :] for a in range(3)], axis=1),

@@ -29,9 +29,9 @@ def rows(flexbody, folder):
     path = common.body(flexbody, "bracket_hex20", folder / "b.flex.h5", "--modes", 4)
     with h5py.File(path) as f:
         get = lambda name: f["invariants/" + name][()]
-        mass, inertia, w1, w3, lam = get("mass")[0], get("I0"), get("W1"), get("W3"), f["modes/eigenvalue"][()]
-        shapes = f["modes/shape"][()]
-    nf = len(lam)
+        mass, inertia, w1, w3, stiffness = get("mass")[0], get("I0"), get("W1"), get("W3"), get("modal_stiffness")
+        modal_mass, shapes = get("modal_mass"), f["modes/shape"][()]
+    nf = len(stiffness)
     i5, w1 = w3.reshape(3, nf, nf), w1.reshape(3, 3, nf)
     found = []
     for dialect in ["fembs", "py-sid"]:
@@ -44,8 +44,8 @@ def rows(flexbody, folder):
         column = (lambda a, k: a * nf + k) if dialect == "fembs" else (lambda a, k: 3 * k + a)
         gr = m0(modal.gr)
         told = {
-            "Me": (m0(modal.me), np.eye(nf)),
-            "Ke": (m0(modal.ke), np.diag(lam)),
+            "Me": (m0(modal.me), modal_mass),
+            "Ke": (m0(modal.ke), stiffness),
             "J": (m0(modal.j)[:, 0], np.array([inertia[at] for at in INERTIA])),
             "J1": (m1(modal.j)[:, :, 0], np.array([[w1[at][k] for at in INERTIA] for k in range(nf)])),
             "Cr1": (m1(modal.cr), i5.transpose(1, 2, 0)),

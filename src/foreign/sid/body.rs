@@ -102,6 +102,12 @@ pub(super) fn body(
     if arrays.gr.m1.is_some() {
         lacks.push("Gr1: it follows from the other arrays and is not taken".to_owned());
     }
+    if frames.iter().any(has_own_axes) {
+        notes.push(
+            "frames have axes other than those of the body (AP), which a body of ours does not hold"
+                .to_owned(),
+        );
+    }
     let listed_frames = listed.frames.iter().zip(frames);
     let frames = listed_frames.map(|(frame, arrays)| place(&frame.label, arrays, &mut stiffness)).collect();
     let damped = largest(&arrays.de.m0) > 0.0;
@@ -188,6 +194,12 @@ fn push(
     for (component, matrix) in components.enumerate().filter(|(_, matrix)| largest(matrix) > 0.0) {
         stiffness.push(GeometricStiffness { load: UnitLoad { kind: kind.clone(), component }, matrix });
     }
+}
+
+/// Whether the axes of a frame are turned against those of the body by more than rounding.
+fn has_own_axes(frame: &FrameArrays) -> bool {
+    let beside = |ap: &Array| (&ap.m0 - Mat::<f64>::identity(3, 3)).norm_max();
+    frame.ap.as_ref().is_some_and(|ap| beside(ap) > ROUNDING + ap.rounding[0])
 }
 
 /// A frame; one with phi1 or psi1 is an interface, whose forces or moments have geometric stiffness.

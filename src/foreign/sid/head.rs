@@ -40,7 +40,9 @@ impl Head {
     fn of_line(line: &str) -> Option<Self> {
         let stated =
             |nodes: &str, modes: &str| Some((nodes.trim().parse().ok()?, modes.trim().parse().ok()?));
-        if let Some((nodes, rest)) = line.split_once(" nodes, ") {
+        if let Some((nodes, rest)) = line.split_once(" nodes, ")
+            && nodes.trim().parse::<usize>().is_ok()
+        {
             let (modes, comment) = rest.split_once(',').unwrap_or((rest, ""));
             let modes = modes.strip_suffix(" modes").or_else(|| modes.strip_suffix(" coordinates"))?;
             return Some(Self { comment: comment.trim().to_owned(), stated: Some(stated(nodes, modes)?) });
