@@ -29,6 +29,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial.transform import Rotation
 
 sys.path += [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parents[2] / "benches/peers")]
 import common  # noqa: E402
@@ -62,7 +63,7 @@ class Body:
         common.export(flexbody, self.path, "exudyn", export)
         with h5py.File(self.path) as f:
             self.ids, self.positions, shapes = f["nodes/id"][()], f["nodes/position"][()], f["modes/shape"][()]
-            self.axes, self.lam = f["frame/axes"][()], f["modes/eigenvalue"][()]
+            self.axes, self.origin, self.lam = f["frame/axes"][()], f["frame/origin"][()], f["modes/eigenvalue"][()]
             self.inertia, self.mass = f["invariants/I0"][()], f["invariants/mass"][0]
             self.interface = LOADED[name]
             self.loaded_ids = f[f"interfaces/{self.interface}/node_id"][()]
@@ -129,25 +130,28 @@ class Scene:
 
     def ours(self, folder):
         """Places, axes and amplitudes by `flexbody simulate`."""
+        # Exudyn's world starts along the axes of the body frame, a scene along those of the model.
+        turn = self.body.axes.T
+        start = f"rotation = {Rotation.from_matrix(turn).as_rotvec().tolist()}\norigin = {(-turn @ self.body.origin).tolist()}"
         lines = [f"[run]\nduration = {self.duration!r}\noutputs = {INSTANTS}\ntolerance = 1e-12"]
         if self.name == "tumbling":
             modes = ", ".join(f"{{ number = {j + 1}, amplitude = {float(q)!r} }}" for j, q in enumerate(self.q))
-            lines += [f"[initial]\nvelocity = {self.velocity.tolist()}\nangular_velocity = {self.omega.tolist()}\nmode = [{modes}]"]
+            lines += [f"[initial]\n{start}\nvelocity = {self.velocity.tolist()}\nangular_velocity = {self.omega.tolist()}\naxes = \"body\"\nmode = [{modes}]"]
         elif self.name == "loads":
             rise = f"{{ from = 0, to = 1, duration = {self.duration / 2!r} }}"
             loads = [(f'interface = "{self.body.interface}"', self.force)]
             loads += [(f"node = {node}", sign * self.pair) for node, sign in self.body.pair]
-            lines += [f"[initial]\nangular_velocity = {self.omega.tolist()}"]
+            lines += [f"[initial]\n{start}\nangular_velocity = {self.omega.tolist()}\naxes = \"body\""]
             lines += [f'[[load]]\n{at}\nforce = {force.tolist()}\naxes = "world"\nhistory = {rise}' for at, force in loads]
         else:
             half = self.duration / 2
-            lines += [f"[spin]\naxis = [0, 0, 1]\nrate = {{ to = {float(self.rate)!r}, duration = {half!r} }}\nhold = true"]
+            lines += [f"[initial]\n{start}\n[spin]\naxis = [0, 0, 1]\naxes = \"body\"\nrate = {{ to = {float(self.rate)!r}, duration = {half!r} }}\nhold = true"]
         scene, motion = folder / "scene.toml", folder / "motion.h5"
         scene.write_text("\n".join(lines) + "\n")
         run(self.body.flexbody, "simulate", self.body.path, "--scene", scene, "-o", motion, "--quiet")
         with h5py.File(motion) as f:
-            e, place = f["frame/attitude"][()], f["frame/origin"][()]
-            return {"place": place - place[0], "axes": np.array([rotation(*row) for row in e]), "q": f["modes/q"][()]}
+            e = f["frame/attitude"][()]
+            return {"place": f["frame/origin"][()], "axes": np.array([rotation(*row) for row in e]) @ self.body.axes, "q": f["modes/q"][()]}
 
     def rise(self, t):
         """From 0 to 1 in the first half of the scene."""
