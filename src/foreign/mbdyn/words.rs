@@ -85,9 +85,11 @@ impl<'t> Words<'t> {
     pub(super) fn number(&mut self, what: &str) -> Result<f64> {
         let word = self.expect(what)?;
         let (word, touching) = word.split_at(end_of_number(word));
-        if !touching.is_empty() && touching[1..].bytes().all(|b| b.is_ascii_digit()) {
-            let number = format!("{word}{touching}");
-            return Err(self.refuse(format!("{what}: {number:?} is no finite number: MBDyn takes it for two, write the letter of the exponent")));
+        let could_be_exponent = |part: &str| part.bytes().skip(1).all(|b| b.is_ascii_digit());
+        if !touching.is_empty() && !word.contains(['e', 'E']) && could_be_exponent(touching) {
+            return Err(self.refuse(format!(
+                "{what}: `{word}{touching}` is no finite number: MBDyn takes it for two, write the letter of the exponent"
+            )));
         }
         if !touching.is_empty() {
             // What was taken ends where the rest of the line begins.
