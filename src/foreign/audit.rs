@@ -109,7 +109,8 @@ fn turns(body: &ForeignBody) -> AuditCheck {
 
 /// Findings whose size is that of an identity: those that a tolerance is about.
 fn is_identity(code: Code) -> bool {
-    matches!(code, Code::AuditIdentity | Code::AuditLumped | Code::AuditLayout | Code::AuditImplausible)
+    use Code::{AuditFrame, AuditIdentity, AuditImplausible, AuditLayout, AuditLumped};
+    matches!(code, AuditIdentity | AuditLumped | AuditLayout | AuditImplausible | AuditFrame)
 }
 
 fn of_identity(check: IdentityCheck) -> AuditCheck {

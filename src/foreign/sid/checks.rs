@@ -139,15 +139,15 @@ pub(super) fn checks(
     if there(&["Gr", "Cr0"]) {
         let rounding = gr_rounding + arrays.cr.rounding[0];
         // Where Oe1 does not belong to Me either, the two come from two masses.
-        let (code, meaning) = if is_free(arrays, layout) {
-            (
-                Code::AuditIdentity,
-                "Cr0, Ct and mdCM1 are zero as of free modes, but Gr has a skew part: Gr is wrong, or all of the three are missing",
-            )
-        } else if two_masses {
+        let (code, meaning) = if two_masses {
             (
                 Code::AuditLumped,
                 "the gyroscopic torque and the coupling of rotation and modes come from different masses",
+            )
+        } else if is_free(arrays, layout) {
+            (
+                Code::AuditIdentity,
+                "Cr0, Ct and mdCM1 are zero as of free modes, but Gr has a skew part: Gr is wrong, or all of the three are missing",
             )
         } else {
             (
