@@ -194,6 +194,7 @@ codes! {
     CheckpointTakenUp = "FB711", Note, Done, "search for modes goes on from a checkpoint", "nothing to do";
     ExportLoses = "FB720", Error, BadInput, "format cannot hold all of the body", "--allow-loss writes the file without it";
     ExportLost = "FB721", Warning, Done, "file that was written lacks a part of the body", "nothing to do if the simulation does not need it";
+    ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "set what the message names in the program's input";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
     ForeignIncomplete = "FB731", Error, BadInput, "file lacks what a body is made of", "write the file anew with the missing part";
     ForeignChanged = "FB732", Note, Done, "modes of the file are no free-surface modes: rigid motion was taken out of them", "nothing to do: the body is the same, its coordinates are others";
@@ -205,6 +206,9 @@ codes! {
     AuditUnits = "FB744", Error, CheckFailed, "numbers do not fit each other: units are mixed", "write masses, lengths and times in one system of units";
     AuditCoupling = "FB745", Error, CheckFailed, "coupling of rigid and flexible motion is missing", "write the inertia couplings too";
     AuditImplausible = "FB746", Error, CheckFailed, "numbers are not those of a body", "check what the file was made of";
+    AuditSurplus = "FB747", Error, CheckFailed, "file has more numbers than its header says", "count what the header states, or take out what is too much";
+    AuditFrame = "FB748", Error, CheckFailed, "axes of a frame are no rotation", "write the axes of the frame right-handed and orthonormal";
+    ForeignUnsound = "FB749", Error, BadInput, "file contradicts what every body fulfils", "flexbody audit says what is wrong with the file; write it anew";
     // FB8xx: usage
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";

@@ -27,8 +27,10 @@ use tempfile::TempDir;
 const STATES: usize = 4;
 
 /// Flags that the evaluation must compile with.
-const STRICT: &[&str] =
-    &["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic", "-ffreestanding"];
+const STRICT: &[&str] = &["-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic", "-ffreestanding"];
+
+/// The compiler and its language.
+const C: &[&str] = &["cc", "-std=c99"];
 
 /// A body as a C program has it.
 struct Compiled {
@@ -45,7 +47,7 @@ fn exported(body: &FlexBody, dialect: &str, points: &Points) -> Exported {
 }
 
 fn run(command: &mut Command) -> Output {
-    command.output().unwrap_or_else(|error| panic!("{command:?}: {error}; the C compiler is `cc`"))
+    command.output().unwrap_or_else(|error| panic!("{command:?}: {error}; the compilers are `cc` and `c++`"))
 }
 
 #[track_caller]
@@ -56,6 +58,10 @@ fn succeed(command: &mut Command) {
 
 impl Compiled {
     fn new(exported: Exported, flags: &[&str]) -> Self {
+        Self::compiled(exported, C, flags)
+    }
+
+    fn compiled(exported: Exported, language: &[&str], flags: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
         let [("h", header)] = &exported.beside[..] else { panic!("a header beside the file") };
@@ -67,7 +73,8 @@ impl Compiled {
         let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/embedded");
         let object = |name: &str| path(name).with_extension("o");
         succeed(
-            Command::new("cc")
+            Command::new(language[0])
+                .args(&language[1..])
                 .args(STRICT)
                 .args(flags)
                 .arg(format!("-DBODY_HEADER=\"{}\"", path("body.h").display()))
@@ -402,6 +409,18 @@ fn craig_bampton_bodies_have_frames_at_their_interfaces() {
     for interface in body.interfaces() {
         let name = format!("_FRAME_{} = ", interface.name.to_uppercase());
         assert!(header.contains(&name), "{name}");
+    }
+}
+
+/// The header is C++ as well: the same numbers as from the library.
+#[test]
+fn the_header_is_cpp_too() {
+    for (body, standard) in kinds().into_iter().zip(["c++11", "c++17", "c++14", "c++20"]) {
+        let body = laden(body, &mut Random(6));
+        let (points, standard) = (some_points(&body), format!("-std={standard}"));
+        let language = ["c++", standard.as_str(), "-x", "c++"];
+        let compiled = Compiled::compiled(exported(&body, "double", &points), &language, &["-O1"]);
+        assert!(error(&compiled, &body, &points, 8) < ROUNDINGS * 0.5 * f64::EPSILON, "{standard}");
     }
 }
 

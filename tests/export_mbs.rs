@@ -28,9 +28,10 @@ fn options(dialect: &str, points: Points) -> ExportOptions {
 
 /// The file, and what it lost.
 fn written(body: &FlexBody, format: &str, options: &ExportOptions) -> (Vec<u8>, Vec<String>) {
-    let (exported, losses) =
+    let (exported, mut losses) =
         export(body, find_format(format).expect("a format"), options, true).expect("written");
     assert!(exported.beside.is_empty());
+    losses.retain(|told| told.code() != Code::ExportNeeds);
     assert!(losses.iter().all(|loss| loss.code() == Code::ExportLost));
     (exported.file, losses.iter().map(|loss| loss.message().to_owned()).collect())
 }
@@ -500,6 +501,26 @@ fn the_size_of_a_loss_is_what_is_lost() {
         .fold(0.0, f64::max);
     let told = losses.iter().find(|loss| loss.contains("W2")).expect("told");
     assert!(told.contains(&format!("{lost:.1e}")), "{told}: {lost:.1e}");
+}
+
+/// What MBDyn ignores without a setting is said, and only where the file has it.
+#[test]
+fn mbdyn_says_what_its_input_must_have() {
+    let plain = fixture("bracket_hex20", 3, BodyFrame::Principal);
+    let needs = |body: &FlexBody, dialect: &str| -> Vec<String> {
+        let mbdyn = find_format("mbdyn").expect("a format");
+        let (_, told) = export(body, mbdyn, &options(dialect, Points::Usual), true).expect("written");
+        let needs = told.iter().filter(|one| one.code() == Code::ExportNeeds);
+        needs.map(|one| one.message().to_owned()).collect()
+    };
+    let spun = stressed(plain.clone(), &[LoadKind::Spin], 1.0, &mut Random(4));
+    let second = plain.interfaces()[1].name.clone();
+    let pulled = stressed(plain.clone(), &[LoadKind::Spin, LoadKind::Force(second)], 1.0, &mut Random(4));
+    assert_eq!(needs(&plain, "level19"), Vec::<String>::new());
+    assert_eq!(needs(&spun, "level13"), Vec::<String>::new());
+    assert!(matches!(&needs(&spun, "level19")[..], [one] if one.contains("use automatic differentiation")));
+    let [_, nodes] = &needs(&pulled, "level19")[..] else { panic!("two settings") };
+    assert!(nodes.contains("2 or more interface nodes"), "{nodes}");
 }
 
 #[test]

@@ -433,6 +433,24 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
     }
 }
 
+/// Readers of the files of FEMBS and PY_SID split the line at a sign of equality; MatMorembs and FEMBeam write none.
+#[test]
+fn the_part_has_a_name_in_the_dialects_that_have_one() {
+    let mut parts = fixture("hex8_edges", 4, BodyFrame::Model).into_parts();
+    for (name, word) in [("Rotor = 2, left", "= Rotor_2,_left"), ("", "=")] {
+        parts.source.name = name.to_owned();
+        let body = FlexBody::new(parts.clone()).expect("valid parts");
+        for (dialect_name, named) in
+            [("fembs", true), ("py-sid", true), ("morembs", false), ("fembeam", false)]
+        {
+            let text = text(&body, &dialect(dialect_name));
+            let line = text.lines().nth(2).expect("a third line").trim();
+            let rest = line.strip_prefix("new modal").expect("the part").trim();
+            assert_eq!(rest, if named { word } else { "" }, "{dialect_name}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_held_is_told() {
     let said =

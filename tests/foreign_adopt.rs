@@ -42,6 +42,7 @@ fn foreign(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Foreig
         dialect: String::new(),
         notes: Vec::new(),
         checks: Vec::new(),
+        unsound: Vec::new(),
         body: ForeignBody {
             name: "block".to_owned(),
             units: None,
@@ -184,6 +185,9 @@ fn what_is_no_body_is_refused_in_words() {
     refused(&|b| b.inertia.i7[(0, 0)] = f64::NAN, Code::ForeignIncomplete, "no NaN");
     refused(&|b| b.modal_stiffness[(0, 0)] *= -1.0, Code::ForeignIncomplete, "not positive definite beside");
     refused(&|b| b.inertia.i3[(0, 1)] = 1e3, Code::ForeignIncomplete, "mode 2 and rigid motion together");
+    // Masses on the axis x.
+    let line = |b: &mut ForeignBody| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into());
+    refused(&line, Code::ForeignIncomplete, "all masses lie on a line");
     refused(
         &|b| {
             b.inertia.i6 = Mat::from_fn(3, 3, |_, _| 1.0);
@@ -229,7 +233,16 @@ fn an_audit_passes_a_body_and_names_what_is_wrong_with_another() {
     assert!(millimetres.findings()[0].message().contains("1e-3"), "{}", millimetres.findings()[0]);
     // An inertia that no body has.
     assert!(codes(&of(&|b| b.inertia.i7[(0, 0)] *= 9.0)).contains(&Code::AuditImplausible));
-    assert!(codes(&of(&|b| b.inertia.i1 = f64::NAN)).contains(&Code::AuditImplausible));
+    assert_eq!(codes(&of(&|b| b.inertia.i1 = f64::NAN)), [Code::AuditImplausible]);
+    // What has no mass has one finding, not one for each number that is divided by it.
+    for mass in [0.0, -3.0] {
+        let found = of(&|b| b.inertia.i1 = mass);
+        assert_eq!(codes(&found), [Code::AuditImplausible], "{:?}", found.findings());
+        assert!(found.findings()[0].message().contains("mass is not positive"));
+    }
+    // No body is made of masses on a line (see above), and the audit says so.
+    let line = of(&|b| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into()));
+    assert!(line.findings().iter().any(|f| f.message().contains("all masses lie on a line")), "{line:?}");
     // A coupling a thousand times too large: modes would carry negative energy.
     assert!(codes(&of(&|b| b.inertia.i3[(0, 0)] = 1e3)).contains(&Code::AuditIdentity));
     assert!(codes(&of(&|b| b.modal_stiffness = Mat::zeros(4, 4))).contains(&Code::AuditImplausible));

@@ -14,6 +14,7 @@ use flexbody::provenance::SourceFile;
 use flexbody::units::UnitSystem;
 use hdf5_metno as hdf5;
 use proptest::prelude::*;
+use std::path::Path;
 use std::sync::LazyLock;
 use support::elements::{Kind, MassRule, Material};
 use support::flexible::body_of;
@@ -183,6 +184,61 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     assert_eq!(found, [("digits", Digits)]);
 }
 
+/// MBDyn reads as many numbers as the header says and skips the rest of the file up to the next record group.
+#[test]
+fn what_mbdyn_skips_is_a_finding() {
+    let text = fem();
+    let surplus = ("no_more_than_the_header_says", Code::AuditSurplus);
+    let of = |text: &str| {
+        let foreign = read(text.as_bytes(), "mbdyn").expect("readable");
+        (findings(&foreign), foreign.unsound)
+    };
+    // femgen writes a row of zeros too many.
+    let masses = row_sums();
+    let mut rows = lumped_groups(masses.masses());
+    rows.push("0.0 0.0 0.0 0.0 0.0 0.0".to_owned());
+    let zeros = with_group(&without(&text, &[14, 15, 16, 17, 18]), "11, MASSES", &rows);
+    let (found, unsound) = of(&zeros);
+    assert_eq!(found, [surplus, ("lumped_masses_carry_modes", Code::AuditLumped)]);
+    assert!(unsound.is_empty(), "{unsound:?}");
+    // A line of words without the signs of a comment is harmless; numbers are not, wherever they stand.
+    let group = "** RECORD GROUP 9,";
+    let (found, unsound) = of(&text.replacen(group, &format!("a remark\n{group}"), 1));
+    assert!(found == [surplus] && unsound.is_empty(), "{found:?}");
+    for numbers in [format!("1.0\n**\n{group}"), format!("**\n1.0\n{group}")] {
+        let (found, unsound) = of(&text.replacen(group, &numbers, 1));
+        assert_eq!((found, unsound.len()), (vec![surplus], 1));
+        assert!(unsound[0].contains("of record group 8"), "{unsound:?}");
+    }
+    // A header that counts fewer modes than there are.
+    let (found, unsound) = of(&text.replacen("REV0 18 3", "REV0 18 2", 1));
+    assert!(found.contains(&surplus) && unsound.len() > 3, "{found:?} {unsound:?}");
+    let foreign = read(text.replacen("REV0 18 3", "REV0 18 2", 1).as_bytes(), "mbdyn").expect("readable");
+    let source = SourceFile::new("body", Path::new("body.fem"), "0".repeat(64));
+    let error = adopt(&foreign, source, UnitSystem::default()).expect_err("another body");
+    assert!(error.has(Code::ForeignUnsound), "{error}");
+}
+
+/// Titles of modes may be blank lines, and numbers may touch.
+#[test]
+fn shapes_are_read_as_mbdyn_reads_them() {
+    let text = fem();
+    let own = read(text.as_bytes(), "mbdyn").expect("readable").body;
+    let is_title = |line: &str| line.starts_with("**    NORMAL MODE SHAPE");
+    let blank =
+        |line: &'static str| move |old: &str| if is_title(old) { line.to_owned() } else { old.to_owned() };
+    for title in ["", "** "] {
+        let lines: Vec<String> = text.lines().map(blank(title)).collect();
+        assert_eq!(read(lines.join("\n").as_bytes(), "mbdyn").expect("readable").body, own);
+    }
+    let touching =
+        |line: &str| if line.starts_with("**") { line.to_owned() } else { line.replace(" -", "-") };
+    let lines: Vec<String> = text.lines().map(touching).collect();
+    assert_ne!(lines.join("\n") + "\n", text);
+    let found = read(lines.join("\n").as_bytes(), "mbdyn").expect("readable");
+    assert_eq!((findings(&found), found.body), (Vec::new(), own));
+}
+
 /// MBDyn's sums over lumped masses are the invariants that the body has with these masses.
 #[test]
 fn bodies_of_lumped_masses_are_taken_as_mbdyn_takes_them() {
@@ -228,10 +284,9 @@ fn errors_name_the_line() {
     };
     let group_9 = line_of("** RECORD GROUP 9,");
     unreadable(&with_number(&text, 9, 0, |_| f64::NAN), group_9 + 1, "no finite number");
-    let group = "** RECORD GROUP 9,";
-    let more = text.replacen(&format!("**\n{group}"), &format!("1.0\n**\n{group}"), 1);
-    unreadable(&more, group_9 - 1, "more values");
-    unreadable(&text.replacen(group, &format!("1.0\n{group}"), 1), group_9, "no record group");
+    // An exponent of three digits as Fortran writes it, which MBDyn takes for two numbers.
+    let digits = format!("{:.16e}", numbers(&text, 9)[0]);
+    unreadable(&text.replacen(&digits, "1.2345678901-101", 1), group_9 + 1, "letter of the exponent");
     unreadable(&text.replacen("** RECORD GROUP 9,", "** RECORD GROUP 8,", 1), group_9, "twice");
     unreadable(&text.replacen("** RECORD GROUP 9,", "** RECORD GROUP 20,", 1), group_9, "no such group");
     let fewer = text.replacen("REV0 18 3", "REV0 18 4", 1);

@@ -5,10 +5,12 @@ mod support;
 use flexbody::diagnostic::Code;
 use flexbody::error::Error;
 use flexbody::export::{ExportOptions, Points, export, find_format};
-use flexbody::foreign::{Foreign, ForeignFormat, audit, find_foreign, recognise};
+use flexbody::foreign::{Foreign, ForeignFormat, adopt, audit, find_foreign, recognise};
 use flexbody::input::InputFile;
 use flexbody::invariants::BodyFrame;
 use flexbody::model::LoadKind;
+use flexbody::provenance::SourceFile;
+use flexbody::units::UnitSystem;
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -315,6 +317,147 @@ fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
     };
     assert_eq!(findings_of(&[LoadKind::Spin, LoadKind::Acceleration]), (Vec::new(), 9));
     assert_eq!(findings_of(&[LoadKind::Spin]), (vec!["FB741 oe1_is_me".to_owned()], 6));
+}
+
+/// The value of an entry of an object in the order that `fembs` has; zeros are not listed.
+fn value_of(text: &str, object: &str, key: &str) -> f64 {
+    let (_, rest) = text.split_once(&format!("\n           {object}\n")).expect("an object");
+    let (inside, _) = rest.split_once(&format!("end {object}")).expect("its end");
+    let found = inside
+        .lines()
+        .filter_map(|line| line.split_once('='))
+        .find(|(name, _)| name.split_whitespace().collect::<String>() == key);
+    found.map_or(0.0, |(_, v)| value(v.trim()))
+}
+
+/// What is wrong with the coupling of a file with this change, in words.
+fn coupling_of(
+    text: &str,
+    change: impl Fn(&str, &str, &str) -> Option<(String, String)>,
+) -> (Vec<String>, String) {
+    let foreign = read(&edited(text, change));
+    let failed = foreign.checks.iter().filter(|check| !check.passed());
+    (findings(&foreign), failed.map(|check| check.meaning.as_str()).collect::<Vec<_>>().join("; "))
+}
+
+#[test]
+fn couplings_that_are_zero_are_told_for_what_they_are() {
+    let text = file("fembs");
+    // Free modes have no Cr0: a skew part of Gr is Gr's own fault.
+    let size = 0.01 * value_of(text, "Gr", "m0(1,1)").abs().max(value_of(text, "Gr", "m0(2,4)").abs());
+    let moved = |key: &str, v: &str, by: f64| same(key, &format!("{:.16e}", value(v) + by));
+    let (found, words) = coupling_of(text, |object, key, v| match (object, key) {
+        ("Cr", key) if key.starts_with("m0") => None,
+        ("Gr", "m0(1,4)") => moved(key, v, size),
+        ("Gr", "m0(2,1)") => moved(key, v, -size),
+        _ => same(key, v),
+    });
+    assert_eq!(found, ["FB740 gr_skew_is_cr0"], "{words}");
+    assert!(words.contains("Gr is wrong"), "{words}");
+    // Cr1 is there, but has nothing that Ge could come from.
+    let (found, words) = coupling_of(text, |object, key, v| match object {
+        "Cr" if key.starts_with("m1") => same(key, &format!("{:e}", value(v).abs())),
+        _ => same(key, v),
+    });
+    assert_eq!(found, ["FB745 coupling_is_there"]);
+    assert!(words.contains("Cr1 has nothing that is skew") && !words.contains("Cr1 is zero"), "{words}");
+    let (_, words) = coupling_of(text, |object, key, v| match object {
+        "Cr" if key.starts_with("m1") => None,
+        _ => same(key, v),
+    });
+    assert!(words.contains("Cr1 is zero although Ge is not"), "{words}");
+}
+
+/// FEMBS puts all of 2 Cr1 into Ge, with the geometric stiffness for angular acceleration that is in Cr1.
+#[test]
+fn ge_with_the_symmetric_part_of_cr1_is_named() {
+    let sid = find_format("sid").expect("a format");
+    let plain = fixture("bracket_hex20", 3, BodyFrame::Model);
+    let size = 0.1 * plain.modes().eigenvalue[0];
+    let body = stressed(plain, &[LoadKind::AngularAcceleration], size, &mut Random(5));
+    let (exported, _) = export(&body, sid, &ExportOptions::default(), true).expect("written");
+    let text = String::from_utf8(exported.file).expect("text");
+    assert_eq!(findings(&read(&text)), Vec::<String>::new());
+    let mut entries = String::new();
+    for (k, l, a) in (0..27).map(|at| (at / 9 + 1, at / 3 % 3 + 1, at % 3 + 1)) {
+        let value = 2.0 * value_of(&text, "Cr", &format!("m1({k},{l},{a})"));
+        entries += &format!("m0({k},{}) = {value:.16e}\n", (a - 1) * 3 + l);
+    }
+    let (before, rest) = text.split_once("\n           Ge\n").expect("Ge");
+    let (_, after) = rest.split_once("end Ge").expect("its end");
+    let sizes = "order = 0\nnrow = 3\nncol = 9\nnq = 3\nnqn = 0\nstructure = 3\n";
+    let foreign = read(&format!("{before}\nGe\n{sizes}{entries}end Ge{after}"));
+    assert_eq!(findings(&foreign), ["FB740 ge_is_twice_cr1"]);
+    let check = foreign.checks.iter().find(|check| check.name == "ge_is_twice_cr1").expect("a check");
+    assert!(check.meaning.contains("Ge is 2 Cr1") && check.meaning.contains("FEMBS"), "{}", check.meaning);
+}
+
+/// Frames that are mirrored or not orthonormal are found, and no body is made of them.
+#[test]
+fn axes_that_are_no_rotation_are_refused() {
+    let cases: [(Change, &str); 2] = [
+        (
+            |object, key, v| {
+                if (object, key) == ("AP", "m0(2,2)") { scaled(key, v, -1.0) } else { same(key, v) }
+            },
+            "mirror image",
+        ),
+        (
+            |object, key, v| {
+                if (object, key) == ("AP", "m0(2,2)") { scaled(key, v, 1.1) } else { same(key, v) }
+            },
+            "not orthonormal",
+        ),
+    ];
+    for (change, words) in cases {
+        let foreign = read(&edited(file("fembs"), change));
+        assert_eq!(findings(&foreign), ["FB748 ap_is_a_rotation"]);
+        let source = SourceFile::new("body", Path::new("body.SID_FEM"), "0".repeat(64));
+        let error = adopt(&foreign, source, UnitSystem::default()).expect_err(words);
+        assert!(error.has(Code::ForeignUnsound) && error.to_string().contains(words), "{error}");
+    }
+}
+
+/// Axes of a frame that are a rotation are sound; that they are not taken is said.
+#[test]
+fn turned_axes_of_a_frame_are_noted() {
+    let note = |foreign: &Foreign| {
+        foreign.notes.iter().any(|note| note.contains("axes other than those of the body"))
+    };
+    assert!(!note(&read(file("fembs"))));
+    let turned = read(&edited(file("fembs"), |object, key, v| match (object, key) {
+        ("AP", "m0(1,1)" | "m0(2,2)") => scaled(key, v, -1.0),
+        _ => same(key, v),
+    }));
+    assert_eq!(findings(&turned), Vec::<String>::new());
+    assert!(note(&turned), "{:?}", turned.notes);
+}
+
+#[test]
+fn first_lines_of_fembeam_and_objects_without_structure_are_read() {
+    for dialect in ["fembs", "morembs", "py-sid", "fembeam"] {
+        let own = read(file(dialect));
+        let (first, rest) = file(dialect).split_once('\n').expect("lines");
+        let stated: Vec<&str> = first.split_whitespace().take(2).collect();
+        let head = format!(
+            "{} nodes, {} modes, generated by FEMBeam2SID MATLAB script on 01-Jan-2026 12:00:00 by a\nread and written again",
+            stated[0], stated[1]
+        );
+        let text = format!("{head}\n{rest}");
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("body.SID_FEM");
+        std::fs::write(&path, &text).expect("writes");
+        assert_eq!(recognise(&InputFile::open(&path).expect("opens")).expect("a format").name(), "sid");
+        assert_eq!(read(&text).body.inertia, own.body.inertia);
+        let more = text.replacen(stated[0], "9999", 1);
+        assert_eq!(findings(&read(&more)), ["FB740 number_of_frames"]);
+
+        let lines = file(dialect).lines().filter(|line| !line.contains("structure"));
+        let inferred = read(&lines.collect::<Vec<_>>().join("\n"));
+        assert_eq!(inferred.body, own.body, "{dialect}");
+        assert!(inferred.notes.iter().any(|note| note.contains("no `structure`")), "{:?}", inferred.notes);
+        assert!(!own.notes.iter().any(|note| note.contains("no `structure`")));
+    }
 }
 
 #[test]

@@ -26,6 +26,11 @@ pub trait ExportFormat: Sync {
     /// What concerns the origin of the numbers only (certificate, lumped comparators, provenance) is in no format and is not told.
     fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String>;
 
+    /// What its program must be told to use all of the file: settings without which a part of it is ignored. Sentences without a full stop.
+    fn needs(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {
+        Vec::new()
+    }
+
     /// The file. Called with options that the format has.
     ///
     /// # Errors
@@ -99,7 +104,7 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
     })
 }
 
-/// Writes `body` in a format, with a warning for everything that the format cannot hold.
+/// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every setting that its program needs.
 ///
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
@@ -120,7 +125,9 @@ pub fn export(
     if !(allow_loss || losses.is_empty()) {
         return Err(Error::new(losses));
     }
-    Ok((format.write(body, options)?, losses))
+    let needs = format.needs(body, options).into_iter().map(|need| Diagnostic::new(Code::ExportNeeds, need));
+    let exported = format.write(body, options)?;
+    Ok((exported, losses.into_iter().chain(needs).collect()))
 }
 
 fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {

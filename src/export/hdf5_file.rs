@@ -4,7 +4,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::hdf5_file::{create, make, put_text};
 use faer::Mat;
-use hdf5::types::VarLenUnicode;
+use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor};
 use hdf5_metno as hdf5;
 
 /// What stands under a name: its contents, and text attributes.
@@ -73,17 +73,31 @@ impl Hdf5Entry {
             }
             Hdf5Contents::Floats(shape, values) => self.describe(&*array(place, name, shape, values)?),
             Hdf5Contents::Integers(shape, values) => self.describe(&*array(place, name, shape, values)?),
-            Hdf5Contents::Text(text) => {
-                let text: VarLenUnicode =
-                    text.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-                self.describe(&*array(place, name, &[], &[text])?)
-            }
+            Hdf5Contents::Text(text) => self.describe(&*put_fixed_text(place, name, text)?),
         }
     }
 
     fn describe(&self, place: &hdf5::Location) -> hdf5::Result<()> {
         self.attributes.iter().try_for_each(|(name, text)| put_text(place, name, text))
     }
+}
+
+/// Bytes that a text of a file can have.
+const LONGEST_TEXT: usize = 1 << 16;
+
+/// A text of its own length, in ASCII where it is that: Octave stops at texts of variable length, and at those of UTF-8. The library writes it
+/// into the type of the file from a longer one.
+fn put_fixed_text(place: &hdf5::Group, name: &str, text: &str) -> hdf5::Result<hdf5::Dataset> {
+    let wrong = |e: &dyn std::fmt::Display| hdf5::Error::from(format!("{name}: {e}"));
+    let (ascii, length) = (text.is_ascii(), text.len().max(1));
+    let kind = if ascii { TypeDescriptor::FixedAscii(length) } else { TypeDescriptor::FixedUnicode(length) };
+    let dataset = place.new_dataset_builder().empty_as(&kind).obj_track_times(false).create(name)?;
+    if ascii {
+        dataset.write_scalar(&FixedAscii::<LONGEST_TEXT>::from_ascii(text).map_err(|e| wrong(&e))?)?;
+    } else {
+        dataset.write_scalar(&text.parse::<FixedUnicode<LONGEST_TEXT>>().map_err(|e| wrong(&e))?)?;
+    }
+    Ok(dataset)
 }
 
 fn array<T: hdf5::H5Type>(

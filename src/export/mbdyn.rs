@@ -57,6 +57,23 @@ impl ExportFormat for Mbdyn {
             .collect()
     }
 
+    fn needs(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        let places = frames(body, &options.points);
+        let tagged = tagged(body, &places);
+        let Some(largest) = tagged.iter().map(|(tag, _)| *tag).max().filter(|_| is_exact(options)) else {
+            return Vec::new();
+        };
+        let mut needs = vec![
+            "MBDyn evaluates geometric stiffness (record group 19) only with `use automatic differentiation` in its control data, and ignores it without a word otherwise".to_owned(),
+        ];
+        if let Some(node) = largest.checked_sub(LOADS_OF_MOTION + 1).map(|index| index / 6 + 1) {
+            needs.push(format!(
+                "MBDyn takes geometric stiffness of forces at interfaces only in a joint with {node} or more interface nodes, in the order of the file"
+            ));
+        }
+        needs
+    }
+
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         let places = frames(body, &options.points);
         let mut file = File(head(body));
@@ -127,11 +144,20 @@ fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
             if places[index + 1..].iter().any(of_interface) {
                 return None;
             }
-            13 + 6 * index + if matches!(load.kind, LoadKind::Moment(_)) { 3 } else { 0 }
+            LOADS_OF_MOTION + 1 + 6 * index + if matches!(load.kind, LoadKind::Moment(_)) { 3 } else { 0 }
         }
         LoadKind::Named(_) => return None,
     };
     Some(first + load.component)
+}
+
+/// Indices of record group 19 for velocities and accelerations; those of the nodes follow.
+const LOADS_OF_MOTION: usize = 12;
+
+/// The matrices of record group 19 by their indices.
+fn tagged<'b>(body: &'b FlexBody, places: &[ExportFrame]) -> Vec<(usize, &'b Mat<f64>)> {
+    let all = body.geometric_stiffness().iter();
+    all.filter_map(|one| Some((tag(&one.load, places)?, &one.matrix))).collect()
 }
 
 /// The text so far.
@@ -227,11 +253,7 @@ impl File {
     }
 
     fn stress_stiffness(&mut self, body: &FlexBody, places: &[ExportFrame]) {
-        let tagged: Vec<(usize, &Mat<f64>)> = body
-            .geometric_stiffness()
-            .iter()
-            .filter_map(|one| Some((tag(&one.load, places)?, &one.matrix)))
-            .collect();
+        let tagged = tagged(body, places);
         if tagged.is_empty() {
             return;
         }

@@ -49,7 +49,7 @@ impl ExportFormat for Simscape {
             let mut root: Vec<_> =
                 matrices.iter().map(|(name, matrix)| Hdf5Contents::matrix(matrix).named(*name)).collect();
             for (name, texts) in [("frames", names.as_slice()), ("units", &units)] {
-                let texts = serde_json::to_string(texts).expect("strings are valid JSON");
+                let texts = ascii(&serde_json::to_string(texts).expect("strings are valid JSON"));
                 root.push(Hdf5Contents::Text(texts).named(name));
             }
             return hdf5_bytes(&root).map(Exported::single);
@@ -64,4 +64,18 @@ impl ExportFormat for Simscape {
         };
         mat5(&variables).map(Exported::single).ok_or_else(too_large)
     }
+}
+
+/// JSON in ASCII, which Octave reads: other characters by their numbers.
+fn ascii(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c.is_ascii() {
+            out.push(c);
+        } else {
+            let mut units = [0; 2];
+            out.extend(c.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    out
 }

@@ -3,16 +3,17 @@
 use super::free_surface::{FreeSurface, beside_diagonal, is_free_surface};
 use super::{Foreign, ForeignBody, ForeignFrame};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, Modes, Parts, Source,
     Storage, TermDecision,
 };
-use crate::invariants::{BodyFrame, Expected, Invariants, identities, symmetrise};
+use crate::invariants::{BodyFrame, Expected, Invariants, Numbered, identities, symmetrise};
 use crate::model::Nodes;
 use crate::provenance::SourceFile;
 use crate::units::UnitSystem;
 use faer::Mat;
+use nalgebra::Matrix3;
 use std::collections::HashSet;
 
 /// A body that was read, and what is to be said of it.
@@ -31,12 +32,16 @@ pub struct Adopted {
 /// same, in other coordinates; its frame is that which rides on the mean motion.
 ///
 /// # Errors
-/// [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes are rigid motions or depend on each other, or
+/// [`ForeignUnsound`](Code::ForeignUnsound) for what the reader says; [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes are rigid motions or depend on each other, or
 /// the stiffness is not positive; those of [`FlexBody::new`].
 pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result<Adopted> {
     let given = &foreign.body;
     let mut diagnostics: Vec<Diagnostic> =
         given.lacks.iter().map(|lack| Diagnostic::new(Code::ForeignDropped, lack.clone())).collect();
+    if !foreign.unsound.is_empty() {
+        let refused = |why: &String| Diagnostic::new(Code::ForeignUnsound, why.clone());
+        return Err(Error::new(foreign.unsound.iter().map(refused).collect()));
+    }
     if given.frames.is_empty() {
         let message = "the file has no node: neither positions nor shapes of the body are known";
         return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
@@ -49,6 +54,9 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
     }) {
         let message = format!("inertia is not that of a body: {} does not hold", broken.formula);
         return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
+    }
+    if axes_without_inertia(&given.inertia) != 0.0 {
+        return Err(Diagnostic::new(Code::ForeignIncomplete, NO_INERTIA).into());
     }
     let mut shape = stacked(&given.frames, |frame| Some(&frame.translation));
     let mut rotation = given
@@ -159,6 +167,24 @@ pub(super) const DIGITS: f64 = 1e-9;
 
 /// How far inertia may be from that of a body before nothing can be computed with it: rounding of few digits is far below.
 const BROKEN: f64 = 1e-2;
+
+/// What a principal moment of zero means.
+pub(super) const NO_INERTIA: &str = "rotation about an axis through the centre of mass has no inertia: all masses lie on a line, or the inertia of the nodes is missing";
+
+/// Number of principal moments about the centre of mass that are zero but for rounding; NaN where they cannot be computed.
+pub(super) fn axes_without_inertia(inertia: &Numbered) -> f64 {
+    const NOTHING: f64 = 1e-12;
+    let centre = inertia.i2 / inertia.i1;
+    let steiner = (Matrix3::identity() * centre.norm_squared() - centre * centre.transpose()) * inertia.i1;
+    let about_centre = inertia.i7 - steiner;
+    if about_centre.iter().any(|entry| !entry.is_finite()) {
+        return f64::NAN;
+    }
+    // Rounding is that of the moments about the origin.
+    let size = inertia.i7.amax();
+    let moments = (0.5 * (about_centre + about_centre.transpose())).symmetric_eigenvalues();
+    moments.iter().filter(|moment| moment.abs() <= NOTHING * size).count() as f64
+}
 
 fn mean(a: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))

@@ -1,6 +1,6 @@
 //! The audit of a file: what its format promises, and what every flexible body must fulfil.
 
-use super::adopt::{ANY_BODY, DIGITS};
+use super::adopt::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
 use super::free_surface::is_free_surface;
 use super::{AuditCheck, Foreign, ForeignBody};
 use crate::diagnostic::{Code, Diagnostic};
@@ -54,16 +54,25 @@ pub fn audit(foreign: &Foreign, tolerance: f64) -> Audit {
     let invariants =
         Invariants::from_numbered(&body.inertia, body.modal_stiffness.clone(), tolerance.max(DIGITS));
     let mut checks = foreign.checks.clone();
-    // Of a mass that does not commute with rotations no file tells W0, which this one needs.
-    let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
-    checks.extend(identities(&invariants, &ANY_BODY).into_iter().filter(told).map(of_identity));
-    checks.extend(modal_checks(&invariants));
-    checks.extend(size(body));
+    let mut notes = foreign.notes.clone();
+    let of_any_body = identities(&invariants, &ANY_BODY);
+    if let Some(cause) = of_any_body.iter().find(|check| is_cause_of_others(check)) {
+        // What follows from it would only repeat it.
+        checks.retain(|check| check.value.is_finite());
+        checks.push(of_identity(cause.clone()));
+        notes.push("checks that need a mass, and numbers, are left out".to_owned());
+    } else {
+        // Of a mass that does not commute with rotations no file tells W0, which this one needs.
+        let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
+        checks.extend(of_any_body.into_iter().filter(told).map(of_identity));
+        checks.push(turns(body));
+        checks.extend(modal_checks(&invariants));
+        checks.extend(size(body));
+        notes.push(kind_of_modes(&invariants));
+    }
     for check in checks.iter_mut().filter(|check| is_identity(check.code)) {
         check.limit = check.limit.max(tolerance);
     }
-    let mut notes = foreign.notes.clone();
-    notes.push(kind_of_modes(&invariants));
     let of_mode = |j: usize| {
         let (k, m) = (body.modal_stiffness[(j, j)], body.inertia.i6[(j, j)]);
         (k / m).sqrt() / std::f64::consts::TAU
@@ -81,9 +90,27 @@ pub fn audit(foreign: &Foreign, tolerance: f64) -> Audit {
     }
 }
 
+/// Whether a check fails without which no other means anything.
+fn is_cause_of_others(check: &IdentityCheck) -> bool {
+    matches!(check.name, "finite" | "mass_positive") && !check.passed
+}
+
+/// Rotation about every axis has inertia: [`adopt`](super::adopt()) makes no other body.
+fn turns(body: &ForeignBody) -> AuditCheck {
+    AuditCheck {
+        name: "turns_about_every_axis",
+        formula: "principal moments about the centre of mass that are zero",
+        value: axes_without_inertia(&body.inertia),
+        limit: 0.0,
+        code: Code::AuditImplausible,
+        meaning: NO_INERTIA.to_owned(),
+    }
+}
+
 /// Findings whose size is that of an identity: those that a tolerance is about.
 fn is_identity(code: Code) -> bool {
-    matches!(code, Code::AuditIdentity | Code::AuditLumped | Code::AuditLayout | Code::AuditImplausible)
+    use Code::{AuditFrame, AuditIdentity, AuditImplausible, AuditLayout, AuditLumped};
+    matches!(code, AuditIdentity | AuditLumped | AuditLayout | AuditImplausible | AuditFrame)
 }
 
 fn of_identity(check: IdentityCheck) -> AuditCheck {

@@ -16,6 +16,8 @@ pub struct Foreign {
     pub notes: Vec<String>,
     /// What must hold in files of this format: redundant arrays, digits, layout. What every body must fulfil is checked elsewhere.
     pub checks: Vec<AuditCheck>,
+    /// Why no body must be made of the file although it can be read: whole sentences without a full stop. Checks say the same.
+    pub unsound: Vec<String>,
     /// The body.
     pub body: ForeignBody,
 }

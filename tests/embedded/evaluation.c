@@ -10,6 +10,11 @@ enum { modes = CONSTANT(MODES), velocities = CONSTANT(VELOCITIES), frames = CONS
 
 typedef OF(real) real;
 
+#ifdef __cplusplus
+extern "C" {
+extern const size_t real_bytes, velocities_count, inputs, outputs;
+#endif
+
 const size_t real_bytes = sizeof(real);
 const size_t velocities_count = velocities;
 const size_t inputs = modes + 2 * velocities + 9;
@@ -64,3 +69,7 @@ void evaluate(const void *state, void *results)
     }
 #endif
 }
+
+#ifdef __cplusplus
+}
+#endif

@@ -9,7 +9,7 @@ use flexbody::diagnostic::Code;
 use flexbody::flex_body::FlexBody;
 use flexbody::invariants::BodyFrame;
 use flexbody::model::{Coupling, NodeSet};
-use hdf5::types::VarLenUnicode;
+use hdf5::types::{FixedAscii, TypeDescriptor};
 use hdf5_metno as hdf5;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -46,7 +46,10 @@ fn of_hdf5(bytes: &[u8]) -> (Matrices, BTreeMap<String, Vec<String>>) {
                 matrices.insert(name, DMatrix::from_row_slice(rows, columns, &values));
             }
             _ => {
-                let text = dataset.read_scalar::<VarLenUnicode>().expect("a text");
+                // Octave stops at texts of variable length and of UTF-8.
+                let kind = dataset.dtype().and_then(|kind| kind.to_descriptor()).expect("a type");
+                assert!(matches!(kind, TypeDescriptor::FixedAscii(_)), "{name}: {kind}");
+                let text = dataset.read_scalar::<FixedAscii<1024>>().expect("a text");
                 texts.insert(name, serde_json::from_str(text.as_str()).expect("a list of texts"));
             }
         }

@@ -1,7 +1,7 @@
 /*
  * SUMMARY
  *
- * Written by flexbody beside the file of the numbers (layout version 1); docs/formats/embedded.md describes both. C99, freestanding: no
+ * Written by flexbody beside the file of the numbers (layout version 1); docs/formats/embedded.md describes both. C99 and C++11, freestanding: no
  * allocation, no library. A compiler may still call memcpy and memset, which every freestanding C has.
  *
  * The equations of motion of one flexible body (docs/theory.md section 6 and 7.4) with exactly the terms that the file holds:
@@ -26,6 +26,15 @@
 #include <stdint.h>
 
 /* SIZES */
+
+/* Arrays that do not overlap: C99 has a word for it, compilers of C++ have their own. */
+#if !defined(__cplusplus)
+#define FLEXBODY_RESTRICT restrict
+#elif defined(__GNUC__) || defined(_MSC_VER)
+#define FLEXBODY_RESTRICT __restrict
+#else
+#define FLEXBODY_RESTRICT
+#endif
 
 /* Rows of the array `linear`. */
 #define FLEXBODY_PAIRS (FLEXBODY_AXES == 3 ? 6 : 1)
@@ -181,8 +190,8 @@ static inline int flexbody_open(flexbody_evaluation *e, const void *data, size_t
 /* ---- kernels ---- */
 
 /* y = A x of an array with nf columns. */
-static inline void flexbody_product(size_t stride, const flexbody_real *restrict a, const flexbody_real *restrict x,
-                                    flexbody_real *restrict y)
+static inline void flexbody_product(size_t stride, const flexbody_real *FLEXBODY_RESTRICT a, const flexbody_real *FLEXBODY_RESTRICT x,
+                                    flexbody_real *FLEXBODY_RESTRICT y)
 {
     for (size_t i = 0; i < stride; ++i)
         y[i] = 0;
@@ -202,7 +211,7 @@ static inline void flexbody_product(size_t stride, const flexbody_real *restrict
 }
 
 /* a'b of n numbers, in four sums that a compiler may keep in a vector register. */
-static inline flexbody_real flexbody_dot(size_t n, const flexbody_real *restrict a, const flexbody_real *restrict b)
+static inline flexbody_real flexbody_dot(size_t n, const flexbody_real *FLEXBODY_RESTRICT a, const flexbody_real *FLEXBODY_RESTRICT b)
 {
     flexbody_real s0 = 0, s1 = 0, s2 = 0, s3 = 0;
     const size_t whole = n - n % 4;
@@ -218,7 +227,7 @@ static inline flexbody_real flexbody_dot(size_t n, const flexbody_real *restrict
 }
 
 /* y += factor x of nf numbers. */
-static inline void flexbody_add(flexbody_real factor, const flexbody_real *restrict x, flexbody_real *restrict y)
+static inline void flexbody_add(flexbody_real factor, const flexbody_real *FLEXBODY_RESTRICT x, flexbody_real *FLEXBODY_RESTRICT y)
 {
     for (size_t i = 0; i < FLEXBODY_MODES; ++i)
         y[i] += factor * x[i];
@@ -291,9 +300,9 @@ static inline void flexbody_add_rigid(const flexbody_real linear[3], const flexb
 }
 
 /* y += factor K q. */
-static inline void flexbody_add_stiffness(const flexbody_evaluation *e, flexbody_real factor, flexbody_real *restrict y)
+static inline void flexbody_add_stiffness(const flexbody_evaluation *e, flexbody_real factor, flexbody_real *FLEXBODY_RESTRICT y)
 {
-    const flexbody_real *restrict k = FLEXBODY_ARRAY(e, STIFFNESS);
+    const flexbody_real *FLEXBODY_RESTRICT k = FLEXBODY_ARRAY(e, STIFFNESS);
 #if FLEXBODY_COLUMNS_STIFFNESS == 1
     for (size_t i = 0; i < FLEXBODY_MODES; ++i)
         y[i] += factor * (k[i] * e->q[i]);
@@ -305,10 +314,10 @@ static inline void flexbody_add_stiffness(const flexbody_evaluation *e, flexbody
 }
 
 /* y += factor D qd. */
-static inline void flexbody_add_damping(const flexbody_evaluation *e, flexbody_real factor, flexbody_real *restrict y)
+static inline void flexbody_add_damping(const flexbody_evaluation *e, flexbody_real factor, flexbody_real *FLEXBODY_RESTRICT y)
 {
 #if FLEXBODY_HAS_DAMPING && FLEXBODY_COLUMNS_DAMPING == 1
-    const flexbody_real *restrict d = FLEXBODY_ARRAY(e, DAMPING);
+    const flexbody_real *FLEXBODY_RESTRICT d = FLEXBODY_ARRAY(e, DAMPING);
     for (size_t i = 0; i < FLEXBODY_MODES; ++i)
         y[i] += factor * (d[i] * e->qd[i]);
 #elif FLEXBODY_HAS_DAMPING
@@ -324,7 +333,7 @@ static inline void flexbody_add_damping(const flexbody_evaluation *e, flexbody_r
 
 /* y += C1(q)'linear + C(q)'angular + m_ff modal. */
 static inline void flexbody_add_modal_inertia(const flexbody_evaluation *e, const flexbody_real linear[3], const flexbody_real angular[3],
-                                              const flexbody_real *modal, flexbody_real *restrict y)
+                                              const flexbody_real *modal, flexbody_real *FLEXBODY_RESTRICT y)
 {
     for (size_t k = 0; k < FLEXBODY_TRANSLATIONS; ++k)
         flexbody_add(linear[k], e->coupling[k], y);

@@ -33,6 +33,8 @@ pub(super) struct Dialect {
     pub(super) mode_last: bool,
     /// Whether symmetric matrices list one triangle instead of both.
     pub(super) triangle: bool,
+    /// Whether `new modal` has a sign of equality and a name after it: readers of these files split the line there.
+    pub(super) named_modal: bool,
     /// Letter of exponents.
     pub(super) exponent: char,
 }
@@ -45,13 +47,21 @@ const FEMBS: Dialect = Dialect {
     ge: Blocks::Component,
     mode_last: false,
     triangle: false,
+    named_modal: true,
     exponent: 'D',
 };
 
 /// All dialects, the usual one first.
 pub(super) const DIALECTS: [Dialect; 4] = [
     FEMBS,
-    Dialect { name: "morembs", moments: ["mCM", "mmi"], triangle: true, exponent: 'E', ..FEMBS },
+    Dialect {
+        name: "morembs",
+        moments: ["mCM", "mmi"],
+        triangle: true,
+        named_modal: false,
+        exponent: 'E',
+        ..FEMBS
+    },
     Dialect { name: "py-sid", gr: Blocks::Mode, ..FEMBS },
     Dialect {
         name: "fembeam",
@@ -59,7 +69,9 @@ pub(super) const DIALECTS: [Dialect; 4] = [
         gr: Blocks::Mode,
         ge: Blocks::Mode,
         mode_last: true,
-        triangle: true,
+        // FEMBeam lists one triangle, but its reader mirrors none: of J it would lose the products of inertia above the diagonal.
+        triangle: false,
+        named_modal: false,
         exponent: 'E',
         ..FEMBS
     },

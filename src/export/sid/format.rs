@@ -58,7 +58,11 @@ fn file(body: &FlexBody, options: &ExportOptions, dialect: &Dialect) -> String {
     let head = format!("{:5}{nf:5}    :No. nodes, No. modes:{}", places.len(), comment(body, dialect));
     text.line(0, &head);
     text.line(1, "part");
-    text.line(6, "new modal");
+    if dialect.named_modal {
+        text.value(6, "new modal", word(&body.source().name));
+    } else {
+        text.line(6, "new modal");
+    }
     refmod(body, &mut text);
     text.line(11, "frame");
     for place in &places {
@@ -72,6 +76,12 @@ fn file(body: &FlexBody, options: &ExportOptions, dialect: &Dialect) -> String {
     text.line(6, "end modal");
     text.line(1, "end part");
     text.out
+}
+
+/// A name as one word without a sign of equality, which readers take for the end of a key; none of a body without a name.
+fn word(name: &str) -> String {
+    let words = name.split(|c: char| c.is_whitespace() || c.is_control() || c == '=');
+    words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
 /// What the rest of the file does not tell: dialect, units, what Oe1 holds beside W2, name.

@@ -82,6 +82,7 @@ impl ForeignFormat for Exudyn {
             dialect: String::new(),
             notes,
             checks,
+            unsound: Vec::new(),
             body: ForeignBody {
                 name: String::new(),
                 units: None,

@@ -2,6 +2,7 @@
 
 use super::body::{COUPLING, Read, by_columns, from_masses, missing};
 use super::records::Records;
+use super::words::Surplus;
 use crate::diagnostic::Code;
 use crate::foreign::AuditCheck;
 use crate::foreign::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, relative, worst};
@@ -13,7 +14,7 @@ const LOST: f64 = 1e-8;
 const TERMS: f64 = 10.0;
 
 pub(super) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {
-    let mut all = vec![digits(records)];
+    let mut all = vec![digits(records), surplus(records)];
     all.extend(masses(records, read));
     if missing(records).is_empty() {
         all.extend(identities(records, read));
@@ -41,6 +42,28 @@ fn digits(records: &Records) -> AuditCheck {
         limit: LOST,
         code: Code::AuditDigits,
         meaning: format!("numbers are written with {}", records.digits.words()),
+    }
+}
+
+/// What MBDyn skips without a word. A matrix of another size than the header says is then read wrong.
+fn surplus(records: &Records) -> AuditCheck {
+    let of_group = |(group, surplus): &(Option<usize>, Surplus)| {
+        let zeros = if surplus.zero { ", all zero" } else { "" };
+        let place =
+            group.map_or("before record group 1".to_owned(), |group| format!("after record group {group}"));
+        format!("{} words{zeros}, in line {} {place}", surplus.words, surplus.line)
+    };
+    let all: Vec<String> = records.skipped.iter().map(of_group).collect();
+    AuditCheck {
+        name: "no_more_than_the_header_says",
+        formula: "number of words beyond those of the header",
+        value: records.skipped.iter().map(|(_, surplus)| surplus.words as f64).sum(),
+        limit: 0.0,
+        code: Code::AuditSurplus,
+        meaning: format!(
+            "the file has more than its header says, which MBDyn skips without a word: {}",
+            if all.is_empty() { "nothing".to_owned() } else { all.join("; ") }
+        ),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::body::{COUPLING, body, from_masses};
 use super::checks::checks;
 use super::records::{GROUP, Records};
+use super::words::Surplus;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::foreign::{Foreign, ForeignFormat};
@@ -37,9 +38,21 @@ impl ForeignFormat for Mbdyn {
             dialect: dialect.to_owned(),
             notes: notes(&records, newest),
             checks: checks(&records, &read),
+            unsound: unsound(&records),
             body: read.body,
         })
     }
+}
+
+/// Numbers that MBDyn skips and that are no zeros: the header counts other nodes or modes than the file has, and matrices are read wrong.
+fn unsound(records: &Records) -> Vec<String> {
+    let numbers = records.skipped.iter().filter(|(_, surplus)| surplus.numbers && !surplus.zero);
+    let sentence = |(group, surplus): &(Option<usize>, Surplus)| {
+        let place = group
+            .map_or_else(|| "before record group 1".to_owned(), |group| format!("of record group {group}"));
+        format!("line {}: {} words {place} are more than the header says", surplus.line, surplus.words)
+    };
+    numbers.map(sentence).collect()
 }
 
 fn notes(records: &Records, newest: usize) -> Vec<String> {

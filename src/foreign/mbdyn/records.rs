@@ -1,6 +1,7 @@
-//! The record groups of a file, read as MBDyn does, but strictly: a group has as many numbers as the header says, no more and no less.
+//! The record groups of a file, read as MBDyn does: of each group as many numbers as the header says. What stands after them MBDyn skips
+//! without a word; here it is told.
 
-use super::words::Words;
+use super::words::{Surplus, Words};
 use crate::error::Result;
 use crate::foreign::digits::Digits;
 use crate::input::InputFile;
@@ -33,6 +34,8 @@ pub(super) struct Records {
     /// Whether the last line is there.
     pub(super) ended: bool,
     pub(super) digits: Digits,
+    /// What MBDyn skips, and the record group before it; none before the first.
+    pub(super) skipped: Vec<(Option<usize>, Surplus)>,
 }
 
 impl Records {
@@ -53,6 +56,7 @@ impl Records {
             general: false,
             ended: false,
             digits: Digits::default(),
+            skipped: Vec::new(),
         };
         let mut seen: Vec<usize> = Vec::new();
         let mut rejected = 0;
@@ -65,8 +69,8 @@ impl Records {
             }
             records.general |= text.starts_with(GENERAL_MASS);
             let Some(title) = text.strip_prefix(GROUP) else {
-                if !text.trim().is_empty() && !text.starts_with("**") {
-                    return Err(words.refuse_at(line, "values that belong to no record group"));
+                if !text.starts_with("**") {
+                    records.skip(seen.last().copied(), Surplus::of(line, text));
                 }
                 continue;
             };
@@ -89,7 +93,7 @@ impl Records {
             } else {
                 records.group(group, rejected, line, &mut words)?;
             }
-            words.end(&format!("record group {group}"))?;
+            records.skip(Some(group), words.surplus());
         }
         let missing: Vec<String> =
             REQUIRED.iter().filter(|group| !seen.contains(group)).map(usize::to_string).collect();
@@ -98,6 +102,20 @@ impl Records {
         }
         records.digits = words.digits;
         Ok(records)
+    }
+
+    /// Takes note of words where none are expected.
+    fn skip(&mut self, group: Option<usize>, surplus: Surplus) {
+        if surplus.words == 0 {
+            return;
+        }
+        match self.skipped.last_mut() {
+            Some((last, found)) if *last == group && found.numbers == surplus.numbers => {
+                found.words += surplus.words;
+                found.zero &= surplus.zero;
+            }
+            _ => self.skipped.push((group, surplus)),
+        }
     }
 
     /// Record group 1; gives the number of rejected modes, whose shapes come first.
@@ -168,17 +186,14 @@ impl Records {
         const WHAT: &str = "record group 8";
         let of_mode = self.n_nodes.saturating_mul(6);
         for mode in 0..rejected.saturating_add(self.n_modes) {
-            let line = words.at();
-            match words.take_line() {
-                Some(title) if title.starts_with("**") && !title.starts_with(GROUP) => {}
-                Some("") => {}
-                _ => return Err(words.refuse_at(line, format!("{WHAT}: mode {} has no title", mode + 1))),
-            }
+            words
+                .take_title()
+                .map_err(|line| words.refuse_at(line, format!("{WHAT}: mode {} has no title", mode + 1)))?;
             let values = words.numbers(of_mode, WHAT)?;
             if mode >= rejected {
                 self.shapes.extend(values);
             }
-            words.end(WHAT)?;
+            self.skip(Some(8), words.surplus_of_line());
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Lines and blank-separated words of a file, with their places.
 
+use super::records::GROUP;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::foreign::digits::Digits;
@@ -80,9 +81,21 @@ impl<'t> Words<'t> {
         }
     }
 
-    /// The next number.
+    /// The next number. One that touches the next, as fields of Fortran do, ends where that begins.
     pub(super) fn number(&mut self, what: &str) -> Result<f64> {
         let word = self.expect(what)?;
+        let (word, touching) = word.split_at(end_of_number(word));
+        let could_be_exponent = |part: &str| part.bytes().skip(1).all(|b| b.is_ascii_digit());
+        if !touching.is_empty() && !word.contains(['e', 'E']) && could_be_exponent(touching) {
+            return Err(self.refuse(format!(
+                "{what}: `{word}{touching}` is no finite number: MBDyn takes it for two, write the letter of the exponent"
+            )));
+        }
+        if !touching.is_empty() {
+            // What was taken ends where the rest of the line begins.
+            let line = self.lines[self.line];
+            self.rest = &line[line.len() - self.rest.len() - touching.len()..];
+        }
         match word.parse::<f64>() {
             Ok(value) if value.is_finite() => {
                 self.digits.see(word);
@@ -107,17 +120,88 @@ impl<'t> Words<'t> {
         word.parse().map_err(|_| self.refuse(format!("{what}: {word:?} is no count")))
     }
 
-    /// The end of a record group: nothing but blanks up to the next comment, which is not taken.
-    pub(super) fn end(&mut self, what: &str) -> Result<()> {
-        loop {
-            let rest = self.rest.trim_start();
-            if rest.starts_with("**") || self.line >= self.lines.len() {
-                return Ok(());
-            }
-            if !rest.is_empty() {
-                return Err(self.refuse(format!("{what}: more values than the header says")));
-            }
+    /// What stands up to the next comment, which is not taken: nothing, of a record group that is over.
+    pub(super) fn surplus(&mut self) -> Surplus {
+        let mut found = Surplus::of(self.at(), "");
+        while self.line < self.lines.len() && !self.rest.trim_start().starts_with("**") {
+            found.see(self.line + 1, self.rest);
             self.take_line();
         }
+        found
+    }
+
+    /// The same up to the end of the line.
+    pub(super) fn surplus_of_line(&mut self) -> Surplus {
+        let line = self.at();
+        Surplus::of(line, self.take_line().unwrap_or(""))
+    }
+
+    /// Takes the title of a mode: a comment, or a blank line where the numbers follow. Gives the line where it should be.
+    pub(super) fn take_title(&mut self) -> std::result::Result<(), usize> {
+        let first = self.at();
+        while self.rest.trim().is_empty() && self.line < self.lines.len() {
+            self.take_line();
+        }
+        if self.rest.starts_with("**") && !self.rest.starts_with(GROUP) {
+            self.take_line();
+            return Ok(());
+        }
+        if self.at() > first && !self.rest.starts_with("**") { Ok(()) } else { Err(first) }
+    }
+}
+
+/// Words where none are expected.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Surplus {
+    /// Line of the first.
+    pub(super) line: usize,
+    pub(super) words: usize,
+    /// Whether all of them are zeros.
+    pub(super) zero: bool,
+    /// Whether all of them are numbers.
+    pub(super) numbers: bool,
+}
+
+impl Surplus {
+    /// The words of a line.
+    pub(super) fn of(line: usize, text: &str) -> Self {
+        let mut found = Self { line, words: 0, zero: true, numbers: true };
+        found.see(line, text);
+        found
+    }
+
+    fn see(&mut self, line: usize, text: &str) {
+        for word in text.split_whitespace() {
+            if self.words == 0 {
+                self.line = line;
+            }
+            self.words += 1;
+            let number = word.parse::<f64>().ok();
+            self.zero &= number == Some(0.0);
+            self.numbers &= number.is_some();
+        }
+    }
+}
+
+/// Bytes of the number that a word begins with: up to a sign that neither begins it nor follows the letter of an exponent.
+fn end_of_number(word: &str) -> usize {
+    let bytes = word.as_bytes();
+    let is_next = |&at: &usize| matches!(bytes[at], b'+' | b'-') && !matches!(bytes[at - 1], b'e' | b'E');
+    (1..bytes.len()).find(is_next).unwrap_or(bytes.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_touch_are_two() {
+        let numbers = |text: &str, count| Words::new(Path::new("body.fem"), text).numbers(count, "group 9");
+        assert_eq!(
+            numbers("-0.12E+01-0.5E-01+3 .5\n1.5-2.5", 6).expect("six"),
+            [-1.2, -0.05, 3.0, 0.5, 1.5, -2.5]
+        );
+        let error = numbers("1.2345678901-101 2", 2).expect_err("an exponent without its letter");
+        assert!(error.to_string().contains("letter of the exponent"), "{error}");
     }
 }

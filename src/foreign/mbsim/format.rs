@@ -59,6 +59,7 @@ impl ForeignFormat for Mbsim {
             dialect: String::new(),
             notes,
             checks: checks(&integrals, &inertia, &stiffness, damping.as_ref()),
+            unsound: Vec::new(),
             body: ForeignBody {
                 name: String::new(),
                 units: None,

@@ -4,8 +4,8 @@ use super::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
 use super::body::Declared;
 use super::frequencies::frequencies;
 use super::layout::{Blocks, Layout};
+use super::missing::{Missing, is_free};
 use super::parse::Listed;
-
 use crate::diagnostic::Code;
 use crate::foreign::AuditCheck;
 use crate::foreign::redundant::worst as larger;
@@ -18,9 +18,6 @@ const ROUNDING: f64 = 1e-10;
 
 /// Roundings of the last digit that one identity may add up.
 const TERMS: f64 = 10.0;
-
-/// Below this part of its bound an array is zero but for rounding.
-const NOTHING: f64 = 1e-9;
 
 /// Digits that a number may lack, relative to the largest of its array.
 const LOST: f64 = 1e-8;
@@ -51,6 +48,10 @@ impl Missed {
         let limit = ROUNDING + TERMS * relative(self.rounding);
         AuditCheck { name, formula, value: relative(self.by), limit, code, meaning: meaning.into() }
     }
+
+    fn passes(self) -> bool {
+        self.check("", "", Code::AuditIdentity, "").passed()
+    }
 }
 
 /// Every check.
@@ -62,9 +63,9 @@ pub(super) fn checks(
     declared: &Declared,
 ) -> Found {
     let mut all = vec![digits(listed, arrays, frames)];
-    let missing = missing(arrays, layout, declared);
-    all.push(coupling(&missing));
-    let there = |names: &[&str]| names.iter().all(|name| !missing.iter().any(|(lost, _)| lost == name));
+    let missing = Missing::find(arrays, layout, declared);
+    all.push(missing.check());
+    let there = |names: &[&str]| missing.none_of(names);
     let [bound_t, bound_r, bound_e] = arrays.bounds();
     let scale = |bound: f64, terms: &[f64]| terms.iter().fold(bound.max(0.0), |most, v| most.max(*v));
     let nq = arrays.nq;
@@ -97,11 +98,17 @@ pub(super) fn checks(
     let ge_rounding = arrays.ge.rounding[0] + 2.0 * arrays.cr.rounding[1];
     let ge_scale = scale(bound_e, &[ge, cr1]);
     if there(&["Ge", "Cr1"]) {
-        all.push(Missed { by: layout.ge.ge_misfit(arrays), scale: ge_scale, rounding: ge_rounding }.check(
+        let missed = |by: f64| Missed { by, scale: ge_scale, rounding: ge_rounding };
+        let doubled = missed(layout.ge.ge_doubled(arrays)).passes();
+        all.push(missed(layout.ge.ge_misfit(arrays)).check(
             "ge_is_twice_cr1",
             "Ge(k,l) = Cr1(k,l) - Cr1(l,k), which is 2 Cr1 of a solid",
             Code::AuditIdentity,
-            "the Coriolis forces among modes do not belong to the coupling of rotation and modes that grows with q",
+            if doubled {
+                "Ge is 2 Cr1 with its part that is symmetric in the modes, as FEMBS writes it: geometric stiffness for angular acceleration, which is in Cr1, is no Coriolis force"
+            } else {
+                "the Coriolis forces among modes do not belong to the coupling of rotation and modes that grows with q"
+            },
         ));
     }
     all.extend(layouts(arrays, layout, scale(bound_r, &[gr]), ge_scale, [gr_rounding, ge_rounding]));
@@ -137,6 +144,11 @@ pub(super) fn checks(
                 Code::AuditLumped,
                 "the gyroscopic torque and the coupling of rotation and modes come from different masses",
             )
+        } else if is_free(arrays, layout) {
+            (
+                Code::AuditIdentity,
+                "Cr0, Ct and mdCM1 are zero as of free modes, but Gr has a skew part: Gr is wrong, or all of the three are missing",
+            )
         } else {
             (
                 Code::AuditIdentity,
@@ -169,7 +181,7 @@ pub(super) fn checks(
 }
 
 /// The largest magnitude. A NaN, from numbers beyond the range of double precision, passes nothing.
-fn worst(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
+pub(super) fn worst(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     places.map(|(i, j)| f(i, j).abs()).fold(0.0, larger)
 }
@@ -221,55 +233,6 @@ fn digits(listed: &Listed<'_>, arrays: &Arrays, frames: &[FrameArrays]) -> Audit
         limit: LOST,
         code: Code::AuditDigits,
         meaning: format!("numbers have {}, which is least for {place}", listed.digits().words()),
-    }
-}
-
-/// Arrays that are zero though others say that they are not.
-fn missing(arrays: &Arrays, layout: &Layout, declared: &Declared) -> Vec<(&'static str, &'static str)> {
-    let nq = arrays.nq;
-    let [bound_t, bound_r, bound_e] = arrays.bounds();
-    let gr = |k: usize| layout.gr.gr(arrays, k);
-    let of_modes = |f: &dyn Fn(usize) -> Matrix3<f64>| (0..nq).map(|k| f(k).amax()).fold(0.0, f64::max);
-    let even = of_modes(&|k| 0.5 * (gr(k) + gr(k).transpose()));
-    let odd = of_modes(&|k| 0.5 * (gr(k) - gr(k).transpose()));
-    let skew = (0..3).map(|a| worst(nq, nq, |k, l| arrays.cr1_skew(k, l, a))).fold(0.0, f64::max);
-    let [ct0, _] = arrays.ct.sizes();
-    let [cr0, _] = arrays.cr.sizes();
-    let [oe0, oe1] = arrays.oe.sizes();
-    let moment1 = arrays.first_moment.sizes()[1];
-    let j1 = arrays.inertia.sizes()[1];
-    let (gr0, ge) = (arrays.gr.sizes()[0], arrays.ge.sizes()[0]);
-    let is = |size: f64, bound: f64| size > NOTHING * bound;
-    let mut found = Vec::new();
-    let mut say = |name, size: f64, witness: bool, why| {
-        if size == 0.0 && witness {
-            found.push((name, why));
-        }
-    };
-    say("Ct", ct0, is(moment1, bound_t), "Ct is zero although mdCM1 is not");
-    say("mdCM1", moment1, is(ct0, bound_t), "mdCM1 is zero although Ct is not");
-    say("Cr0", cr0, is(odd, bound_r), "Cr0 is zero although Gr has a skew part");
-    say("Gr", gr0, is(j1, bound_r) || is(cr0, bound_r), "Gr is zero although J1 or Cr0 is not");
-    say("J1", j1, is(even, bound_r) || is(oe0, bound_r), "J1 is zero although Gr or Oe0 is not");
-    say("Oe0", oe0, is(j1, bound_r), "Oe0 is zero although J1 is not");
-    say("Ge", ge, is(skew, bound_e), "Ge is zero although Cr1 is not");
-    say("Cr1", skew, is(ge, bound_e), "Cr1 is zero although Ge is not");
-    say("Oe1", oe1, bound_e > 0.0 && !declared.without_w2, "Oe1 is zero although Me is not");
-    found
-}
-
-fn coupling(missing: &[(&'static str, &'static str)]) -> AuditCheck {
-    let why: Vec<&str> = missing.iter().map(|(_, why)| *why).collect();
-    AuditCheck {
-        name: "coupling_is_there",
-        formula: "number of arrays that are zero and may not be",
-        value: missing.len() as f64,
-        limit: 0.0,
-        code: Code::AuditCoupling,
-        meaning: format!(
-            "rigid motion and deformation do not act on each other as they must: {}",
-            if why.is_empty() { "nothing".to_owned() } else { why.join(", ") }
-        ),
     }
 }
 
@@ -326,7 +289,7 @@ fn constant_centrifugal(arrays: &Arrays, scale: f64) -> Vec<AuditCheck> {
     let (own, other) = (misfit(false), misfit(true));
     let rounding = arrays.oe.rounding[0] + arrays.inertia.rounding[1];
     let missed = |by: f64| Missed { by, scale, rounding };
-    let exchanged = other < 0.1 * own && missed(other).check("", "", Code::AuditLayout, "").passed();
+    let exchanged = other < 0.1 * own && missed(other).passes();
     let identity = missed(if exchanged { other } else { own }).check(
         "oe0_is_j1",
         "Oe0(k) = -[J1_11/2, J1_22/2, J1_33/2, J1_12, J1_23, J1_13]_k",
@@ -434,17 +397,6 @@ fn of_frames(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<AuditCheck> {
             Some(Missed { by, scale, rounding: psi.rounding[0] + ap.rounding[1] })
         },
     );
-    identity(
-        "ap_is_a_rotation",
-        "AP0' AP0 = 1",
-        "the undeformed axes of a frame are not orthonormal",
-        &|frame| {
-            let ap = frame.ap.as_ref()?;
-            let product = |i: usize, j: usize| (0..3).map(|k| ap.m0[(k, i)] * ap.m0[(k, j)]).sum::<f64>();
-            let by = worst(3, 3, |i, j| product(i, j) - f64::from(i == j));
-            Some(Missed { by, scale: 1.0, rounding: ap.rounding[0] })
-        },
-    );
     for (name, formula, of_moment) in [
         ("phi1_symmetric", "phi.M1(k,l) = phi.M1(l,k)", false),
         ("psi1_symmetric", "psi.M1(k,l) = psi.M1(l,k)", true),
@@ -466,5 +418,25 @@ fn of_frames(listed: &Listed<'_>, frames: &[FrameArrays]) -> Vec<AuditCheck> {
             );
         }
     }
+    all.push(axes(listed, frames));
     all
+}
+
+/// The undeformed axes of every frame. Those of the body have no other, so that a mirrored frame is one of another body.
+fn axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
+    let (mut total, mut what) = (Missed { by: 0.0, scale: 1.0, rounding: 0.0 }, String::new());
+    for (frame, listed) in frames.iter().zip(&listed.frames) {
+        let Some(ap) = &frame.ap else { continue };
+        let axes = Matrix3::from_fn(|i, j| ap.m0[(i, j)]);
+        let by =
+            larger((axes.transpose() * axes - Matrix3::identity()).amax(), (axes.determinant() - 1.0).abs());
+        total.rounding = total.rounding.max(ap.rounding[0]);
+        if by > total.by || by.is_nan() {
+            total.by = by;
+            let how =
+                if axes.determinant() < 0.0 { "a mirror image of the body's" } else { "not orthonormal" };
+            what = format!("the undeformed axes of node {} are {how}", listed.label);
+        }
+    }
+    total.check("ap_is_a_rotation", "AP0' AP0 = 1, det AP0 = 1", Code::AuditFrame, what)
 }

@@ -5,8 +5,9 @@ use super::body::{Declared, body};
 use super::checks::checks;
 use super::layout::Layout;
 use super::parse::Listed;
+use crate::diagnostic::Code;
 use crate::error::Result;
-use crate::foreign::{Foreign, ForeignFormat};
+use crate::foreign::{AuditCheck, Foreign, ForeignFormat};
 use crate::input::InputFile;
 
 /// SID_FEM text (Wallrapp, Standard Input Data).
@@ -14,6 +15,13 @@ pub struct SidFile;
 
 /// Bytes at the beginning in which the first keywords must be.
 const HEAD: usize = 4096;
+
+/// Axes that are no rotation, beyond what few digits leave of one.
+fn unsound(checks: &[AuditCheck]) -> Vec<String> {
+    const FEW_DIGITS: f64 = 1e-2;
+    let broken = |check: &&AuditCheck| check.code == Code::AuditFrame && !(check.value <= FEW_DIGITS);
+    checks.iter().filter(broken).map(|check| check.meaning.clone()).collect()
+}
 
 impl ForeignFormat for SidFile {
     fn name(&self) -> &'static str {
@@ -23,9 +31,7 @@ impl ForeignFormat for SidFile {
     fn recognises(&self, file: &InputFile) -> bool {
         let bytes = file.bytes();
         let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]).to_lowercase();
-        let mut lines = head.lines().map(str::trim).filter(|line| !line.is_empty()).take(3);
-        let part = lines.by_ref().take(2).any(|line| line == "part");
-        part && head.contains("new modal")
+        head.lines().any(|line| line.trim() == "part") && head.contains("new modal")
     }
 
     fn read(&self, file: &InputFile) -> Result<Foreign> {
@@ -43,6 +49,18 @@ impl ForeignFormat for SidFile {
         let found = checks(&listed, &arrays, &frames, &layout, &declared);
         let (body, mut notes) = body(&listed, &arrays, frames, &declared, found.spin_in_oe);
         notes.insert(0, layout.reason);
-        Ok(Foreign { format: "sid", dialect: layout.dialect.to_owned(), notes, checks: found.checks, body })
+        let inferred = listed.inferred();
+        if !inferred.is_empty() {
+            let names = inferred.join(", ");
+            notes.push(format!("{names} have no `structure`: it is taken from the entries that they list"));
+        }
+        Ok(Foreign {
+            format: "sid",
+            dialect: layout.dialect.to_owned(),
+            notes,
+            unsound: unsound(&found.checks),
+            checks: found.checks,
+            body,
+        })
     }
 }

@@ -50,13 +50,22 @@ impl Blocks {
 
     /// max |Ge(k; l, a) - (Cr1(k, l, a) - Cr1(l, k, a))|.
     pub(super) fn ge_misfit(self, arrays: &Arrays) -> f64 {
+        self.ge_beside(arrays, |k, l, a| arrays.cr1_skew(k, l, a))
+    }
+
+    /// max |Ge(k; l, a) - 2 Cr1(k, l, a)|, which is the same where Cr1 is skew in the modes.
+    pub(super) fn ge_doubled(self, arrays: &Arrays) -> f64 {
+        self.ge_beside(arrays, |k, l, a| 2.0 * arrays.cr.linear(l, k, a))
+    }
+
+    fn ge_beside(self, arrays: &Arrays, expected: impl Fn(usize, usize, usize) -> f64) -> f64 {
         let nq = arrays.nq;
         let mut most = 0.0f64;
         for l in 0..nq {
             for a in 0..3 {
                 let column = self.column(a, l, nq);
                 for k in 0..nq {
-                    most = most.max((arrays.ge.m0[(k, column)] - arrays.cr1_skew(k, l, a)).abs());
+                    most = most.max((arrays.ge.m0[(k, column)] - expected(k, l, a)).abs());
                 }
             }
         }
@@ -112,7 +121,7 @@ impl Layout {
                 let [even, odd] = blocks.gr_misfit(arrays);
                 even.max(odd)
             }),
-            fitting(|blocks| blocks.ge_misfit(arrays)),
+            fitting(|blocks| blocks.ge_misfit(arrays).min(blocks.ge_doubled(arrays))),
         ];
         let usual = declared.map_or((Blocks::Component, Blocks::Component), |(_, gr, ge)| (gr, ge));
         let (gr, ge) = (found[0].unwrap_or(usual.0), found[1].unwrap_or(usual.1));

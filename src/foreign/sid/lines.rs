@@ -7,6 +7,8 @@ use std::path::Path;
 pub(super) struct Line<'t> {
     /// Number from 1.
     pub(super) number: usize,
+    /// The line without blanks around.
+    pub(super) text: &'t str,
     /// What stands before the first `=`: lower case, words one blank apart.
     pub(super) key: String,
     /// What stands after it, without blanks around.
@@ -43,7 +45,8 @@ impl<'t> Lines<'t> {
                 None => (text, None),
             };
             let words: Vec<&str> = key.split_whitespace().collect();
-            return Ok(Line { number: at + 1, key: words.join(" ").to_lowercase(), value });
+            let key = words.join(" ").to_lowercase();
+            return Ok(Line { number: at + 1, text: text.trim(), key, value });
         }
         Err(self.unreadable(self.last.max(1), format!("the file ends inside of `{inside}`")))
     }

@@ -5,8 +5,10 @@ mod body;
 mod checks;
 mod format;
 mod frequencies;
+mod head;
 mod layout;
 mod lines;
+mod missing;
 mod parse;
 mod taylor;
 

@@ -1,5 +1,6 @@
 //! The structure of the file: `part`, `new modal`, `refmod`, `frame` and the objects.
 
+use super::head::Head;
 use super::lines::{Line, Lines};
 use super::taylor::{ModeIndex, Taylor};
 use crate::diagnostic::{Code, Diagnostic};
@@ -72,26 +73,8 @@ impl<'t> Listed<'t> {
     /// FB730, FB731.
     pub(super) fn read(path: &'t Path, text: &'t str) -> Result<Self, Diagnostic> {
         let mut lines = Lines::new(path, text);
-        let mut line = lines.next("part")?;
-        let (mut comment, mut stated) = (String::new(), None);
-        if line.key != "part" {
-            let first = text.lines().nth(line.number - 1).unwrap_or("");
-            // `21 4 :No. nodes, No. modes:free text`
-            let (counts, rest) = first.split_once(':').unwrap_or((first, ""));
-            comment = rest.split_once(':').map_or(rest, |(_, text)| text).trim().to_owned();
-            let counts: Vec<Option<usize>> =
-                counts.split_whitespace().map(|count| count.parse().ok()).collect();
-            stated = match counts[..] {
-                [Some(nodes), Some(modes)] => Some((nodes, modes)),
-                _ => {
-                    let message = "first line without the numbers of nodes and modes";
-                    return Err(lines.unreadable(line.number, message));
-                }
-            };
-            line = lines.next("part")?;
-        }
-        expect(&lines, &line, "part")?;
-        line = lines.next("part")?;
+        let Head { comment, stated } = Head::read(&mut lines)?;
+        let line = lines.next("part")?;
         expect(&lines, &line, "new modal")?;
         let mut refmod = None;
         let mut frames: Option<Vec<Frame>> = None;
@@ -118,7 +101,7 @@ impl<'t> Listed<'t> {
                 }
             }
         }
-        line = lines.next("part")?;
+        let line = lines.next("part")?;
         expect(&lines, &line, "end part")?;
         let incomplete = |message: String| Diagnostic::new(Code::ForeignIncomplete, message).in_file(path);
         let refmod = refmod.ok_or_else(|| incomplete("no `refmod` with the mass".to_owned()))?;
@@ -171,6 +154,17 @@ impl<'t> Listed<'t> {
     fn all_objects(&self) -> impl Iterator<Item = &Taylor> {
         let of_frames = self.frames.iter().flat_map(|frame| frame.objects.iter().flatten());
         self.objects.iter().flatten().chain(of_frames)
+    }
+
+    /// Names of objects that list something and have no `structure`, each once.
+    pub(super) fn inferred(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = Vec::new();
+        for object in self.all_objects().filter(|object| object.inferred && !object.is_empty()) {
+            if !names.contains(&object.name.as_str()) {
+                names.push(&object.name);
+            }
+        }
+        names
     }
 
     /// The digits of the whole file.

@@ -23,6 +23,8 @@ pub(super) struct Taylor {
     pub(super) ncol: usize,
     nq: usize,
     structure: usize,
+    /// Whether the file has no `structure` of it.
+    pub(super) inferred: bool,
     m0: Vec<Entry>,
     m1: Vec<Entry>,
     /// How its entries are written.
@@ -83,7 +85,8 @@ impl Taylor {
             nrow: of(1)?,
             ncol: of(2)?,
             nq: of(3)?,
-            structure: of(5)?,
+            structure: sizes[5].unwrap_or_else(|| inferred_structure(&name, &m0, &m1)),
+            inferred: sizes[5].is_none(),
             name: name.clone(),
             m0,
             m1,
@@ -220,6 +223,22 @@ impl Taylor {
                 }
             }
         }
+    }
+}
+
+/// What `structure` of an object must be that has none, by the entries that it lists: ccx2sid writes none. Objects that are symmetric by their
+/// meaning may list one triangle.
+fn inferred_structure(name: &str, m0: &[Entry], m1: &[Entry]) -> usize {
+    const SYMMETRIC: [&str; 5] = ["j", "mmi", "me", "ke", "de"];
+    let all = || m0.iter().chain(m1);
+    let beside = |sign: std::cmp::Ordering| all().any(|entry| entry.index[0].cmp(&entry.index[1]) == sign);
+    let one_triangle = beside(std::cmp::Ordering::Less) != beside(std::cmp::Ordering::Greater);
+    if all().next().is_none() {
+        0
+    } else if m1.is_empty() && SYMMETRIC.contains(&name) && one_triangle {
+        2
+    } else {
+        3
     }
 }
 

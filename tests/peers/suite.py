@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+"""Exports in the programs that they are for, in one table: installs what it can, runs what there is, and says what was not found.
+
+    python3 tests/peers/suite.py --install --write
+
+installs Exudyn, welib, h5py and scipy by pip into target/peers, Octave and an ARM compiler by apt-get (as root; else it says the command), runs every
+peer with target/release/flexbody and writes the table of docs/export.md and that of docs/formats/embedded.md. Some minutes. Without options it runs what is
+installed and prints. Programs that are in no package archive are found by environment variables: PYMBS, FEMBEAM (folders of their sources). Exits with 1
+when a number is worse than its limit; what is not found is said and fails nothing.
+
+`--small` takes those peers that need seconds (CI runs it); `--all` also runs craig_bampton.py and mechanisms.py, which write files of their own.
+"""
+
+import argparse
+import importlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import common
+from common import ROOT, Absent, Row
+
+VENV = ROOT / "target/peers"
+PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "welib==4.2.0", "h5py", "numpy", "scipy"]
+APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi"]
+
+
+def other_libraries(flexbody, folder):
+    """json, npz, Simscape and Chrono with the libraries of Python."""
+    import h5py
+    import read_exports
+    import scipy
+
+    path = common.body(flexbody, "bracket_hex20", folder / "cb.flex.h5", "--basis", "craig-bampton", "--modes", 6)
+    read_exports.main(str(flexbody), str(path))
+    program = f"h5py {h5py.__version__}, scipy {scipy.__version__}"
+    return [Row(program, "json, npz, simscape, chrono", "every array is that of the body, rigid motion has its inertia (1: no)", 0.0, 0.0)]
+
+
+def arm_table(flexbody, folder):
+    import compilers
+
+    text = compilers.arm(flexbody, folder)
+    print(text)
+    TABLES["docs/formats/embedded.md", "arm"] = text
+    return []
+
+
+# Pages and the marked places in them that `--write` fills.
+TABLES = {}
+# Name, module and function, whether it needs seconds only.
+PEERS = [
+    ("Exudyn", "exudyn_bodies.rows", False),
+    ("Octave", "octave.simscape", True),
+    ("FEMBeam in Octave", "octave.fembeam", True),
+    ("pymbs", "pymbs_sid.rows", True),
+    ("welib", "sid.rows", True),
+    ("h5py, numpy, scipy", "suite.other_libraries", True),
+    ("compilers", "compilers.rows", True),
+    ("ARM compiler", "suite.arm_table", True),
+]
+
+
+def measure(flexbody, small):
+    """Rows of every peer that is here, and what is not."""
+    found, absent = [], []
+    for name, where, quick in PEERS:
+        if small and not quick:
+            continue
+        print(f"{name}:", flush=True)
+        module, function = where.split(".")
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                run = globals()[function] if module == "suite" else getattr(importlib.import_module(module), function)
+                rows = run(flexbody, Path(folder))
+            except Absent as missing:
+                absent.append(f"{name}: {missing}")
+                print(f"  not found: {missing}: skipped")
+                continue
+            except ImportError as missing:
+                absent.append(f"{name}: pip: {missing.name}")
+                print(f"  not found: Python module {missing.name} (pip; --install): skipped")
+                continue
+            except (AssertionError, RuntimeError, ValueError, LookupError, OSError) as error:
+                print(f"  failed: {error!r}")
+                rows = [Row(name, where, "runs (1: no)", 1.0, 0.0)]
+        for row in rows:
+            print(f"  {'good' if row.good() else 'BAD '} {row.found:8.1e} (limit {row.limit:.0e}) {row.what}", flush=True)
+        found += rows
+    return found, absent
+
+
+def table(rows, absent):
+    lines = ["| program | format | compared | largest difference | limit |", "|---|---|---|---|---|"]
+    lines += [f"| {row.program} | {row.format} | {row.what} | {row.found:.1e} | {row.limit:.0e} |" for row in rows]
+    missing = f"\nNot at hand when this was written: {'; '.join(absent)}.\n" if absent else ""
+    return "\n".join(lines) + "\n" + missing
+
+
+def write(page, mark, text):
+    """Replaces what stands between the marks of a page."""
+    path = ROOT / page
+    before, rest = path.read_text().split(f"<!-- {mark} -->\n", 1)
+    _, after = rest.split(f"<!-- end of {mark} -->", 1)
+    path.write_text(f"{before}<!-- {mark} -->\n{text}<!-- end of {mark} -->{after}")
+
+
+def install():
+    """A virtual environment with the modules, and the packages; goes on in that environment."""
+    python = VENV / "bin/python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", *PIP], check=True)
+    missing = [name for name, tool in zip(APT, ["octave-cli", "g++", "arm-none-eabi-gcc", "arm-none-eabi-gcc"]) if not shutil.which(tool)]
+    if missing:
+        command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
+        if shutil.which("apt-get") and os.geteuid() == 0:
+            subprocess.run(command, check=False)
+        else:
+            print("as root:", " ".join(command))
+    words = [word for word in sys.argv[1:] if word != "--install"]
+    os.execv(python, [str(python), __file__, *words])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flexbody", type=Path, default=ROOT / "target/release/flexbody")
+    parser.add_argument("--install", action="store_true", help="install what pip and apt-get have, then run")
+    parser.add_argument("--write", action="store_true", help="write the tables of docs/")
+    parser.add_argument("--small", action="store_true", help="only what needs seconds")
+    parser.add_argument("--all", action="store_true", help="also the scripts that write files of their own")
+    args = parser.parse_args()
+    if args.install:
+        install()
+    if not args.flexbody.is_file():
+        sys.exit(f"{args.flexbody} is not there: cargo build --release, or --flexbody PROGRAM")
+    rows, absent = measure(args.flexbody.resolve(), args.small)
+    bad = [row for row in rows if not row.good()]
+    if args.write and not (bad or args.small):
+        TABLES["docs/export.md", "peers"] = table(rows, absent)
+        for (page, mark), text in TABLES.items():
+            write(page, mark, text)
+    print(f"\n{len(rows)} comparisons, {len(bad)} worse than allowed" + "".join(f"\nnot found: {one}" for one in absent))
+    if args.all:
+        for script in ["craig_bampton.py", "mechanisms.py"]:
+            subprocess.run([sys.executable, Path(__file__).with_name(script), "--flexbody", args.flexbody.resolve()], check=True)
+    sys.exit(bool(bad))
+
+
+if __name__ == "__main__":
+    main()
