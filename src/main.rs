@@ -1,7 +1,6 @@
 //! The `flexbody` program: parses the command line, runs, exits with a documented code.
 
-use flexbody::cli::{parse, run};
-use flexbody::diagnostic::{Code, Diagnostic};
+use flexbody::cli::{parse, run, tell_bug};
 use flexbody::error::ExitCode;
 use std::io::{IsTerminal, Write};
 
@@ -20,8 +19,7 @@ fn main() -> std::process::ExitCode {
     let _ = ctrlc::set_handler(interrupted);
     let code = std::panic::catch_unwind(|| run(&arguments)).unwrap_or_else(|_| {
         // The panic itself has been printed; this says what it means and what to do.
-        eprintln!("{}", Diagnostic::new(Code::Internal, "the program stopped at a contradiction of its own"));
-        ExitCode::Bug
+        tell_bug(&arguments)
     });
     std::process::ExitCode::from(code as u8)
 }

@@ -174,6 +174,7 @@ impl FlexBody {
             origin: self.parts.frame.origin,
             eigenvalues: Some(&self.parts.modes.eigenvalue),
             eigenvalue_noise: self.parts.certificate.rigid_noise,
+            eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
         };
         let checks = identities(&self.parts.invariants, &expected);
         // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.

@@ -45,7 +45,8 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
     let mut invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS);
     restore_symmetries(&mut invariants);
     if let Some(broken) = identities(&invariants, &ANY_BODY).into_iter().find(|check| {
-        matches!(check.name, "finite" | "mass_positive" | "second_moment_psd") && check.value > BROKEN
+        matches!(check.name, "finite" | "mass_positive" | "second_moment_psd" | "inertia_psd")
+            && check.value > BROKEN
     }) {
         let message = format!("inertia is not that of a body: {} does not hold", broken.formula);
         return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
@@ -134,6 +135,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             // What digits of K leave of the modes, as far as the file shows it.
             rigid_noise,
             rigid_residual: 0.0,
+            eigenvalue_rounding: 0.0,
             guarantee: None,
         },
         interfaces: interfaces(given),
@@ -152,6 +154,7 @@ pub(super) const ANY_BODY: Expected<'static> = Expected {
     origin: nalgebra::Vector3::new(0.0, 0.0, 0.0),
     eigenvalues: None,
     eigenvalue_noise: 0.0,
+    eigenvalue_rounding: 0.0,
 };
 
 /// What counts as rounding in files of 10 digits and more, relative to Cauchy-Schwarz bounds; what is told twice differs by no more.

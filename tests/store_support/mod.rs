@@ -211,6 +211,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             remark: if r.below(2) == 0 { String::new() } else { r.name() },
             rigid_noise: r.value(),
             rigid_residual: r.value(),
+            eigenvalue_rounding: r.positive(),
             guarantee: (n * nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
         },
         interfaces: (0..interfaces)
@@ -268,7 +269,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     bits.extend(m.eigenvalue.iter().chain(&m.residual).chain(&m.damping_ratio).map(|v| v.to_bits()));
     bits.extend(p.nodes.positions.iter().flatten().map(|v| v.to_bits()));
     bits.extend(p.frame.origin.iter().chain(p.frame.axes.iter()).map(|v| v.to_bits()));
-    bits.extend([c.shift, c.rigid_noise, c.rigid_residual].map(f64::to_bits));
+    bits.extend([c.shift, c.rigid_noise, c.rigid_residual, c.eigenvalue_rounding].map(f64::to_bits));
     if let Some(g) = &c.guarantee {
         let columns = [&g.eigenvalue_lower, &g.eigenvalue_upper, &g.shape_error];
         bits.extend(columns.into_iter().flatten().chain(&g.digits).map(|v| v.to_bits()));

@@ -57,6 +57,14 @@ pub(super) const CERTIFICATE: &[Item] = &[
         |v| Some(Value::Float(v.body.certificate.rigid_residual)),
     ),
     attribute(
+        "eigenvalue_rounding",
+        Float,
+        ONE,
+        "what rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
+        |v| Some(Value::Float(v.body.certificate.eigenvalue_rounding)),
+    )
+    .added(4),
+    attribute(
         "shift_below",
         Float,
         PER_TIME2,
