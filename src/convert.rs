@@ -420,6 +420,7 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
         rigid_noise: found.rigid_noise,
         rigid_residual: model.rigid_residual(),
         eigenvalue_rounding: eigenvalue_rounding(model, found),
+        inertia_rounding: 0.0,
         guarantee,
     }
 }

@@ -180,6 +180,7 @@ codes! {
     BodyWithoutDigest = "FB713", Note, Done, "flex-body file without a digest: a change since it was written cannot be seen", "convert the model again to get one";
     BodyUntrustworthy = "FB714", Error, Untrustworthy, "body that was made breaks what must hold for every body; nothing is written", "ask for fewer modes, or look for parts that are joined too weakly or for masses that no body has; report the model to us if it stays";
     WarningsDenied = "FB715", Error, CheckFailed, "warnings are denied", "see the warnings, or leave out --deny-warnings";
+    ForeignRounded = "FB716", Warning, Done, "inertia data of another program's file carry few digits", "write the file with 17 significant digits, and from one mass matrix: flexbody audit says more";
     ExportLoses = "FB720", Error, BadInput, "format cannot hold all of the body", "--allow-loss writes the file without it";
     ExportLost = "FB721", Warning, Done, "file that was written lacks a part of the body", "nothing to do if the simulation does not need it";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";

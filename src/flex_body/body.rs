@@ -178,8 +178,10 @@ impl FlexBody {
         };
         let checks = identities(&self.parts.invariants, &expected);
         // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.
-        let mut checks = relaxed(checks, self.parts.storage, 4 + 3 * self.n_modes());
+        let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
+        let mut checks = relaxed(checks, rounding + self.parts.certificate.inertia_rounding);
         checks.extend(self.parts.interface_identities());
+        checks.extend(self.parts.cross_checks());
         checks
     }
 }

@@ -1,6 +1,7 @@
 //! The product: a validated flexible body, independent of the files it came from and goes to.
 
 mod body;
+mod cross_checks;
 mod in_units;
 mod interface;
 mod model_rows;

@@ -136,6 +136,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             rigid_noise,
             rigid_residual: 0.0,
             eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: interfaces(given),
@@ -143,7 +144,22 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
         terms,
         storage: Storage::F64,
     })?;
+    let (body, warning) = with_own_rounding(body)?;
+    diagnostics.extend(warning);
     Ok(Adopted { body, diagnostics })
+}
+
+/// The body with what the digits of its file leave of the identities of inertia, and a warning where this is more than rounding.
+fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
+    let missed = body.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed);
+    let missed = missed.map(|check| check.value).fold(0.0, f64::max);
+    if missed == 0.0 || missed > BROKEN {
+        return Ok((body, None));
+    }
+    let mut parts = body.into_parts();
+    parts.certificate.inertia_rounding = missed;
+    let message = format!("the inertia data of the file are those of a body to {missed:.1e} of their size");
+    Ok((FlexBody::new(parts)?, Some(Diagnostic::new(Code::ForeignRounded, message))))
 }
 
 /// What is asked of a body whatever its modes are.

@@ -32,7 +32,8 @@ pub struct IdentityCheck {
 }
 
 impl IdentityCheck {
-    fn new(name: &'static str, formula: &'static str, value: f64, limit: f64) -> Self {
+    /// Passed where `value` is at most `limit`.
+    pub fn new(name: &'static str, formula: &'static str, value: f64, limit: f64) -> Self {
         Self { name, formula, value, limit, passed: value <= limit }
     }
 }

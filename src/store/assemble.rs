@@ -326,6 +326,7 @@ impl Take<'_> {
             rigid_noise: self.float("/certificate@rigid_noise"),
             rigid_residual: self.float("/certificate@rigid_residual"),
             eigenvalue_rounding: self.optional_float("/certificate@eigenvalue_rounding").unwrap_or(0.0),
+            inertia_rounding: self.optional_float("/certificate@inertia_rounding").unwrap_or(0.0),
             guarantee: self.guarantee(),
         }
     }

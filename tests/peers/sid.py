@@ -54,7 +54,7 @@ def audit(program, text):
         run = subprocess.run([program, "audit", path, "--json"], capture_output=True, text=True)
     if not run.stdout:
         sys.exit(run.stderr)
-    return json.loads(run.stdout)
+    return json.loads(run.stdout)["results"]
 
 
 def main():

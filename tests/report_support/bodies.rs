@@ -114,6 +114,7 @@ pub fn engine_mount() -> FlexBody {
             rigid_noise: 3.2e-9,
             rigid_residual: 1.1e-15,
             eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: vec![Interface {
@@ -262,6 +263,7 @@ pub fn condensed(
             rigid_noise: 0.0,
             rigid_residual: 0.0,
             eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: vec![],

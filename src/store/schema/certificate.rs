@@ -65,6 +65,14 @@ pub(super) const CERTIFICATE: &[Item] = &[
     )
     .added(4),
     attribute(
+        "inertia_rounding",
+        Float,
+        ONE,
+        "to what part of their Cauchy-Schwarz bounds the inertia data were known before this file: the digits of a file of another program; 0: to the rounding of 64-bit floats",
+        |v| Some(Value::Float(v.body.certificate.inertia_rounding)),
+    )
+    .added(4),
+    attribute(
         "shift_below",
         Float,
         PER_TIME2,
