@@ -214,8 +214,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             remark: if r.below(2) == 0 { String::new() } else { r.name() },
             rigid_noise: r.value(),
             rigid_residual: r.value(),
-            eigenvalue_rounding: r.positive(),
-            inertia_rounding: r.positive(),
+            eigenvalue_rounding: 1.5e-9,
+            inertia_rounding: 2.5e-7,
             guarantee: (n * nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
         },
         interfaces: (0..interfaces)
