@@ -221,7 +221,8 @@ pub fn codes_markdown() -> String {
          | 4 | not enough memory or disk |\n\
          | 70 | a bug of ours |\n\
          | 130 | interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left |\n\n\
-         A process ends with the exit code of its first error; warnings and notes do not change it.\n\n\
+         A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
+         `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
     );
     for code in Code::ALL {
