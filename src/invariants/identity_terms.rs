@@ -43,18 +43,21 @@ fn central(body: &Invariants) -> Matrix3<f64> {
 }
 
 pub(super) fn second_moment_negative(body: &Invariants) -> f64 {
-    negative(&matrix(&central(body)), body.second_moment.trace())
+    // Not the trace, which may be negative too.
+    negative(&matrix(&central(body)), body.second_moment.diagonal().abs().sum())
 }
 
 /// How negative the smallest principal moment about the centre of mass is, relative to the sum of all.
 pub(super) fn inertia_negative(body: &Invariants) -> f64 {
-    negative(&matrix(&inertia_of(&central(body))), body.inertia().trace())
+    negative(&matrix(&inertia_of(&central(body))), body.inertia().diagonal().abs().sum())
 }
 
 /// By how much the largest principal moment about the centre of mass exceeds the sum of the others.
 pub(super) fn triangle_excess(body: &Invariants) -> f64 {
     let moments = symmetric_eigenvalues(matrix(&inertia_of(&central(body))).as_ref());
-    moments.map_or(f64::NAN, |i| scaled((i[2] - i[1] - i[0]).max(0.0), body.second_moment.trace()))
+    moments.map_or(f64::NAN, |i| {
+        scaled((i[2] - i[1] - i[0]).max(0.0), body.second_moment.diagonal().abs().sum())
+    })
 }
 
 pub(super) fn s_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
