@@ -122,7 +122,7 @@ def make_model(args, case, folder):
 def run_flexbody(args, folder, threads):
     text, run = measured([args.program, "convert", folder / "model.toml", "-o", folder / "body.flex.h5", "--modes", MODES,
                           "--threads", threads, "--json", "--quiet"])
-    report = parsed(text)
+    report = parsed(text)["results"]
     worst = report["modes"]["worst_residual"]  # over |K x| + lambda |M x|; what it can be over |K x| alone
     detail = {key: report["run"][key] for key in ("phases", "counters")}
     return run | {"residual": 2 * worst / (1 - worst), "frequencies_hz": report["modes"]["frequency_hz"], "detail": detail,

@@ -142,7 +142,7 @@ def main():
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
             if done.returncode != 0:
                 sys.exit(f"{' '.join(command)} ended with {done.returncode}:\n{done.stderr}")
-            told = json.loads(done.stdout)["modes"]["truncation"]
+            told = json.loads(done.stdout)["results"]["modes"]["truncation"]
             # The first modes are those of scipy: their part of the response.
             modes = vectors[:, 6:6 + count]
             had = ((modes.T @ loads) ** 2 / flexible[:count, None]).sum(axis=0)

@@ -95,7 +95,7 @@ def convert(program, folder, model, modes, residual):
 
 def decided(program, folder, scene):
     """What `select` decides, in words."""
-    told = json.loads(run(program, "select", "body.flex.h5", "--scene", scene, "--json", folder=folder))
+    told = json.loads(run(program, "select", "body.flex.h5", "--scene", scene, "--json", folder=folder))["results"]
     kept = [term["group"] for term in told["terms"] if term["kept"]]
     def proof(term):
         if not term["limit"]:

@@ -4,7 +4,7 @@ use crate::basis::{
     self, BasisChoice, Loads, ModalBasis, ModeSettings, Task, Truncation as Lacking, free_surface_of,
 };
 use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
+use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, energy_noise};
 use crate::error::Result;
 use crate::flex_body::{
     Certificate, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody,
@@ -419,8 +419,22 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
         remark: completeness.remark.clone(),
         rigid_noise: found.rigid_noise,
         rigid_residual: model.rigid_residual(),
+        eigenvalue_rounding: eigenvalue_rounding(model, found),
+        inertia_rounding: 0.0,
         guarantee,
     }
+}
+
+/// What rounding of the products with K may leave in Psi' K Psi, relative to sqrt(lambda_p lambda_q).
+///
+/// Errors of the size of a roundoff in the entries of K change psi_p' K psi_q by sum_ij dK_ij psi_ip psi_jq, whose standard deviation the
+/// Cauchy-Schwarz inequality bounds by the root of those of psi_p' K psi_p and psi_q' K psi_q: the matrix of the squares K_ij^2 is positive
+/// semidefinite like K. The largest of these relative to its eigenvalue bounds every entry.
+fn eigenvalue_rounding(model: &FeModel, found: &ModalBasis) -> f64 {
+    let solution = &found.solution;
+    let noise = energy_noise(model.stiffness(), solution.vectors.as_ref(), f64::EPSILON);
+    let relative = noise.iter().zip(&solution.eigenvalues).map(|(noise, lambda)| noise / lambda);
+    ROUNDINGS * relative.fold(0.0, f64::max)
 }
 
 /// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.
@@ -444,6 +458,9 @@ fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
         })
         .collect()
 }
+
+/// How many standard deviations of its rounding an entry of Psi' K Psi may be off: none of many is.
+const ROUNDINGS: f64 = 10.0;
 
 /// Part of the motion of an interface that is rounding.
 const RIGID_FIT: f64 = 1e-8;

@@ -192,6 +192,11 @@ codes! {
     CheckpointVersion = "FB709", Error, BadInput, "checkpoint of another format version", "read it with the flexbody version named in the file, or name another file";
     CheckpointForeign = "FB710", Error, BadInput, "checkpoint of another model", "name another file for this model";
     CheckpointTakenUp = "FB711", Note, Done, "search for modes goes on from a checkpoint", "nothing to do";
+    BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/format.md says how a program that changes files states new digests";
+    BodyWithoutDigest = "FB713", Note, Done, "flex-body file without a digest: a change since it was written cannot be seen", "convert the model again to get one";
+    BodyUntrustworthy = "FB714", Error, Untrustworthy, "body that was made breaks what must hold for every body; nothing is written", "ask for fewer modes, or look for parts that are joined too weakly or for masses that no body has; report the model to us if it stays";
+    WarningsDenied = "FB715", Error, CheckFailed, "warnings are denied", "see the warnings, or leave out --deny-warnings";
+    ForeignRounded = "FB716", Warning, Done, "inertia data of another program's file carry few digits", "write the file with 17 significant digits, and from one mass matrix: flexbody audit says more";
     ExportLoses = "FB720", Error, BadInput, "format cannot hold all of the body", "--allow-loss writes the file without it";
     ExportLost = "FB721", Warning, Done, "file that was written lacks a part of the body", "nothing to do if the simulation does not need it";
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "set what the message names in the program's input";
@@ -229,7 +234,8 @@ pub fn codes_markdown() -> String {
          | 4 | not enough memory or disk |\n\
          | 70 | a bug of ours |\n\
          | 130 | interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left |\n\n\
-         A process ends with the exit code of its first error; warnings and notes do not change it.\n\n\
+         A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
+         `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
     );
     for code in Code::ALL {

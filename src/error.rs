@@ -54,6 +54,11 @@ impl Error {
         self.diagnostics
     }
 
+    /// The same after what was found before it: warnings and notes that are told with it.
+    pub fn after(self, earlier: Vec<Diagnostic>) -> Self {
+        Self { diagnostics: earlier.into_iter().chain(self.diagnostics).collect() }
+    }
+
     /// Puts what it is about in front of every message.
     pub fn about(self, what: impl std::fmt::Display) -> Self {
         Self { diagnostics: self.diagnostics.into_iter().map(|d| d.about(&what)).collect() }

@@ -2,7 +2,7 @@
 
 mod process;
 
-use flexbody::cli::{Arguments, parse, run};
+use flexbody::cli::{Arguments, parse, run, tell_bug};
 use flexbody::diagnostic::{Code, Diagnostic};
 use flexbody::error::ExitCode;
 use std::io::{IsTerminal, Write};
@@ -27,23 +27,18 @@ fn main() -> std::process::ExitCode {
 /// and ends the process by a signal where there is no memory left.
 fn work(arguments: Arguments) -> ExitCode {
     const STACK: usize = 8 << 20;
-    match std::thread::Builder::new()
-        .name("flexbody".to_owned())
-        .stack_size(STACK)
-        .spawn(move || run(&arguments))
-    {
-        Ok(worker) => worker.join().unwrap_or_else(|_| {
+    std::thread::scope(|scope| {
+        let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
+        match worker.spawn_scoped(scope, || run(&arguments)) {
             // The panic itself has been printed; this says what it means and what to do.
-            let message = "the program stopped at a contradiction of its own";
-            eprintln!("{}", Diagnostic::new(Code::Internal, message));
-            ExitCode::Bug
-        }),
-        Err(error) => {
-            let message = format!("not enough memory: no thread can be started: {error}");
-            eprintln!("{}", Diagnostic::new(Code::MemoryShort, message));
-            ExitCode::Resources
+            Ok(worker) => worker.join().unwrap_or_else(|_| tell_bug(&arguments)),
+            Err(error) => {
+                let message = format!("not enough memory: no thread can be started: {error}");
+                eprintln!("{}", Diagnostic::new(Code::MemoryShort, message));
+                ExitCode::Resources
+            }
         }
-    }
+    })
 }
 
 /// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by page, cleared

@@ -3,9 +3,11 @@
 use crate::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness, rigid_mass};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{relative_residual, residual_scale, rounding_residual};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::flex_body::{FlexBody, Storage};
-use crate::invariants::{DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences};
+use crate::invariants::{
+    BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
+};
 use crate::linalg::{SymmetricMatrix, gram};
 use crate::model::{Damping, FeModel, GeometricStiffness, UnitLoad};
 use faer::Mat;
@@ -19,6 +21,35 @@ const STIFFNESS: &str = "modal_stiffness";
 /// What another evaluation of K psi may leave, in units of the rounding estimate eps | |K| |psi| |: the shapes were also
 /// turned into body axes and back.
 const ROUNDING: f64 = 30.0;
+
+/// What must hold for `body` without its model: the identities of `flexbody check`.
+pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
+    body.identities(frame_of(body))
+}
+
+/// What the frame of `body` was meant to be.
+fn frame_of(body: &FlexBody) -> BodyFrame {
+    let name = body.source().settings["frame"].as_str();
+    BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model)
+}
+
+/// Refuses a body that [`own_identities`] would not pass: what is written is what `flexbody check` accepts.
+///
+/// # Errors
+/// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one for every identity that does not hold.
+pub fn accept(body: &FlexBody) -> Result<()> {
+    let failed = own_identities(body).into_iter().filter(|check| !check.passed);
+    let told: Vec<Diagnostic> = failed
+        .map(|check| {
+            let IdentityCheck { name, formula, value, limit, .. } = check;
+            let message = format!(
+                "the body breaks `{name}` ({formula}): {value:.1e}, where at most {limit:.1e} is rounding"
+            );
+            Diagnostic::new(Code::BodyUntrustworthy, message)
+        })
+        .collect();
+    if told.is_empty() { Ok(()) } else { Err(Error::new(told)) }
+}
 
 /// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.
 ///

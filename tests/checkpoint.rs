@@ -183,7 +183,7 @@ fn the_program_keeps_and_takes_up_a_checkpoint() {
     let rod = manifest("connecting_rod");
     let columns = |output: &Output| {
         assert_eq!(output.status.code(), Some(0), "{output:?}");
-        json(output)["run"]["counters"]["solved_columns"].as_u64().expect("a count")
+        json(output)["results"]["run"]["counters"]["solved_columns"].as_u64().expect("a count")
     };
     let first = columns(&convert(folder.path(), &rod, &["--modes", "20"]));
     let again = convert(folder.path(), &rod, &["--modes", "20"]);

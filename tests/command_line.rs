@@ -26,6 +26,11 @@ impl Run {
     fn json(&self) -> Value {
         serde_json::from_str(&self.out).unwrap_or_else(|e| panic!("{e}: {}", self.out))
     }
+
+    /// What the command found.
+    fn results(&self) -> Value {
+        self.json()["results"].take()
+    }
 }
 
 /// Runs `flexbody` in `folder` with the words of `line`.
@@ -190,7 +195,7 @@ fn the_file_is_the_same_bytes_at_any_number_of_threads() {
                     manifest.display()
                 ),
             );
-            assert_eq!(run.json()["run"]["threads"], threads);
+            assert_eq!(run.results()["run"]["threads"], threads);
             fs::read(folder.path().join(format!("{threads}.h5"))).unwrap()
         })
         .into();
@@ -205,7 +210,7 @@ fn json_is_all_that_is_printed_and_holds_the_facts() {
     let run =
         done(folder.path(), "convert model.toml -o b.h5 --modes 7 --json --report r.json --report r.txt");
     assert_eq!(run.err, "");
-    let json = run.json();
+    let json = run.results();
     assert_eq!(json["format"], "flexbody-report");
     assert_eq!(json["modes"]["count"], 7);
     let exact = 7850.0 * 0.4 * 0.15 * 0.1;
@@ -286,7 +291,7 @@ fn matrices_on_the_command_line_are_the_model_of_the_manifest() {
 #[test]
 fn modes_up_to_a_frequency_are_those_below_it() {
     let folder = model();
-    let all = done(folder.path(), "convert model.toml -o a.h5 --json").json();
+    let all = done(folder.path(), "convert model.toml -o a.h5 --json").results();
     let hz = |json: &Value| -> Vec<f64> {
         json["modes"]["frequency_hz"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
     };
@@ -294,7 +299,7 @@ fn modes_up_to_a_frequency_are_those_below_it() {
     let limit = 0.5 * (all[6] + all[7]);
     let below =
         hz(&done(folder.path(), &format!("convert model.toml -o b.h5 --max-frequency {limit} --json"))
-            .json());
+            .results());
     assert_eq!(below.len(), 7);
     assert!(below.iter().zip(&all).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{below:?} {all:?}");
 }
@@ -349,9 +354,9 @@ fn check_passes_on_what_convert_wrote_and_recomputes_it_from_the_matrices() {
         let manifest = fixture(name).join("model.toml").display().to_string();
         done(folder.path(), &format!("convert {manifest} -o b.h5 --quiet"));
         let own = done(folder.path(), "check b.h5");
-        assert!(own.out.contains("all 21 identities hold"), "{name}: {}", own.out);
+        assert!(own.out.contains("all 22 identities hold"), "{name}: {}", own.out);
         let against = done(folder.path(), &format!("check b.h5 --against {manifest}"));
-        assert!(against.out.contains("all 27 identities hold"), "{name}: {}", against.out);
+        assert!(against.out.contains("all 28 identities hold"), "{name}: {}", against.out);
         assert!(!against.err.contains("FB706"), "{name}: {}", against.err);
     }
 }
@@ -364,8 +369,9 @@ fn check_allows_for_what_rounding_takes_from_a_slender_body() {
     let raw = beam.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     write_model(folder.path(), &raw, Triangle::Lower);
     done(folder.path(), "convert model.toml -o b.h5 --quiet");
-    let json = done(folder.path(), "check b.h5 --against model.toml --json").json();
-    let check = json.as_array().unwrap().iter().find(|c| c["name"] == "stiffness_recomputed").unwrap();
+    let json = done(folder.path(), "check b.h5 --against model.toml --json").results();
+    let check =
+        json["identities"].as_array().unwrap().iter().find(|c| c["name"] == "stiffness_recomputed").unwrap();
     assert!(check["value"].as_f64().unwrap() > 1e-12, "no rounding to allow for: {check}");
     assert!(check["limit"].as_f64().unwrap() < 1e-5, "{check}");
 }
@@ -385,8 +391,7 @@ fn check_finds_a_model_that_changed() {
     let failed: Vec<_> = run.out.lines().filter(|l| l.ends_with("FAILED")).collect();
     assert!(failed[0].starts_with("stiffness_recomputed"), "{failed:?}");
     let json = flexbody(folder.path(), "check b.h5 --against model.toml --json");
-    let names: Vec<_> = json
-        .json()
+    let names: Vec<_> = json.results()["identities"]
         .as_array()
         .unwrap()
         .iter()
@@ -426,12 +431,12 @@ fn check_finds_an_identity_that_is_broken() {
 #[test]
 fn inspect_tells_what_the_file_holds() {
     let folder = model();
-    let converted = done(folder.path(), "convert model.toml -o b.h5 --modes 9 --json").json();
+    let converted = done(folder.path(), "convert model.toml -o b.h5 --modes 9 --json").results();
     let text = done(folder.path(), "inspect b.h5").out;
     assert!(text.contains("45 nodes, 135 degrees of freedom, consistent mass"), "{text}");
     assert!(text.contains("9 flexible") && text.contains("proved: 9 flexible + 6 rigid modes"), "{text}");
     assert!(!text.contains("wall"), "{text}");
-    let json = done(folder.path(), "inspect b.h5 --json").json();
+    let json = done(folder.path(), "inspect b.h5 --json").results();
     for key in ["model", "body", "modes", "completeness", "lumped"] {
         assert_eq!(json[key], converted[key], "{key}");
     }
@@ -456,7 +461,7 @@ fn nodal_masses_of_the_user_are_compared_like_any_other_scheme() {
     rows.reverse();
     fs::write(folder.path().join("masses.csv"), "node,mass\n".to_owned() + &rows.concat()).unwrap();
     let json =
-        done(folder.path(), "convert model.toml -o b.h5 --lumped row-sum,user=masses.csv --json").json();
+        done(folder.path(), "convert model.toml -o b.h5 --lumped row-sum,user=masses.csv --json").results();
     assert_eq!(json["lumped"].as_array().unwrap().len(), 2);
     let (own, given) = (norms(&json, "row-sum"), norms(&json, "user"));
     assert!(own["W2_spectral"].as_f64().unwrap() > 1e-3, "{own}");
@@ -475,7 +480,7 @@ fn nodal_masses_of_the_user_are_compared_like_any_other_scheme() {
         run.err
     );
     assert!(!folder.path().join("c.h5").exists());
-    let json = done(folder.path(), "convert model.toml -o d.h5 --lumped none --json").json();
+    let json = done(folder.path(), "convert model.toml -o d.h5 --lumped none --json").results();
     assert_eq!(json["lumped"], Value::Array(Vec::new()));
 }
 
@@ -485,7 +490,7 @@ fn lumped_modes_never_have_higher_frequencies_than_the_consistent_ones() {
     let folder = model();
     let run =
         done(folder.path(), "convert model.toml -o b.h5 --modes 8 --lumped row-sum --lumped-modes --json");
-    let json = run.json();
+    let json = run.results();
     let lumped = &json["lumped_modes"][0];
     assert_eq!((&lumped["scheme"], &lumped["done"]), (&"row-sum".into(), &true.into()));
     let of = |value: &Value| -> Vec<f64> {
@@ -500,7 +505,7 @@ fn lumped_modes_never_have_higher_frequencies_than_the_consistent_ones() {
         done(folder.path(), "convert model.toml -o b.h5 --modes 8 --lumped row-sum --lumped-modes").out;
     assert!(text.lines().any(|l| l.starts_with("own modes") && l.contains("off by -")), "{text}");
     assert_eq!(
-        done(folder.path(), "convert model.toml -o c.h5 --json").json()["lumped_modes"],
+        done(folder.path(), "convert model.toml -o c.h5 --json").results()["lumped_modes"],
         Value::Array(Vec::new())
     );
 }
@@ -520,7 +525,7 @@ fn fast_accuracy_says_not_proved_everywhere() {
     assert!(fs::read_to_string(folder.path().join("r.html")).unwrap().contains("Not proved complete."));
     // The file alone says so too.
     assert!(done(folder.path(), "inspect b.h5").out.contains("NOT PROVED"));
-    assert_eq!(done(folder.path(), "inspect b.h5 --json").json()["completeness"]["proved"], false);
+    assert_eq!(done(folder.path(), "inspect b.h5 --json").results()["completeness"]["proved"], false);
     let proved = done(folder.path(), "convert model.toml -o c.h5");
     assert!(proved.out.contains("proved: 20 flexible + 6 rigid modes") && !proved.err.contains("FB507"));
 }
@@ -542,8 +547,8 @@ fn a_body_made_by_the_library_from_memory_is_one_like_any_other() {
     let folder = tempfile::tempdir().unwrap();
     let body = from_memory::write_truss(&folder.path().join("truss.flex.h5")).unwrap();
     let run = done(folder.path(), "check truss.flex.h5");
-    assert!(run.out.contains("all 21 identities hold"), "{}", run.out);
-    let json = done(folder.path(), "inspect truss.flex.h5 --json").json();
+    assert!(run.out.contains("all 22 identities hold"), "{}", run.out);
+    let json = done(folder.path(), "inspect truss.flex.h5 --json").results();
     assert_eq!(json["model"]["name"], "truss");
     assert_eq!(json["modes"]["count"], 8);
     assert_eq!(json["modes"]["frequency_hz"][0], body.frequencies_hz()[0]);

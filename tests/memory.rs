@@ -45,7 +45,7 @@ fn convert(folder: &Path, options: &str) -> Output {
 fn report(folder: &Path, options: &str) -> Value {
     let output = convert(folder, &format!("{options} --json"));
     assert!(output.status.success(), "{options}: {output:?}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
+    serde_json::from_slice::<Value>(&output.stdout).expect("JSON")["results"].take()
 }
 
 fn estimate(report: &Value) -> f64 {

@@ -44,7 +44,7 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     ];
     let run = flexbody(place, &words);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let told = json(&run.stdout);
+    let told = json(&run.stdout)["results"].take();
     let schema = json(include_bytes!("../schemas/selection-report.schema.json"));
     let schema = jsonschema::validator_for(&schema).expect("a schema");
     let wrong: Vec<String> = schema.iter_errors(&told).map(|error| error.to_string()).collect();
@@ -63,7 +63,7 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     assert!(small.source().files.iter().any(|file| file.role == "scene" && file.name == "scene.toml"));
     assert_eq!(small.terms().len(), 3);
     let again = flexbody(place, &["select", &manifest, "--scene", "scene.toml", "--json"]);
-    let again = json(&again.stdout);
+    let again = json(&again.stdout)["results"].take();
     assert_eq!(again["modes"]["kept"].as_array().expect("a list").len(), small.n_modes());
     for term in again["terms"].as_array().expect("terms") {
         let group = term["group"].as_str().expect("a name");
@@ -83,7 +83,7 @@ fn a_cost_that_nothing_meets_is_a_check_that_fails() {
     prepare(place, "[cost]\nmultiplications = 900\n");
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml", "--json"]);
     assert!(run.status.success());
-    assert!(json(&run.stdout)["chosen"]["multiplications"].as_u64().expect("a number") <= 900);
+    assert!(json(&run.stdout)["results"]["chosen"]["multiplications"].as_u64().expect("a number") <= 900);
 }
 
 #[test]

@@ -242,7 +242,7 @@ fn every_body_gets_files_of_its_own() {
         assert_eq!(run.status.code(), Some(0));
         assert_same(&body, &store::read(own.path().join("own.h5")).unwrap());
 
-        let report = &reports[b];
+        let report = &reports["results"]["bodies"][b];
         assert!(schema.is_valid(report));
         assert_eq!(report["model"]["body"]["number"], b + 1);
         assert_eq!(report["model"]["n_nodes"], raw.nodes.len());

@@ -1,7 +1,7 @@
 //! `flexbody convert --from`: a body of another program's file.
 
 use super::arguments::{ConvertArguments, StorageName};
-use super::output::{Outcome, tell};
+use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -11,6 +11,7 @@ use crate::output::OutputSlot;
 use crate::provenance::SourceFile;
 use crate::report::{Facts, Format, RunData, render};
 use crate::store;
+use crate::verification::accept;
 
 pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let format = find_foreign(from)?;
@@ -31,7 +32,8 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     if arguments.storage == StorageName::F32 {
         adopted.body = adopted.body.rounded_to_f32()?;
     }
-    tell(arguments.printing, &adopted.diagnostics);
+    accept(&adopted.body)?;
+    refuse_warnings(arguments.printing, &adopted.diagnostics)?;
     store::fill_slot(&adopted.body, &slot)?;
     let run = RunData { diagnostics: adopted.diagnostics, ..RunData::default() };
     let facts = Facts::new(&adopted.body, &run);
@@ -39,5 +41,6 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
         slot.fill(render(&facts, format).as_bytes())?;
     }
     OutputSlot::commit_all(std::iter::once(slot).chain(reports))?;
-    Ok(Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true })
+    let (text, json) = (render(&facts, Format::Text), render(&facts, Format::Json));
+    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
 }

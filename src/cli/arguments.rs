@@ -373,9 +373,12 @@ pub struct CompareArguments {
 /// How to print.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Printing {
-    /// Print results and diagnostics as JSON
+    /// Print one JSON object: results, diagnostics, whether all passed (schemas/output.schema.json)
     #[arg(long)]
     pub json: bool,
+    /// Take a warning as a failed check: exit code 1, and no file is written
+    #[arg(long)]
+    pub deny_warnings: bool,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,

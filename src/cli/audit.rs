@@ -16,6 +16,7 @@ pub(super) fn run(arguments: &AuditArguments) -> Result<Outcome> {
     Ok(Outcome {
         text: audit_text(&name, &found),
         json: format!("{:#}", audit_json(&name, &found)),
+        diagnostics: Vec::new(),
         passed: found.passed(),
     })
 }

@@ -1,28 +1,28 @@
 //! `flexbody check`.
 
 use super::arguments::CheckArguments;
-use super::output::{Outcome, tell};
+use super::output::Outcome;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::input::{read_manifest, read_model};
-use crate::invariants::BodyFrame;
 use crate::model::{FeModel, RawModel};
 use crate::report::{dropped_text, identities_json, identities_text};
 use crate::store;
-use crate::verification::{changed_sources, verify};
+use crate::verification::{changed_sources, own_identities, verify};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
-    let body = store::read(&arguments.body)?;
-    let mut checks = body.identities(frame_of(&body));
+    let (body, mut diagnostics) = store::read_with_notes(&arguments.body)?;
+    let mut checks = own_identities(&body);
     if let Some(manifest) = &arguments.against {
         let model = model_of(&body, read_model(&read_manifest(manifest)?)?)?;
-        tell(arguments.printing, &changed_sources(&body, &model));
+        diagnostics.extend(changed_sources(&body, &model));
         checks.extend(verify(&body, &model)?);
     }
     let passed = checks.iter().all(|check| check.passed);
     let text = identities_text(&checks) + &dropped_text(&body);
-    Ok(Outcome { text, json: format!("{:#}", identities_json(&checks)), passed })
+    let json = format!("{:#}", serde_json::json!({ "identities": identities_json(&checks) }));
+    Ok(Outcome { text, json, diagnostics, passed })
 }
 
 /// The model that `body` was made of: all of `raw`, or one of the bodies in it.
@@ -35,10 +35,4 @@ fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
         let message = format!("the file holds {number}, the model has {of}");
         Diagnostic::new(Code::BodyIncomparable, message).into()
     })
-}
-
-/// What the frame of `body` was meant to be.
-fn frame_of(body: &FlexBody) -> BodyFrame {
-    let name = body.source().settings["frame"].as_str();
-    BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model)
 }

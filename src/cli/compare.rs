@@ -7,8 +7,9 @@ use crate::report::{Tolerances, compare};
 use crate::store;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
-    let a = store::read(&arguments.a)?;
-    let b = store::read(&arguments.b)?;
+    let (a, mut diagnostics) = store::read_with_notes(&arguments.a)?;
+    let (b, of_b) = store::read_with_notes(&arguments.b)?;
+    diagnostics.extend(of_b);
     let usual = Tolerances::default();
     let tolerances = Tolerances {
         frequency: arguments.frequency.unwrap_or(usual.frequency),
@@ -21,6 +22,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
     Ok(Outcome {
         text: comparison.text(),
         json: format!("{:#}", comparison.json()),
+        diagnostics,
         passed: comparison.passed(),
     })
 }

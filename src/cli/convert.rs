@@ -3,7 +3,7 @@
 use super::adopt;
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
 use super::checkpoint::resume;
-use super::output::{Outcome, tell};
+use super::output::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::watcher::Watcher;
@@ -27,6 +27,7 @@ use crate::selection::WantedResponses;
 use crate::store;
 use crate::tailoring::{Tailoring, convert_for_scene};
 use crate::units::UnitSystem;
+use crate::verification::accept;
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -55,7 +56,6 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         Job { arguments, files: &files, lumped: &lumped, loads: &loads, formats: &formats, scene, threads };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
-        tell(arguments.printing, &done.diagnostics);
         OutputSlot::commit_all(done.slots)?;
         return Ok(done.outcome);
     }
@@ -67,14 +67,12 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     for places in &all[1..] {
         slots.push(places.reserve()?);
     }
-    let (mut finished, mut told) = (Vec::<Done>::new(), Vec::new());
+    let (mut finished, mut told) = (Vec::<Done>::new(), Vec::<Diagnostic>::new());
     for ((checked, places), reserved) in bodies.into_iter().zip(&all).zip(slots) {
-        let number = checked.model.number().expect("every body of several has a number");
         let watcher = if finished.is_empty() { &watcher } else { &self::watcher(arguments, "start") };
-        let done = job.convert(checked, places, reserved, watcher).map_err(|error| error.about(number))?;
+        let done = job.convert(checked, places, reserved, watcher)?;
         // What holds for all of the matrices is told once.
-        let new: Vec<_> = done.diagnostics.iter().filter(|d| !told.contains(*d)).cloned().collect();
-        tell(arguments.printing, &new);
+        let new = done.outcome.diagnostics.iter().filter(|d| !told.contains(*d)).cloned().collect::<Vec<_>>();
         told.extend(new);
         finished.push(done);
     }
@@ -84,7 +82,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     OutputSlot::commit_all(slots.into_iter().flatten())?;
     let texts: Vec<String> = outcomes.iter().map(|outcome| outcome.text.clone()).collect();
     let reports: Vec<&str> = outcomes.iter().map(|outcome| outcome.json.trim_end()).collect();
-    Ok(Outcome { text: texts.join("\n"), json: format!("[{}]", reports.join(",\n")), passed: true })
+    let json = format!("{{\n\"bodies\": [\n{}\n]\n}}", reports.join(",\n"));
+    Ok(Outcome { text: texts.join("\n"), json, diagnostics: told, passed: true })
 }
 
 fn watcher(arguments: &ConvertArguments, first: &str) -> Watcher {
@@ -106,7 +105,6 @@ struct Job<'a> {
 struct Done {
     slots: Vec<OutputSlot>,
     outcome: Outcome,
-    diagnostics: Vec<Diagnostic>,
 }
 
 impl Job<'_> {
@@ -117,35 +115,49 @@ impl Job<'_> {
         reserved: Reserved,
         watcher: &Watcher,
     ) -> Result<Done> {
-        let Self { arguments, .. } = *self;
-        let CheckedModel { model, mut diagnostics, .. } = checked;
-        let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, &model)).transpose()?;
-        let basis = basis(arguments, self.loads, &model).inspect_err(|_| {
+        let CheckedModel { model, diagnostics, .. } = checked;
+        let early = diagnostics.clone();
+        let done = refuse_warnings(self.arguments.printing, &early)
+            .and_then(|()| self.convert_model(&model, diagnostics, places, reserved, watcher));
+        done.map_err(|error| {
             watcher.clear();
-            tell(arguments.printing, &diagnostics);
-        })?;
-        let settings = self.settings(&model, basis);
+            let error = match model.number() {
+                Some(number) => error.about(number),
+                None => error,
+            };
+            if error.has(Code::WarningsDenied) { error } else { error.after(early) }
+        })
+    }
+
+    fn convert_model(
+        &self,
+        model: &FeModel,
+        mut diagnostics: Vec<Diagnostic>,
+        places: &Places,
+        reserved: Reserved,
+        watcher: &Watcher,
+    ) -> Result<Done> {
+        let Self { arguments, .. } = *self;
+        let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, model)).transpose()?;
+        let settings = self.settings(model, basis(arguments, self.loads, model)?);
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
         let watch = |event: Event<'_>| watcher.hear(event);
         let (mut conversion, selection) = match (self.scene, &arguments.scene) {
             (Some(scene), Some(path)) => {
-                convert_for_scene(&model, &self.of_band(settings), scene, resume, &watch)
+                convert_for_scene(model, &self.of_band(settings), scene, resume, &watch)
                     .map_err(|error| error.in_file(path))
                     .map(|(conversion, selection)| (conversion, Some(selection)))
             }
-            _ => convert_for(&model, &settings, None, resume, &watch).map(|conversion| (conversion, None)),
-        }
-        .inspect_err(|_| {
-            watcher.clear();
-            tell(arguments.printing, &diagnostics);
-        })?;
+            _ => convert_for(model, &settings, None, resume, &watch).map(|conversion| (conversion, None)),
+        }?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
         if arguments.storage == StorageName::F32 {
             conversion.body = conversion.body.rounded_to_f32()?;
         }
+        accept(&conversion.body)?;
         watcher.hear(Event::Phase("writing"));
         store::fill_slot(&conversion.body, &reserved.body)?;
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
@@ -158,6 +170,7 @@ impl Job<'_> {
             Some(number) => diagnostic.about(number),
             None => diagnostic,
         }));
+        refuse_warnings(arguments.printing, &diagnostics)?;
         let mut run = run_data(output, &conversion, diagnostics.clone(), phases, self.threads);
         // Reading may have taken more than the work will.
         run.memory_estimate_bytes = conversion.plan.map(|plan| peak.unwrap_or(0).max(resident + plan.bytes));
@@ -170,9 +183,9 @@ impl Job<'_> {
         let decided = selection.as_ref().map(|selection| SelectionFacts::new(selection, &nothing));
         let text = render(&facts, Format::Text)
             + &decided.map_or_else(String::new, |facts| facts.render(Format::Text));
-        let outcome = Outcome { text, json: render(&facts, Format::Json), passed: true };
+        let outcome = Outcome { text, json: render(&facts, Format::Json), diagnostics, passed: true };
         let slots = std::iter::once(reserved.body).chain(reserved.reports).collect();
-        Ok(Done { slots, outcome, diagnostics })
+        Ok(Done { slots, outcome })
     }
 
     /// Free modes by the band of the scene, unless their number or highest frequency is given.

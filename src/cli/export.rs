@@ -1,14 +1,13 @@
 //! `flexbody export`.
 
 use super::arguments::ExportArguments;
-use super::output::{Outcome, tell};
+use super::output::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::export::{ExportOptions, Points, export, find_format};
 use crate::input::parse_units;
 use crate::output::OutputSlot;
-use crate::report::diagnostics_json;
 use crate::store;
 use std::path::PathBuf;
 
@@ -24,13 +23,14 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     refuse_replacing(inputs.into_iter(), std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
-    let mut body = store::read(&arguments.body)?;
+    let (mut body, mut diagnostics) = store::read_with_notes(&arguments.body)?;
     if let Some(units) = units {
         body = body.in_units(&units)?;
     }
     let (exported, losses) = export(&body, format, &options, arguments.allow_loss)
         .map_err(|error| error.in_file(&arguments.body))?;
-    tell(arguments.printing, &losses);
+    diagnostics.extend(losses);
+    refuse_warnings(arguments.printing, &diagnostics)?;
     let beside: Vec<(PathBuf, Vec<u8>)> = exported
         .beside
         .into_iter()
@@ -52,13 +52,15 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let line = |(path, size): &(PathBuf, usize)| {
         format!("{}, {} bytes: {} for {}\n", path.display(), size, format.name(), format.reader())
     };
-    let mut json = diagnostics_json(&losses);
-    json["files"] = written
-        .iter()
-        .map(|(path, size)| serde_json::json!({ "path": path.display().to_string(), "bytes": size }))
-        .collect();
-    json["format"] = format.name().into();
-    Ok(Outcome { text: written.iter().map(line).collect(), json: format!("{json:#}"), passed: true })
+    let file = |(path, size): &(PathBuf, usize)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
+    let files: serde_json::Value = written.iter().map(file).collect();
+    let json = serde_json::json!({ "format": format.name(), "files": files });
+    Ok(Outcome {
+        text: written.iter().map(line).collect(),
+        json: format!("{json:#}"),
+        diagnostics,
+        passed: true,
+    })
 }
 
 /// `nodes`, `interfaces`, or node numbers with commas.

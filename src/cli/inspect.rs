@@ -9,9 +9,15 @@ use crate::store;
 pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
     if arguments.structure {
         let structure = format!("{:#}", store::structure(&arguments.body)?);
-        return Ok(Outcome { text: structure.clone(), json: structure, passed: true });
+        return Ok(Outcome {
+            text: structure.clone(),
+            json: structure,
+            diagnostics: Vec::new(),
+            passed: true,
+        });
     }
-    let body = store::read(&arguments.body)?;
+    let (body, diagnostics) = store::read_with_notes(&arguments.body)?;
     let facts = Facts::new(&body, &RunData::default());
-    Ok(Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true })
+    let (text, json) = (render(&facts, Format::Text), render(&facts, Format::Json));
+    Ok(Outcome { text, json, diagnostics, passed: true })
 }

@@ -18,4 +18,4 @@ mod trade;
 mod watcher;
 
 pub use arguments::Arguments;
-pub use output::{parse, run};
+pub use output::{parse, run, tell_bug};

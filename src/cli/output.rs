@@ -4,15 +4,17 @@ use super::arguments::{Arguments, Command, Printing};
 use super::resources::use_threads;
 use super::{audit, check, compare, convert, export, inspect, select, simulate, trade};
 use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::error::{ExitCode, Result};
-use crate::report::diagnostics_json;
-use clap::Parser;
+use crate::error::{Error, ExitCode, Result};
+use crate::report::output_json;
+use clap::{CommandFactory, Parser};
 use std::io::Write;
 
-/// What a command found: text for stdout (or JSON with `--json`), and whether its checks passed.
+/// What a command found: text for stdout, the same as JSON, what is to be said of it, and whether its checks passed.
 pub(super) struct Outcome {
     pub text: String,
+    /// The `results` of the object that `--json` prints.
     pub json: String,
+    pub diagnostics: Vec<Diagnostic>,
     pub passed: bool,
 }
 
@@ -22,15 +24,25 @@ pub(super) struct Outcome {
 /// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for a command line that is not understood.
 pub fn parse() -> std::result::Result<Arguments, ExitCode> {
     Arguments::try_parse().map_err(|error| {
-        let json = std::env::args_os().take_while(|word| word != "--").any(|word| word == "--json");
-        if json && error.use_stderr() {
-            let printing = Printing { json, quiet: false };
-            return finish(printing, Err(Diagnostic::new(Code::Usage, first_paragraph(&error)).into()));
+        let words = || std::env::args_os().skip(1).take_while(|word| word != "--");
+        if words().any(|word| word == "--json") && error.use_stderr() {
+            let printing = Printing { json: true, quiet: false, deny_warnings: false };
+            let given = words().find_map(|word| command_named(word.to_str()?));
+            return finish(
+                given.as_deref(),
+                printing,
+                Err(Diagnostic::new(Code::Usage, first_paragraph(&error)).into()),
+            );
         }
         // Nobody is left to tell when the stream is closed.
         let _ = error.print();
         if error.use_stderr() { ExitCode::BadInput } else { ExitCode::Done }
     })
+}
+
+/// The command of that name.
+fn command_named(word: &str) -> Option<String> {
+    Arguments::command().find_subcommand(word).map(|command| command.get_name().to_owned())
 }
 
 /// What clap says is wrong, in one line, without its tips and its usage.
@@ -49,57 +61,89 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Simulate(arguments) => arguments.threads,
         _ => None,
     });
-    let (printing, outcome) = match &arguments.command {
-        Command::Convert(arguments) => (arguments.printing, convert::run(arguments)),
-        Command::Inspect(arguments) => (arguments.printing, inspect::run(arguments)),
-        Command::Check(arguments) => (arguments.printing, check::run(arguments)),
-        Command::Compare(arguments) => (arguments.printing, compare::run(arguments)),
-        Command::Select(arguments) => (arguments.printing, select::run(arguments)),
-        Command::Simulate(arguments) => (arguments.printing, simulate::run(arguments)),
-        Command::Trade(arguments) => (arguments.printing, trade::run(arguments)),
-        Command::Export(arguments) => (arguments.printing, export::run(arguments)),
-        Command::Audit(arguments) => (arguments.printing, audit::run(arguments)),
+    let (name, printing) = command_of(arguments);
+    let outcome = match &arguments.command {
+        Command::Convert(arguments) => convert::run(arguments),
+        Command::Inspect(arguments) => inspect::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
+        Command::Select(arguments) => select::run(arguments),
+        Command::Simulate(arguments) => simulate::run(arguments),
+        Command::Trade(arguments) => trade::run(arguments),
+        Command::Export(arguments) => export::run(arguments),
+        Command::Audit(arguments) => audit::run(arguments),
     };
-    finish(printing, outcome)
+    finish(Some(name), printing, outcome)
 }
 
-fn finish(printing: Printing, outcome: Result<Outcome>) -> ExitCode {
-    match outcome {
+fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
+    match &arguments.command {
+        Command::Convert(arguments) => ("convert", arguments.printing),
+        Command::Inspect(arguments) => ("inspect", arguments.printing),
+        Command::Check(arguments) => ("check", arguments.printing),
+        Command::Compare(arguments) => ("compare", arguments.printing),
+        Command::Select(arguments) => ("select", arguments.printing),
+        Command::Simulate(arguments) => ("simulate", arguments.printing),
+        Command::Trade(arguments) => ("trade", arguments.printing),
+        Command::Export(arguments) => ("export", arguments.printing),
+        Command::Audit(arguments) => ("audit", arguments.printing),
+    }
+}
+
+/// Tells that the program stopped at a contradiction of its own.
+pub fn tell_bug(arguments: &Arguments) -> ExitCode {
+    let (name, printing) = command_of(arguments);
+    let message = "the program stopped at a contradiction of its own";
+    finish(Some(name), printing, Err(Diagnostic::new(Code::Internal, message).into()))
+}
+
+fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -> ExitCode {
+    let (results, diagnostics, code, text) = match outcome {
         Ok(outcome) => {
-            let printed = if printing.json {
-                print(&outcome.json)
-            } else if !printing.quiet {
-                print(&outcome.text)
-            } else {
-                Ok(())
-            };
-            if let Err(error) = printed {
-                let message = format!("the results cannot be printed: {error}");
-                tell(
-                    Printing { json: false, ..printing },
-                    &[Diagnostic::new(Code::OutputUnwritable, message)],
-                );
-                return ExitCode::Resources;
-            }
-            if outcome.passed { ExitCode::Done } else { ExitCode::CheckFailed }
+            let denied = printing.deny_warnings && warnings(&outcome.diagnostics).next().is_some();
+            let code = if outcome.passed && !denied { ExitCode::Done } else { ExitCode::CheckFailed };
+            (Some(outcome.json), outcome.diagnostics, code, Some(outcome.text))
         }
+        Err(error) => (None, error.diagnostics().to_vec(), error.exit_code(), None),
+    };
+    tell(printing, &diagnostics);
+    let printed = match text {
+        _ if printing.json => print(&output_json(command, code, &diagnostics, results.as_deref())),
+        Some(text) if !printing.quiet => print(&text),
+        _ => Ok(()),
+    };
+    match printed {
+        Ok(()) => code,
         Err(error) => {
-            let code = error.exit_code();
-            if printing.json {
-                let mut json = diagnostics_json(error.diagnostics());
-                json["exit_code"] = (code as u8).into();
-                // The exit code tells it as well.
-                let _ = print(&format!("{json:#}"));
-            } else {
-                tell(printing, error.diagnostics());
-            }
-            code
+            let message = format!("the results cannot be printed: {error}");
+            let unprinted = Diagnostic::new(Code::OutputUnwritable, message);
+            tell(Printing { json: false, ..printing }, &[unprinted]);
+            // A failure of the work itself is what its exit code tells.
+            if code == ExitCode::Done { ExitCode::Resources } else { code }
         }
     }
 }
 
+fn warnings(diagnostics: &[Diagnostic]) -> impl Iterator<Item = &Diagnostic> {
+    diagnostics.iter().filter(|diagnostic| diagnostic.severity() == Severity::Warning)
+}
+
+/// Ends a command that is about to write, where a warning is to count as an error.
+///
+/// # Errors
+/// All `diagnostics`, with [`WarningsDenied`](Code::WarningsDenied).
+pub(super) fn refuse_warnings(printing: Printing, diagnostics: &[Diagnostic]) -> Result<()> {
+    let mut codes: Vec<&str> = warnings(diagnostics).map(|warning| warning.code().id()).collect();
+    if !printing.deny_warnings || codes.is_empty() {
+        return Ok(());
+    }
+    codes.dedup();
+    let message = format!("nothing is written: --deny-warnings, and there is {}", codes.join(", "));
+    Err(Error::from(Diagnostic::new(Code::WarningsDenied, message)).after(diagnostics.to_vec()))
+}
+
 /// Prints diagnostics to stderr: all of them, or errors only when quiet; none with `--json`, whose output has them.
-pub(super) fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
+fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
     if printing.json {
         return;
     }

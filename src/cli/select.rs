@@ -2,7 +2,7 @@
 
 use super::arguments::SelectArguments;
 use super::convert::{read_loads, responses_to};
-use super::output::{Outcome, tell};
+use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
@@ -36,13 +36,13 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
         converted(arguments, &scene, &watch)?
     } else {
         refuse_modes(arguments)?;
-        (store::read(&arguments.body)?, Vec::new())
+        store::read_with_notes(&arguments.body)?
     };
     let selection =
         select(&body, &scene, memory_left(None), &watch).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
-    tell(arguments.printing, &run.diagnostics);
+    refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = SelectionFacts::new(&selection, &run);
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
@@ -51,6 +51,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     Ok(Outcome {
         text: facts.render(Format::Text),
         json: facts.render(Format::Json),
+        diagnostics: run.diagnostics.clone(),
         passed: selection.holds(),
     })
 }

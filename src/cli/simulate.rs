@@ -1,7 +1,7 @@
 //! `flexbody simulate`.
 
 use super::arguments::SimulateArguments;
-use super::output::{Outcome, tell};
+use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{memory_left, use_threads};
 use super::watcher::Watcher;
@@ -23,13 +23,14 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
-    let body = store::read(&arguments.body)?;
+    let (body, mut diagnostics) = store::read_with_notes(&arguments.body)?;
     watcher.hear(Event::Phase("simulation"));
-    let (recording, diagnostics) =
+    let (recording, found) =
         simulate(&body, &scene, memory_left(None), |part| watcher.hear(Event::Fraction(part)))
             .map_err(|error| error.in_file(&arguments.scene))?;
+    diagnostics.extend(found);
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
-    tell(arguments.printing, &run.diagnostics);
+    refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = SimulationFacts::new(&recording, body.units(), &run);
 
     if let Some(slot) = &motion {
@@ -43,5 +44,6 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     }
     // Nothing appears before everything is done.
     OutputSlot::commit_all(motion.into_iter().chain(table).chain(reports))?;
-    Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed: true })
+    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
 }

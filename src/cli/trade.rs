@@ -1,7 +1,7 @@
 //! `flexbody trade`.
 
 use super::arguments::{ReferenceName, TradeArguments};
-use super::output::{Outcome, tell};
+use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
@@ -44,7 +44,9 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         diagnostics.extend(found);
         (Some(checked.model), sources)
     } else {
-        (None, vec![Source::new("file", store::read(&arguments.body)?, None)?])
+        let (body, notes) = store::read_with_notes(&arguments.body)?;
+        diagnostics.extend(notes);
+        (None, vec![Source::new("file", body, None)?])
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
     let settings = Settings { repeat: arguments.repeat.into(), memory: memory_left(None) };
@@ -52,7 +54,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
-    tell(arguments.printing, &run.diagnostics);
+    refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = TradeFacts::new(&study, &run);
 
     if let Some(slot) = &table {
@@ -64,7 +66,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     // Nothing appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports))?;
     let passed = study.recommended.row().is_some();
-    Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed })
+    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
 }
 
 /// What a flex-body file cannot be asked for.

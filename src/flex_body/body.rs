@@ -174,11 +174,14 @@ impl FlexBody {
             origin: self.parts.frame.origin,
             eigenvalues: Some(&self.parts.modes.eigenvalue),
             eigenvalue_noise: self.parts.certificate.rigid_noise,
+            eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
         };
         let checks = identities(&self.parts.invariants, &expected);
         // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.
-        let mut checks = relaxed(checks, self.parts.storage, 4 + 3 * self.n_modes());
+        let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
+        let mut checks = relaxed(checks, rounding + self.parts.certificate.inertia_rounding);
         checks.extend(self.parts.interface_identities());
+        checks.extend(self.parts.cross_checks());
         checks
     }
 }

@@ -2,6 +2,7 @@
 
 mod body;
 mod carried;
+mod cross_checks;
 mod in_units;
 mod interface;
 mod model_axes;

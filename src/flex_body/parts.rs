@@ -96,6 +96,10 @@ pub struct Certificate {
     pub rigid_noise: f64,
     /// max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix.
     pub rigid_residual: f64,
+    /// What rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0 when not known.
+    pub eigenvalue_rounding: f64,
+    /// To what part of their Cauchy-Schwarz bounds the inertia data were known: the digits of a file of another program; 0: to rounding.
+    pub inertia_rounding: f64,
     /// What accuracy `certified` adds.
     pub guarantee: Option<Guarantee>,
 }

@@ -87,11 +87,11 @@ fn without_guarantee(certificate: Certificate) -> Certificate {
     Certificate { guarantee: None, ..certificate }
 }
 
-/// Limits of identities of a body whose arrays are rounded: sums of up to `terms` of them.
-pub(super) fn relaxed(mut checks: Vec<IdentityCheck>, storage: Storage, terms: usize) -> Vec<IdentityCheck> {
+/// Limits of identities of a body whose arrays are rounded, which adds `rounding` to what rounding of 64-bit floats leaves.
+pub(super) fn relaxed(mut checks: Vec<IdentityCheck>, rounding: f64) -> Vec<IdentityCheck> {
     // What has no tolerance, as being finite, does not get any.
     for check in checks.iter_mut().filter(|check| check.limit > 0.0) {
-        check.limit += storage.rounding() * terms as f64;
+        check.limit += rounding;
         check.passed = check.value <= check.limit;
     }
     checks

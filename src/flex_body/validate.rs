@@ -40,7 +40,10 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.geometric_stiffness(parts, nf);
     check.lumped(parts, nf);
     let c = &parts.certificate;
-    check.finite("certificate", [c.shift, c.rigid_noise, c.rigid_residual]);
+    check.finite(
+        "certificate",
+        [c.shift, c.rigid_noise, c.rigid_residual, c.eigenvalue_rounding, c.inertia_rounding],
+    );
     check.guarantee(parts, nf);
     check.terms(parts);
     check.interfaces(parts, n);

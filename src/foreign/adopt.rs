@@ -50,7 +50,8 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
     let mut invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS);
     restore_symmetries(&mut invariants);
     if let Some(broken) = identities(&invariants, &ANY_BODY).into_iter().find(|check| {
-        matches!(check.name, "finite" | "mass_positive" | "second_moment_psd") && check.value > BROKEN
+        matches!(check.name, "finite" | "mass_positive" | "second_moment_psd" | "inertia_psd")
+            && check.value > BROKEN
     }) {
         let message = format!("inertia is not that of a body: {} does not hold", broken.formula);
         return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
@@ -142,6 +143,8 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             // What digits of K leave of the modes, as far as the file shows it.
             rigid_noise,
             rigid_residual: 0.0,
+            eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: interfaces(given),
@@ -149,7 +152,22 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
         terms,
         storage: Storage::F64,
     })?;
+    let (body, warning) = with_own_rounding(body)?;
+    diagnostics.extend(warning);
     Ok(Adopted { body, diagnostics })
+}
+
+/// The body with what the digits of its file leave of the identities of inertia, and a warning where this is more than rounding.
+fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
+    let missed = body.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed);
+    let missed = missed.map(|check| check.value).fold(0.0, f64::max);
+    if missed == 0.0 || missed > BROKEN {
+        return Ok((body, None));
+    }
+    let mut parts = body.into_parts();
+    parts.certificate.inertia_rounding = missed;
+    let message = format!("the inertia data of the file are those of a body to {missed:.1e} of their size");
+    Ok((FlexBody::new(parts)?, Some(Diagnostic::new(Code::ForeignRounded, message))))
 }
 
 /// What is asked of a body whatever its modes are.
@@ -160,6 +178,7 @@ pub(super) const ANY_BODY: Expected<'static> = Expected {
     origin: nalgebra::Vector3::new(0.0, 0.0, 0.0),
     eigenvalues: None,
     eigenvalue_noise: 0.0,
+    eigenvalue_rounding: 0.0,
 };
 
 /// What counts as rounding in files of 10 digits and more, relative to Cauchy-Schwarz bounds; what is told twice differs by no more.

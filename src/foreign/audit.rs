@@ -118,7 +118,7 @@ fn of_identity(check: IdentityCheck) -> AuditCheck {
         "finite" => (Code::AuditImplausible, "some numbers are missing or no numbers"),
         "mass_positive" => (Code::AuditImplausible, "the mass is not positive"),
         "second_moment_symmetric" => (Code::AuditImplausible, "the inertia tensor is not symmetric"),
-        "second_moment_psd" => (
+        "second_moment_psd" | "inertia_psd" => (
             Code::AuditImplausible,
             "no distribution of mass has this inertia and centre of mass: they refer to different points, or products of inertia have the wrong sign",
         ),

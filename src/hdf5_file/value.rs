@@ -145,7 +145,12 @@ pub(crate) fn elements(dims: &[usize]) -> Result<usize, String> {
 }
 
 /// Refuses data that lie in other files, and sizes that the stored bytes cannot hold.
-fn storage(dataset: &hdf5::Dataset, elements: usize, size: usize, stored: &mut Stored) -> Result<(), String> {
+pub(super) fn storage(
+    dataset: &hdf5::Dataset,
+    elements: usize,
+    size: usize,
+    stored: &mut Stored,
+) -> Result<(), String> {
     let plist = dataset.create_plist().map_err(|e| format!("expected a storage layout, found {e}"))?;
     let layout = plist.get_layout().map_err(|e| format!("expected a storage layout, found {e}"))?;
     let external = plist.get_external().map_err(|e| format!("expected a storage layout, found {e}"))?;

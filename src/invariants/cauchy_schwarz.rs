@@ -14,6 +14,8 @@ use nalgebra::Vector3;
 pub struct CauchySchwarz {
     mass: f64,
     second_moment: Vector3<f64>,
+    /// I0_kk of a mass that has inertia about axes which no places give it; `None`: that of the places.
+    inertia: Option<Vector3<f64>>,
     mode: Vec<f64>,
 }
 
@@ -28,8 +30,13 @@ impl CauchySchwarz {
             let whole = invariants.general.as_ref().map_or(moved, |general| general.modal_mass[(p, p)]);
             moved.max(whole).max(0.0).sqrt()
         };
+        let inertia = invariants.general.as_ref().map(|_| {
+            let floor = f64::EPSILON * invariants.inertia().trace();
+            invariants.inertia().diagonal().map(|i| i.max(floor).max(0.0))
+        });
         Self {
             mass: invariants.mass,
+            inertia,
             second_moment: invariants.second_moment.diagonal().map(|j| j.max(floor).max(0.0)),
             mode: (0..invariants.n_modes()).map(norm).collect(),
         }
@@ -41,14 +48,23 @@ impl CauchySchwarz {
         self.mode[p]
     }
 
-    /// |c_k| <= sqrt(m) |x_k|.
+    /// |c_k| <= sqrt(m) |x_k|; of a mass that does not commute with rotations, c_k couples a translation to the rotations about the other
+    /// axes: |c_k| <= sqrt(m I0_ll).
     pub fn first_moment(&self, k: usize) -> f64 {
-        (self.mass * self.second_moment[k]).sqrt()
+        let size = match &self.inertia {
+            Some(inertia) => inertia[(k + 1) % 3].max(inertia[(k + 2) % 3]),
+            None => self.second_moment[k],
+        };
+        (self.mass * size).sqrt()
     }
 
-    /// |J_kl| <= |x_k| |x_l|.
+    /// |J_kl| <= |x_k| |x_l|; of a mass that does not commute with rotations J stands for I0, and has its bounds.
     pub fn second_moment(&self, k: usize, l: usize) -> f64 {
-        (self.second_moment[k] * self.second_moment[l]).sqrt()
+        match &self.inertia {
+            Some(_) if k == l => self.largest_moment(),
+            Some(_) => self.inertia(k, l),
+            None => (self.second_moment[k] * self.second_moment[l]).sqrt(),
+        }
     }
 
     /// |C1_k,p| <= sqrt(m) |psi_p|.
@@ -56,9 +72,10 @@ impl CauchySchwarz {
         self.mass.sqrt() * self.mode[p]
     }
 
-    /// |Ibar_kl,p| <= |x_k| |psi_p|.
+    /// |Ibar_kl,p| <= |x_k| |psi_p|; of a mass that does not commute with rotations Ibar stands for W1 and C2, and has bounds of their size.
     pub fn ibar(&self, k: usize, p: usize) -> f64 {
-        self.second_moment[k].sqrt() * self.mode[p]
+        let size = if self.inertia.is_some() { self.largest_moment() } else { self.second_moment[k] };
+        size.sqrt() * self.mode[p]
     }
 
     /// |S_kl,pq| <= |psi_p| |psi_q|; it bounds the entries of m_ff, W2 and W3 too.
@@ -83,6 +100,9 @@ impl CauchySchwarz {
 
     /// I0_kk.
     fn moment(&self, k: usize) -> f64 {
+        if let Some(inertia) = &self.inertia {
+            return inertia[k];
+        }
         self.second_moment[(k + 1) % 3] + self.second_moment[(k + 2) % 3]
     }
 

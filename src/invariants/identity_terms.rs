@@ -43,13 +43,21 @@ fn central(body: &Invariants) -> Matrix3<f64> {
 }
 
 pub(super) fn second_moment_negative(body: &Invariants) -> f64 {
-    negative(&matrix(&central(body)), body.second_moment.trace())
+    // Not the trace, which may be negative too.
+    negative(&matrix(&central(body)), body.second_moment.diagonal().abs().sum())
+}
+
+/// How negative the smallest principal moment about the centre of mass is, relative to the sum of all.
+pub(super) fn inertia_negative(body: &Invariants) -> f64 {
+    negative(&matrix(&inertia_of(&central(body))), body.inertia().diagonal().abs().sum())
 }
 
 /// By how much the largest principal moment about the centre of mass exceeds the sum of the others.
 pub(super) fn triangle_excess(body: &Invariants) -> f64 {
     let moments = symmetric_eigenvalues(matrix(&inertia_of(&central(body))).as_ref());
-    moments.map_or(f64::NAN, |i| scaled((i[2] - i[1] - i[0]).max(0.0), body.second_moment.trace()))
+    moments.map_or(f64::NAN, |i| {
+        scaled((i[2] - i[1] - i[0]).max(0.0), body.second_moment.diagonal().abs().sum())
+    })
 }
 
 pub(super) fn s_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
@@ -73,7 +81,11 @@ pub(super) fn ibar_excess(body: &Invariants, bound: &CauchySchwarz) -> f64 {
 
 pub(super) fn ibar_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     over(3, 3, |k, l| {
-        let size = |p| bound.ibar(k, p).hypot(bound.ibar(l, p));
+        let size = |p| match body.general {
+            // Ibar then stands for W1 and C2: the difference is C2 about the third axis.
+            Some(_) if k != l => bound.c2(3 - k - l, p),
+            _ => bound.ibar(k, p).hypot(bound.ibar(l, p)),
+        };
         over(body.n_modes(), 1, |p, _| scaled(body.ibar[k][l][p] - body.ibar[l][k][p], size(p)))
     })
 }

@@ -339,7 +339,11 @@ impl BodyComparison {
                     .to_owned(),
             );
         }
-        let smallest = a.invariants().second_moment.diagonal().min();
+        // J of a mass with inertia of its own may have no positive diagonal.
+        let smallest = match a.invariants().general {
+            Some(_) => a.invariants().inertia().diagonal().min(),
+            None => a.invariants().second_moment.diagonal().min(),
+        };
         let lost = lost_by_shift(a.invariants().mass, change.shift.norm(), smallest);
         for (name, difference) in differences {
             // Mass has a row of its own.

@@ -97,6 +97,10 @@ impl Take<'_> {
         }
     }
 
+    fn optional_float(&mut self, path: &str) -> Option<f64> {
+        self.scan.values.contains_key(path).then(|| self.float(path))
+    }
+
     /// A count that may be absent; negative ones are problems.
     fn optional_count(&mut self, path: &str) -> Option<usize> {
         let Some(Value::Int(value)) = self.scan.values.remove(path) else { return None };
@@ -321,6 +325,8 @@ impl Take<'_> {
             remark: self.text("/certificate@remark"),
             rigid_noise: self.float("/certificate@rigid_noise"),
             rigid_residual: self.float("/certificate@rigid_residual"),
+            eigenvalue_rounding: self.optional_float("/certificate@eigenvalue_rounding").unwrap_or(0.0),
+            inertia_rounding: self.optional_float("/certificate@inertia_rounding").unwrap_or(0.0),
             guarantee: self.guarantee(),
         }
     }

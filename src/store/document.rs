@@ -45,6 +45,60 @@ characters or a leading dot, and keep their order by HDF5 creation order. Nothin
 number of threads or on its path: equal bodies are equal bytes.
 ";
 
+/// What the digests are made of, with the lines of Python that state them anew.
+const DIGESTS: &str = "\
+## Digests
+
+Since 1.4 the root attribute `digests` has a line `SHA-256  path` (two spaces, a line feed at the end of each) for every group and every dataset of the
+file, entries that this page does not know included, in the order of the bytes of their paths; the root group is `/`. The root attribute `sha256` is the SHA-256 of this text in UTF-8, in
+lowercase hexadecimal like all others. A reader refuses a file whose content has other digests (FB712) and names what was changed, added or
+removed. The digests see numbers, shapes, types and attributes; they do not see how HDF5 lays these out: chunks, compression, byte order, storage of texts, and the order of
+members and attributes.
+
+The digest of a dataset is the SHA-256 of its record followed by the records of its attributes, by name in the order of their bytes; that of a group has
+its attributes alone, the root without `digests` and `sha256`. A record is the line
+
+    LENGTH NAME TYPE SHAPE BYTES
+
+followed by the content. NAME is the attribute's name, empty for the dataset itself, and LENGTH the number of its bytes; TYPE is `float64`, `float32`, `int64` (and other
+`int` and `uint`) or `text`; SHAPE is the extents with `x` between them, empty for a single value; BYTES is the number of bytes of the content: numbers row-major and
+little-endian, texts in UTF-8 without an end mark. One space stands between the fields, a line feed ends the line. Other types, arrays of texts, links that are not hard and more than eight levels of groups occur in no flex-body file.
+
+These lines compute them; a program that changes a file on purpose states them anew with the last two:
+
+```python
+import hashlib, h5py, numpy as np
+
+def record(name, value):
+    if isinstance(value, str):
+        kind, shape, content = \"text\", \"\", value.encode()
+    else:
+        value = np.asarray(value)
+        kind, shape = value.dtype.name, \"x\".join(map(str, value.shape))
+        content = value.astype(value.dtype.newbyteorder(\"<\")).tobytes()
+    return f\"{len(name.encode())} {name} {kind} {shape} {len(content)}\\n\".encode() + content
+
+def digests(file):
+    found = {}
+    def add(path, entry):
+        content = record(\"\", entry[()]) if isinstance(entry, h5py.Dataset) else b\"\"
+        for name in sorted(entry.attrs, key=str.encode):
+            if path != \"/\" or name not in (\"digests\", \"sha256\"):
+                content += record(name, entry.attrs[name])
+        found[path] = hashlib.sha256(content).hexdigest()
+    add(\"/\", file)
+    file.visititems(lambda path, entry: add(\"/\" + path, entry))
+    text = \"\".join(f\"{found[path]}  {path}\\n\" for path in sorted(found, key=str.encode))
+    return text, hashlib.sha256(text.encode()).hexdigest()
+
+with h5py.File(\"body.flex.h5\", \"r+\") as f:
+    for name, value in zip((\"digests\", \"sha256\"), digests(f)):
+        f.attrs[name] = value
+```
+
+A digest tells damage and careless edits from what was written; it is no signature. What the laws of mechanics say of the numbers themselves is checked besides: section 10 of the [theory](theory.md).
+";
+
 /// `docs/format.md`.
 pub fn format_markdown() -> String {
     let mut out = INTRODUCTION.to_owned();
@@ -55,6 +109,7 @@ pub fn format_markdown() -> String {
         "\nEntries marked *derived* follow from the others; a reader recomputes them and refuses a file that contradicts\n\
          itself by more than {DERIVED_TOLERANCE:e} of the magnitude of the data they come from.\n"
     ));
+    add(format_args!("\n{DIGESTS}"));
     for group in TABLE {
         add(format_args!("\n## `{}`\n\n{}\n", group.path, group.description));
         let (attributes, datasets): (Vec<_>, Vec<_>) = group.entries().partition(|i| i.shape().is_none());

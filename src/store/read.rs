@@ -4,6 +4,7 @@ use super::assemble::assemble;
 use super::derived::check_derived;
 use super::scan::Scan;
 use super::schema::{FORMAT, MAJOR};
+use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
@@ -18,32 +19,64 @@ use std::path::Path;
 /// program; [`BodyVersion`](Code::BodyVersion): a newer format; [`BodySchema`](Code::BodySchema): missing, mis-shaped
 /// or not finite, one diagnostic per entry; [`BodyIdentity`](Code::BodyIdentity): entries that contradict each other.
 pub fn read(path: impl AsRef<Path>) -> Result<FlexBody> {
-    let (body, problems) = examine(path.as_ref())?;
-    match body {
-        Some(body) if problems.is_empty() => Ok(body),
-        _ => Err(Error::new(problems)),
+    read_with_notes(path).map(|(body, _)| body)
+}
+
+/// The same, with what there is to say of a file that is sound: [`BodyWithoutDigest`](Code::BodyWithoutDigest) of an older format.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_notes(path: impl AsRef<Path>) -> Result<(FlexBody, Vec<Diagnostic>)> {
+    let examined = examine(path.as_ref())?;
+    match examined.body {
+        Some(body) if examined.problems.is_empty() => Ok((body, examined.notes)),
+        _ => Err(Error::new(examined.problems)),
     }
+}
+
+/// What is in a file, and what is wrong with it.
+struct Examined {
+    body: Option<FlexBody>,
+    problems: Vec<Diagnostic>,
+    notes: Vec<Diagnostic>,
 }
 
 /// Everything that is wrong with the file at `path` by its schema; empty when [`read`] would succeed.
 pub fn validate(path: impl AsRef<Path>) -> Vec<Diagnostic> {
-    examine(path.as_ref()).map_or_else(Error::into_diagnostics, |(_, problems)| problems)
+    examine(path.as_ref()).map_or_else(Error::into_diagnostics, |examined| examined.problems)
 }
 
-fn examine(path: &Path) -> Result<(Option<FlexBody>, Vec<Diagnostic>)> {
+fn examine(path: &Path) -> Result<Examined> {
     let (file, bytes) = open_checked(path)?;
     let mut scan = Scan::new(&file, path, bytes);
     let units = scan.units().cloned().filter(|_| scan.problems.is_empty());
     let Some(parts) = units.and_then(|units| assemble(&mut scan, units)) else {
-        return Ok((None, scan.problems));
+        return Ok(Examined { body: None, problems: scan.problems, notes: Vec::new() });
     };
     match FlexBody::new(parts) {
         Ok(body) => {
             check_derived(&mut scan, body.parts());
-            Ok((Some(body), scan.problems))
+            // What contradicts itself or the format is told by these, which say more.
+            if scan.problems.is_empty() {
+                scan.check_digests(&file);
+            }
+            let note = scan.stated_digests().is_none().then(|| without_digest(&scan).in_file(path));
+            Ok(Examined { body: Some(body), problems: scan.problems, notes: note.into_iter().collect() })
         }
-        Err(e) => Ok((None, e.into_diagnostics().into_iter().map(|d| d.in_file(path)).collect())),
+        Err(e) => {
+            let problems = e.into_diagnostics().into_iter().map(|d| d.in_file(path)).collect();
+            Ok(Examined { body: None, problems, notes: Vec::new() })
+        }
     }
+}
+
+fn without_digest(scan: &Scan) -> Diagnostic {
+    let minor = match scan.values.get("/@format_minor") {
+        Some(Value::Int(minor)) => *minor,
+        _ => 0,
+    };
+    let message = format!("the file has no digest: it was written in format version {MAJOR}.{minor}");
+    Diagnostic::new(Code::BodyWithoutDigest, message)
 }
 
 /// Opens a file of this program and of a format that this version knows; also gives its size in bytes.

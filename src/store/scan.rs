@@ -1,15 +1,16 @@
 //! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing that
 //! the file declares before it is checked against the rest.
 
+use super::digest::{self, LIST, Numbers, WHOLE, digests_of, of_numbers};
 use super::extents::{Sizes, dataset, index};
 use super::item::{Group, Item, Kind, Origin, Per};
 use super::names;
-use super::schema::TABLE;
 use super::schema::terms::{DROPPED, KEPT};
+use super::schema::{DIGESTS_SINCE, TABLE};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::flex_body::{Group as TermGroup, Groups, Storage};
-use crate::hdf5_file::{self as hdf5_file, Stored};
+use crate::hdf5_file::{self as hdf5_file, Array, Stored};
 use crate::units::UnitSystem;
 use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -29,6 +30,8 @@ pub(super) struct Scan {
     pub problems: Vec<Diagnostic>,
     sizes: Sizes,
     stored: Stored,
+    /// Fingerprints of the numbers that were read, where the file has digests.
+    numbers: Numbers,
     units: Option<UnitSystem>,
     /// Precision of the large arrays, which the root says.
     pub storage: Storage,
@@ -66,6 +69,7 @@ impl Scan {
             problems: Vec::new(),
             sizes: Sizes::default(),
             stored: Stored::new(bytes),
+            numbers: Numbers::default(),
             units: None,
             storage: Storage::F64,
             of_groups: Vec::new(),
@@ -151,7 +155,7 @@ impl Scan {
         for item in group.entries() {
             let name = key(&path, item);
             self.texts(&opened, &name, item);
-            let entry = self.entry(&opened, item, &mut sizes);
+            let entry = self.entry(&opened, &name, item, &mut sizes);
             if let (Ok(value), Some(_)) = (&entry, item.of) {
                 self.of_groups.push((name.clone(), item, value.is_some()));
             }
@@ -177,6 +181,7 @@ impl Scan {
     fn entry(
         &mut self,
         place: &hdf5::Group,
+        name: &str,
         item: &Item,
         sizes: &mut Sizes,
     ) -> Result<Option<Value>, String> {
@@ -184,8 +189,10 @@ impl Scan {
             Kind::Floats(shape) => {
                 let stored = &mut self.stored;
                 let values = match item.is_short(self.storage) {
-                    false => dataset::<f64>(place, item.name, shape, sizes, stored)?,
+                    false => dataset::<f64>(place, item.name, shape, sizes, stored)?
+                        .inspect(|read| self.hash(name, read)),
                     true => dataset::<f32>(place, item.name, shape, sizes, stored)?
+                        .inspect(|read| self.hash(name, read))
                         .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims)),
                 };
                 let Some((values, dims)) = values else { return Ok(None) };
@@ -197,7 +204,8 @@ impl Scan {
                 }
             }
             Kind::Ints(shape) => {
-                let values = dataset::<i64>(place, item.name, shape, sizes, &mut self.stored)?;
+                let values = dataset::<i64>(place, item.name, shape, sizes, &mut self.stored)?
+                    .inspect(|read| self.hash(name, read));
                 Ok(values.map(|(values, _)| Value::Ints(values)))
             }
             Kind::Text => Ok(hdf5_file::text(place, item.name)?.map(Value::Text)),
@@ -217,6 +225,44 @@ impl Scan {
                 }
                 Ok(Some(Value::Named(values)))
             }
+        }
+    }
+
+    /// Keeps the fingerprint of numbers that were read, so that they are not read again.
+    fn hash<T: digest::Number>(&mut self, name: &str, (values, dims): &Array<T>) {
+        if self.stated_digests().is_some() {
+            self.numbers.insert(name.to_owned(), of_numbers(dims, values));
+        }
+    }
+
+    /// The list of digests that the file states, and the SHA-256 of the list.
+    pub fn stated_digests(&self) -> Option<(&str, &str)> {
+        match [LIST, WHOLE].map(|name| self.values.get(&format!("/@{name}"))) {
+            [Some(Value::Text(list)), Some(Value::Text(whole))] => Some((list, whole)),
+            _ => None,
+        }
+    }
+
+    /// Holds all content of the file, unknown entries included, to the digests that it states.
+    pub fn check_digests(&mut self, file: &hdf5::File) {
+        let Some((list, whole)) = self.stated_digests() else {
+            let minor = self.values.get("/@format_minor");
+            if matches!(minor, Some(Value::Int(minor)) if *minor >= DIGESTS_SINCE) {
+                self.add_as(
+                    Code::BodyChanged,
+                    format!("the attributes `{LIST}` and `{WHOLE}` were removed from the file"),
+                );
+            }
+            return;
+        };
+        let (list, whole) = (list.to_owned(), whole.to_owned());
+        let found = digests_of(file, &mut self.numbers, &mut self.stored);
+        let differs = match found {
+            Ok(found) => digest::difference(&found, &list, &whole),
+            Err(problem) => Some(problem),
+        };
+        if let Some(differs) = differs {
+            self.add_as(Code::BodyChanged, format!("the content is not what was written; {differs}"));
         }
     }
 

@@ -1,5 +1,6 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
 
+use super::digest::{LIST, WHOLE};
 use super::item::Extent::{Fixed, InternalRows, Modes, Nodes, ThreeModes};
 use super::item::Kind::{Floats, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
@@ -21,7 +22,9 @@ pub(super) mod terms;
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
 /// See [`MAJOR`].
-pub(super) const MINOR: i64 = 3;
+pub(super) const MINOR: i64 = 4;
+/// The minor version from which on every file has digests.
+pub(super) const DIGESTS_SINCE: i64 = 4;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
 
@@ -135,6 +138,17 @@ const ROOT: &[Item] = &[
     attribute("units_stated", Int, ONE, "1: the user stated the units; 0: m, kg, s were assumed", |v| {
         Some(Value::Int(v.body.units.stated.into()))
     }),
+    attribute(
+        LIST,
+        Text,
+        ONE,
+        "SHA-256 of every group and dataset, as described above: a line for each, by path; absent before 1.4",
+        // Of what was written: the writer adds it at the end.
+        |_| None,
+    )
+    .added(DIGESTS_SINCE),
+    attribute(WHOLE, Text, ONE, "SHA-256 of the text of `digests`: of all content; absent before 1.4", |_| None)
+        .added(DIGESTS_SINCE),
 ];
 
 const SOURCE: &[Item] = &[

@@ -1,15 +1,17 @@
 //! Writes a body as the table says.
 
+use super::digest::{LIST, Number, Numbers, WHOLE, digests_of, of_numbers, sealed};
 use super::item::{Extent, Item, Kind, Per};
 use super::names;
-use super::scan::place;
+use super::scan::{key, place};
 use super::schema::TABLE;
 use super::value::{Value, View};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
-use crate::hdf5_file::{create, make, put_text};
+use crate::hdf5_file::{Stored, create, make, put_text};
 use crate::output::OutputSlot;
+use crate::provenance::Fingerprint;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
@@ -65,6 +67,7 @@ pub(super) fn system_error(text: &str) -> std::io::Error {
 
 fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     let file = create(path)?;
+    let mut numbers = Numbers::default();
     for group in TABLE {
         if group.per != Per::Body {
             make(&file, group.parent())?;
@@ -79,54 +82,66 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             let path = place(group, name.as_deref().map(names::encode).as_deref());
             let target = if path == "/" { file.as_group()? } else { make(&file, &path)? };
             for item in group.entries() {
-                if let Some(value) = item.value(&view) {
-                    put(&target, item, &view, value)?;
+                let Some(value) = item.value(&view) else { continue };
+                if let Some(fingerprint) = put(&target, item, &view, value)? {
+                    numbers.insert(key(&path, item), fingerprint);
                 }
             }
         }
     }
+    // Every dataset has its fingerprint already: nothing is read back but attributes.
+    let digests = digests_of(&file, &mut numbers, &mut Stored::new(0))?;
+    let (list, whole) = sealed(&digests);
+    put_text(&file, LIST, &list)?;
+    put_text(&file, WHOLE, &whole)?;
     file.flush()?;
     file.close()
 }
 
-fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<()> {
+/// Writes an entry; of a dataset, gives the fingerprint of its numbers.
+fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<Option<Fingerprint>> {
     let shape = item.dims(view);
     match (item.kind, value) {
         (Kind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
             let short: Vec<f32> = values.into_iter().map(nearest_f32).collect();
-            put_floats(place, item, view, &short)
+            return put_floats(place, item, view, &short).map(Some);
         }
-        (Kind::Floats(_), Value::Floats(values)) => put_floats(place, item, view, &values),
+        (Kind::Floats(_), Value::Floats(values)) => return put_floats(place, item, view, &values).map(Some),
         (Kind::Ints(_), Value::Ints(values)) => {
+            let fingerprint = of_numbers(&shape, &values);
             let dataset = place.new_dataset::<i64>().obj_track_times(false).shape(shape).create(item.name)?;
             dataset.write_raw(&values)?;
-            describe(&dataset, item, view)
+            describe(&dataset, item, view)?;
+            return Ok(Some(fingerprint));
         }
-        (Kind::Text, Value::Text(text)) => put_text(place, item.name, &text),
-        (Kind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v),
-        (Kind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v),
-        (Kind::Named, Value::Named(values)) => {
-            values.iter().try_for_each(|(n, v)| place.new_attr::<f64>().create(n.as_str())?.write_scalar(v))
-        }
+        (Kind::Text, Value::Text(text)) => put_text(place, item.name, &text)?,
+        (Kind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v)?,
+        (Kind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v)?,
+        (Kind::Named, Value::Named(values)) => values
+            .iter()
+            .try_for_each(|(n, v)| place.new_attr::<f64>().create(n.as_str())?.write_scalar(v))?,
         (kind, value) => unreachable!("table entry {}: {kind:?} for {value:?}", item.name),
     }
+    Ok(None)
 }
 
-fn put_floats<T: hdf5::H5Type>(
+fn put_floats<T: hdf5::H5Type + Number>(
     place: &hdf5::Group,
     item: &Item,
     view: &View<'_>,
     values: &[T],
-) -> hdf5::Result<()> {
+) -> hdf5::Result<Fingerprint> {
     let shape = item.dims(view);
     let mut builder = place.new_dataset::<T>().obj_track_times(false);
     if let [Extent::Modes, Extent::Nodes, _] = item.shape().unwrap_or(&[]) {
         // One chunk per mode: a reader of few modes touches only these.
         builder = builder.chunk(vec![1, shape[1], shape[2]]).shuffle().deflate(DEFLATE_LEVEL);
     }
+    let fingerprint = of_numbers(&shape, values);
     let dataset = builder.shape(shape).create(item.name)?;
     dataset.write_raw(values)?;
-    describe(&dataset, item, view)
+    describe(&dataset, item, view)?;
+    Ok(fingerprint)
 }
 
 #[allow(clippy::cast_possible_truncation)] // what it is for

@@ -87,6 +87,7 @@ fn norms_are_those_of_the_reference_program() {
             origin: frame.origin,
             eigenvalues: Some(&modes.eigenvalues),
             eigenvalue_noise: 0.0,
+            eigenvalue_rounding: 0.0,
         };
         for check in identities(&exact, &expected) {
             assert!(check.passed, "{}: {} is {:e}", model.name, check.name, check.value);

@@ -113,6 +113,8 @@ pub fn engine_mount() -> FlexBody {
             remark: String::new(),
             rigid_noise: 3.2e-9,
             rigid_residual: 1.1e-15,
+            eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: vec![Interface {
@@ -260,6 +262,8 @@ pub fn condensed(
             remark: String::new(),
             rigid_noise: 0.0,
             rigid_residual: 0.0,
+            eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: vec![],

@@ -8,9 +8,12 @@ use flexbody::flex_body::{
 };
 use flexbody::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
-use flexbody::provenance::SourceFile;
+use flexbody::provenance::{SourceFile, sha256_hex};
 use flexbody::units::UnitSystem;
+use hdf5::types::VarLenUnicode;
+use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use std::collections::BTreeMap;
 
 /// SplitMix64: small, seeded, the same everywhere.
 pub struct Random {
@@ -211,6 +214,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             remark: if r.below(2) == 0 { String::new() } else { r.name() },
             rigid_noise: r.value(),
             rigid_residual: r.value(),
+            eigenvalue_rounding: 1.5e-9,
+            inertia_rounding: 2.5e-7,
             guarantee: (n * nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
         },
         interfaces: (0..interfaces)
@@ -268,7 +273,10 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     bits.extend(m.eigenvalue.iter().chain(&m.residual).chain(&m.damping_ratio).map(|v| v.to_bits()));
     bits.extend(p.nodes.positions.iter().flatten().map(|v| v.to_bits()));
     bits.extend(p.frame.origin.iter().chain(p.frame.axes.iter()).map(|v| v.to_bits()));
-    bits.extend([c.shift, c.rigid_noise, c.rigid_residual].map(f64::to_bits));
+    bits.extend(
+        [c.shift, c.rigid_noise, c.rigid_residual, c.eigenvalue_rounding, c.inertia_rounding]
+            .map(f64::to_bits),
+    );
     if let Some(g) = &c.guarantee {
         let columns = [&g.eigenvalue_lower, &g.eigenvalue_upper, &g.shape_error];
         bits.extend(columns.into_iter().flatten().chain(&g.digits).map(|v| v.to_bits()));
@@ -290,4 +298,59 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         p.coordinates.as_ref().map(|c| &c.names),
     );
     (bits, texts)
+}
+
+/// States the digests of a file anew, as `docs/format.md` says.
+pub fn seal(file: &hdf5::File) {
+    let mut found = BTreeMap::new();
+    digest_group(&file.as_group().unwrap(), "", &mut found);
+    let list: String = found.iter().map(|(path, digest)| format!("{digest}  {path}\n")).collect();
+    for (name, text) in [("sha256", sha256_hex(list.as_bytes())), ("digests", list)] {
+        let _ = file.delete_attr(name);
+        let text: VarLenUnicode = text.parse().unwrap();
+        file.new_attr::<VarLenUnicode>().create(name).unwrap().write_scalar(&text).unwrap();
+    }
+}
+
+fn digest_group(group: &hdf5::Group, path: &str, found: &mut BTreeMap<String, String>) {
+    let own = if path.is_empty() { "/" } else { path };
+    found.insert(own.to_owned(), sha256_hex(&attribute_records(group, path.is_empty())));
+    for name in group.member_names().unwrap() {
+        let inner = format!("{path}/{name}");
+        match group.group(&name) {
+            Ok(member) => digest_group(&member, &inner, found),
+            Err(_) => {
+                let dataset = group.dataset(&name).unwrap();
+                let content = [record("", &dataset), attribute_records(&dataset, false)].concat();
+                found.insert(inner, sha256_hex(&content));
+            }
+        }
+    }
+}
+
+fn attribute_records(place: &hdf5::Location, is_root: bool) -> Vec<u8> {
+    let mut names = place.attr_names().unwrap();
+    names.sort();
+    names.retain(|name| !is_root || !["digests", "sha256"].contains(&name.as_str()));
+    names.iter().flat_map(|name| record(name, &place.attr(name).unwrap())).collect()
+}
+
+/// `LENGTH NAME TYPE SHAPE BYTES`, a line feed, and the content.
+fn record(name: &str, place: &hdf5::Container) -> Vec<u8> {
+    use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
+    let (kind, content): (&str, Vec<u8>) = match place.dtype().unwrap().to_descriptor().unwrap() {
+        TypeDescriptor::Float(FloatSize::U8) => {
+            ("float64", place.read_raw::<f64>().unwrap().iter().flat_map(|v| v.to_le_bytes()).collect())
+        }
+        TypeDescriptor::Integer(IntSize::U8) => {
+            ("int64", place.read_raw::<i64>().unwrap().iter().flat_map(|v| v.to_le_bytes()).collect())
+        }
+        TypeDescriptor::Integer(IntSize::U4) => {
+            ("int32", place.read_raw::<i32>().unwrap().iter().flat_map(|v| v.to_le_bytes()).collect())
+        }
+        _ => ("text", place.read_scalar::<VarLenUnicode>().unwrap().as_bytes().to_vec()),
+    };
+    let shape: Vec<String> = place.shape().iter().map(usize::to_string).collect();
+    let head = format!("{} {name} {kind} {} {}\n", name.len(), shape.join("x"), content.len());
+    [head.into_bytes(), content].concat()
 }

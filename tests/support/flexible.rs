@@ -133,6 +133,8 @@ pub fn made_of(
             remark: String::new(),
             rigid_noise: 0.0,
             rigid_residual: 0.0,
+            eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
             guarantee: None,
         },
         interfaces: Vec::new(),

@@ -57,6 +57,22 @@ pub(super) const CERTIFICATE: &[Item] = &[
         |v| Some(Value::Float(v.body.certificate.rigid_residual)),
     ),
     attribute(
+        "eigenvalue_rounding",
+        Float,
+        ONE,
+        "what rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
+        |v| Some(Value::Float(v.body.certificate.eigenvalue_rounding)),
+    )
+    .added(4),
+    attribute(
+        "inertia_rounding",
+        Float,
+        ONE,
+        "to what part of their Cauchy-Schwarz bounds the inertia data were known before this file: the digits of a file of another program; 0: to the rounding of 64-bit floats",
+        |v| Some(Value::Float(v.body.certificate.inertia_rounding)),
+    )
+    .added(4),
+    attribute(
         "shift_below",
         Float,
         PER_TIME2,
