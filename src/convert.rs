@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody,
+    Certificate, FixedInterface, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody,
     MassStructure, Modes, Parts, Source, Storage, TermDecision, Truncation,
 };
 use crate::invariants::{
@@ -277,6 +277,7 @@ pub fn convert_for(
     diagnostics.extend(warning.into_iter().chain(softening).chain(fits));
     let body =
         FlexBody::new(Parts { lumped, certificate: certificate(model, &found, guarantee), terms, ..parts })?;
+    diagnostics.extend(free_frequencies(&body));
     let solution = found.solution;
     Ok(Conversion {
         body,
@@ -420,7 +421,53 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
         rigid_noise: found.rigid_noise,
         rigid_residual: model.rigid_residual(),
         guarantee,
+        fixed_interface: found.fixed_interface.clone().map(fixed_interface),
     }
+}
+
+/// The same of the body; written out, so that neither room need know the other.
+fn fixed_interface(found: basis::FixedInterface) -> FixedInterface {
+    let basis::FixedInterface {
+        modes,
+        interface_motions,
+        counted,
+        shift,
+        next,
+        residual,
+        free_estimate,
+        free_lower,
+    } = found;
+    FixedInterface { modes, interface_motions, counted, shift, next, residual, free_estimate, free_lower }
+}
+
+/// Part by which a frequency may be too high before the user is told.
+const TOO_HIGH: f64 = 0.01;
+
+/// A note about the frequencies of the free body that a Craig-Bampton body does not hold.
+fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
+    let fixed = body.certificate().fixed_interface.as_ref()?;
+    let (theta, hertz) = (&body.modes().eigenvalue, body.frequencies_hz());
+    let holding = fixed.holding(theta, TOO_HIGH);
+    let first = *theta.get(holding)?;
+    let kept = if body.has_rigid_interfaces() { " with the same rigid interfaces" } else { "" };
+    let holds = match holding {
+        0 => format!("none is within 1 % of that of the free body{kept}"),
+        count => format!(
+            "the lowest {count} (up to {:.6} Hz) are within 1 % of those of the free body{kept}",
+            hertz[count - 1]
+        ),
+    };
+    let percent = |part: f64| format!("{:.2} %", 100.0 * part);
+    let most = fixed.largest_excess(holding, first).map(|most| format!(", {} at most", percent(most)));
+    let message = format!(
+        "of the {} frequencies of the Craig-Bampton body {holds}; that of mode {}, {:.6} Hz, is too high by {}{}",
+        theta.len(),
+        holding + 1,
+        hertz[holding],
+        percent(fixed.excess(holding, first)),
+        most.unwrap_or_default(),
+    );
+    Some(Diagnostic::new(Code::FreeFrequencies, message))
 }
 
 /// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.

@@ -1,6 +1,7 @@
 //! The product: a validated flexible body, independent of the files it came from and goes to.
 
 mod body;
+mod fixed_interface;
 mod in_units;
 mod interface;
 mod model_rows;
@@ -13,6 +14,7 @@ mod validate;
 pub use crate::invariants::{Frame, Group, Groups};
 pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 pub use body::FlexBody;
+pub use fixed_interface::FixedInterface;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,

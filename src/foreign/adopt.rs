@@ -135,6 +135,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             rigid_noise,
             rigid_residual: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: interfaces(given),
         coordinates: None,

@@ -114,6 +114,7 @@ pub fn engine_mount() -> FlexBody {
             rigid_noise: 3.2e-9,
             rigid_residual: 1.1e-15,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: vec![Interface {
             name: "base".to_owned(),
@@ -261,6 +262,7 @@ pub fn condensed(
             rigid_noise: 0.0,
             rigid_residual: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: vec![],
         coordinates: None,

@@ -134,6 +134,7 @@ pub fn made_of(
             rigid_noise: 0.0,
             rigid_residual: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: Vec::new(),
         coordinates: None,
