@@ -52,12 +52,12 @@ impl Completeness {
     }
 }
 
-/// What was made static: shapes that are no modes of the free body and do not claim to be.
-pub(super) const STATIC: [&str; 4] =
+/// Kinds of shapes that are no modes of the free body and do not claim to be.
+const STATIC: [&str; 4] =
     ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
 
 /// How many modes of the body are static shapes.
-pub(super) fn static_shapes(body: &FlexBody) -> usize {
+fn static_shapes(body: &FlexBody) -> usize {
     body.modes().provenance.iter().filter(|origin| is_static(origin)).count()
 }
 
@@ -66,10 +66,12 @@ pub(super) fn is_static(origin: &str) -> bool {
     STATIC.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
 }
 
+/// Verdict about shapes of which nothing is to be proved.
+const GIVEN: &str = "given";
+
 /// The verdict in one word, and in a few.
 fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
     let basis = body.source().settings["basis"].as_str().unwrap_or_default();
-    let given = "given";
     match (&body.certificate().fixed_interface, proved) {
         (Some(fixed), true) if fixed.modes == 0 => ("proved", "Static condensation."),
         (Some(_), true) => ("proved", "No fixed-interface mode is missing."),
@@ -77,10 +79,10 @@ fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
         (None, true) if static_shapes(body) > 0 => ("proved", "No free mode is missing."),
         (None, true) => ("proved", "No mode is missing."),
         // Files of earlier versions tell what was proved in the remark only.
-        (None, false) if basis == "craig-bampton" => (given, "Craig-Bampton basis."),
+        (None, false) if basis == "craig-bampton" => (GIVEN, "Craig-Bampton basis."),
         // Without a count nothing spoke against them either.
         (None, false) if basis == "imported" && body.certificate().negative_pivots.is_none() => {
-            (given, "Shapes as given.")
+            (GIVEN, "Shapes as given.")
         }
         (None, false) => ("open", "Not proved complete."),
     }
@@ -94,7 +96,8 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
     }
     let Some(flexible) = c.proved_modes else {
         let why = if c.remark.is_empty() { "no inertia count was made".to_owned() } else { plain(&c.remark) };
-        return (false, format!("NOT PROVED: {why}"));
+        let verdict = if head(body, false).0 == GIVEN { "not proved" } else { "NOT PROVED" };
+        return (false, format!("{verdict}: {why}"));
     };
     let shift = significant(shift_hz.unwrap_or(f64::NAN), 5);
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();

@@ -25,7 +25,7 @@ fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) ->
         // What eigenvalues of dense and sparse solutions differ by.
         let rounding = 1e-9 * theta;
         let all = format!("{what}, mode {j}: {lower:e} <= {lambda:e} <= {estimate:e} <= {theta:e}");
-        assert!(lower <= lambda + rounding && lambda <= estimate + rounding && estimate <= theta, "{all}");
+        assert!(lower <= lambda + rounding && lambda <= estimate + rounding && estimate <= *theta, "{all}");
         assert!(lower > 0.0 || *theta > 0.5 * cut, "{all}: no bound below {cut:e}");
         let missing = theta - lambda;
         if *theta < FAR_BELOW * cut && missing > 1e3 * rounding {

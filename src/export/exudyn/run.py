@@ -23,9 +23,12 @@ import exudyn.itemInterface as eii
 import numpy as np
 from exudyn.FEM import ObjectFFRFreducedOrderInterface
 from exudyn.advancedUtilities import LoadDictFromHDF5
+from exudyn.rigidBodyUtilities import RigidBodyInertia
 
 HERE = Path(__file__).resolve()
 FILE = HERE.with_name(HERE.name.removesuffix("_exudyn.py") + ".hdf5")
+# Part of the mass and of the inertia of the body that a carrier of a reference point has.
+WEIGHTLESS = 1e-8
 
 
 def interfaces():
@@ -37,26 +40,48 @@ def interfaces():
 def add_body(mbs, **options):
     """Adds the body; `options` are those of AddObjectFFRFreducedOrder (gravity, positionRef, initialAngularVelocity, ...).
 
-    Returns its dictionary (`oFFRFreducedOrder`, `nRigidBody`, `nGenericODE2`, ...) with the loaded file under `cms`.
+    Returns its dictionary (`oFFRFreducedOrder`, `nRigidBody`, `nGenericODE2`, ...) with the loaded file under `cms` and the options.
     """
     if not FILE.exists():
         raise SystemExit(f"{FILE} is not there: keep this program beside the file that flexbody export wrote, named BODY.hdf5")
     cms = ObjectFFRFreducedOrderInterface()
     cms.LoadFromFile(str(FILE))
-    return {**cms.AddObjectFFRFreducedOrder(mbs, **options), "cms": cms}
+    return {**cms.AddObjectFFRFreducedOrder(mbs, **options), "cms": cms, "options": options}
 
 
 def add_marker(mbs, body, name):
     """A marker at the reference point of an interface, with rotations where its nodes determine them."""
     entry = interfaces()[name]
     nodes, weights = [int(node) for node in entry["meshNodeNumbers"]], list(entry["weights"])
-    if entry["marker"] == "rigid":
-        return mbs.AddMarker(eii.MarkerSuperElementRigid(
-            name=name, bodyNumber=body["oFFRFreducedOrder"], meshNodeNumbers=nodes, weightingFactors=weights,
-            offset=entry["offset"], useAlternativeApproach=True))
-    # Nodes on a line, or one alone: a place without a direction, for spherical joints and forces.
-    return mbs.AddMarker(eii.MarkerSuperElementPosition(
-        name=name, bodyNumber=body["oFFRFreducedOrder"], meshNodeNumbers=nodes, weightingFactors=weights))
+    number = body["oFFRFreducedOrder"]
+    if entry["marker"] != "rigid":
+        # Nodes on a line, or one alone: a place without a direction, for spherical joints and forces.
+        return mbs.AddMarker(eii.MarkerSuperElementPosition(
+            name=name, bodyNumber=number, meshNodeNumbers=nodes, weightingFactors=weights))
+    mean = mbs.AddMarker(eii.MarkerSuperElementRigid(
+        name=name, bodyNumber=number, meshNodeNumbers=nodes, weightingFactors=weights, useAlternativeApproach=True))
+    if np.linalg.norm(entry["offset"]) <= 1e-9 * np.linalg.norm(np.ptp(body["cms"].xRef.reshape(-1, 3), axis=0)):
+        return mean
+    return add_carrier(mbs, body, mean, entry)
+
+
+def add_carrier(mbs, body, mean, entry):
+    """A marker at a reference point that is not the mean of the nodes: on a rigid body without noticeable mass that the mean carries.
+
+    The parameter `offset` of the marker would not do: Exudyn (1.13.6) turns it with the frame of the body, but not with the interface.
+    """
+    cms, given = body["cms"], body["options"]
+    turn = np.array(given.get("rotationMatrixRef", np.eye(3)))
+    turn = turn.reshape(3, 3) if turn.size else np.eye(3)
+    arm = turn @ entry["referencePoint"]
+    omega = np.array(given.get("initialAngularVelocity", [0, 0, 0]))
+    carrier = mbs.CreateRigidBody(
+        referencePosition=np.array(given.get("positionRef", [0, 0, 0])) + arm, referenceRotationMatrix=turn,
+        initialVelocity=np.array(given.get("initialVelocity", [0, 0, 0])) + np.cross(omega, arm), initialAngularVelocity=omega,
+        inertia=RigidBodyInertia(mass=WEIGHTLESS * cms.totalMass, inertiaTensor=WEIGHTLESS * np.trace(cms.inertiaLocal) / 3 * np.eye(3)))
+    inside = mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=carrier, localPosition=list(-entry["offset"])))
+    mbs.AddObject(eii.GenericJoint(markerNumbers=[mean, inside], constrainedAxes=[1] * 6))
+    return mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=carrier))
 
 
 def period(body):
@@ -96,7 +121,7 @@ def add_joint(mbs, body, name, kind, drive=None):
     return marker, mbs.AddObject(eii.SphericalJoint(markerNumbers=[place, marker]))
 
 
-def simulate(kinds, size=None, periods=10, steps=2000):
+def simulate(kinds, size=None, periods=10, steps=1000):
     """A simulation with a joint of a kind at each interface, from rest.
 
     Prints and returns for each interface the displacement at the end and the largest, and the largest force of a rigid joint.
@@ -123,9 +148,12 @@ def simulate(kinds, size=None, periods=10, steps=2000):
     settings.timeIntegration.numberOfSteps = steps
     settings.timeIntegration.verboseMode = 0
     settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
-    settings.solutionSettings.writeSolutionToFile = False
-    settings.solutionSettings.sensorsWritePeriod = duration / steps
-    mbs.SolveDynamic(settings)
+    # Of the forces that the motion takes: from rest there are none yet to which tolerances could be relative.
+    forces = body["cms"].totalMass * size * (2 * np.pi / period(body)) ** 2
+    settings.timeIntegration.newton.absoluteTolerance = 1e-8 * forces
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = duration / steps
+    mbs.SolveDynamic(settings, showHints=True)
     found = {}
     for name, (place, force) in sensors.items():
         moved = mbs.GetSensorStoredData(place)[:, 1:] - interfaces()[name]["referencePoint"]
