@@ -30,7 +30,7 @@ def cross(a, b):
 
 
 class Body:
-    """Invariants of a file."""
+    """Invariants of a file whose frame is at the centre of mass, along the axes of the model, in which scenes are."""
 
     def __init__(self, path):
         with h5py.File(path) as file:
@@ -44,7 +44,23 @@ class Body:
             self.nodes = {int(number): i for i, number in enumerate(file["nodes/id"][()])}
             self.positions, self.shape = file["nodes/position"][()], file["modes/shape"][()]
             self.interfaces = {name: {key: group[key][()] for key in ("reference", "translation", "rotation") if key in group} for name, group in file.get("interfaces", {}).items()}
+            self.axes = file["frame/axes"][()]
         self.nf = len(self.eigenvalue)
+        self.turn()
+
+    def turn(self):
+        """From the axes of the file to those of the model."""
+        a, nf = self.axes, self.nf
+        self.I0 = a @ self.I0 @ a.T
+        self.W1 = np.einsum("ac,bd,cdj->abj", a, a, self.W1.reshape(3, 3, nf)).reshape(3, 3 * nf)
+        self.W2 = np.einsum("ac,bd,cidj->aibj", a, a, self.W2.reshape(3, nf, 3, nf)).reshape(3 * nf, 3 * nf)
+        self.W3 = np.einsum("ac,cij->aij", a, self.W3.reshape(3, nf, nf)).reshape(3 * nf, nf)
+        self.positions, self.shape = self.positions @ a.T, self.shape @ a.T
+        self.interfaces = {name: {key: a @ value for key, value in own.items()} for name, own in self.interfaces.items()}
+
+    def in_model(self, vector, axes):
+        """A vector that turns with the body, along the axes of the model."""
+        return self.axes @ vector if axes == "body" else vector
 
     def point(self, load):
         """Place, rows of translation and of rotation (3 x nf) where a load acts."""
@@ -103,18 +119,20 @@ class Motion:
         self.damping = 2 * damping * np.sqrt(body.eigenvalue)
         self.loads = []
         for load in scene.get("load", []):
-            vectors = [np.array(load.get(name, [0, 0, 0]), float) for name in ("force", "torque")]
-            self.loads.append((*body.point(load), *vectors, load.get("axes", "world") == "world", history(load.get("history", 1.0))))
+            axes = load.get("axes", "world")
+            vectors = [body.in_model(np.array(load.get(name, [0, 0, 0]), float), axes) for name in ("force", "torque")]
+            self.loads.append((*body.point(load), *vectors, axes == "world", history(load.get("history", 1.0))))
         self.kinks = sorted({float(t) for load in scene.get("load", []) for t in kinks(load.get("history", 1.0))} | {float(t) for t in kinks(scene.get("spin", {}).get("rate", 0.0))})
         spin = scene.get("spin")
-        self.spin = None if spin is None else (np.array(spin["axis"], float) / np.linalg.norm(spin["axis"]), history(spin["rate"]))
+        axis = None if spin is None else body.in_model(np.array(spin["axis"], float), spin.get("axes", "model"))
+        self.spin = None if spin is None else (axis / np.linalg.norm(axis), history(spin["rate"]))
 
     def start(self):
         first = self.scene.get("initial", {})
         turn = np.array(first.get("rotation", [0, 0, 0]), float)
         angle = np.linalg.norm(turn)
         e = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * turn / angle if angle > 0 else np.zeros(3)])
-        omega = np.array(first.get("angular_velocity", [0, 0, 0]), float)
+        omega = self.body.in_model(np.array(first.get("angular_velocity", [0, 0, 0]), float), first.get("axes", "model"))
         q, qd = np.zeros(self.body.nf), np.zeros(self.body.nf)
         for mode in first.get("mode", []):
             if mode["number"] <= self.body.nf:

@@ -89,6 +89,8 @@ codes! {
     InterfaceAcross = "FB210", Error, BadInput, "interface has nodes of several bodies", "give each body an interface of its own";
     SceneSyntax = "FB211", Error, BadInput, "scene is not valid TOML or has unknown, missing or mistyped keys", "see docs/simulate.md for the keys";
     SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "flexbody inspect shows the modes and interfaces of the body";
+    SceneContradicts = "FB213", Error, BadInput, "scene contradicts itself", "leave one of the two out";
+    CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried there", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with all terms";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
@@ -161,6 +163,11 @@ codes! {
     SpinSoftens = "FB542", Warning, Done, "spin at which a body without geometric stiffness is too soft", "convert the model with [[geometric_stiffness]] for spin";
     PhaseDrifts = "FB543", Warning, Done, "errors that grow with time although amplitudes are bounded", "check a run as long as the longest that the model is for: phases run apart with angular velocity times duration";
     ResonanceDropped = "FB544", Warning, Done, "a dropped mode near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
+    LoadIdle = "FB545", Warning, Done, "a load that does nothing", "to see gravity and inertia bend a body that is held, let an interface carry it: [carried] in docs/simulate.md";
+    CarrierUnresolved = "FB546", Warning, Done, "modes that resolve the carried interface badly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and the interface in the manifest";
+    CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness that does not act while the body is carried", "it was given for the free body: trust spins that are slow beside the first frequency only";
+    RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
+    StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -5,15 +5,15 @@ mod support;
 use faer::Mat;
 use flexbody::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use flexbody::convert::{ConvertSettings, convert};
-use flexbody::dynamics::{Configuration, EulerParameters, Orientation, Terms};
+use flexbody::dynamics::{EulerParameters, Orientation, Terms};
 use flexbody::eigen::Wanted;
 use flexbody::flex_body::FlexBody;
 use flexbody::linalg::{gram, multiply};
 use flexbody::model::FeModel;
 use flexbody::progress::SILENT;
 use flexbody::scene::{
-    History, Initial, Measure, OtherModes, OutputErrors, Path, Recording, Resolution, Run, Scene, Scheme,
-    Spin, Tolerance, simulate,
+    Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Run, Scene, Scheme, Spin,
+    Tolerance, Trace, trace, trace_at,
 };
 use nalgebra::Vector3;
 use support::flexible::soft_block;
@@ -24,28 +24,40 @@ fn scene(duration: f64) -> Scene {
         run: Run {
             duration: Some(duration),
             outputs: 40,
+            most_steps: Run::MOST_STEPS,
             scheme: Scheme::Adaptive { tolerance: 1e-9 },
             terms: Terms::ALL,
         },
-        initial: Initial { angular_velocity: Vector3::new(0.02, 0.1, 0.01), ..Initial::default() },
+        initial: Initial {
+            angular_velocity: Vector3::new(0.02, 0.1, 0.01),
+            axes: Axes::Body,
+            ..Initial::default()
+        },
         gravity: None,
         loads: Vec::new(),
         spin: None,
+        carried: None,
         watched: Vec::new(),
         requirements: Default::default(),
         source: None,
+        resolved: false,
     }
 }
 
-fn motion(body: &FlexBody, scene: &Scene) -> Recording {
-    simulate(body, scene, None, |_| ()).expect("a motion").0
+fn motion(body: &FlexBody, scene: &Scene) -> Trace {
+    trace(body, scene, None, |_| ()).expect("a motion").0
 }
 
-/// The motion with other states.
-fn changed(recording: &Recording, change: impl Fn(usize, &mut Configuration)) -> Recording {
-    let mut other = recording.clone();
-    other.states.iter_mut().enumerate().for_each(|(i, state)| change(i, state));
+/// The motion with other modal coordinates.
+fn changed(motion: &Trace, change: impl Fn(usize, &mut Vec<f64>)) -> Trace {
+    let mut other = motion.clone();
+    other.q.iter_mut().enumerate().for_each(|(i, q)| change(i, q));
     other
+}
+
+/// The largest of values, none of them negative.
+fn most(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, f64::max)
 }
 
 #[test]
@@ -64,23 +76,16 @@ fn the_attitude_is_apart_by_the_angle_of_a_turn() {
     let recording = motion(&body, &scene(30.0));
     for angle in [1e-9, 1e-3, 3.0] {
         let (sin, cos) = f64::sin_cos(0.5 * angle);
-        let turned = changed(&recording, |i, state| {
-            let [a, b, c, d] = state.attitude.0;
-            // A turn about the x axis of the body behind it, at one instant; the sign of Euler parameters means nothing.
-            if i == 7 {
-                state.attitude = EulerParameters([
-                    a * cos - b * sin,
-                    b * cos + a * sin,
-                    c * cos + d * sin,
-                    d * cos - c * sin,
-                ]);
-                state.attitude.0.iter_mut().for_each(|e| *e = -*e);
-            }
-        });
-        let axes =
-            (recording.states[7].attitude.axes().transpose() * turned.states[7].attitude.axes()).trace();
+        // A turn about the x axis of the body behind it; the sign of Euler parameters means nothing.
+        let mut turned = recording.clone();
+        for attitude in &mut turned.attitude {
+            let [a, b, c, d] = attitude.0;
+            let both = [a * cos - b * sin, b * cos + a * sin, c * cos + d * sin, d * cos - c * sin];
+            *attitude = EulerParameters(both.map(|e| -e));
+        }
+        let axes = (recording.attitude[7].axes().transpose() * turned.attitude[7].axes()).trace();
         let found = Measure::new(&body, &recording).of_subset(&turned, &[0, 1, 2, 3]).largest().attitude;
-        assert!((found - angle).abs() < 1e-15 + 1e-13 * angle, "{found} {angle}");
+        assert!((found - angle).abs() < 1e-15 + 1e-7 * angle, "{found} {angle}");
         assert!((axes - (1.0 + 2.0 * angle.cos())).abs() < 1e-13, "the turn is one by {angle}");
     }
 }
@@ -91,21 +96,22 @@ fn deformations_are_apart_by_their_elastic_energy_and_the_nodes_that_move_most()
     let recording = motion(&body, &scene(30.0));
     let measure = Measure::new(&body, &recording);
     let amplitude = 1e-3;
-    let other = changed(&recording, |_, state| state.q[2] += amplitude);
+    let other = changed(&recording, |_, q| q[2] += amplitude);
     let errors = measure.of_subset(&other, &[0, 1, 2, 3, 4]).largest();
-    let most = recording.balances.iter().map(|balance| balance.elastic).fold(0.0, f64::max);
-    let expected = (0.5 * body.modes().eigenvalue[2] * amplitude * amplitude / most).sqrt();
+    let most_energy = most(recording.elastic.iter().copied());
+    let expected = (0.5 * body.modes().eigenvalue[2] * amplitude * amplitude / most_energy).sqrt();
     let stress = errors.stress.expect("a deformed body");
-    assert!((stress / expected - 1.0).abs() < 1e-9, "{stress} {expected}");
+    // What the motion does between the places where it was looked at adds a little to its largest energy.
+    assert!((stress / expected - 1.0).abs() < 1e-3 && stress <= expected, "{stress} {expected}");
     // The mode moves no node further than the one that it moves most along some axis does.
     let shape = &body.modes().shape;
     let of_node = |q: &[f64], i: usize| {
         Vector3::from_fn(|k, _| q.iter().enumerate().map(|(j, q)| shape[(3 * i + k, j)] * q).sum::<f64>())
             .norm()
     };
-    let most = |q: &[f64]| (0..body.n_nodes()).map(|i| of_node(q, i)).fold(0.0, f64::max);
-    let largest = recording.states.iter().map(|state| most(&state.q)).fold(0.0, f64::max);
-    let difference = most(&[0.0, 0.0, amplitude, 0.0, 0.0]);
+    let longest = |q: &[f64]| most((0..body.n_nodes()).map(|i| of_node(q, i)));
+    let largest = most(recording.q.iter().map(|q| longest(q)));
+    let difference = longest(&[0.0, 0.0, amplitude, 0.0, 0.0]);
     let deflection = errors.deflection.expect("a deformed body");
     assert!(
         (deflection / (difference / largest) - 1.0).abs() < 0.05,
@@ -119,14 +125,14 @@ fn modes_that_are_not_there_are_missing() {
     let body = soft_block(5);
     let recording = motion(&body, &scene(30.0));
     let kept = [4, 1];
-    let fewer = changed(&recording, |_, state| state.q = kept.iter().map(|&j| state.q[j]).collect());
+    let fewer = changed(&recording, |_, q| *q = kept.iter().map(|&j| q[j]).collect());
     let stress = Measure::new(&body, &recording).of_subset(&fewer, &kept).largest().stress;
-    let energy = |state: &Configuration, modes: &[usize]| -> f64 {
-        modes.iter().map(|&j| 0.5 * body.modes().eigenvalue[j] * state.q[j].powi(2)).sum()
+    let energy = |q: &[f64], modes: &[usize]| -> f64 {
+        modes.iter().map(|&j| 0.5 * body.modes().eigenvalue[j] * q[j].powi(2)).sum()
     };
-    let most = |modes: &[usize]| recording.states.iter().map(|s| energy(s, modes)).fold(0.0, f64::max);
-    let expected = (most(&[0, 2, 3]) / most(&[0, 1, 2, 3, 4])).sqrt();
-    assert!((stress.expect("a deformed body") / expected - 1.0).abs() < 1e-6);
+    let largest = |modes: &[usize]| most(recording.q.iter().map(|q| energy(q, modes)));
+    let expected = (largest(&[0, 2, 3]) / largest(&[0, 1, 2, 3, 4])).sqrt();
+    assert!((stress.expect("a deformed body") / expected - 1.0).abs() < 1e-3);
 }
 
 #[test]
@@ -134,29 +140,27 @@ fn watched_points_and_reactions_count_relative_to_their_largest() {
     let body = soft_block(4);
     let spin = Spin {
         axis: Vector3::z(),
+        axes: Axes::Body,
         rate: History::Sine { amplitude: 0.05, frequency: 0.1, phase: 0.0 },
         hold: true,
     };
     let recording = motion(&body, &Scene { spin: Some(spin), ..scene(20.0) });
+    let instants = recording.time.len();
     let mut other = recording.clone();
     let reactions = other.reactions.as_mut().expect("a prescribed spin");
-    let largest = recording.reactions.iter().flatten().map(|(_, torque)| torque.norm()).fold(0.0, f64::max);
-    reactions[3].1.x += 0.02 * largest;
-    let path = |deflection: Vec<f64>| Path {
-        name: "a point".to_owned(),
-        place: Vec::new(),
-        deflection: deflection.into_iter().map(|x| Vector3::new(x, 0.0, 0.0)).collect(),
-    };
-    let steps = || (0..41).map(f64::from);
+    let largest = most(recording.reactions.iter().flatten().map(|(_, torque)| torque.norm()));
+    reactions.iter_mut().for_each(|(_, torque)| torque.x += 0.02 * largest);
+    let along_x = |values: Vec<f64>| values.into_iter().map(|x| Vector3::new(x, 0.0, 0.0)).collect();
     let (mut a, mut b) = (recording.clone(), other);
-    a.paths = vec![path(steps().collect()), path(vec![0.0; 41])];
-    b.paths = vec![path(steps().collect()), path(steps().map(|x| 0.1 * x).collect())];
+    a.deflections = vec![along_x(recording.time.clone()), along_x(vec![0.0; instants])];
+    let tenth = recording.time.iter().map(|t| 0.1 * t).collect();
+    b.deflections = vec![along_x(recording.time.clone()), along_x(tenth)];
     let history = Measure::new(&body, &a).of_subset(&b, &[0, 1, 2, 3]);
     let errors = history.largest();
-    assert!((errors.reaction.expect("a reaction") - 0.02).abs() < 1e-12);
+    assert!((errors.reaction.expect("a reaction") - 0.02).abs() < 1e-4);
     assert!((errors.deflection.expect("a path") - 0.1).abs() < 1e-15);
-    // What grows like time is 40 in the end and 20 in the middle.
-    assert!((history.growth().expect("an error") - 2.0).abs() < 1e-12);
+    // What grows like time is twice as large in the end as in the middle of the run, however unevenly it was looked at.
+    assert!((history.growth().expect("an error") - 2.0).abs() < 0.1);
     let tolerance = Tolerance { deflection: 0.05, ..Tolerance::default() };
     assert!((errors.worst(&tolerance) - 2.0).abs() < 1e-12 && !errors.within(&tolerance));
 }
@@ -166,7 +170,7 @@ fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let body = soft_block(4);
     let at_rest = Scene { initial: Initial::default(), ..scene(1.0) };
     let recording = motion(&body, &at_rest);
-    let other = changed(&recording, |_, state| state.q[0] += 1e-20);
+    let other = changed(&recording, |_, q| q[0] += 1e-20);
     let errors = Measure::new(&body, &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
     let least = Resolution::new(&body, None);
     let lambda = body.modes().eigenvalue[0];
@@ -213,24 +217,25 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     let rate = reference.modes().eigenvalue[0].sqrt();
     let mut turning = scene(3.0 / rate);
     turning.initial.angular_velocity *= 0.3 * rate;
-    let recordings = [&candidate, &reference].map(|body| motion(body, &turning));
+    let whole = motion(&reference, &turning);
+    let recordings = [trace_at(&candidate, &turning, &whole.time).expect("a motion"), whole];
     let found = Measure::new(&reference, &recordings[1]).of_other(&recordings[0], &modes).largest();
 
     // Displacements of all rows, and their energy, one instant after the other.
     let displacements = |which: usize, i: usize| {
-        let q = &recordings[which].states[i].q;
+        let q = &recordings[which].q[i];
         Mat::from_fn(vectors[which].nrows(), 1, |row, _| {
             q.iter().enumerate().map(|(j, q)| vectors[which][(row, j)] * q).sum::<f64>()
         })
     };
     let energy = |u: &Mat<f64>| 0.5 * gram(u.as_ref(), weighted(u).as_ref())[(0, 0)];
-    let most = |of: &dyn Fn(usize) -> f64| (0..41).map(of).fold(0.0, f64::max);
-    let expected = (most(&|i| energy(&(displacements(0, i) - displacements(1, i))))
-        / most(&|i| energy(&displacements(1, i))))
+    let largest = |of: &dyn Fn(usize) -> f64| most((0..recordings[1].time.len()).map(of));
+    let expected = (largest(&|i| energy(&(displacements(0, i) - displacements(1, i))))
+        / largest(&|i| energy(&displacements(1, i))))
     .sqrt();
     let stress = found.stress.expect("a deformed body");
     assert!(expected > 1e-3, "residual vectors matter here: {expected}");
-    assert!((stress / expected - 1.0).abs() < 1e-6, "{stress} {expected}");
+    assert!((stress / expected - 1.0).abs() < 1e-3, "{stress} {expected}");
     // A basis is no distance from itself, to the square root of rounding in K.
     let own = gram(vectors[1].as_ref(), weighted(&vectors[1]).as_ref());
     let itself = OtherModes::new(&reference, &reference, own.as_ref()).expect("one body");

@@ -7,7 +7,7 @@ use flexbody::flex_body::{FlexBody, Groups};
 use flexbody::progress::SILENT;
 use flexbody::scene::{
     AttachmentKind, Initial, Measure, MotionRange, Range, Requirements, Run, Scene, Scheme, Tolerance,
-    simulate,
+    simulate, trace, trace_at,
 };
 use flexbody::selection::{Selection, select};
 use nalgebra::Vector3;
@@ -38,10 +38,10 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
 
 /// The largest error over its tolerance of a selected body in a scene; `None` where the whole body cannot follow it.
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f64> {
-    let (reference, _) = simulate(whole, scene, None, |_| ()).ok()?;
+    let (reference, _) = trace(whole, scene, None, |_| ()).ok()?;
     let own = reduced(whole, selection);
-    let (recording, _) = simulate(&own, &scene.of_modes(&selection.modes), None, |_| ()).expect("a motion");
-    let errors = Measure::new(whole, &reference).of_subset(&recording, &selection.modes).largest();
+    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time).expect("a motion");
+    let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
     Some(errors.worst(&scene.requirements.tolerance))
 }
 
@@ -116,6 +116,7 @@ fn idle(requirements: Requirements) -> Scene {
         run: Run {
             duration: None,
             outputs: 500,
+            most_steps: Run::MOST_STEPS,
             scheme: Scheme::Adaptive { tolerance: 1e-9 },
             terms: Terms::ALL,
         },
@@ -123,9 +124,11 @@ fn idle(requirements: Requirements) -> Scene {
         gravity: None,
         loads: Vec::new(),
         spin: None,
+        carried: None,
         watched: Vec::new(),
         requirements,
         source: None,
+        resolved: false,
     }
 }
 

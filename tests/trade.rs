@@ -8,7 +8,7 @@ use flexbody::flex_body::{FlexBody, Groups, Storage};
 use flexbody::invariants::BodyFrame;
 use flexbody::model::FeModel;
 use flexbody::progress::SILENT;
-use flexbody::scene::{Initial, ModeStart, Run, Scene, Scheme, simulate};
+use flexbody::scene::{Axes, Initial, ModeStart, Run, Scene, Scheme, simulate};
 use flexbody::trade::{
     Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
 };
@@ -30,16 +30,19 @@ fn tumble(spin: f64, turns: f64) -> Scene {
         run: Run {
             duration: Some(turns * std::f64::consts::TAU / spin),
             outputs: 60,
+            most_steps: Run::MOST_STEPS,
             scheme: Scheme::Adaptive { tolerance: 1e-10 },
             terms: Terms::ALL,
         },
-        initial: Initial { angular_velocity: axis * spin, ..Initial::default() },
+        initial: Initial { angular_velocity: axis * spin, axes: Axes::Body, ..Initial::default() },
         gravity: None,
         loads: Vec::new(),
         spin: None,
+        carried: None,
         watched: Vec::new(),
         requirements: Default::default(),
         source: None,
+        resolved: false,
     }
 }
 

@@ -4,7 +4,7 @@ use super::arguments::SelectArguments;
 use super::convert::{read_loads, responses_to};
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
-use super::resources::memory_left;
+use super::resources::{memory_left, use_threads};
 use super::watcher::Watcher;
 use crate::basis::{BasisChoice, FreeSurface, ModeSettings};
 use crate::convert::ConvertSettings;
@@ -26,6 +26,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), arguments.report.iter())?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
@@ -40,7 +41,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let selection =
         select(&body, &scene, memory_left(None), &watch).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
-    let run = RunData { phases: watcher.finish(), diagnostics, ..RunData::default() };
+    let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     tell(arguments.printing, &run.diagnostics);
     let facts = SelectionFacts::new(&selection, &run);
     for (slot, format) in reports.iter().zip(formats) {

@@ -3,7 +3,7 @@
 use super::arguments::SimulateArguments;
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
-use super::resources::memory_left;
+use super::resources::{memory_left, use_threads};
 use super::watcher::Watcher;
 use crate::error::Result;
 use crate::output::OutputSlot;
@@ -19,6 +19,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let motion = arguments.output.as_ref().map(store::prepare_output).transpose()?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
@@ -27,7 +28,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let (recording, diagnostics) =
         simulate(&body, &scene, memory_left(None), |part| watcher.hear(Event::Fraction(part)))
             .map_err(|error| error.in_file(&arguments.scene))?;
-    let run = RunData { phases: watcher.finish(), diagnostics, ..RunData::default() };
+    let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     tell(arguments.printing, &run.diagnostics);
     let facts = SimulationFacts::new(&recording, body.units(), &run);
 

@@ -202,6 +202,14 @@ impl EquationsOfMotion {
         self.rigid.len() + self.nf
     }
 
+    /// Elastic energy q'K_ff q / 2.
+    ///
+    /// # Panics
+    /// When `q` has another number of entries than there are modes.
+    pub fn elastic_energy(&self, q: &[f64]) -> f64 {
+        0.5 * self.stiffness.quadratic(q)
+    }
+
     /// The terms that are there.
     pub fn terms(&self) -> Terms {
         self.terms

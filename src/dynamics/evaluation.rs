@@ -321,7 +321,7 @@ impl<'a> Evaluation<'a> {
 
     /// U = q' K_ff q / 2.
     pub fn elastic_energy(&self) -> f64 {
-        0.5 * self.equations.stiffness.quadratic(&self.q)
+        self.equations.elastic_energy(&self.q)
     }
 
     /// V, omega: velocity of the origin and angular velocity of the body frame, body axes.

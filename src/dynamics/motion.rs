@@ -205,6 +205,13 @@ impl<'a> Motion<'a> {
         (self.size.mass, self.size.radius)
     }
 
+    /// Elastic energy of a deformation that is 1e-9 of the radius of gyration in the softest mode: far below what is integrated, far above
+    /// rounding.
+    pub fn least_energy(&self) -> f64 {
+        const PART: f64 = 1e-9;
+        0.5 * self.size.mass * (PART * self.size.radius * self.size.first_rate).powi(2)
+    }
+
     /// The body at a state.
     ///
     /// # Errors
@@ -231,6 +238,11 @@ impl<'a> Motion<'a> {
 
     fn layout(&self) -> Layout {
         Layout(self.evaluation.equations().n_modes())
+    }
+
+    /// Attitude of the frame and modal coordinates at a state.
+    pub fn shape<'s>(&self, state: &'s [f64]) -> (EulerParameters, &'s [f64]) {
+        (attitude(state), &state[Layout::MODES..self.layout().linear()])
     }
 
     /// Sets the evaluation; the place and the rates of what is prescribed.

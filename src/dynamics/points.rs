@@ -144,6 +144,11 @@ impl BodyPoint {
         self.position + self.translation.at(&evaluation.q)
     }
 
+    /// Deflection r(q) - r(0) from the undeformed body, body axes.
+    pub fn deflection(&self, q: &[f64]) -> Vector3<f64> {
+        self.translation.at(q)
+    }
+
     /// Velocity V + omega x r(q) + dr/dt.
     pub fn velocity(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
         let turned = evaluation.omega.cross(&self.place(evaluation));

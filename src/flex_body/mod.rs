@@ -1,9 +1,11 @@
 //! The product: a validated flexible body, independent of the files it came from and goes to.
 
 mod body;
+mod carried;
 mod fixed_interface;
 mod in_units;
 mod interface;
+mod model_axes;
 mod model_rows;
 mod parts;
 mod reduced;
@@ -14,6 +16,7 @@ mod validate;
 pub use crate::invariants::{Frame, Group, Groups};
 pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 pub use body::FlexBody;
+pub use carried::Carrier;
 pub use fixed_interface::FixedInterface;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
 pub use parts::{

@@ -3,8 +3,8 @@
 use super::adopt::{ANY_BODY, DIGITS};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
-use crate::invariants::{Expected, GeneralTerms, Groups, IdentityCheck, Invariants, identities};
-use crate::linalg::{dense_cholesky, symmetric_eigen};
+use crate::invariants::{Expected, GeneralTerms, IdentityCheck, Invariants, identities};
+use crate::linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 use faer::Mat;
 
 /// A mode of which less than this part of its squared M-norm is left without rigid motion is a rigid motion.
@@ -65,7 +65,7 @@ impl FreeSurface {
             Err(Diagnostic::new(Code::ForeignIncomplete, message).with_help(help).into())
         };
         let nf = invariants.n_modes();
-        let mass = mass_matrix(invariants);
+        let mass = invariants.mass_matrix();
         let of_rigid = mass.as_ref().submatrix(0, 0, 6, 6).to_owned();
         let Some(lower) = dense_cholesky(of_rigid) else {
             return refuse("the mass matrix of rigid motion is not positive definite");
@@ -158,9 +158,9 @@ impl FreeSurface {
             None => -taken[(i, j)],
             Some(mode) => self.modes[(mode, j)],
         });
-        let mut new = with_rigid(old).with_basis(t.as_ref());
+        let mut new = old.with_rigid_modes().with_basis(t.as_ref());
         if let Some(general) = &old.general {
-            let (own, mut w3) = (w3_of_s(old), w3_of_s(&new));
+            let (own, mut w3) = (old.w3_of_s(), new.w3_of_s());
             let count = new.n_modes();
             for a in 0..3 {
                 let beside = Mat::from_fn(nf, nf, |i, j| general.w3[(a * nf + i, j)] - own[(a * nf + i, j)]);
@@ -172,110 +172,4 @@ impl FreeSurface {
         }
         new.with_groups(old.groups)
     }
-}
-
-/// W3 by its formula from S.
-fn w3_of_s(invariants: &Invariants) -> Mat<f64> {
-    let solid = Invariants { general: None, groups: Groups::ALL, ..invariants.clone() };
-    solid.w3().expect("held")
-}
-
-/// [m I, -c~, C1; ., I0, C2; ., ., m_ff]: M in the six rigid motions and the modes.
-fn mass_matrix(invariants: &Invariants) -> Mat<f64> {
-    let (c1, c2, modal) = (&invariants.c1, invariants.c2(), invariants.modal_mass());
-    let (lever, inertia) = (invariants.first_moment.cross_matrix(), invariants.inertia());
-    let nf = invariants.n_modes();
-    Mat::from_fn(6 + nf, 6 + nf, |i, j| match (i.min(j), i.max(j)) {
-        (a, b) if b < 3 => invariants.mass * f64::from(a == b),
-        (a, b) if a < 3 && b < 6 => -lever[(a, b - 3)],
-        (a, b) if b < 6 => inertia[(a - 3, b - 3)],
-        (a, b) if a < 3 => c1[(a, b - 6)],
-        (a, b) if a < 6 => c2[(a - 3, b - 6)],
-        _ => modal[(i - 6, j - 6)],
-    })
-}
-
-/// The sign of the permutation (a, b, c) of (0, 1, 2); 0 where an index repeats.
-fn permutation(a: usize, b: usize, c: usize) -> f64 {
-    match (3 + b - a) % 3 {
-        0 => 0.0,
-        1 if c == 3 - a - b => 1.0,
-        2 if c == 3 - a - b => -1.0,
-        _ => 0.0,
-    }
-}
-
-/// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes before the others.
-fn with_rigid(old: &Invariants) -> Invariants {
-    let nf = old.n_modes();
-    let (m, c, j) = (old.mass, &old.first_moment, &old.second_moment);
-    let axes = || 0..3;
-    let delta = |a: usize, b: usize| f64::from(a == b);
-    // (e_d x c)_l.
-    let turned = |l: usize, d: usize| axes().map(|i| permutation(l, d, i) * c[i]).sum::<f64>();
-    let c1 = Mat::from_fn(3, 6 + nf, |k, p| match p {
-        0..3 => m * delta(k, p),
-        3..6 => turned(k, p - 3),
-        _ => old.c1[(k, p - 6)],
-    });
-    let ibar = |k: usize, l: usize, p: usize| match p {
-        0..3 => delta(l, p) * c[k],
-        3..6 => axes().map(|i| permutation(l, p - 3, i) * j[(k, i)]).sum(),
-        _ => old.ibar[k][l][p - 6],
-    };
-    // u_k' Ms v_l of motions in this order: translations, rotations, modes.
-    let product = |k: usize, l: usize, p: usize, q: usize| match (p, q) {
-        (0..3, 0..3) => delta(k, p) * delta(l, q) * m,
-        (0..3, 3..6) => delta(k, p) * turned(l, q - 3),
-        (0..3, _) => delta(k, p) * old.c1[(l, q - 6)],
-        (3..6, 3..6) => {
-            let entry = |a: usize, b: usize| permutation(k, p - 3, a) * permutation(l, q - 3, b) * j[(a, b)];
-            axes().flat_map(|a| axes().map(move |b| (a, b))).map(|(a, b)| entry(a, b)).sum()
-        }
-        (3..6, _) => axes().map(|i| permutation(k, p - 3, i) * old.ibar[i][l][q - 6]).sum(),
-        _ => old.s[k][l][(p - 6, q - 6)],
-    };
-    let rank = |p: usize| (p / 3).min(2);
-    let s = |k: usize, l: usize| {
-        Mat::from_fn(6 + nf, 6 + nf, |p, q| {
-            if rank(p) <= rank(q) { product(k, l, p, q) } else { product(l, k, q, p) }
-        })
-    };
-    Invariants {
-        mass: m,
-        first_moment: *c,
-        second_moment: *j,
-        c1,
-        ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| (0..6 + nf).map(|p| ibar(k, l, p)).collect())),
-        s: [0, 1, 2].map(|k| [0, 1, 2].map(|l| s(k, l))),
-        modal_stiffness: Mat::from_fn(6 + nf, 6 + nf, |p, q| {
-            if p < 6 || q < 6 { 0.0 } else { old.modal_stiffness[(p - 6, q - 6)] }
-        }),
-        general: None,
-        groups: Groups::ALL,
-    }
-}
-
-/// L^-1 B.
-fn solve_lower(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
-    let mut x = b.clone();
-    for j in 0..x.ncols() {
-        for i in 0..x.nrows() {
-            let before: f64 = (0..i).map(|k| lower[(i, k)] * x[(k, j)]).sum();
-            x[(i, j)] = (x[(i, j)] - before) / lower[(i, i)];
-        }
-    }
-    x
-}
-
-/// L^-T B.
-fn solve_upper(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
-    let mut x = b.clone();
-    for j in 0..x.ncols() {
-        for i in (0..x.nrows()).rev() {
-            let after: f64 = (i + 1..x.nrows()).map(|k| lower[(k, i)] * x[(k, j)]).sum();
-            x[(i, j)] = (x[(i, j)] - after) / lower[(i, i)];
-        }
-    }
-    x
 }

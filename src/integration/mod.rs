@@ -8,5 +8,5 @@ mod system;
 
 pub use explicit::Explicit;
 pub use gauss::Gauss;
-pub use schedule::{Method, integrate};
+pub use schedule::{Method, Sight, integrate, integrate_closely};
 pub use system::{Failure, Oscillator, System, Work};

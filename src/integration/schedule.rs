@@ -13,7 +13,7 @@ const BEFORE_BREAK: f64 = 4.0 * f64::EPSILON;
 pub enum Method {
     /// Steps as long as the tolerance allows.
     Explicit(Explicit),
-    /// Steps of one length between two instants, at most `step`.
+    /// Steps of one length between two breaks, at most `step`.
     Gauss {
         /// The method.
         method: Gauss,
@@ -39,8 +39,20 @@ impl Method {
     }
 }
 
+/// What a state that is shown belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sight {
+    /// An instant that was asked for.
+    Instant,
+    /// The start, the end of a step, and both sides of a break.
+    End,
+    /// A place within a step.
+    Within,
+}
+
 /// Integrates from the first to the last of `instants` and shows the state at every one to `observe`, which may end the integration
-/// by returning an error.
+/// by returning an error. The steps do not depend on the instants between: within a step the explicit method interpolates, and the
+/// method of Gauss takes a shorter step aside.
 ///
 /// * `state`: y at the first instant; afterwards, y at the last.
 /// * `instants`: ascending.
@@ -59,50 +71,159 @@ pub fn integrate<E: From<Failure>>(
     breaks: &[f64],
     mut observe: impl FnMut(f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
+    integrate_closely(method, system, state, instants, breaks, 1, |sight, time, state| match sight {
+        Sight::Instant => observe(time, state),
+        Sight::End | Sight::Within => Ok(()),
+    })
+}
+
+/// As [`integrate`], and shows besides the instants the state at the start, at the end of every step, at both sides of every break and, of
+/// the explicit method, at `parts` - 1 places within every step that divide it evenly. Times never descend; an instant at one of these
+/// places is shown twice.
+///
+/// # Errors
+/// As [`integrate`].
+///
+/// # Panics
+/// As [`integrate`].
+pub fn integrate_closely<E: From<Failure>>(
+    method: &mut Method,
+    system: &mut dyn System,
+    state: &mut [f64],
+    instants: &[f64],
+    breaks: &[f64],
+    parts: usize,
+    mut observe: impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
+) -> Result<(), E> {
     let (Some(&start), Some(&last)) = (instants.first(), instants.last()) else { return Ok(()) };
-    observe(start, state)?;
-    let mut wanted = instants[1..].iter().copied().peekable();
-    let stops = breaks.iter().copied().filter(|&at| start < at && at < last).chain([last]);
-    let (mut time, mut length) = (start, 0.0);
-    let mut within = vec![0.0; state.len()];
-    for stop in stops {
+    observe(Sight::End, start, state)?;
+    observe(Sight::Instant, start, state)?;
+    let mut wanted = Wanted { rest: &instants[1..] };
+    let mut from = start;
+    for stop in breaks.iter().copied().filter(|&at| start < at && at < last).chain([last]) {
         method.restart();
         // f at a break is that after it, which is not what the last rate of an explicit step is about.
-        let before = if breaks.contains(&stop) { stop - BEFORE_BREAK * stop.abs() } else { stop };
-        while time < stop {
-            match method {
-                Method::Explicit(_) if time >= before => time = stop,
-                Method::Explicit(method) => {
-                    let end = method.step(system, time, state, before)?;
-                    finite(state, time)?;
-                    time = if end < before { end } else { stop };
-                    while let Some(instant) = wanted.next_if(|&instant| instant < time) {
-                        method.interpolate(system, instant, state, &mut within)?;
-                        observe(instant, &within)?;
-                    }
-                }
-                Method::Gauss { method, step } => {
-                    let end = wanted.peek().map_or(stop, |&instant| instant.min(stop));
-                    let from = time;
-                    let steps = ((end - from) / *step * (1.0 - STEP_ROUNDING)).ceil().max(1.0);
-                    // Lengths that differ by the rounding of times are one length.
-                    let even = (end - from) / steps;
-                    if (length - even).abs() > STEP_ROUNDING * even {
-                        length = even;
-                    }
-                    let mut taken = 0.0;
-                    while taken < steps {
-                        method.step(system, time, state, length)?;
-                        finite(state, time)?;
-                        taken += 1.0;
-                        time = if taken < steps { from + taken * length } else { end };
-                    }
-                }
+        let piece = Piece { from, before: if breaks.contains(&stop) { just_before(stop) } else { stop } };
+        match method {
+            Method::Explicit(method) => {
+                explicit_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;
             }
-            while let Some(instant) = wanted.next_if(|&instant| instant <= time) {
-                observe(instant, state)?;
+            Method::Gauss { method, step } => {
+                gauss_piece(method, *step, system, state, piece, &mut wanted, &mut observe)?;
             }
         }
+        if piece.before < stop {
+            observe(Sight::End, stop, state)?;
+        }
+        while let Some(instant) = wanted.next_until(stop) {
+            observe(Sight::Instant, instant, state)?;
+        }
+        from = stop;
+    }
+    Ok(())
+}
+
+/// The last time before a break that f does not count as after it.
+fn just_before(stop: f64) -> f64 {
+    stop - BEFORE_BREAK * stop.abs()
+}
+
+/// A stretch of time without breaks.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    from: f64,
+    /// Its end, just before the break there.
+    before: f64,
+}
+
+/// The instants that were not shown yet.
+struct Wanted<'i> {
+    rest: &'i [f64],
+}
+
+impl Wanted<'_> {
+    /// The next one where it is not after `time`.
+    fn next_until(&mut self, time: f64) -> Option<f64> {
+        let (&first, rest) = self.rest.split_first()?;
+        (first <= time).then(|| {
+            self.rest = rest;
+            first
+        })
+    }
+
+    /// The next one where it is before `time`.
+    fn next_before(&mut self, time: f64) -> Option<f64> {
+        self.rest.first().filter(|&&first| first < time)?;
+        self.next_until(time)
+    }
+}
+
+fn explicit_piece<E: From<Failure>>(
+    method: &mut Explicit,
+    system: &mut dyn System,
+    state: &mut [f64],
+    piece: Piece,
+    parts: usize,
+    wanted: &mut Wanted<'_>,
+    observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut within = vec![0.0; state.len()];
+    let mut time = piece.from;
+    while time < piece.before {
+        let end = method.step(system, time, state, piece.before)?;
+        finite(state, time)?;
+        for part in 1..=parts {
+            let place = if part < parts { time + (end - time) * (part as f64 / parts as f64) } else { end };
+            while let Some(instant) = wanted.next_before(place) {
+                method.interpolate(system, instant, state, &mut within)?;
+                observe(Sight::Instant, instant, &within)?;
+            }
+            if part < parts {
+                method.interpolate(system, place, state, &mut within)?;
+                observe(Sight::Within, place, &within)?;
+            }
+        }
+        observe(Sight::End, end, state)?;
+        time = end;
+    }
+    Ok(())
+}
+
+fn gauss_piece<E: From<Failure>>(
+    method: &mut Gauss,
+    longest: f64,
+    system: &mut dyn System,
+    state: &mut [f64],
+    piece: Piece,
+    wanted: &mut Wanted<'_>,
+    observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut aside: Option<Gauss> = None;
+    let mut before = state.to_vec();
+    let span = piece.before - piece.from;
+    let steps = (span / longest * (1.0 - STEP_ROUNDING)).ceil().max(1.0);
+    let length = span / steps;
+    let (mut time, mut taken) = (piece.from, 0.0);
+    while taken < steps {
+        before.copy_from_slice(state);
+        method.step(system, time, state, length)?;
+        finite(state, time)?;
+        taken += 1.0;
+        let end = if taken < steps { piece.from + taken * length } else { piece.before };
+        // What lies within rounding of the end is at the end.
+        while let Some(instant) = wanted.next_before(end - STEP_ROUNDING * length) {
+            let aside = aside.get_or_insert_with(|| method.clone());
+            let mut within = before.clone();
+            aside.restart();
+            aside.step(system, time, &mut within, instant - time)?;
+            finite(&within, time)?;
+            observe(Sight::Instant, instant, &within)?;
+        }
+        while let Some(instant) = wanted.next_before(end) {
+            observe(Sight::Instant, instant, state)?;
+        }
+        observe(Sight::End, end, state)?;
+        time = end;
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ mod lumped;
 mod numbered;
 mod primary;
 mod principal_axes;
+mod rigid_modes;
 mod softening;
 mod transform;
 

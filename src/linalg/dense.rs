@@ -87,6 +87,30 @@ fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     difference.norm_max() / a.norm_max().max(f64::MIN_POSITIVE)
 }
 
+/// L^-1 B of a lower triangle L.
+pub fn solve_lower(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+    let mut x = b.clone();
+    for j in 0..x.ncols() {
+        for i in 0..x.nrows() {
+            let before: f64 = (0..i).map(|k| lower[(i, k)] * x[(k, j)]).sum();
+            x[(i, j)] = (x[(i, j)] - before) / lower[(i, i)];
+        }
+    }
+    x
+}
+
+/// L^-T B of a lower triangle L.
+pub fn solve_upper(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+    let mut x = b.clone();
+    for j in 0..x.ncols() {
+        for i in (0..x.nrows()).rev() {
+            let after: f64 = (i + 1..x.nrows()).map(|k| lower[(k, i)] * x[(k, j)]).sum();
+            x[(i, j)] = (x[(i, j)] - after) / lower[(i, i)];
+        }
+    }
+    x
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

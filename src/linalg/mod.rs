@@ -22,7 +22,7 @@ mod tree_walk;
 pub use compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
 pub use compensated_pencil::small_pencil_eigenvalues;
 pub use compensated_product::{CompensatedBlock, LANES, gram_compensated, multiply_compensated, sum_length};
-pub use dense::{SymmetricEigen, dense_cholesky, symmetric_eigen};
+pub use dense::{SymmetricEigen, dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;

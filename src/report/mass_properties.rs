@@ -1,5 +1,6 @@
 //! Mass, centre of mass and principal inertia of a body, whatever its frame.
 
+use super::numbers::significant;
 use crate::flex_body::FlexBody;
 use crate::invariants::Invariants;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -62,7 +63,18 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
         (false, true) => "axes of the model",
         (false, false) => "axes neither principal nor of the model",
     };
-    format!("{origin}, {axes}")
+    let turned = turned_degrees(&frame.axes);
+    if body.source().n_dofs == 0 || turned < 1e-9 {
+        return format!("{origin}, {axes}");
+    }
+    format!("{origin}, {axes}, turned by {} degrees from those of the model", significant(turned, 4))
+}
+
+/// The angle between the body axes and those of the model, degrees.
+fn turned_degrees(axes: &Matrix3<f64>) -> f64 {
+    let skew =
+        Vector3::new(axes[(2, 1)] - axes[(1, 2)], axes[(0, 2)] - axes[(2, 0)], axes[(1, 0)] - axes[(0, 1)]);
+    skew.norm().atan2(axes.trace() - 1.0).to_degrees()
 }
 
 /// c / m: in the body frame. Unit: length.

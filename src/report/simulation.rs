@@ -16,6 +16,7 @@ use crate::scene::{Drift, Recording, Scheme};
 use crate::units::UnitSystem;
 use nalgebra::Vector3;
 use serde::Serialize;
+use std::f64::consts::TAU;
 use std::fmt::Write;
 
 /// Facts of a simulation, and its recording.
@@ -37,6 +38,14 @@ pub struct SimulationFacts<'a> {
     first: EnergyFacts,
     last: EnergyFacts,
     largest_spin: f64,
+    /// Axes of the model, turning with the body.
+    largest_spin_components: [f64; 3],
+    /// Axes of the model at the start.
+    gravity: Option<[f64; 3]>,
+    /// What carries the body, and its natural frequencies so.
+    carried: Option<CarriedFacts<'a>>,
+    /// What the origin of the frame is.
+    frame_origin: String,
     largest_deflection: f64,
     points: Vec<PointFacts<'a>>,
     diagnostics: &'a [Diagnostic],
@@ -51,6 +60,14 @@ pub struct SimulationFacts<'a> {
 enum MethodFacts {
     Adaptive { order: usize, tolerance: f64 },
     Conserving { order: usize, step: f64 },
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct CarriedFacts<'a> {
+    by: &'a str,
+    frequency_hz: Vec<f64>,
+    largest_force: f64,
+    largest_torque: f64,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -76,11 +93,18 @@ impl<'a> SimulationFacts<'a> {
             let of = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
             EnergyFacts { kinetic: of(|b| b.kinetic), elastic: of(|b| b.elastic), work: of(|b| b.work) }
         };
-        let largest =
-            |vectors: &mut dyn Iterator<Item = Vector3<f64>>| vectors.map(|v| v.norm()).fold(0.0, f64::max);
-        let points = recording.paths.iter().map(|path| PointFacts {
+        let extremes = &recording.extremes;
+        let setting = &recording.setting;
+        let hertz = |lambda: &f64| lambda.max(0.0).sqrt() / TAU * units.hertz();
+        let carried = setting.carrier.as_deref().map(|by| CarriedFacts {
+            by,
+            frequency_hz: setting.eigenvalues.iter().map(hertz).collect(),
+            largest_force: extremes.reaction.0,
+            largest_torque: extremes.reaction.1,
+        });
+        let points = recording.paths.iter().zip(&extremes.watched).map(|(path, peak)| PointFacts {
             name: &path.name,
-            largest_deflection: largest(&mut path.deflection.iter().copied()),
+            largest_deflection: peak.value,
             last_place: path.place.last().copied().unwrap_or_default().into(),
         });
         Self {
@@ -104,8 +128,12 @@ impl<'a> SimulationFacts<'a> {
             angular_momentum_drift: angular,
             first: energies(recording.balances.first()),
             last: energies(recording.balances.last()),
-            largest_spin: largest(&mut recording.states.iter().map(|state| state.omega)),
-            largest_deflection: recording.deflection,
+            largest_spin: extremes.spin,
+            largest_deflection: extremes.deflection.value,
+            largest_spin_components: extremes.spin_about.into(),
+            gravity: setting.gravity.map(Into::into),
+            carried,
+            frame_origin: setting.origin_in_words(),
             points: points.collect(),
             diagnostics: &run.diagnostics,
             wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
@@ -162,6 +190,41 @@ impl<'a> SimulationFacts<'a> {
         )
     }
 
+    fn gravity_in_words(&self) -> Option<String> {
+        let [x, y, z] = self.gravity?.map(|g| significant(g, 6));
+        let turned = if self.largest_spin > 0.0 { " at the start" } else { "" };
+        Some(format!("{x}, {y}, {z} {} along the axes of the model{turned}", self.unit(0, 1, -2)))
+    }
+
+    fn spin_in_words(&self) -> String {
+        let most = format!("{} rad/{}", significant(self.largest_spin, 5), self.units.time());
+        if self.largest_spin == 0.0 {
+            return most;
+        }
+        let [x, y, z] = self.largest_spin_components.map(|w| significant(w, 5));
+        format!("{most}; at most {x}, {y}, {z} about the axes of the model")
+    }
+
+    fn carried_in_words(&self) -> Vec<(&'static str, String)> {
+        const FIRST: usize = 6;
+        let Some(carried) = &self.carried else { return Vec::new() };
+        let first: Vec<String> =
+            carried.frequency_hz.iter().take(FIRST).map(|hertz| significant(*hertz, 5)).collect();
+        let more = if carried.frequency_hz.len() > FIRST { " ..." } else { "" };
+        let (force, torque) = (significant(carried.largest_force, 5), significant(carried.largest_torque, 5));
+        vec![
+            ("Carried", format!("by {}; natural frequencies so {}{more} Hz", carried.by, first.join(" "))),
+            (
+                "Reaction",
+                format!(
+                    "force at most {force} {}, torque at most {torque} {}",
+                    self.unit(1, 1, -2),
+                    self.unit(1, 2, -2)
+                ),
+            ),
+        ]
+    }
+
     fn text(&self) -> String {
         let mut page = Page(String::new());
         let duration = significant(self.duration, 6);
@@ -184,10 +247,13 @@ impl<'a> SimulationFacts<'a> {
                 self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift
             ),
         );
-        page.entry(
-            "Spin",
-            &format!("at most {} rad/{}", significant(self.largest_spin, 5), self.units.time()),
-        );
+        if let Some(gravity) = self.gravity_in_words() {
+            page.entry("Gravity", &gravity);
+        }
+        page.entry("Spin", &format!("at most {}", self.spin_in_words()));
+        for (what, words) in self.carried_in_words() {
+            page.entry(what, &words);
+        }
         let part = significant(100.0 * self.largest_deflection, 3);
         page.entry("Deflection", &format!("{part} % of the largest extent of the body"));
         for point in &self.points {
@@ -239,10 +305,7 @@ impl<'a> SimulationFacts<'a> {
             ("Energy at the start", escape(&self.energy_in_words(&self.first))),
             ("Energy at the end", escape(&self.energy_in_words(&self.last))),
             ("Work of loads and damping", format!("{} {}", significant(self.last.work, 6), units(1, 2, -2))),
-            (
-                "Largest spin",
-                format!("{} rad/{}", significant(self.largest_spin, 5), escape(&self.units.time())),
-            ),
+            ("Largest spin", escape(&self.spin_in_words())),
             (
                 "Largest deflection",
                 format!(
@@ -251,6 +314,8 @@ impl<'a> SimulationFacts<'a> {
                 ),
             ),
         ];
+        items.extend(self.gravity_in_words().map(|gravity| ("Gravity", escape(&gravity))));
+        items.extend(self.carried_in_words().into_iter().map(|(what, words)| (what, escape(&words))));
         for point in &self.points {
             let [x, y, z] = point.last_place.map(|v| significant(v, 6));
             items.push((
@@ -291,15 +356,23 @@ impl<'a> SimulationFacts<'a> {
         let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
         chart("Drift of the energy", vec![line("less work", lost)], energy);
         let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
-        chart("Angular velocity, body axes", components(&omega), format!("rad {}^-1", self.units.time()));
+        chart(
+            "Angular velocity, axes of the model",
+            components(&omega),
+            format!("rad {}^-1", self.units.time()),
+        );
         chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
         for path in paths {
-            let title = format!("Deflection of {}, body axes", path.name);
+            let title = format!("Deflection of {}, axes of the model", path.name);
             chart(&title, components(&path.deflection), self.units.length().clone());
         }
         if let Some(reactions) = reactions {
             let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
-            chart("Torque of the prescribed motion, body axes", components(&torques), self.unit(1, 2, -2));
+            chart(
+                "Torque of the prescribed motion, axes of the model",
+                components(&torques),
+                self.unit(1, 2, -2),
+            );
         }
     }
 

@@ -1,6 +1,8 @@
 //! How far a motion is from that of a reference: the errors that tolerances of a scene are about.
 
-use super::{Recording, Tolerance};
+use super::lively::{LivelyNodes, along_axes, longest};
+use super::peak::Peak;
+use super::{Tolerance, Trace};
 use crate::dynamics::EulerParameters;
 use crate::flex_body::FlexBody;
 use faer::MatRef;
@@ -15,7 +17,7 @@ pub(crate) const LEAST_REACTION: f64 = 1e-3;
 /// Force and torque.
 type Reaction = (Vector3<f64>, Vector3<f64>);
 
-/// Largest errors over time. `None`: the reference has nothing of it.
+/// Largest errors over the continuous motion. `None`: the reference has nothing of it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct OutputErrors {
     /// Angle between the frames, radians.
@@ -64,9 +66,11 @@ impl OutputErrors {
     }
 }
 
-/// The errors at every instant, as [`OutputErrors`] has the largest of them.
+/// The errors along the motion, as [`OutputErrors`] has the largest of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorHistory {
+    /// Where the motion was looked at.
+    pub time: Vec<f64>,
     /// Of the attitude.
     pub attitude: Vec<f64>,
     /// Of deflections.
@@ -78,28 +82,34 @@ pub struct ErrorHistory {
 }
 
 impl ErrorHistory {
-    /// The largest errors.
+    /// The largest errors, also between the places where the motion was looked at.
     pub fn largest(&self) -> OutputErrors {
-        let of = |history: &Option<Vec<f64>>| history.as_ref().map(|history| largest(history.iter()));
+        let of = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
         OutputErrors {
-            attitude: largest(self.attitude.iter()),
-            deflection: of(&self.deflection),
-            stress: of(&self.stress),
-            reaction: of(&self.reaction),
+            attitude: of(&self.attitude),
+            deflection: self.deflection.as_deref().map(of),
+            stress: self.stress.as_deref().map(of),
+            reaction: self.reaction.as_deref().map(of),
         }
     }
 
-    /// The largest error in the second half of the instants relative to that in the first half, of the output where this is most; about 1
+    /// The largest error in the second half of the run relative to that in the first half, of the output where this is most; about 1
     /// for errors that stay bounded, 2 and more for a phase that runs away. `None` without an error in the first half.
     pub fn growth(&self) -> Option<f64> {
         let of = |history: &Vec<f64>| {
-            let (first, second) = history.split_at(history.len().div_ceil(2));
-            let before = largest(first.iter());
-            (before > 0.0).then(|| largest(second.iter()) / before)
+            let (before, after) = self.halves(history);
+            (before > 0.0).then_some(after / before)
         };
         let others = [&self.deflection, &self.stress, &self.reaction];
         let all = others.into_iter().flatten().chain([&self.attitude]);
         all.filter_map(of).reduce(f64::max)
+    }
+
+    /// The largest of `values` along the motion in the first half of the run, and in the second.
+    pub fn halves(&self, values: &[f64]) -> (f64, f64) {
+        let end = self.time.last().copied().unwrap_or(0.0);
+        let (first, second) = values.split_at(self.time.partition_point(|&time| time <= 0.5 * end));
+        (largest(first.iter()), largest(second.iter()))
     }
 }
 
@@ -108,7 +118,7 @@ fn largest<'v>(values: impl Iterator<Item = &'v f64>) -> f64 {
     values.fold(0.0, |most, &value| if value > most || value.is_nan() { value } else { most })
 }
 
-/// How far apart the deformations of two motions are, at every instant.
+/// How far apart the deformations of two motions are, along the motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Apart {
     /// Elastic energy of the difference.
@@ -124,34 +134,34 @@ impl ErrorHistory {
     /// are watched.
     ///
     /// # Panics
-    /// When the instants of the recordings are not the same.
-    pub fn new(reference: &Recording, candidate: &Recording, apart: &Apart) -> Self {
-        assert!(reference.time == candidate.time, "recordings of the same instants");
+    /// When the motions were not looked at in the same places.
+    pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
+        assert!(reference.time == candidate.time, "motions that were looked at in the same places");
         let (mass, radius) = reference.size;
         let largest_of = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let motion = largest_of(&mut reference.balances.iter().map(|b| b.kinetic - b.flight + b.elastic));
-        let spin = largest_of(&mut reference.states.iter().map(|state| state.omega.norm()));
+        let peak_of = |values: &mut dyn Iterator<Item = f64>| Peak::of(&reference.time, values).value;
+        let (motion, spin) = (reference.extremes.internal, reference.extremes.spin);
         let relative = |values: Vec<f64>, scale: f64, none: f64| {
             (scale > none).then(|| values.into_iter().map(|value| value / scale).collect::<Vec<_>>())
         };
 
-        let states = reference.states.iter().zip(&candidate.states);
-        let attitude = states.map(|(a, b)| angle(&a.attitude, &b.attitude)).collect();
-        let (deflection, scale) = if reference.paths.is_empty() {
+        let attitudes = reference.attitude.iter().zip(&candidate.attitude);
+        let attitude = attitudes.map(|(a, b)| angle(a, b)).collect();
+        let (deflection, scale) = if reference.deflections.is_empty() {
             (apart.deflection.clone(), apart.largest_deflection)
         } else {
-            let all = reference.paths.iter().flat_map(|path| &path.deflection);
-            let pairs = || reference.paths.iter().zip(&candidate.paths);
-            let at =
-                |i: usize| largest_of(&mut pairs().map(|(a, b)| (a.deflection[i] - b.deflection[i]).norm()));
-            ((0..reference.time.len()).map(at).collect(), largest_of(&mut all.map(|d| d.norm())))
+            let pairs = || reference.deflections.iter().zip(&candidate.deflections);
+            let at = |i: usize| largest_of(&mut pairs().map(|(a, b)| (a[i] - b[i]).norm()));
+            let paths = reference.deflections.iter();
+            let largest = paths.map(|path| peak_of(&mut path.iter().map(|d| d.norm())));
+            ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, f64::max))
         };
-        let energy = largest_of(&mut reference.balances.iter().map(|balance| balance.elastic));
+        let energy = peak_of(&mut reference.elastic.iter().map(|energy| energy.max(0.0).sqrt()));
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
         let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
             let of = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
                 let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
-                let largest = largest_of(&mut a.iter().map(|a| part(a).norm()));
+                let largest = peak_of(&mut a.iter().map(|a| part(a).norm()));
                 // Forces that are rounding are no forces, however small the least that counts.
                 let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
                 (largest > NO_TORQUE * motion / lever)
@@ -168,9 +178,10 @@ impl ErrorHistory {
             }
         });
         Self {
+            time: reference.time.clone(),
             attitude,
             deflection: relative(deflection, scale.max(reference.resolution.deflection), 0.0),
-            stress: relative(stress, energy.sqrt().max(reference.resolution.root_energy), 0.0),
+            stress: relative(stress, energy.max(reference.resolution.root_energy), 0.0),
             reaction,
         }
     }
@@ -189,25 +200,24 @@ fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
 #[derive(Debug, Clone)]
 pub struct Measure<'r> {
     body: &'r FlexBody,
-    recording: &'r Recording,
+    trace: &'r Trace,
     /// Nodes that are looked at where no points are watched.
     nodes: Vec<usize>,
-    rows: Rows,
+    rows: LivelyNodes,
     largest_deflection: f64,
 }
 
 impl<'r> Measure<'r> {
-    /// Measures against `recording`, a motion of `body`.
+    /// Measures against `trace`, a motion of `body`.
     ///
     /// # Panics
-    /// When the recording has another number of modes.
-    pub fn new(body: &'r FlexBody, recording: &'r Recording) -> Self {
-        assert!(recording.states.iter().all(|state| state.q.len() == body.n_modes()), "a motion of the body");
-        let nodes = if recording.paths.is_empty() { liveliest(body) } else { Vec::new() };
-        let rows = Rows::new(body, &nodes);
-        let deflections = recording.states.iter().map(|state| longest(rows.displacements(&state.q)));
-        let largest_deflection = deflections.fold(0.0, f64::max);
-        Self { body, recording, nodes, rows, largest_deflection }
+    /// When the motion has another number of modes.
+    pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
+        assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
+        let nodes = if trace.deflections.is_empty() { along_axes(body) } else { Vec::new() };
+        let rows = LivelyNodes::new(body, &nodes);
+        let largest_deflection = Peak::of(&trace.time, trace.q.iter().map(|q| rows.longest(q))).value;
+        Self { body, trace, nodes, rows, largest_deflection }
     }
 
     /// The body.
@@ -216,31 +226,32 @@ impl<'r> Measure<'r> {
     }
 
     /// Its motion.
-    pub fn recording(&self) -> &'r Recording {
-        self.recording
+    pub fn trace(&self) -> &'r Trace {
+        self.trace
     }
 
     /// Errors of the motion of a body that has the modes `kept` (from 0) of the reference, in this order.
     ///
     /// # Panics
-    /// When the reference has no such modes, or the instants are not the same.
-    pub fn of_subset(&self, candidate: &Recording, kept: &[usize]) -> ErrorHistory {
+    /// When the reference has no such modes, or the motions were not looked at in the same places.
+    pub fn of_subset(&self, candidate: &Trace, kept: &[usize]) -> ErrorHistory {
         let energy = &self.body.invariants().modal_stiffness;
         let apart = self.apart(candidate, |reference, own| {
             let mut difference: Vec<f64> = reference.iter().map(|q| -q).collect();
             kept.iter().zip(own).for_each(|(&mode, q)| difference[mode] += q);
             let energy = 0.5 * quadratic(energy.as_ref(), &difference);
-            (energy, longest(self.rows.displacements(&difference)))
+            (energy, self.rows.longest(&difference))
         });
-        ErrorHistory::new(self.recording, candidate, &apart)
+        ErrorHistory::new(self.trace, candidate, &apart)
     }
 
     /// Errors of the motion of a body with other modes of the same model.
     ///
     /// # Panics
-    /// When the instants are not the same.
-    pub fn of_other(&self, candidate: &Recording, modes: &OtherModes<'_>) -> ErrorHistory {
-        let (energy, rows) = (&self.body.invariants().modal_stiffness, Rows::new(modes.body, &self.nodes));
+    /// When the motions were not looked at in the same places.
+    pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
+        let (energy, rows) =
+            (&self.body.invariants().modal_stiffness, LivelyNodes::new(modes.body, &self.nodes));
         let apart = self.apart(candidate, |reference, own| {
             let q = DVector::from_column_slice(own);
             let difference = &modes.map * &q - DVector::from_column_slice(reference);
@@ -249,12 +260,11 @@ impl<'r> Measure<'r> {
             let deflection = longest(displacements.map(|(own, reference)| own - reference));
             (0.5 * (quadratic(energy.as_ref(), difference.as_slice()) + outside), deflection)
         });
-        ErrorHistory::new(self.recording, candidate, &apart)
+        ErrorHistory::new(self.trace, candidate, &apart)
     }
 
-    fn apart(&self, candidate: &Recording, of: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
-        let states = self.recording.states.iter().zip(&candidate.states);
-        let (energy, deflection) = states.map(|(a, b)| of(&a.q, &b.q)).unzip();
+    fn apart(&self, candidate: &Trace, of: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
+        let (energy, deflection) = self.trace.q.iter().zip(&candidate.q).map(|(a, b)| of(a, b)).unzip();
         Apart { energy, deflection, largest_deflection: self.largest_deflection }
     }
 }
@@ -293,47 +303,6 @@ impl<'c> OtherModes<'c> {
         let outside = of(candidate) - transposed.tr_mul(&map);
         Some(Self { body: candidate, map, outside })
     }
-}
-
-/// For every mode and axis the node that moves most along it, ascending, each once.
-fn liveliest(body: &FlexBody) -> Vec<usize> {
-    let shape = &body.modes().shape;
-    let most = |j: usize, axis: usize| {
-        let size = |i: usize| shape[(3 * i + axis, j)].abs();
-        (1..body.n_nodes()).fold(0, |best, i| if size(i) > size(best) { i } else { best })
-    };
-    let all = (0..body.n_modes()).flat_map(|j| (0..body.dimension()).map(move |axis| (j, axis)));
-    let mut nodes: Vec<usize> = all.map(|(j, axis)| most(j, axis)).collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    nodes
-}
-
-/// Rows of the modes at some nodes, three per node, each of nf entries.
-#[derive(Debug, Clone)]
-struct Rows(Vec<f64>);
-
-impl Rows {
-    fn new(body: &FlexBody, nodes: &[usize]) -> Self {
-        let rows = nodes.iter().flat_map(|i| 3 * i..3 * i + 3);
-        let row = |row: usize| (0..body.n_modes()).map(move |j| body.modes().shape[(row, j)]);
-        Self(rows.flat_map(row).collect())
-    }
-
-    /// Displacements of the nodes.
-    fn displacements<'s>(&'s self, q: &'s [f64]) -> impl Iterator<Item = Vector3<f64>> + 's {
-        let product = move |row: &[f64]| row.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
-        let of_node = move |rows: &[f64]| {
-            let mut rows = rows.chunks_exact(q.len());
-            Vector3::from_fn(|_, _| rows.next().map_or(0.0, product))
-        };
-        self.0.chunks_exact(3 * q.len()).map(of_node)
-    }
-}
-
-/// The longest of displacements.
-fn longest(displacements: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    displacements.map(|d| d.norm()).fold(0.0, f64::max)
 }
 
 /// x'A x of a matrix that is not negative.

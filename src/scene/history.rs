@@ -65,6 +65,80 @@ impl History {
         }
     }
 
+    /// The integral from time zero to a time.
+    pub fn integral(&self, time: f64) -> f64 {
+        match self {
+            Self::Constant(value) => value * time,
+            Self::Table { times, .. } => {
+                let (from, to) = (time.min(0.0), time.max(0.0));
+                let inner = times.iter().copied().filter(|&t| from < t && t < to);
+                let ends: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
+                // Lines between the ends: trapezoids are exact.
+                let piece =
+                    |ends: &[f64]| 0.5 * (self.at(ends[0]).0 + self.at(ends[1]).0) * (ends[1] - ends[0]);
+                let sum: f64 = ends.windows(2).map(piece).sum();
+                if time < 0.0 { -sum } else { sum }
+            }
+            Self::Sine { amplitude, frequency, phase } => {
+                let half = 0.5 * TAU * frequency * time;
+                // cos(phase) - cos(2 half + phase), without cancellation.
+                amplitude / (TAU * frequency) * 2.0 * (half + phase).sin() * half.sin()
+            }
+            Self::Ramp { from, to, start, duration } => {
+                let risen = |time: f64| {
+                    let x = ((time - start) / duration).clamp(0.0, 1.0);
+                    let after = (time - start - duration).max(0.0);
+                    duration * (0.5 * x * x + ((TAU * x).cos() - 1.0) / (TAU * TAU)) + after
+                };
+                from * time + (to - from) * (risen(time) - risen(0.0))
+            }
+        }
+    }
+
+    /// The second derivative at a time, of a history that is smooth: zero of a table between its points.
+    pub fn curvature(&self, time: f64) -> f64 {
+        match self {
+            Self::Constant(_) | Self::Table { .. } => 0.0,
+            Self::Sine { frequency, .. } => -(TAU * frequency).powi(2) * self.at(time).0,
+            Self::Ramp { from, to, start, duration } => {
+                let x = ((time - start) / duration).clamp(0.0, 1.0);
+                (to - from) * TAU * (TAU * x).sin() / (duration * duration)
+            }
+        }
+    }
+
+    /// The largest magnitude of the value and of the rate from time zero to a time; of a sine at any time.
+    pub fn largest_until(&self, end: f64) -> (f64, f64) {
+        let inner = self.breaks().into_iter().filter(|&time| 0.0 < time && time < end);
+        let ends = [0.0].into_iter().chain(inner).chain(end.is_finite().then_some(end));
+        let (mut value, mut rate) = (0.0f64, 0.0f64);
+        for time in ends {
+            let (at, slope) = self.at(time);
+            (value, rate) = (value.max(at.abs()), rate.max(slope.abs()));
+        }
+        match self {
+            Self::Sine { amplitude, frequency, .. } => (amplitude.abs(), amplitude.abs() * TAU * frequency),
+            // Half way up it rises at twice the mean rate.
+            Self::Ramp { start, duration, .. } if 0.0 < start + duration && *start < end => {
+                let middle = (start + 0.5 * duration).clamp(0.0, end);
+                (value, rate.max(self.at(middle).1.abs()))
+            }
+            _ => (value, rate),
+        }
+    }
+
+    /// Whether it is zero from time zero to a time.
+    pub fn is_zero_until(&self, end: f64) -> bool {
+        match self {
+            Self::Sine { amplitude, .. } => *amplitude == 0.0,
+            Self::Ramp { from, to, start, .. } => *from == 0.0 && (*to == 0.0 || *start >= end),
+            _ => {
+                let inner = self.breaks().into_iter().filter(|&time| 0.0 < time && time < end);
+                [0.0, end].into_iter().chain(inner).all(|time| self.at(time).0 == 0.0)
+            }
+        }
+    }
+
     /// The history times a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         match self {
@@ -107,8 +181,17 @@ mod tests {
         for history in histories {
             for i in 0..60 {
                 let (time, step) = (-0.51 + 0.07 * f64::from(i), 1e-5);
-                let slope = (history.at(time + step).0 - history.at(time - step).0) / (2.0 * step);
-                assert!((slope - history.at(time).1).abs() < 1e-6, "{history:?} at {time}");
+                let slope_of = |of: &dyn Fn(f64) -> f64| (of(time + step) - of(time - step)) / (2.0 * step);
+                let near = |slope: f64, rate: f64| {
+                    assert!((slope - rate).abs() < 1e-6, "{history:?} at {time}: {slope}, {rate}");
+                };
+                near(slope_of(&|t| history.at(t).0), history.at(time).1);
+                near(slope_of(&|t| history.integral(t)), history.at(time).0);
+                if !matches!(history, History::Table { .. }) {
+                    near(slope_of(&|t| history.at(t).1), history.curvature(time));
+                }
+                let (value, rate) = history.largest_until(4.0);
+                assert!(time < 0.0 || history.at(time).0.abs() <= value && history.at(time).1.abs() <= rate);
             }
         }
     }

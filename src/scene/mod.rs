@@ -1,22 +1,37 @@
 //! What a body is to do: the scene file, and its simulation.
 
+mod contradictions;
 mod description;
+mod effort;
 mod errors;
+mod extremes;
 mod history;
+mod lively;
+mod peak;
+mod prepared;
 mod read;
+mod read_carried;
 mod read_requirements;
 mod recording;
 mod requirements;
 mod simulate;
+mod stage;
 mod surroundings;
+mod trace;
 
-pub use description::{Axes, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
+pub use description::{
+    Axes, Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin, Translation,
+};
 pub(crate) use errors::LEAST_REACTION;
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
+pub use extremes::{Drift, Extremes};
 pub use history::History;
+pub use peak::Peak;
+pub(crate) use prepared::damped;
 pub use read::read_scene;
-pub use recording::{Drift, Path, Recording, Resolution};
+pub use recording::{Path, Recording, Resolution, Setting};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
-pub(crate) use simulate::damped;
 pub use simulate::simulate;
+pub use stage::Stage;
 pub(crate) use surroundings::points_of;
+pub use trace::{Trace, trace, trace_at};

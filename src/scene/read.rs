@@ -1,5 +1,7 @@
 //! Reads `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
+use super::contradictions::contradictions;
+use super::read_carried::carried;
 use super::read_requirements::{self, requirements};
 use super::{Axes, History, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
 use crate::diagnostic::Code;
@@ -12,18 +14,21 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::DeValue;
 
-const TOP: &[&str] = &["name", "run", "initial", "gravity", "load", "spin", "watch"];
-const RUN: &[&str] = &["duration", "outputs", "method", "tolerance", "order", "step", "terms"];
-const INITIAL: &[&str] = &["origin", "velocity", "rotation", "angular_velocity", "mode"];
+const TOP: &[&str] = &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch"];
+const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
+const INITIAL: &[&str] = &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode"];
 const MODE: &[&str] = &["number", "amplitude", "rate"];
 const LOAD: &[&str] = &["node", "interface", "force", "torque", "axes", "history"];
-const SPIN: &[&str] = &["axis", "rate", "hold"];
+const SPIN: &[&str] = &["axis", "axes", "rate", "hold"];
 const WATCH: &[&str] = &["node", "interface"];
 const HISTORIES: [(&str, &[&str]); 3] = [
     ("a table of points", &["times", "values"]),
     ("a sine", &["amplitude", "frequency", "phase"]),
     ("a ramp", &["from", "to", "start", "duration"]),
 ];
+
+/// All axes that a vector can be along.
+pub(super) const EVERY: [Axes; 3] = [Axes::Model, Axes::Body, Axes::World];
 
 /// Instants recorded unless said.
 const OUTPUTS: i64 = 500;
@@ -64,11 +69,13 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
     let gravity = top.get("gravity").map(|value| vector(walk, "gravity", value));
     let loads = list(walk, top, "load", load);
     let spin = walk.table(top, "spin").map(|(table, span)| spin(walk, table, span));
+    let carried = walk.table(top, "carried").map(|(table, span)| carried(walk, table, span));
     let watched = list(walk, top, "watch", |walk, table, span| {
         walk.known_keys(table, "[[watch]]", WATCH);
         place(walk, table, span)
     });
     let requirements = requirements(walk, top);
+    contradictions(walk, top);
     Some(Scene {
         name: name?,
         run: run?,
@@ -76,14 +83,16 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         gravity: transposed(gravity)?,
         loads: loads?,
         spin: transposed(spin)?,
+        carried: transposed(carried)?,
         watched: watched?,
         requirements: requirements?,
         source: Some(SourceFile::new("scene", walk.path, walk.fingerprint())),
+        resolved: false,
     })
 }
 
 /// What is not there is no mistake; what is there and wrong is.
-fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
+pub(super) fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
     match value {
         Some(read) => read.map(Some),
         None => Some(None),
@@ -96,23 +105,26 @@ fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
         true => positive(walk, table, "duration", &span).map(Some),
         false => Some(None),
     };
-    let outputs = match table.get("outputs") {
-        None => Some(OUTPUTS),
+    let mut count = |key: &str, default: i64, most: i64| match table.get(key) {
+        None => Some(default),
         Some(value) => {
-            let count = integer(value).filter(|count| (1..=MOST_OUTPUTS).contains(count));
+            let count = integer(value).filter(|count| (1..=most).contains(count));
             if count.is_none() {
-                walk.wrong(value.span(), format!("`outputs` is not a number from 1 to {MOST_OUTPUTS}"));
+                walk.wrong(value.span(), format!("`{key}` is not a number from 1 to {most}"));
             }
             count
         }
     };
+    let outputs = count("outputs", OUTPUTS, MOST_OUTPUTS);
+    let most_steps = count("most_steps", Run::MOST_STEPS as i64, i64::MAX);
     let terms = match table.get("terms") {
         None => Some(Terms::ALL),
         Some(value) => terms(walk, value),
     };
     let scheme = scheme(walk, table, &span);
     let outputs = usize::try_from(outputs?).ok()?;
-    Some(Run { duration: duration?, outputs, scheme: scheme?, terms: terms? })
+    let most_steps = most_steps? as u64;
+    Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms: terms? })
 }
 
 fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
@@ -194,6 +206,7 @@ fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
     };
     let [origin, velocity, rotation, angular_velocity] =
         ["origin", "velocity", "rotation", "angular_velocity"].map(&mut or_zero);
+    let axes = axes(walk, table, &EVERY, Axes::Model);
     let modes = list(walk, table, "mode", |walk, table, span| {
         walk.known_keys(table, "[[initial.mode]]", MODE);
         let number = mode_number(walk, table, &span, "[[initial.mode]]");
@@ -208,6 +221,7 @@ fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
         velocity: velocity?,
         rotation: rotation?,
         angular_velocity: angular_velocity?,
+        axes: axes?,
         modes: modes?,
     })
 }
@@ -230,6 +244,20 @@ pub(super) fn mode_number(
     Some(number? - 1)
 }
 
+/// One of the axes `known` under the key `axes`.
+pub(super) fn axes(walk: &mut Walk<'_>, table: &Table, known: &[Axes], default: Axes) -> Option<Axes> {
+    let Some(value) = table.get("axes") else { return Some(default) };
+    let given = match value.get_ref() {
+        DeValue::String(text) => known.iter().copied().find(|axes| axes.name() == text.as_ref()),
+        _ => None,
+    };
+    if given.is_none() {
+        let names: Vec<String> = known.iter().map(|axes| format!("\"{}\"", axes.name())).collect();
+        walk.mistyped("axes", value, &names.join(" or "));
+    }
+    given
+}
+
 fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> {
     walk.known_keys(table, "[[load]]", LOAD);
     let at = place(walk, table, span.clone());
@@ -238,15 +266,7 @@ fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> 
     if force.is_none() && torque.is_none() {
         walk.wrong(span, "load has neither `force` nor `torque`".to_owned());
     }
-    let axes = match table.get("axes").map(|value| (value, value.get_ref())) {
-        None => Some(Axes::World),
-        Some((_, DeValue::String(name))) if name == "world" => Some(Axes::World),
-        Some((_, DeValue::String(name))) if name == "body" => Some(Axes::Body),
-        Some((value, _)) => {
-            walk.mistyped("axes", value, "\"world\" or \"body\"");
-            None
-        }
-    };
+    let axes = axes(walk, table, &EVERY, Axes::World);
     let history = match table.get("history") {
         Some(value) => history(walk, "history", value),
         None => Some(History::Constant(1.0)),
@@ -262,16 +282,11 @@ fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> 
 
 fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Spin> {
     walk.known_keys(table, "[spin]", SPIN);
-    let axis = match table.get("axis") {
-        None => Some(Vector3::z()),
-        Some(value) => vector(walk, "axis", value).and_then(|axis| {
-            let unit = axis.try_normalize(0.0);
-            if unit.is_none() {
-                walk.wrong(value.span(), "`axis` has no direction".to_owned());
-            }
-            unit
-        }),
+    let axis = match table.contains_key("axis") {
+        true => direction(walk, table, "axis"),
+        false => Some(Vector3::z()),
     };
+    let axes = axes(walk, table, &EVERY, Axes::Model);
     let rate = match table.get("rate") {
         Some(value) => history(walk, "rate", value),
         None => {
@@ -287,10 +302,20 @@ fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Spin> 
             None
         }
     };
-    Some(Spin { axis: axis?, rate: rate?, hold: hold? })
+    Some(Spin { axis: axis?, axes: axes?, rate: rate?, hold: hold? })
 }
 
-fn place(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Point> {
+/// A vector of length one along that of `key`, which must be there.
+pub(super) fn direction(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Vector3<f64>> {
+    let value = table.get(key)?;
+    let unit = vector(walk, key, value)?.try_normalize(0.0);
+    if unit.is_none() {
+        walk.wrong(value.span(), format!("`{key}` has no direction"));
+    }
+    unit
+}
+
+pub(super) fn place(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Point> {
     match (table.get("node"), table.contains_key("interface")) {
         (Some(value), false) => {
             let node = integer(value);
@@ -311,7 +336,7 @@ fn place(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Point
     }
 }
 
-fn history(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<History> {
+pub(super) fn history(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<History> {
     const EXPECTED: &str = "a number or a table { times, values }, { amplitude, frequency, phase } or { from, to, start, duration }";
     let table = match value.get_ref() {
         DeValue::Table(table) => table,
@@ -446,6 +471,7 @@ pub(super) fn place_of(table: &Table, key: &str, span: &Range<usize>) -> Range<u
 
 #[cfg(test)]
 mod tests {
+    use super::super::read_carried::{CARRIED, CARRIED_SPIN, TRANSLATION};
     use super::*;
 
     /// The schema and the reader name the same keys.
@@ -459,6 +485,9 @@ mod tests {
             ("/properties/initial/properties/mode/items/properties", MODE),
             ("/properties/load/items/properties", LOAD),
             ("/properties/spin/properties", SPIN),
+            ("/properties/carried/properties", CARRIED),
+            ("/properties/carried/properties/spin/properties", CARRIED_SPIN),
+            ("/properties/carried/properties/translation/properties", TRANSLATION),
             ("/properties/watch/items/properties", WATCH),
             ("/$defs/history/anyOf/1/properties", HISTORIES[0].1),
             ("/$defs/history/anyOf/2/properties", HISTORIES[1].1),

@@ -1,15 +1,16 @@
 //! Reads the tables of a scene that say what is demanded of the body.
 
-use super::read::{finite, list, place_of, positive, vector};
+use super::Axes;
+use super::read::{axes, finite, list, place_of, positive, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 use crate::input::{Table, Value, Walk, integer, real};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use toml::de::DeValue;
 
 /// The tables, for the list of known ones.
 pub(super) const TABLES: [(&str, &[&str]); 7] = [
-    ("motion", &["angular_velocity", "angular_acceleration"]),
-    ("attachment", &["kind", "inertia", "first_frequency"]),
+    ("motion", &["angular_velocity", "angular_acceleration", "axes"]),
+    ("attachment", &["kind", "inertia", "axes", "first_frequency"]),
     ("limits", &["deflection", "stress", "mode_stress", "mode"]),
     ("band", &["frequency"]),
     ("damping", &["ratio"]),
@@ -44,14 +45,23 @@ pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requireme
                 "motion" => {
                     let [velocity, acceleration] =
                         ["angular_velocity", "angular_acceleration"].map(|key| range(walk, table, key));
-                    target.motion =
-                        MotionRange { angular_velocity: velocity?, angular_acceleration: acceleration? };
+                    let axes = turning_axes(walk, table);
+                    target.motion = MotionRange {
+                        angular_velocity: velocity?,
+                        angular_acceleration: acceleration?,
+                        axes: axes?,
+                    };
                 }
                 "attachment" => {
                     let (kind, inertia) = (kind(walk, table), attached_inertia(walk, table));
                     let first_frequency = optional(walk, "first_frequency");
-                    target.attachment =
-                        Attachment { kind: kind?, inertia: inertia?, first_frequency: first_frequency? };
+                    let axes = turning_axes(walk, table);
+                    target.attachment = Attachment {
+                        kind: kind?,
+                        inertia: Matrix3::from_diagonal(&inertia?),
+                        axes: axes?,
+                        first_frequency: first_frequency?,
+                    };
                 }
                 "limits" => target.limits = limits(walk, table, &span)?,
                 "band" => target.band = Some(positive(walk, table, "frequency", &span)?),
@@ -102,6 +112,11 @@ pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requireme
         }
     }
     all
+}
+
+/// Axes that turn with the body.
+fn turning_axes(walk: &mut Walk<'_>, table: &Table) -> Option<Axes> {
+    axes(walk, table, &[Axes::Model, Axes::Body], Axes::Model)
 }
 
 /// A number that is not negative, or three of them.

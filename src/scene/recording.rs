@@ -1,12 +1,12 @@
 //! What a simulation leaves.
 
-use super::Scheme;
-use crate::dynamics::{Balance, Configuration};
+use super::{Drift, Extremes, Scene, Scheme};
+use crate::dynamics::{Balance, Configuration, Orientation, RotationVector};
 use crate::flex_body::FlexBody;
 use crate::integration::Work;
 use nalgebra::Vector3;
 
-/// The motion of a body over time. Numbers are in the units of the body.
+/// The motion of a body at the instants that its scene writes. Numbers are in the units of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// Name of the scene.
@@ -21,18 +21,54 @@ pub struct Recording {
     pub states: Vec<Configuration>,
     /// Energies, momenta, work and impulses at every instant.
     pub balances: Vec<Balance>,
-    /// Force and torque about the origin of the frame, body axes, that the prescribed motion takes; none without.
+    /// What the numbers mean.
+    pub setting: Setting,
+    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes; none without.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
     /// Paths of the watched points.
     pub paths: Vec<Path>,
     /// What the integration did.
     pub work: Work,
-    /// Mass of the body, and its radius of gyration about the centre of mass, sqrt(tr(I) / 2m).
-    pub size: (f64, f64),
-    /// Largest deflection of a node when the elastic energy is largest, relative to the largest extent of the body.
-    pub deflection: f64,
-    /// What is small enough not to count.
-    pub resolution: Resolution,
+    /// The largest of everything, also between the instants.
+    pub extremes: Extremes,
+}
+
+/// What a recording is about: its frame, and what the body is exposed to.
+///
+/// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model and turn with the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// What carries the body.
+    pub carrier: Option<String>,
+    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the reference point of what carries it.
+    pub origin: Vector3<f64>,
+    /// Gravity at the start, axes of the model.
+    pub gravity: Option<Vector3<f64>>,
+    /// Eigenvalues of the body as it is carried; empty where nothing carries it. Unit: 1/time^2.
+    pub eigenvalues: Vec<f64>,
+}
+
+impl Setting {
+    /// Of a body in its stage.
+    pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
+        let start = RotationVector(scene.initial.rotation).axes();
+        let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
+        let eigenvalues = carrier.as_ref().and_then(|_| body.eigenvalues_in_frame());
+        Self {
+            carrier,
+            origin: body.frame().origin,
+            gravity: scene.gravity.map(|gravity| start.tr_mul(&gravity)),
+            eigenvalues: eigenvalues.unwrap_or_default(),
+        }
+    }
+
+    /// What the origin of the frame is, in words.
+    pub fn origin_in_words(&self) -> String {
+        match &self.carrier {
+            Some(carrier) => format!("reference point of {carrier}"),
+            None => "centre of mass of the undeformed body".to_owned(),
+        }
+    }
 }
 
 /// The least deformation that counts: errors are relative to the largest of the motion, or to this where that is less.
@@ -66,43 +102,20 @@ pub struct Path {
     pub name: String,
     /// Place at every instant, world axes.
     pub place: Vec<Vector3<f64>>,
-    /// Deflection from the undeformed body, body axes.
+    /// Deflection from the undeformed body, axes of the model.
     pub deflection: Vec<Vector3<f64>>,
-}
-
-/// How well what cannot change did not: largest differences over the instants, dimensionless.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drift {
-    /// Of energy less work, relative to the largest internal energy E (that of flight left out) or work.
-    pub energy: f64,
-    /// Of linear momentum less impulse, relative to the largest of both and of sqrt(2 m E).
-    pub linear: f64,
-    /// Of angular momentum less angular impulse, relative to the largest of both and of r sqrt(2 m E), r being the radius of gyration.
-    pub angular: f64,
 }
 
 impl Recording {
     /// The drift of energy and momenta.
     pub fn drift(&self) -> Drift {
-        let Some(first) = self.balances.first() else {
-            return Drift { energy: 0.0, linear: 0.0, angular: 0.0 };
-        };
-        let largest = |of: &dyn Fn(&Balance) -> f64| self.balances.iter().map(of).fold(0.0, f64::max);
-        let relative = |difference: f64, scale: f64| if scale > 0.0 { difference / scale } else { 0.0 };
-        let total = |b: &Balance| b.kinetic + b.elastic;
-        let energy = largest(&|b| (total(b) - b.flight).max(b.work.abs()));
-        let (mass, radius) = self.size;
-        let momentum = (2.0 * mass * energy).sqrt();
-        Drift {
-            energy: relative(largest(&|b| (total(b) - total(first) - b.work).abs()), energy),
-            linear: relative(
-                largest(&|b| (b.linear - first.linear - b.impulse).norm()),
-                largest(&|b| b.linear.norm().max(b.impulse.norm())).max(momentum),
-            ),
-            angular: relative(
-                largest(&|b| (b.angular - first.angular - b.angular_impulse).norm()),
-                largest(&|b| b.angular.norm().max(b.angular_impulse.norm())).max(momentum * radius),
-            ),
-        }
+        self.extremes.drift
+    }
+}
+
+impl Path {
+    /// A path without a place yet.
+    pub(super) fn new(name: String) -> Self {
+        Self { name, place: Vec::new(), deflection: Vec::new() }
     }
 }

@@ -1,6 +1,7 @@
 //! What a scene demands of a body, and what it says about motion that nobody simulates. All of it is optional.
 
-use nalgebra::Vector3;
+use super::Axes;
+use nalgebra::{Matrix3, Vector3};
 
 /// What decides which terms and modes a body needs.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -28,6 +29,8 @@ pub struct MotionRange {
     pub angular_velocity: Option<Range>,
     /// Angular acceleration.
     pub angular_acceleration: Option<Range>,
+    /// Axes of components, which turn with the body: not those of the world.
+    pub axes: Axes,
 }
 
 /// Largest magnitude of a vector.
@@ -35,7 +38,7 @@ pub struct MotionRange {
 pub enum Range {
     /// In any direction.
     Any(f64),
-    /// Of the components along the body axes.
+    /// Of the components along axes that turn with the body.
     Axes(Vector3<f64>),
 }
 
@@ -54,8 +57,10 @@ impl Range {
 pub struct Attachment {
     /// Kind.
     pub kind: AttachmentKind,
-    /// Inertia that joints attach to the body, about the axes of its frame; zero is the conservative default.
-    pub inertia: Vector3<f64>,
+    /// Inertia that joints attach to the body; zero is the conservative default.
+    pub inertia: Matrix3<f64>,
+    /// Its axes, which turn with the body: not those of the world.
+    pub axes: Axes,
     /// First frequency of the assembled machine, oscillations per time.
     pub first_frequency: Option<f64>,
 }

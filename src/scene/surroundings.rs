@@ -1,17 +1,63 @@
 //! A scene as forces and prescribed motion of one body.
 
-use super::{Axes, Load, Point, Scene, Spin};
+use super::{Axes, Carried, Load, Point, Scene, Spin};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::dynamics::{BodyPoint, Evaluation, Place, Prescribed, Surroundings};
+use crate::dynamics::{BodyPoint, Evaluation, Orientation, Place, Prescribed, RotationVector, Surroundings};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// What acts on a body in a scene.
 pub(super) struct SceneForces<'a> {
     gravity: Option<Vector3<f64>>,
     loads: Vec<(BodyPoint, &'a Load)>,
     spin: Option<&'a Spin>,
+    carried: Option<CarriedMotion<'a>>,
+}
+
+/// The prescribed motion of the frame of a body that is carried.
+struct CarriedMotion<'a> {
+    carried: &'a Carried,
+    /// From the axis of rotation to the origin of the frame, its axes.
+    arm: Vector3<f64>,
+    /// Axes of the frame at time zero.
+    start: Matrix3<f64>,
+}
+
+impl<'a> CarriedMotion<'a> {
+    fn new(body: &FlexBody, scene: &'a Scene) -> Option<Self> {
+        let carried = scene.carried.as_ref()?;
+        let through = carried.spin.as_ref().and_then(|spin| spin.through);
+        let arm = through.map_or_else(Vector3::zeros, |through| body.frame().origin - through);
+        Some(Self { carried, arm, start: RotationVector(scene.initial.rotation).axes() })
+    }
+
+    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes of the frame.
+    fn at(&self, time: f64) -> (Prescribed, Prescribed) {
+        let zero = Vector3::zeros();
+        let (omega, alpha, turned) = match &self.carried.spin {
+            Some(spin) => {
+                let (rate, slope) = spin.rate.at(time);
+                let turned = RotationVector(spin.axis * spin.rate.integral(time)).axes();
+                (spin.axis * rate, spin.axis * slope, turned)
+            }
+            None => (zero, zero, Matrix3::identity()),
+        };
+        let (velocity, acceleration) = match &self.carried.translation {
+            Some(translation) => {
+                let (velocity, acceleration) = translation.drive.at(time);
+                let along = (self.start * turned).tr_mul(&translation.direction);
+                (along * velocity, along * acceleration)
+            }
+            None => (zero, zero),
+        };
+        let linear = omega.cross(&self.arm) + velocity;
+        let rate = alpha.cross(&self.arm) + acceleration - omega.cross(&velocity);
+        (
+            Prescribed { linear: Some(linear), angular: Some(omega) },
+            Prescribed { linear: Some(rate), angular: Some(alpha) },
+        )
+    }
 }
 
 impl<'a> SceneForces<'a> {
@@ -45,7 +91,8 @@ impl<'a> SceneForces<'a> {
         }
         match (watched, loads) {
             (Some(watched), Some(loads)) if found.is_empty() => {
-                Ok((Self { gravity: scene.gravity, loads, spin: scene.spin.as_ref() }, watched))
+                let (spin, carried) = (scene.spin.as_ref(), CarriedMotion::new(body, scene));
+                Ok((Self { gravity: scene.gravity, loads, spin, carried }, watched))
             }
             _ => Err(Error::new(found)),
         }
@@ -93,6 +140,15 @@ fn leaving_the_plane(scene: &Scene) -> Vec<String> {
         (scene.gravity.as_ref().is_none_or(in_plane), "`gravity`".to_owned()),
         (scene.spin.as_ref().is_none_or(|spin| about_normal(&spin.axis)), "`axis` of [spin]".to_owned()),
     ];
+    let carried = scene.carried.as_ref();
+    if let Some(spin) = carried.and_then(|carried| carried.spin.as_ref()) {
+        checks.push((about_normal(&spin.axis), "`axis` of [carried.spin]".to_owned()));
+        let through = spin.through.as_ref().is_none_or(in_plane);
+        checks.push((through, "`through` of [carried.spin]".to_owned()));
+    }
+    if let Some(translation) = carried.and_then(|carried| carried.translation.as_ref()) {
+        checks.push((in_plane(&translation.direction), "`direction` of [carried.translation]".to_owned()));
+    }
     for load in &scene.loads {
         checks.push((in_plane(&load.force), format!("`force` at {}", load.at)));
         checks.push((about_normal(&load.torque), format!("`torque` at {}", load.at)));
@@ -109,7 +165,8 @@ impl Surroundings for SceneForces<'_> {
             let factor = load.history.at(time).0;
             let in_body = |v: &Vector3<f64>| match load.axes {
                 Axes::World => place.axes.tr_mul(v) * factor,
-                Axes::Body => v * factor,
+                // The frame of the body is that of the scene.
+                Axes::Model | Axes::Body => v * factor,
             };
             point.add_force(evaluation, &in_body(&load.force), forces);
             if load.torque != Vector3::zeros() {
@@ -119,6 +176,9 @@ impl Surroundings for SceneForces<'_> {
     }
 
     fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
+        if let Some(carried) = &self.carried {
+            return carried.at(time);
+        }
         let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
         let (rate, slope) = spin.rate.at(time);
         let linear = spin.hold.then(Vector3::zeros);

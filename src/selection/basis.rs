@@ -19,8 +19,9 @@ impl WantedResponses {
         let turns = scene.initial.angular_velocity.norm() > 0.0;
         let at_interface = |load: &Load| matches!(load.at, Point::Interface(_));
         Self {
-            centrifugal: motion || turns || scene.spin.is_some(),
-            interfaces: scene.loads.iter().any(at_interface),
+            centrifugal: motion || turns || scene.rotation().is_some(),
+            // The reaction is a load at the interface that carries the body.
+            interfaces: scene.carried.is_some() || scene.loads.iter().any(at_interface),
         }
     }
 }

@@ -16,6 +16,13 @@ pub(super) const PART_OF_BOUNDS: f64 = 0.5;
 /// How far the run may stay behind the rotation that the scene allows for its measurements to count.
 pub(super) const SLACK_OF_RANGE: f64 = 1.01;
 
+/// Sets of groups that a body in `scene` may be left with, cheapest first. A body that is carried keeps all: dropped groups are those of
+/// its own modes, and what the interface takes from these needs them.
+pub(super) fn sets_in(scene: &Scene) -> impl Iterator<Item = Groups> {
+    let all = scene.carried.is_none();
+    sets().filter(move |set| all || *set == Groups::ALL)
+}
+
 /// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size of K_ff, W3 two times three.
 pub(super) fn sets() -> impl Iterator<Item = Groups> {
     (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
@@ -27,13 +34,14 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     let allowed = Situation::new(body, scene, &loads);
     let mut own = scene.clone();
     own.requirements.motion = Default::default();
-    let (spin, acceleration) = match &scene.spin {
-        Some(spin) => {
-            let rate = Variation::of(&spin.rate, allowed.duration.value);
+    let (spin, acceleration) = match (scene.rotation(), &scene.carried) {
+        (Some((_, rate)), _) => {
+            let rate = Variation::of(rate, allowed.duration.value);
             (rate.largest, rate.rate)
         }
+        (None, Some(_)) => (0.0, 0.0),
         // The accelerations of a free body grow like the square of its angular velocity.
-        None => (scene.initial.angular_velocity.norm(), f64::INFINITY),
+        (None, None) => (scene.initial.angular_velocity.norm(), f64::INFINITY),
     };
     let velocity = allowed.spin.value / spin;
     let acceleration = match scene.requirements.motion.angular_acceleration {
@@ -47,11 +55,11 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     if factor.is_nan() || factor <= SLACK_OF_RANGE {
         return Ok(vec![own]);
     }
-    let mut scaled = own.clone();
-    match (&scene.spin, &scene.requirements.motion.angular_velocity) {
-        (Some(_), _) if factor.is_infinite() => return Ok(vec![scene.clone()]),
+    let mut scaled = own.turning_faster(factor);
+    match (scene.prescribes(), &scene.requirements.motion.angular_velocity) {
+        (true, _) if factor.is_infinite() => return Ok(vec![scene.clone()]),
         // A free body that does not turn at first is given the rotation.
-        (None, Some(range)) if factor.is_infinite() => {
+        (false, Some(range)) if factor.is_infinite() => {
             scaled.initial.angular_velocity = match range {
                 Range::Axes(components) => *components,
                 Range::Any(length) if body.dimension() == 2 => Vector3::z() * *length,
@@ -59,9 +67,6 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
             };
         }
         _ => scaled.initial.angular_velocity *= factor,
-    }
-    if let Some(spin) = &mut scaled.spin {
-        spin.rate = spin.rate.scaled(factor);
     }
     Ok(vec![own, scaled])
 }

@@ -53,8 +53,8 @@ pub fn participations(
         let [x, y, z] = load.force.into();
         add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
     }
-    let axis = match &scene.spin {
-        Some(spin) => Some(spin.axis),
+    let axis = match scene.rotation() {
+        Some((axis, _)) => Some(*axis),
         None => scene.initial.angular_velocity.try_normalize(0.0),
     };
     if let (Some(axis), Some(w1)) = (axis, body.invariants().w1()) {

@@ -1,6 +1,6 @@
 //! The search for a cheaper model, by measured motion.
 
-use super::cases::{PART_OF_BOUNDS, sets, worst};
+use super::cases::{PART_OF_BOUNDS, sets_in, worst};
 use super::trial::{Bench, ModeShare, Trial, multiplications};
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
@@ -68,7 +68,8 @@ impl Search<'_> {
 
     /// The first set of groups whose motion is within a part of the tolerances.
     fn cheapest(&self, budget: f64, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
-        let smaller = sets().filter(|set| *set != choice.groups && set.and(choice.groups) == *set);
+        let smaller = sets_in(self.cases[0].0.scene)
+            .filter(|set| *set != choice.groups && set.and(choice.groups) == *set);
         for groups in smaller.collect::<Vec<_>>() {
             let trial = self.measured(&choice.modes, groups, budget)?;
             let passed = trial.passed();
@@ -83,7 +84,7 @@ impl Search<'_> {
 
     /// Modes by what they do, most first.
     fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
-        let mut of_cases = self.cases.iter().map(|(bench, measure)| bench.shares(measure.recording()));
+        let mut of_cases = self.cases.iter().map(|(bench, measure)| bench.shares(measure.trace()));
         choice.shares = of_cases.next().unwrap_or_default();
         for other in of_cases {
             for (share, other) in choice.shares.iter_mut().zip(other) {
@@ -131,7 +132,7 @@ impl Search<'_> {
     pub fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<bool> {
         let ranked = self.ranked(choice);
         let mut best: Option<(f64, Groups, Vec<usize>)> = None;
-        for groups in sets() {
+        for groups in sets_in(self.cases[0].0.scene) {
             if groups.and(choice.groups) != groups {
                 continue;
             }

@@ -13,7 +13,7 @@ use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups, TermDecision};
 use crate::progress::{Event, Watch};
-use crate::scene::{Measure, Scene, damped, points_of};
+use crate::scene::{Measure, Scene, Stage, damped, points_of};
 
 /// What was decided, and on what grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +72,11 @@ impl Selection {
 /// # Errors
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::scene::simulate).
 pub fn rule_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<Vec<TermDecision>> {
-    let body = &*damped(body, scene)?;
+    if scene.carried.is_some() {
+        return Ok(Vec::new());
+    }
+    let stage = Stage::new(body, scene)?;
+    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
     let scenes = scenes(body, scene)?;
     let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
     let trials = bounded(&cases, false)?;
@@ -91,7 +95,8 @@ pub fn rule_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<V
 /// # Errors
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::scene::simulate).
 pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<'_>) -> Result<Selection> {
-    let body = &*damped(body, scene)?;
+    let stage = Stage::new(body, scene)?;
+    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
     let (loads, _) = points_of(body, scene)?;
     let situation = Situation::new(body, scene, &loads);
     let scenes = scenes(body, scene)?;
@@ -106,7 +111,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
     let whole = by_bounds.map_or(held, |kept| kept.and(held));
     let all: Vec<usize> = (0..body.n_modes()).collect();
     let mut choice = Choice { groups: whole, modes: all.clone(), shares: Vec::new(), chosen: None };
-    let mut diagnostics = Vec::new();
+    let mut diagnostics = stage.found.clone();
     let mode_reason;
     let mut short_of = None;
     match scene.run.duration {
@@ -133,14 +138,13 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
             watch(Event::Phase("reference motion"));
             let mut references = Vec::new();
             for case in &cases {
-                let (reference, said) = case.bench().motion(body, whole)?;
+                let (reference, said) = case.bench().motion(whole)?;
                 diagnostics.extend(said);
                 references.push(reference);
             }
             let measures = references.iter().map(|reference| Measure::new(body, reference));
             let tried: Vec<_> = cases.iter().map(Case::bench).zip(measures).collect();
-            let speeds = references.iter().flat_map(|one| one.states.iter().map(|state| state.omega.norm()));
-            let largest = speeds.fold(0.0, f64::max);
+            let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
             if situation.spin.value > SLACK_OF_RANGE * largest
                 && scene.requirements.motion.angular_velocity.is_some()
             {

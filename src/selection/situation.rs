@@ -55,7 +55,7 @@ impl Situation {
     /// Of `scene`, which fits `body`; `points` are those of its loads.
     pub fn new(body: &FlexBody, scene: &Scene, points: &[BodyPoint]) -> Self {
         let (demands, eigenvalues) = (&scene.requirements, &body.modes().eigenvalue);
-        let inertia = body.invariants().inertia() + Matrix3::from_diagonal(&demands.attachment.inertia);
+        let inertia = body.invariants().inertia() + demands.attachment.inertia;
         let softest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
         let duration = match scene.run.duration {
             Some(value) => Input { name: "duration", value, source: "[run] duration".to_owned() },
@@ -120,13 +120,17 @@ fn turning(
     let motion = &scene.requirements.motion;
     let principal = inertia.symmetric_eigenvalues();
     let (least, most) = (principal.min(), principal.max());
-    let run = match &scene.spin {
-        Some(spin) => {
-            let rate = Variation::of(&spin.rate, duration);
-            let source = "[spin] rate".to_owned();
+    let run = match (scene.rotation(), &scene.carried) {
+        (Some((_, rate)), carried) => {
+            let rate = Variation::of(rate, duration);
+            let source = if carried.is_some() { "[carried.spin] rate" } else { "[spin] rate" }.to_owned();
             [(rate.largest, source.clone()), (rate.rate, source)]
         }
-        None => {
+        (None, Some(_)) => {
+            let source = "[carried], which does not turn".to_owned();
+            [(0.0, source.clone()), (0.0, source)]
+        }
+        (None, None) => {
             // The angular momentum of a free body is that of the start and what torques add.
             let start = inertia * scene.initial.angular_velocity;
             let torque: f64 = scene
@@ -153,7 +157,7 @@ fn turning(
     let [(spin, spin_source), (acceleration, acceleration_source)] = run;
     // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what it is.
     let larger = |range: &Option<Range>, value: f64, source: String, key: &str| match range {
-        Some(range) if scene.spin.is_none() || range.length() > value => {
+        Some(range) if !scene.prescribes() || range.length() > value => {
             (range.length(), format!("[motion] {key}"))
         }
         _ => (value, source),
@@ -221,6 +225,9 @@ fn driven(
         },
         _ => return Err("its rotation is not given: neither [spin] nor a stiff attachment".to_owned()),
     };
+    if scene.carried.is_some() {
+        return Err("the body is carried: its frame moves its modes".to_owned());
+    }
     if body.invariants().general.is_some() {
         return Err("the mass matrix does not commute with rotations".to_owned());
     }
@@ -241,7 +248,7 @@ fn driven(
         let history = Variation::of(&load.history, duration);
         let psi = rows.of(point);
         let (psi, size, factor) = match load.axes {
-            Axes::Body => {
+            Axes::Model | Axes::Body => {
                 let along = DMatrix::from_fn(1, nf, |_, j| psi.column(j).dot(&load.force));
                 (along, 1.0, history)
             }

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
 use crate::scene::{
     ErrorHistory, History, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin,
-    simulate,
+    Trace, simulate, trace, trace_at,
 };
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
@@ -20,6 +20,9 @@ use std::f64::consts::TAU;
 /// Instants per shortest period that bounds look at a motion, and how many they look at in all.
 const INSTANTS_PER_PERIOD: f64 = 20.0;
 const MOST_INSTANTS: usize = 20_000;
+
+/// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a spin is looked for.
+const LEAST_INSTANTS: usize = 500;
 
 /// A model with fewer terms or modes and the error that it makes.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,29 +69,28 @@ pub struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// The motion of `body` with the groups `kept`.
+    /// The continuous motion of the body with the groups `kept`.
     ///
     /// # Errors
-    /// As [`simulate`].
-    pub fn motion(&self, body: &FlexBody, kept: Groups) -> Result<(Recording, Vec<Diagnostic>)> {
+    /// As [`trace`].
+    pub fn motion(&self, kept: Groups) -> Result<(Trace, Vec<Diagnostic>)> {
         let mut scene = self.scene.clone();
         scene.run.terms = Terms::ALL.held(kept);
-        simulate(body, &scene, self.memory, |_| ())
+        trace(self.body, &scene, self.memory, |_| ())
     }
 
-    /// The motion of the body with the groups `kept`, at instants that follow its fastest mode, the loads and the spin, those of the scene
-    /// among them. `None` where these would be too many.
+    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the loads and the spin. `None` where
+    /// these would be too many.
     ///
     /// # Errors
     /// As [`simulate`].
     pub fn fine_motion(&self, kept: Groups) -> Result<Option<Recording>> {
         let mut scene = self.scene.clone();
-        let most = MOST_INSTANTS.max(scene.run.outputs);
         let wanted = (self.situation.duration.value * self.fastest() / TAU * INSTANTS_PER_PERIOD).ceil();
-        if wanted.is_nan() || wanted > most as f64 {
+        if wanted.is_nan() || wanted > MOST_INSTANTS as f64 {
             return Ok(None);
         }
-        scene.run.outputs *= (wanted as usize).div_ceil(scene.run.outputs).max(1);
+        scene.run.outputs = (wanted as usize).max(LEAST_INSTANTS);
         scene.run.terms = Terms::ALL.held(kept);
         Ok(Some(simulate(self.body, &scene, self.memory, |_| ())?.0))
     }
@@ -98,11 +100,10 @@ impl Bench<'_> {
         let duration = self.situation.duration.value;
         let modes = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
         let histories = self.scene.loads.iter().map(|load| &load.history);
-        let tones =
-            histories.chain(self.scene.spin.iter().map(|spin| &spin.rate)).map(|history| match history {
-                History::Sine { frequency, .. } => TAU * frequency,
-                _ => 0.0,
-            });
+        let tones = histories.chain(self.scene.driving()).map(|history| match history {
+            History::Sine { frequency, .. } => TAU * frequency,
+            _ => 0.0,
+        });
         let mut breaks = self.scene.spin.as_ref().map_or(Vec::new(), |spin| spin.rate.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);
@@ -130,15 +131,13 @@ impl Bench<'_> {
             own = whole.reduced(modes, whole.invariants().groups, Vec::new())?;
             &own
         };
-        let started;
-        let bench = if modes.len() == whole.n_modes() {
-            self
-        } else {
-            started = self.scene.of_modes(modes);
-            &Bench { scene: &started, ..*self }
-        };
-        let history = match bench.motion(body, kept) {
-            Ok((recording, _)) => Ok(measure.of_subset(&recording, modes)),
+        let mut scene =
+            if modes.len() == whole.n_modes() { self.scene.clone() } else { self.scene.of_modes(modes) };
+        scene.run.terms = Terms::ALL.held(kept);
+        // The same steps: errors are those of the model.
+        scene.run.scheme = measure.trace().scheme;
+        let history = match trace_at(body, &scene, &measure.trace().time) {
+            Ok(trace) => Ok(measure.of_subset(&trace, modes)),
             Err(error) if error.diagnostics().iter().all(|d| d.code() == Code::SimulationStopped) => {
                 Err(error.diagnostics()[0].message().to_owned())
             }
@@ -211,31 +210,23 @@ impl Bench<'_> {
         let levers = self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>() * error.energy;
         let torque = driven.torque_error(norms, &own, &error, &lacking) + levers;
 
-        // Relative to what is certain of the whole motion at the instants of the scene, or to the least that counts.
-        let outputs = self.scene.run.outputs;
-        let every = run.map_or(1, |run| ((run.time.len() - 1) / outputs).max(1));
+        // Relative to what is certain of the whole motion, or to the least that counts.
         let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
         let relative = |error: f64, of_run: &dyn Fn(&Recording) -> f64, least: f64| {
             error / (run.map_or(0.0, of_run) - error).max(least)
         };
-        let paths = |run: &Recording| {
-            let all = run.paths.iter().flat_map(|path| path.deflection.iter().step_by(every));
-            all.map(|d| d.norm()).fold(0.0, f64::max)
-        };
-        let energies = |run: &Recording| {
-            let all = run.balances.iter().step_by(every);
-            all.map(|balance| balance.elastic).fold(0.0, f64::max).sqrt()
-        };
+        let paths = |run: &Recording| run.extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max);
+        let energies = |run: &Recording| run.extremes.elastic.sqrt();
         let torques = |run: &Recording| {
-            let all = run.reactions.iter().flat_map(|all| all.iter().step_by(every));
-            all.map(|(_, torque)| torque.norm()).fold(0.0, f64::max)
+            run.reactions.iter().flatten().map(|(_, torque)| torque.norm()).fold(0.0, f64::max)
         };
         // The inertia whose radius of gyration a recording has: of a plane body that about its normal alone.
         let inertia = self.body.invariants().inertia();
         let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
         let rate = |spin: &Spin| {
-            let at = |i: usize| driven.rotation.duration * (i as f64 / outputs as f64);
-            (0..=outputs).map(|i| spin.rate.at(at(i)).0.abs()).fold(0.0, f64::max)
+            let even =
+                (0..=LEAST_INSTANTS).map(|i| driven.rotation.duration * (i as f64 / LEAST_INSTANTS as f64));
+            even.map(|time| spin.rate.at(time).0.abs()).fold(0.0, f64::max)
         };
         let least_torque = LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2);
         Ok(OutputErrors {
@@ -268,28 +259,27 @@ impl Bench<'_> {
     }
 
     /// What every mode does in a motion of the body.
-    pub fn shares(&self, recording: &Recording) -> Vec<ModeShare> {
-        let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+    pub fn shares(&self, trace: &Trace) -> Vec<ModeShare> {
         let mut longest = vec![0.0f64; self.body.n_modes()];
         self.each_watched(|rows| {
             for (longest, column) in longest.iter_mut().zip(rows.column_iter()) {
                 *longest = longest.max(column.norm());
             }
         });
-        let energy = most(&mut recording.balances.iter().map(|balance| balance.elastic)).sqrt();
-        let paths = recording.paths.iter().flat_map(|path| &path.deflection);
-        let deflection = match recording.paths.is_empty() {
-            true => recording.deflection * self.body.extent(),
-            false => most(&mut paths.map(|d| d.norm())),
+        let extremes = &trace.extremes;
+        let energy = extremes.elastic.sqrt();
+        let deflection = match extremes.watched.is_empty() {
+            true => extremes.deflection.value * self.body.extent(),
+            false => extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max),
         };
         let share = |j: usize| {
-            let amplitude = most(&mut recording.states.iter().map(|state| state.q[j].abs()));
+            let amplitude = extremes.amplitudes[j];
             let moved = longest[j] * amplitude;
             let root_energy = (0.5 * self.body.modes().eigenvalue[j]).sqrt() * amplitude;
             ModeShare {
                 amplitude,
-                deflection: moved / deflection.max(recording.resolution.deflection),
-                stress: root_energy / energy.max(recording.resolution.root_energy),
+                deflection: moved / deflection.max(trace.resolution.deflection),
+                stress: root_energy / energy.max(trace.resolution.root_energy),
                 kept: true,
             }
         };

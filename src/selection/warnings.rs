@@ -18,20 +18,15 @@ const NEAR: f64 = 0.1;
 /// How much more the errors of a model grow from the first half of the run to the second than the motion does, where those of the second
 /// matter: about 1 for errors that stay in step with the motion, more where phases run apart.
 pub(super) fn growth_of(bench: &Bench<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
-    let most = |half: &[f64]| half.iter().copied().fold(0.0, f64::max);
-    let halves = |values: &[f64]| {
-        let (first, second) = values.split_at(values.len().div_ceil(2));
-        (most(first), most(second))
-    };
     let growth = |(first, second): (f64, f64), allowed: f64| {
         (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
     };
-    let energies = measure.recording().balances.iter().map(|balance| balance.elastic.max(0.0).sqrt());
-    let motion = growth(halves(&energies.collect::<Vec<_>>()), 0.0)?;
+    let energies = measure.trace().elastic.iter().map(|energy| energy.max(0.0).sqrt());
+    let motion = growth(errors.halves(&energies.collect::<Vec<_>>()), 0.0)?;
     let tolerance = &bench.scene.requirements.tolerance;
     // The attitude has no amplitude: it grows when it grows.
-    let of_attitude = growth(halves(&errors.attitude), tolerance.attitude);
-    let of_stress = errors.stress.as_ref().and_then(|stress| growth(halves(stress), tolerance.stress));
+    let of_attitude = growth(errors.halves(&errors.attitude), tolerance.attitude);
+    let of_stress = errors.stress.as_ref().and_then(|stress| growth(errors.halves(stress), tolerance.stress));
     let beyond_motion = of_stress.map(|growth| growth / motion.max(1.0));
     [of_attitude, beyond_motion].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
 }
@@ -48,7 +43,7 @@ pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
 pub(super) fn resonances(bench: &Bench<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
     let (body, scene) = (bench.body, bench.scene);
     let rows = PointRows::new(body);
-    let spin = measure.recording().states.iter().map(|state| state.omega.norm()).fold(0.0, f64::max);
+    let spin = measure.trace().extremes.spin;
     let mut found = Vec::new();
     for (load, point) in scene.loads.iter().zip(bench.loads) {
         // Seen from the body a force that is fixed in space turns the other way round.

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 const FORMAT: &str = "flexbody-simulation";
-const VERSION: i64 = 1;
+const VERSION: i64 = 2;
 
 /// Unit exponents of mass^(1/2), length and time.
 const fn of(mass_halves: i8, length: i8, time: i8) -> Units {
@@ -96,7 +96,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
         ("energy_drift", drift.energy),
         ("linear_momentum_drift", drift.linear),
         ("angular_momentum_drift", drift.angular),
-        ("largest_deflection", recording.deflection),
+        ("largest_deflection", recording.extremes.deflection.value),
     ] {
         number(name, value)?;
     }
@@ -109,21 +109,28 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     frame.vectors(
         "origin",
         of(0, 1, 0),
-        "origin of the body frame, world axes",
+        &format!("{}, origin of the frame; world axes", recording.setting.origin_in_words()),
         states.iter().map(|s| &s.origin),
     )?;
+    let in_model = "origin of the frame in the coordinates of the model";
+    frame.put("origin_in_model", of(0, 1, 0), in_model, 1, recording.setting.origin.as_slice())?;
     let attitudes: Vec<f64> = states.iter().flat_map(|s| s.attitude.0).collect();
     frame.put(
         "attitude",
         Units::One,
-        "Euler parameters, the cosine of half the angle first",
+        "Euler parameters of the frame, from axes of the model, turning with the body, to world axes; the cosine of half the angle first",
         n,
         &attitudes,
     )?;
     let velocities = states.iter().map(|s| &s.velocity);
     frame.vectors("velocity", of(0, 1, -1), "velocity of the origin, world axes", velocities)?;
     let rates = states.iter().map(|s| &s.omega);
-    frame.vectors("angular_velocity", of(0, 0, -1), "angular velocity of the frame, body axes", rates)?;
+    frame.vectors(
+        "angular_velocity",
+        of(0, 0, -1),
+        "angular velocity of the frame, axes of the model, turning with the body",
+        rates,
+    )?;
 
     let modes = group("modes")?;
     let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
@@ -153,9 +160,9 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
 
     if let Some(reactions) = &recording.reactions {
         let reaction = group("reaction")?;
-        let description = "force that the prescribed motion takes, body axes";
+        let description = "force that the prescribed motion takes, axes of the model, turning with the body";
         reaction.vectors("force", of(2, 1, -2), description, reactions.iter().map(|r| &r.0))?;
-        let description = "torque about the origin that the prescribed motion takes, body axes";
+        let description = "torque about the origin of the frame that the prescribed motion takes, axes of the model, turning with the body";
         reaction.vectors("torque", of(2, 2, -2), description, reactions.iter().map(|r| &r.1))?;
     }
     if !recording.paths.is_empty() {
@@ -163,7 +170,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
         for path in &recording.paths {
             let point = Place { group: make(&points.group, &names::encode(&path.name))?, units };
             point.vectors("place", of(0, 1, 0), "place, world axes", path.place.iter())?;
-            let description = "deflection from the undeformed body, body axes";
+            let description = "deflection from the undeformed body, axes of the model, turning with the body";
             point.vectors("deflection", of(0, 1, 0), description, path.deflection.iter())?;
         }
     }

@@ -3,7 +3,7 @@
 use super::Source;
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Group, Groups, Storage, TermDecision};
-use crate::scene::Recording;
+use crate::scene::Trace;
 
 /// Mode counts of a ladder: about three to a doubling of the work.
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
@@ -100,8 +100,9 @@ impl Candidate {
     }
 }
 
-/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference.
-pub(super) fn candidates(sources: &[Source], motion: &Recording) -> Vec<Candidate> {
+/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference. Bodies that are `carried` keep all
+/// groups.
+pub(super) fn candidates(sources: &[Source], motion: &Trace, carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {
         let nf = of.body().n_modes();
@@ -135,7 +136,8 @@ pub(super) fn candidates(sources: &[Source], motion: &Recording) -> Vec<Candidat
         }
     }
     for candidate in &mut all {
-        candidate.groups = candidate.groups.and(sources[candidate.source].body().groups());
+        let held = sources[candidate.source].body().groups();
+        candidate.groups = if carried { held } else { candidate.groups.and(held) };
     }
     let mut distinct: Vec<Candidate> = Vec::with_capacity(all.len());
     for candidate in all {
@@ -147,10 +149,10 @@ pub(super) fn candidates(sources: &[Source], motion: &Recording) -> Vec<Candidat
 }
 
 /// Modes by the largest elastic energy that they have in a motion, the largest first.
-fn by_energy(body: &FlexBody, motion: &Recording) -> Vec<usize> {
+fn by_energy(body: &FlexBody, motion: &Trace) -> Vec<usize> {
     let energy: Vec<f64> = (0..body.n_modes())
         .map(|j| {
-            let most = motion.states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
+            let most = motion.extremes.amplitudes[j];
             body.modes().eigenvalue[j] * most * most
         })
         .collect();

@@ -2,8 +2,7 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dynamics::{
-    Balance, Configuration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
-    ReferenceConditions,
+    NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, ReferenceConditions,
 };
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
@@ -11,7 +10,7 @@ use crate::integration::{Explicit, Failure, Method, integrate};
 use crate::linalg::{combine, multiply};
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
-use crate::scene::{Apart, Axes, ErrorHistory, Load, Path, Point, Recording, Scene, Scheme};
+use crate::scene::{Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace};
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -21,14 +20,17 @@ const TOLERANCE: f64 = 1e-8;
 /// Multiplications with K that are affordable: some minutes.
 const AFFORDABLE: f64 = 3e11;
 
+/// Instants whose errors are computed together.
+const BLOCK: usize = 256;
+
 /// Evaluations per shortest period that an explicit method of order 8 takes at the least.
 const EVALUATIONS: f64 = 15.0;
 
-/// The motion of all nodes of a model at the instants of a recording.
+/// The motion of all nodes of a model, in the places where that of a body of it was looked at.
 #[derive(Debug, Clone)]
 pub struct NodalReference<'m> {
     model: &'m FeModel,
-    recording: Recording,
+    trace: Trace,
     /// Displacements (N x instants), rows and axes of the model.
     displacements: Mat<f64>,
     largest_deflection: f64,
@@ -43,6 +45,9 @@ impl<'m> NodalReference<'m> {
     pub fn refuse<'s>(model: &FeModel, scene: &'s Scene) -> Result<Vec<(usize, &'s Load)>> {
         if scene.spin.is_some() {
             return Err(refused("the nodal equations know no prescribed spin"));
+        }
+        if scene.carried.is_some() {
+            return Err(refused("the nodal equations carry no interface"));
         }
         if scene.requirements.damping.is_some() && model.damping().is_none() {
             return Err(refused(NodalError::DampingOfModes));
@@ -74,15 +79,17 @@ impl<'m> NodalReference<'m> {
         model: &'m FeModel,
         body: &FlexBody,
         scene: &Scene,
-        motion: &Recording,
+        motion: &Trace,
+        memory: Option<u64>,
         watch: Watch<'_>,
     ) -> Result<Self> {
         let loads = Self::refuse(model, scene)?;
+        refuse_too_much(model, motion, memory)?;
         let end = motion.time.last().copied().unwrap_or(0.0);
         let equations =
             NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes).map_err(refused)?;
         let modes = NodalModes::new(&equations, body).ok_or_else(|| refused("the body has other rows"))?;
-        let start = modes.lift(&motion.states[0]);
+        let start = modes.lift(&motion.start);
         let mut state = equations.state(&start).map_err(refused)?;
         let act = |time: f64, evaluation: &mut NodalEvaluation<'_>| {
             if let Some(gravity) = &scene.gravity {
@@ -92,7 +99,7 @@ impl<'m> NodalReference<'m> {
                 let factor = load.history.at(time).0;
                 let in_world = |v: &Vector3<f64>| match load.axes {
                     Axes::World => v * factor,
-                    Axes::Body => evaluation.axes() * v * factor,
+                    Axes::Model | Axes::Body => evaluation.axes() * v * factor,
                 };
                 let (force, torque) = (in_world(&load.force), in_world(&load.torque));
                 evaluation.add_force(*node, &force);
@@ -109,31 +116,19 @@ impl<'m> NodalReference<'m> {
         let mut system = NodalMotion::new(&equations, act);
         let mut observer = NodalEvaluation::new(&equations);
         let mut displacements = Mat::zeros(equations.n_rows(), motion.time.len());
-        let (mut states, mut balances) = (Vec::new(), Vec::new());
+        let (mut attitude, mut elastic) = (Vec::new(), Vec::new());
+        let (mut spin, mut internal) = (Peak::default(), Peak::default());
         let breaks = scene.breaks();
         let observe = |time: f64, state: &[f64]| {
             observer.set(state)?;
-            displacements.col_as_slice_mut(states.len()).copy_from_slice(observer.displacements());
+            displacements.col_as_slice_mut(attitude.len()).copy_from_slice(observer.displacements());
             let now = observer.configuration();
-            let (linear, angular) = observer.momenta();
-            states.push(Configuration {
-                origin: now.origin,
-                attitude: now.attitude,
-                velocity: now.velocity,
-                omega: now.omega,
-                q: Vec::new(),
-                qd: Vec::new(),
-            });
-            balances.push(Balance {
-                kinetic: observer.kinetic_energy(),
-                elastic: observer.elastic_energy(),
-                flight: 0.5 * linear.norm_squared() / motion.size.0,
-                work: 0.0,
-                linear,
-                angular,
-                impulse: Vector3::zeros(),
-                angular_impulse: Vector3::zeros(),
-            });
+            let flight = 0.5 * observer.momenta().0.norm_squared() / motion.size.0;
+            let energy = observer.elastic_energy();
+            spin.see(time, now.omega.norm());
+            internal.see(time, (observer.kinetic_energy() - flight + energy).max(0.0).sqrt());
+            attitude.push(now.attitude);
+            elastic.push(energy);
             watch(Event::Fraction(time / end));
             Ok::<(), Failure>(())
         };
@@ -144,40 +139,60 @@ impl<'m> NodalReference<'m> {
             },
         )?;
         let own = Shapes::new(model, body, &displacements);
-        let paths = scene.watched.iter().map(|point| own.path(body, point)).collect();
-        let recording = Recording {
+        let trace = Trace {
             scheme: Scheme::Adaptive { tolerance },
-            states,
-            balances,
+            attitude,
+            elastic,
+            q: Vec::new(),
             reactions: None,
-            paths,
+            deflections: scene.watched.iter().map(|point| own.path(body, point)).collect(),
             work: method.work(),
-            deflection: 0.0,
+            extremes: Extremes { spin: spin.value, internal: internal.value.powi(2), ..Extremes::default() },
             ..motion.clone()
         };
         let lengths = (0..displacements.ncols()).map(|i| longest(model, displacements.col_as_slice(i)));
-        let largest_deflection = lengths.fold(0.0, f64::max);
-        Ok(Self { model, recording, displacements, largest_deflection })
+        let largest_deflection = Peak::of(&trace.time, lengths).value;
+        Ok(Self { model, trace, displacements, largest_deflection })
     }
 
     /// Errors of the motion of `body`; `None` when it is no body of the model.
-    pub fn errors(&self, body: &FlexBody, candidate: &Recording) -> Option<ErrorHistory> {
+    pub fn errors(&self, body: &FlexBody, candidate: &Trace) -> Option<ErrorHistory> {
         let vectors = body.vectors_of(self.model)?;
-        let q = Mat::from_fn(body.n_modes(), candidate.states.len(), |j, i| candidate.states[i].q[j]);
-        let difference = combine(vectors.as_ref(), q.as_ref()) - &self.displacements;
-        let mut forces = Mat::zeros(difference.nrows(), difference.ncols());
-        multiply(self.model.stiffness(), 1, difference.as_ref(), forces.as_mut());
-        let instants = 0..difference.ncols();
-        let product = |i: usize| {
-            let pairs = difference.col_as_slice(i).iter().zip(forces.col_as_slice(i));
-            0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
-        };
-        let apart = Apart {
-            energy: instants.clone().map(|i| product(i).max(0.0)).collect(),
-            deflection: instants.map(|i| longest(self.model, difference.col_as_slice(i))).collect(),
-            largest_deflection: self.largest_deflection,
-        };
-        Some(ErrorHistory::new(&self.recording, candidate, &apart))
+        let (mut energy, mut deflection) = (Vec::new(), Vec::new());
+        for first in (0..candidate.q.len()).step_by(BLOCK) {
+            let count = BLOCK.min(candidate.q.len() - first);
+            let q = Mat::from_fn(body.n_modes(), count, |j, i| candidate.q[first + i][j]);
+            let own = combine(vectors.as_ref(), q.as_ref());
+            let difference = own - self.displacements.as_ref().subcols(first, count);
+            let mut forces = Mat::zeros(difference.nrows(), count);
+            multiply(self.model.stiffness(), 1, difference.as_ref(), forces.as_mut());
+            let product = |i: usize| {
+                let pairs = difference.col_as_slice(i).iter().zip(forces.col_as_slice(i));
+                0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
+            };
+            energy.extend((0..count).map(|i| product(i).max(0.0)));
+            deflection.extend((0..count).map(|i| longest(self.model, difference.col_as_slice(i))));
+        }
+        let apart = Apart { energy, deflection, largest_deflection: self.largest_deflection };
+        Some(ErrorHistory::new(&self.trace, candidate, &apart))
+    }
+}
+
+/// The displacements of all rows are kept wherever the motion is looked at.
+fn refuse_too_much(model: &FeModel, motion: &Trace, memory: Option<u64>) -> Result<()> {
+    const DOUBLE: f64 = 8.0;
+    let needed = DOUBLE * motion.time.len() as f64 * (model.rows().len() + 3 * model.nodes().len()) as f64;
+    match memory {
+        Some(left) if needed > left as f64 => {
+            let message = format!(
+                "the motion of all nodes takes {:.3} GB, {:.3} GB are left",
+                needed / 1e9,
+                left as f64 / 1e9
+            );
+            let help = "take --reference full, or simulate a shorter `duration`";
+            Err(Diagnostic::new(Code::MemoryShort, message).with_help(help).into())
+        }
+        _ => Ok(()),
     }
 }
 
@@ -232,11 +247,11 @@ impl Shapes {
         Self { shape, rotation: (!rows.rotations().is_empty()).then_some(rotation) }
     }
 
-    /// Deflections of a watched point; where it is in the world nobody asks for.
-    fn path(&self, body: &FlexBody, point: &Point) -> Path {
+    /// Deflections of a watched point.
+    fn path(&self, body: &FlexBody, point: &Point) -> Vec<Vector3<f64>> {
         let at = |a: &Mat<f64>, first: usize, i: usize| Vector3::from_fn(|k, _| a[(first + k, i)]);
         let of = |a: &Mat<f64>, first: usize| (0..a.ncols()).map(|i| at(a, first, i)).collect();
-        let deflection = match point {
+        match point {
             Point::Node(number) => {
                 let node = body.nodes().ids.iter().position(|id| id == number);
                 node.map_or_else(Vec::new, |node| of(&self.shape, 3 * node))
@@ -248,7 +263,6 @@ impl Shapes {
                     .and_then(|own| own.rows(body.nodes(), self.shape.as_ref(), rotation, body.dimension()));
                 rows.map_or_else(Vec::new, |rows| of(&rows.translation, 0))
             }
-        };
-        Path { name: point.to_string(), place: Vec::new(), deflection }
+        }
     }
 }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::flex_body::{FlexBody, LumpedBody, MassStructure};
 use crate::linalg::{gram, multiply};
 use crate::model::FeModel;
-use crate::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Recording, Scene};
+use crate::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 
@@ -40,6 +40,19 @@ impl Source {
         multiply(model.stiffness(), 1, others.as_ref(), product.as_mut());
         self.shared = Some(gram(own.as_ref(), product.as_ref()));
         Some(self)
+    }
+
+    /// The same with its bodies in the frame of a scene.
+    ///
+    /// # Errors
+    /// Those of [`Stage::new`].
+    pub(super) fn staged(&self, scene: &Scene) -> Result<Self> {
+        let mut parts = self.body.clone().into_parts();
+        parts.lumped = self.lumped.clone();
+        let whole = FlexBody::new(parts)?;
+        let mut parts = Stage::new(&whole, scene)?.body.into_owned().into_parts();
+        let lumped = std::mem::take(&mut parts.lumped);
+        Ok(Self { body: FlexBody::new(parts)?, lumped, ..self.clone() })
     }
 
     /// What it is.
@@ -110,7 +123,7 @@ impl Source {
         measure: &Measure<'_>,
         body: &FlexBody,
         modes: &[usize],
-        motion: &Recording,
+        motion: &Trace,
     ) -> Option<ErrorHistory> {
         let Some(shared) = &self.shared else { return Some(measure.of_subset(motion, modes)) };
         let shared = Mat::from_fn(modes.len(), shared.ncols(), |i, j| shared[(modes[i], j)]);

@@ -9,7 +9,7 @@ use crate::flex_body::FlexBody;
 use crate::integration::Work;
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
-use crate::scene::{Measure, OutputErrors, Recording, Scene, Tolerance, simulate};
+use crate::scene::{Measure, OutputErrors, Scene, Stage, Tolerance, Trace, trace, trace_at};
 use crate::store;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -121,7 +121,7 @@ pub struct Trade {
 /// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
 ///
 /// # Errors
-/// Those of [`simulate`] and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the
+/// Those of [`trace`] and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the
 /// temporary folder.
 pub fn trade(
     sources: &[Source],
@@ -133,18 +133,22 @@ pub fn trade(
     let Some(source) = sources.first() else {
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
     };
-    // Groups are what candidates differ in.
-    let mut scene = scene.clone();
-    scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
     watch(Event::Phase("reference"));
-    refuse_too_much(sources, &scene, settings.memory)?;
-    nodal.map(|model| NodalReference::refuse(model, &scene)).transpose()?;
+    nodal.map(|model| NodalReference::refuse(model, scene)).transpose()?;
+    let stage = Stage::new(source.body(), scene)?;
+    let staged = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
+    let (sources, source) = (&staged[..], &staged[0]);
+    // Groups are what candidates differ in.
+    let mut scene = stage.scene.into_owned();
+    scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
     let full = |part| watch(Event::Fraction(part));
-    let (motion, diagnostics) = simulate(source.body(), &scene, settings.memory, full)?;
+    let (motion, said) = trace(source.body(), &scene, settings.memory, full)?;
+    refuse_too_much(sources, &motion, settings.memory)?;
+    let diagnostics = [stage.found, said].concat();
     let nodal = match nodal {
         Some(model) => {
             watch(Event::Phase("nodal reference"));
-            Some(NodalReference::new(model, source.body(), &scene, &motion, watch)?)
+            Some(NodalReference::new(model, source.body(), &scene, &motion, settings.memory, watch)?)
         }
         None => None,
     };
@@ -152,7 +156,7 @@ pub fn trade(
     let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref() };
 
     watch(Event::Phase("errors"));
-    let all = candidates(sources, &motion);
+    let all = candidates(sources, &motion, scene.carried.is_some());
     let (count, done) = (all.len() as f64, AtomicUsize::new(0));
     let step = |done: &AtomicUsize| {
         let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -192,7 +196,7 @@ pub fn trade(
 struct Job<'j> {
     sources: &'j [Source],
     scene: &'j Scene,
-    motion: &'j Recording,
+    motion: &'j Trace,
     measure: &'j Measure<'j>,
     nodal: Option<&'j NodalReference<'j>>,
 }
@@ -221,7 +225,7 @@ impl Job<'_> {
         let body = candidate.body(source)?;
         let mut scene = self.own_scene(source, &body, candidate);
         scene.run.scheme = self.motion.scheme;
-        let motion = simulate(&body, &scene, None, |_| ())?.0;
+        let motion = trace_at(&body, &scene, &self.motion.time)?;
         let history = match self.nodal {
             Some(nodal) => nodal.errors(&body, &motion),
             None => source.errors(self.measure, &body, &candidate.modes, &motion),
@@ -263,7 +267,7 @@ impl Job<'_> {
     }
 
     fn own_scene(&self, source: &Source, body: &FlexBody, candidate: &Candidate) -> Scene {
-        source.scene(self.scene, body, &candidate.modes, &self.motion.states[0])
+        source.scene(self.scene, body, &candidate.modes, &self.motion.start)
     }
 }
 
@@ -275,8 +279,8 @@ fn file_size(body: &FlexBody) -> Result<u64> {
     Ok(std::fs::metadata(slot.temporary()).map_or(0, |meta| meta.len()))
 }
 
-/// Every thread has a body, its equations and its motion, beside the motion of the reference.
-fn refuse_too_much(sources: &[Source], scene: &Scene, memory: Option<u64>) -> Result<()> {
+/// Every thread has a body, its equations and its motion, beside that of the reference, which is there.
+fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -> Result<()> {
     const DOUBLE: f64 = 8.0;
     /// W1 to W3, their panels and copies, and S: squares of the modes.
     const SQUARES: f64 = 40.0;
@@ -284,9 +288,9 @@ fn refuse_too_much(sources: &[Source], scene: &Scene, memory: Option<u64>) -> Re
         |of: &dyn Fn(&FlexBody) -> usize| sources.iter().map(|s| of(s.body())).max().unwrap_or(0) as f64;
     let (nodes, modes) = (most(&FlexBody::n_nodes), most(&FlexBody::n_modes));
     let body = nodes * (7.0 + 6.0 * modes) + SQUARES * modes * modes;
-    let motion = (scene.run.outputs + 1) as f64 * (50.0 + 2.0 * modes + 6.0 * scene.watched.len() as f64);
+    let motion = reference.bytes(most(&FlexBody::n_modes) as usize);
     let threads = rayon::current_num_threads() as f64;
-    let needed = DOUBLE * (motion + threads * (2.0 * body + motion));
+    let needed = threads * (DOUBLE * 2.0 * body + motion);
     match memory {
         Some(left) if needed > left as f64 => {
             let message = format!(
@@ -295,7 +299,7 @@ fn refuse_too_much(sources: &[Source], scene: &Scene, memory: Option<u64>) -> Re
                 left as f64 / 1e9
             );
             Err(Diagnostic::new(Code::MemoryShort, message)
-                .with_help("use fewer --threads, modes or `outputs`")
+                .with_help("use fewer --threads or modes, or a shorter `duration`")
                 .into())
         }
         _ => Ok(()),

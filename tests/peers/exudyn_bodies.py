@@ -28,6 +28,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial.transform import Rotation
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches/peers"))
 from measure import node_order, read_model  # noqa: E402
@@ -59,7 +60,7 @@ class Body:
         run(flexbody, "export", self.path, "--to", "exudyn", "--allow-loss", "-o", export)
         with h5py.File(self.path) as f:
             self.ids, self.positions, shapes = f["nodes/id"][()], f["nodes/position"][()], f["modes/shape"][()]
-            self.axes, self.lam = f["frame/axes"][()], f["modes/eigenvalue"][()]
+            self.axes, self.origin, self.lam = f["frame/axes"][()], f["frame/origin"][()], f["modes/eigenvalue"][()]
             self.inertia, self.mass = f["invariants/I0"][()], f["invariants/mass"][0]
         self.shapes = shapes.reshape(MODES, -1).T.copy()
         self.loaded = ObjectFFRFreducedOrderInterface()
@@ -119,19 +120,22 @@ class Scene:
 
     def ours(self, folder):
         """Places, axes and amplitudes by `flexbody simulate`."""
+        # Exudyn's world starts along the axes of the body frame, a scene along those of the model.
+        turn = self.body.axes.T
+        start = f"rotation = {Rotation.from_matrix(turn).as_rotvec().tolist()}\norigin = {(-turn @ self.body.origin).tolist()}"
         lines = [f"[run]\nduration = {self.duration!r}\noutputs = {INSTANTS}\ntolerance = 1e-12"]
         if self.name == "tumbling":
             modes = ", ".join(f"{{ number = {j + 1}, amplitude = {float(q)!r} }}" for j, q in enumerate(self.q))
-            lines += [f"[initial]\nvelocity = {self.velocity.tolist()}\nangular_velocity = {self.omega.tolist()}\nmode = [{modes}]"]
+            lines += [f"[initial]\n{start}\nvelocity = {self.velocity.tolist()}\nangular_velocity = {self.omega.tolist()}\naxes = \"body\"\nmode = [{modes}]"]
         else:
             half = self.duration / 2
-            lines += [f"[spin]\naxis = [0, 0, 1]\nrate = {{ to = {float(self.rate)!r}, duration = {half!r} }}\nhold = true"]
+            lines += [f"[initial]\n{start}\n[spin]\naxis = [0, 0, 1]\naxes = \"body\"\nrate = {{ to = {float(self.rate)!r}, duration = {half!r} }}\nhold = true"]
         scene, motion = folder / "scene.toml", folder / "motion.h5"
         scene.write_text("\n".join(lines) + "\n")
         run(self.body.flexbody, "simulate", self.body.path, "--scene", scene, "-o", motion)
         with h5py.File(motion) as f:
             e = f["frame/attitude"][()]
-            return {"place": f["frame/origin"][()], "axes": np.array([rotation(*row) for row in e]), "q": f["modes/q"][()]}
+            return {"place": f["frame/origin"][()], "axes": np.array([rotation(*row) for row in e]) @ self.body.axes, "q": f["modes/q"][()]}
 
     def angle(self, t):
         """Integral of the rate: a smooth rise over half the scene, then constant."""

@@ -182,23 +182,32 @@ impl Doing {
             run: Run {
                 duration: Some(duration),
                 outputs: self.outputs,
+                most_steps: Run::MOST_STEPS,
                 scheme: Scheme::Adaptive { tolerance: 1e-10 },
                 terms: Terms::ALL,
             },
             initial: Initial {
                 modes,
+                axes: Axes::Body,
                 angular_velocity: if free { axis * rate } else { Vector3::zeros() },
                 ..Initial::default()
             },
             gravity: None,
             loads: self.pushes.iter().map(load).collect(),
-            spin: (!free).then(|| Spin { axis, rate: self.spin.history(rate, duration, &rates), hold: true }),
+            spin: (!free).then(|| Spin {
+                axis,
+                axes: Axes::Body,
+                rate: self.spin.history(rate, duration, &rates),
+                hold: true,
+            }),
+            carried: None,
             watched: self.watched.iter().map(|&part| node(part)).collect(),
             requirements: Requirements {
                 damping: Some(self.damping).filter(|&d| d > 0.0),
                 ..Default::default()
             },
             source: None,
+            resolved: false,
         }
     }
 }

@@ -1,0 +1,124 @@
+//! Rigid motion as modes: M in rigid motions and modes, and the same body with other amounts of rigid motion in its modes.
+
+use super::{GeneralTerms, Groups, Invariants};
+use faer::{Mat, MatRef};
+
+impl Invariants {
+    /// \[m I, -c~, C1; ., I0, C2; ., ., m_ff\]: M in the six rigid motions and the modes.
+    pub fn mass_matrix(&self) -> Mat<f64> {
+        let (c1, c2, modal) = (&self.c1, self.c2(), self.modal_mass());
+        let (lever, inertia) = (self.first_moment.cross_matrix(), self.inertia());
+        let nf = self.n_modes();
+        Mat::from_fn(6 + nf, 6 + nf, |i, j| match (i.min(j), i.max(j)) {
+            (a, b) if b < 3 => self.mass * f64::from(a == b),
+            (a, b) if a < 3 && b < 6 => -lever[(a, b - 3)],
+            (a, b) if b < 6 => inertia[(a - 3, b - 3)],
+            (a, b) if a < 3 => c1[(a, b - 6)],
+            (a, b) if a < 6 => c2[(a - 3, b - 6)],
+            _ => modal[(i - 6, j - 6)],
+        })
+    }
+
+    /// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes before the others.
+    pub(crate) fn with_rigid_modes(&self) -> Self {
+        let old = self;
+        let nf = old.n_modes();
+        let (m, c, j) = (old.mass, &old.first_moment, &old.second_moment);
+        let axes = || 0..3;
+        let delta = |a: usize, b: usize| f64::from(a == b);
+        // (e_d x c)_l.
+        let turned = |l: usize, d: usize| axes().map(|i| permutation(l, d, i) * c[i]).sum::<f64>();
+        let c1 = Mat::from_fn(3, 6 + nf, |k, p| match p {
+            0..3 => m * delta(k, p),
+            3..6 => turned(k, p - 3),
+            _ => old.c1[(k, p - 6)],
+        });
+        let ibar = |k: usize, l: usize, p: usize| match p {
+            0..3 => delta(l, p) * c[k],
+            3..6 => axes().map(|i| permutation(l, p - 3, i) * j[(k, i)]).sum(),
+            _ => old.ibar[k][l][p - 6],
+        };
+        // u_k' Ms v_l of motions in this order: translations, rotations, modes.
+        let product = |k: usize, l: usize, p: usize, q: usize| match (p, q) {
+            (0..3, 0..3) => delta(k, p) * delta(l, q) * m,
+            (0..3, 3..6) => delta(k, p) * turned(l, q - 3),
+            (0..3, _) => delta(k, p) * old.c1[(l, q - 6)],
+            (3..6, 3..6) => {
+                let entry =
+                    |a: usize, b: usize| permutation(k, p - 3, a) * permutation(l, q - 3, b) * j[(a, b)];
+                axes().flat_map(|a| axes().map(move |b| (a, b))).map(|(a, b)| entry(a, b)).sum()
+            }
+            (3..6, _) => axes().map(|i| permutation(k, p - 3, i) * old.ibar[i][l][q - 6]).sum(),
+            _ => old.s[k][l][(p - 6, q - 6)],
+        };
+        let rank = |p: usize| (p / 3).min(2);
+        let s = |k: usize, l: usize| {
+            Mat::from_fn(6 + nf, 6 + nf, |p, q| {
+                if rank(p) <= rank(q) { product(k, l, p, q) } else { product(l, k, q, p) }
+            })
+        };
+        Self {
+            mass: m,
+            first_moment: *c,
+            second_moment: *j,
+            c1,
+            ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| (0..6 + nf).map(|p| ibar(k, l, p)).collect())),
+            s: [0, 1, 2].map(|k| [0, 1, 2].map(|l| s(k, l))),
+            modal_stiffness: Mat::from_fn(6 + nf, 6 + nf, |p, q| {
+                if p < 6 || q < 6 { 0.0 } else { old.modal_stiffness[(p - 6, q - 6)] }
+            }),
+            general: None,
+            groups: Groups::ALL,
+        }
+    }
+
+    /// W3 by its formula from S.
+    pub(crate) fn w3_of_s(&self) -> Mat<f64> {
+        let solid = Self { general: None, groups: Groups::ALL, ..self.clone() };
+        solid.w3().expect("held")
+    }
+
+    /// The same body with the modes psi_j - t_j - theta_j x x: `taken` has the translation t_j and the rotation theta_j of every mode
+    /// (6 x nf). Rigid motion takes no elastic energy, so that K_ff stays.
+    ///
+    /// What is linear in the modes, C1, C2 and m_ff, is exact for every mass matrix, and everything is where M commutes with rotations.
+    /// Where it does not, W0 to W3 of the rigid motion that is taken are those of a body that does and has the same J.
+    ///
+    /// # Panics
+    /// When the sizes disagree, or a group is not held: of what is not there nothing can be taken.
+    pub fn without_rigid_motion(&self, taken: MatRef<'_, f64>) -> Self {
+        let nf = self.n_modes();
+        assert!((taken.nrows(), taken.ncols()) == (6, nf), "six rigid motions of every mode");
+        assert!(self.groups == Groups::ALL, "a body that holds all groups");
+        let change = Mat::from_fn(6 + nf, nf, |i, j| match i.checked_sub(6) {
+            None => -taken[(i, j)],
+            Some(mode) => f64::from(mode == j),
+        });
+        let mut new = self.with_rigid_modes().with_basis(change.as_ref());
+        new.modal_stiffness = self.modal_stiffness.clone();
+        let Some(general) = &self.general else { return new };
+        let solid = |body: &Self| {
+            let solid = Self { general: None, ..body.clone() };
+            (solid.w0(), solid.w3_of_s())
+        };
+        let ((old_w0, old_w3), (new_w0, new_w3)) = (solid(self), solid(&new));
+        let modal_mass = change.transpose() * self.mass_matrix() * &change;
+        new.general = Some(GeneralTerms {
+            w0: new_w0 + (&general.w0 - old_w0),
+            w3: new_w3 + (&general.w3 - old_w3),
+            modal_mass: Mat::from_fn(nf, nf, |i, j| 0.5 * (modal_mass[(i, j)] + modal_mass[(j, i)])),
+            plane: general.plane,
+        });
+        if general.plane { new.about_z() } else { new }
+    }
+}
+
+/// The sign of the permutation (a, b, c) of (0, 1, 2); 0 where an index repeats.
+fn permutation(a: usize, b: usize, c: usize) -> f64 {
+    match (3 + b - a) % 3 {
+        0 => 0.0,
+        1 if c == 3 - a - b => 1.0,
+        2 if c == 3 - a - b => -1.0,
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,98 @@
+//! The largest value of a smooth function that is seen at instants.
+
+/// Intervals whose lengths differ by more than this are not of one parabola: the instants stand at a break.
+const UNEVEN: f64 = 8.0;
+
+/// The largest value of a function f >= 0 of time that is seen at ascending instants, and where it lies.
+///
+/// Between instants f^2 is taken for the parabola through a largest value and its neighbours: sizes of vectors have smooth squares. With six
+/// instants in the period of a vibration a peak is found to within a few hundredths, with twenty to within 1e-4.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Peak {
+    /// The largest value.
+    pub value: f64,
+    /// Its time.
+    pub time: f64,
+    /// Times and squares of the last two instants, the earlier first.
+    last: [Option<(f64, f64)>; 2],
+}
+
+impl Peak {
+    /// Sees `value` at `time`.
+    pub fn see(&mut self, time: f64, value: f64) {
+        self.offer(time, value);
+        let now = (time, value * value);
+        if let [Some(before), Some(middle)] = self.last
+            && let Some((time, square)) = vertex(before, middle, now)
+        {
+            self.offer(time, square.sqrt());
+        }
+        self.last = [self.last[1], Some(now)];
+    }
+
+    /// A value that is not a number is the largest of all.
+    fn offer(&mut self, time: f64, value: f64) {
+        if value > self.value || value.is_nan() {
+            (self.value, self.time) = (value, time);
+        }
+    }
+
+    /// The peak of the function times `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        let square = |(time, value): (f64, f64)| (time, value * factor * factor);
+        Self { value: self.value * factor, time: self.time, last: self.last.map(|one| one.map(square)) }
+    }
+
+    /// The peak of `values` at `times`.
+    pub fn of(times: &[f64], values: impl IntoIterator<Item = f64>) -> Self {
+        let mut peak = Self::default();
+        times.iter().zip(values).for_each(|(&time, value)| peak.see(time, value));
+        peak
+    }
+}
+
+/// Where the parabola through three points is largest, if the middle one is the largest of them.
+fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<(f64, f64)> {
+    let (before, after) = (b.0 - a.0, c.0 - b.0);
+    if !(b.1 >= a.1 && b.1 >= c.1) || !(before < UNEVEN * after && after < UNEVEN * before) {
+        return None;
+    }
+    let (rise, fall) = ((b.1 - a.1) / before, (c.1 - b.1) / after);
+    let bend = (rise - fall) / (before + after);
+    let slope = (rise * after + fall * before) / (before + after);
+    (bend > 0.0).then(|| (b.0 + 0.5 * slope / bend, b.1 + 0.25 * slope * slope / bend))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_between_instants_is_found() {
+        for (per_period, error) in [(6.5, 0.04), (20.0, 4e-4), (60.0, 4e-6)] {
+            for phase in 0..40 {
+                let wave = |t: f64| (t + 0.1 * f64::from(phase)).sin().abs();
+                let times: Vec<f64> =
+                    (0..200).map(|i| f64::from(i) * std::f64::consts::TAU / per_period).collect();
+                let peak = Peak::of(&times, times.iter().map(|&t| wave(t)));
+                assert!((peak.value - 1.0).abs() < error, "{per_period} {phase}: {peak:?}");
+                assert!(wave(peak.time) > 1.0 - 4.0 * error, "{peak:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_exact_at_uneven_instants() {
+        let times = [0.0, 0.5, 1.7, 2.1];
+        let peak = Peak::of(&times, times.iter().map(|t| (4.0 - (t - 1.3) * (t - 1.3)).sqrt()));
+        assert!((peak.value - 2.0).abs() < 1e-14 && (peak.time - 1.3).abs() < 1e-14, "{peak:?}");
+    }
+
+    #[test]
+    fn jumps_and_numbers_that_are_none_are_not_smoothed() {
+        let jump = Peak::of(&[0.0, 1.0, 1.0 + 1e-15, 2.0], [1.0, 2.0, 0.5, 0.5]);
+        assert_eq!((jump.value, jump.time), (2.0, 1.0));
+        assert!(Peak::of(&[0.0, 1.0, 2.0], [1.0, f64::NAN, 0.5]).value.is_nan());
+        assert!(Peak::of(&[0.0, 1.0, 2.0], [0.0; 3]).value == 0.0);
+    }
+}
