@@ -22,7 +22,7 @@ use crate::eigen::{
 };
 use crate::error::Result;
 use crate::linalg::{
-    Elimination, ReducedPencil, add_combination, combine, gram, side_by_side, subtract_combination,
+    Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side, subtract_combination,
     symmetric_eigen,
 };
 use crate::model::{Coupling, FeModel, rigid_count};
@@ -404,6 +404,7 @@ fn fixed_modes(
 /// G and H of the responses y to the inertia of the constraint modes, without their part along the fixed-interface modes.
 fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> Lacking {
     let pencil = &problem.pencil;
+    let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
     for _ in 0..2 {
         let along = gram(fixed.vectors.as_ref(), pencil.apply_mass(response.as_ref()).as_ref());
         subtract_combination(response.as_mut(), fixed.vectors.as_ref(), along.as_ref());
@@ -413,6 +414,7 @@ fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolu
         Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))
     };
     Lacking {
+        whole,
         stiffness: symmetric(pencil.apply_stiffness(response.as_ref())),
         mass: symmetric(pencil.apply_mass(response.as_ref())),
     }

@@ -14,8 +14,8 @@ use crate::linalg::{combine, gram, symmetric_eigen};
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 
-/// Part of the largest coupling below which a combination of corrections is rounding.
-const COUPLED: f64 = 1e-13;
+/// Part of the energy of the whole responses below which what the basis lacks of them is rounding.
+const COUPLED: f64 = 1e-14;
 
 /// Dense eigenproblems that are solved for the lower bounds at the most: modes share them beyond.
 const PROBLEMS: usize = 64;
@@ -23,6 +23,8 @@ const PROBLEMS: usize = 64;
 /// What the basis lacks of the static responses to the inertia of the interface motions (c of them).
 #[derive(Debug, Clone)]
 pub(super) struct Lacking {
+    /// Energies y'K y of the whole responses, before what the basis has of them was taken out (c).
+    pub whole: Vec<f64>,
     /// G = y'K y (c x c).
     pub stiffness: Mat<f64>,
     /// H = y'M y (c x c).
@@ -50,7 +52,7 @@ pub(super) fn free_estimate(
     lacking: &Lacking,
     cut: Option<f64>,
 ) -> Option<FreeEstimate> {
-    let estimate = corrected(theta, rigid, q, lacking)?;
+    let mut estimate = corrected(theta, rigid, q, lacking)?;
     let coupling = |a: MatRef<'_, f64>, b: MatRef<'_, f64>| {
         gram(a, combine(lacking.stiffness.as_ref(), b).as_ref())
     };
@@ -62,7 +64,11 @@ pub(super) fn free_estimate(
         for chunk in (0..below).collect::<Vec<_>>().chunks(below.div_ceil(PROBLEMS).max(1)) {
             let highest = theta[chunk[chunk.len() - 1]];
             let bounds = weighed_down(theta, &blocks, highest * cut / (cut - highest))?;
-            chunk.iter().for_each(|&j| lower[j] = bounds[j].min(estimate[j]));
+            for &j in chunk {
+                lower[j] = bounds[j].min(theta[j]);
+                // Where the basis lacks next to nothing they differ by rounding.
+                estimate[j] = estimate[j].max(lower[j]);
+            }
         }
     }
     Some(FreeEstimate { estimate, lower })
@@ -76,13 +82,12 @@ fn corrected(
     lacking: &Lacking,
 ) -> Option<Vec<f64>> {
     let (nf, c) = (theta.len(), lacking.stiffness.nrows());
-    // Corrections of one size, then K-orthonormal.
-    let size: Vec<f64> = (0..c).map(|i| lacking.stiffness[(i, i)].max(0.0).sqrt()).collect();
+    // Responses of one size, then corrections K-orthonormal.
+    let size: Vec<f64> = lacking.whole.iter().map(|energy| energy.max(0.0).sqrt()).collect();
     let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
     let scaled = Mat::from_fn(c, c, |i, j| unit(i) * lacking.stiffness[(i, j)] * unit(j));
     let eigen = symmetric_eigen(scaled.as_ref())?;
-    let largest = eigen.values.last().copied().unwrap_or(0.0);
-    let kept: Vec<usize> = (0..c).filter(|&i| eigen.values[i] > COUPLED * largest).collect();
+    let kept: Vec<usize> = (0..c).filter(|&i| eigen.values[i] > COUPLED).collect();
     let k = kept.len();
     let corrections =
         Mat::from_fn(c, k, |i, j| unit(i) * eigen.vectors[(i, kept[j])] / eigen.values[kept[j]].sqrt());
@@ -148,6 +153,7 @@ mod tests {
         // b of the unit interface motion (1, 1, 1) along the mode that is left out.
         let coupled = 2.0 * left[0] + left[1];
         let lacking = Lacking {
+            whole: vec![coupled * coupled / b],
             stiffness: Mat::from_fn(1, 1, |_, _| coupled * coupled / b),
             mass: Mat::from_fn(1, 1, |_, _| coupled * coupled / (b * b)),
         };
@@ -156,5 +162,10 @@ mod tests {
         assert!(theta > 1.0 && found.lower[0] <= 1.0 && found.lower[0] > 0.9, "{found:?}, theta {theta}");
         let unknown = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &lacking, None).expect("finite");
         assert_eq!(unknown.lower, [0.0]);
+        // Rounding of a response that the basis has is no correction.
+        let noise = |size: f64| Mat::from_fn(1, 1, |_, _| 1e-30 * size);
+        let nothing = Lacking { whole: vec![1.0], stiffness: noise(1.0), mass: noise(1.0 / a) };
+        let found = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &nothing, Some(b)).expect("finite");
+        assert_eq!((found.estimate, found.lower), (vec![theta], vec![theta]));
     }
 }
