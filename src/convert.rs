@@ -7,8 +7,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FixedInterface, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody,
-    MassStructure, Modes, Parts, Source, Storage, TermDecision, Truncation,
+    Certificate, FixedInterface, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates,
+    LumpedBody, MassStructure, Modes, Parts, Source, Storage, TermDecision, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,

@@ -50,7 +50,8 @@ fn a_lossy_export_is_refused_whole_and_allowed_with_a_warning() {
     assert!(errors(&allowed).starts_with("warning[FB721]"), "{}", errors(&allowed));
     assert_eq!(names(place), ["body.fem", "body.flex.h5"]);
     let told: Value = {
-        let run = run(place, "export body.flex.h5 --to mbdyn --dialect level13 -o body.fem --allow-loss --json");
+        let run =
+            run(place, "export body.flex.h5 --to mbdyn --dialect level13 -o body.fem --allow-loss --json");
         serde_json::from_slice(&run.stdout).expect("JSON")
     };
     assert_eq!(told["warnings"], 1);

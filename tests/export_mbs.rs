@@ -311,8 +311,10 @@ fn interfaces_of_exudyn_are_nodes_whose_mean_motion_is_that_of_the_interface() {
                     group.dataset(name).expect(name).read_scalar().expect("text");
                 text.as_str().to_owned()
             };
-            let floats = |name: &str| -> Vec<f64> { group.dataset(name).expect(name).read_raw().expect("floats") };
-            let integers = |name: &str| -> Vec<i64> { group.dataset(name).expect(name).read_raw().expect("integers") };
+            let floats =
+                |name: &str| -> Vec<f64> { group.dataset(name).expect(name).read_raw().expect("floats") };
+            let integers =
+                |name: &str| -> Vec<i64> { group.dataset(name).expect(name).read_raw().expect("integers") };
             assert_eq!((text("name"), text("marker")), (interface.name.clone(), "rigid".to_owned()));
             let mesh: Vec<usize> = integers("meshNodeNumbers").iter().map(|&i| i as usize).collect();
             let weights = floats("weights");

@@ -22,8 +22,8 @@ use crate::eigen::{
 };
 use crate::error::Result;
 use crate::linalg::{
-    Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side, subtract_combination,
-    symmetric_eigen,
+    Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side,
+    subtract_combination, symmetric_eigen,
 };
 use crate::model::{Coupling, FeModel, rigid_count};
 use crate::progress::{Event, Watch};
@@ -302,9 +302,13 @@ impl<'a> Parts<'a> {
         let hertz = model.units().frequency_of(held.shift);
         let more = held.modes_below.saturating_sub(fixed);
         let proved = match held.proof {
-            Proof::NotProved => format!("its {fixed} fixed-interface modes are not proved complete: {}", held.remark),
+            Proof::NotProved => {
+                format!("its {fixed} fixed-interface modes are not proved complete: {}", held.remark)
+            }
             Proof::InertiaCount if more == 0 => {
-                format!("its {fixed} fixed-interface modes are all there are below {hertz:.6} Hz (inertia count)")
+                format!(
+                    "its {fixed} fixed-interface modes are all there are below {hertz:.6} Hz (inertia count)"
+                )
             }
             Proof::InertiaCount => format!(
                 "of the {} fixed-interface modes below {hertz:.6} Hz (inertia count) it has {fixed}",

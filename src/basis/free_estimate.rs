@@ -53,9 +53,8 @@ pub(super) fn free_estimate(
     cut: Option<f64>,
 ) -> Option<FreeEstimate> {
     let mut estimate = corrected(theta, rigid, q, lacking)?;
-    let coupling = |a: MatRef<'_, f64>, b: MatRef<'_, f64>| {
-        gram(a, combine(lacking.stiffness.as_ref(), b).as_ref())
-    };
+    let coupling =
+        |a: MatRef<'_, f64>, b: MatRef<'_, f64>| gram(a, combine(lacking.stiffness.as_ref(), b).as_ref());
     let blocks = [coupling(rigid, rigid), coupling(rigid, q), coupling(q, q)];
     let mut lower = vec![0.0; theta.len()];
     if let Some(cut) = cut {

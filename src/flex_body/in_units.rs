@@ -1,6 +1,9 @@
 //! A body with its numbers in other units.
 
-use super::{Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts};
+use super::{
+    Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes,
+    Parts,
+};
 use crate::error::Result;
 use crate::invariants::{GeneralTerms, Invariants};
 use crate::model::{GeometricStiffness, LoadKind};

@@ -1,7 +1,8 @@
 //! A body with some of its modes, and some groups of its kinetic energy.
 
 use super::{
-    Certificate, FixedInterface, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts, Storage, TermDecision,
+    Certificate, FixedInterface, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts,
+    Storage, TermDecision,
 };
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;

@@ -35,8 +35,7 @@ impl CommonModes {
                 .into());
         }
         let of_more: Vec<usize> = kept.iter().map(|&i| partners[i]).collect();
-        let (a_modes, b_modes) =
-            if of_a.len() <= of_b.len() { (kept, of_more) } else { (of_more, kept) };
+        let (a_modes, b_modes) = if of_a.len() <= of_b.len() { (kept, of_more) } else { (of_more, kept) };
         let mut notes = vec![format!(
             "{} in common {} compared: {} of the first body with {} of the second",
             counted(a_modes.len(), "mode"),
@@ -128,7 +127,11 @@ mod tests {
     fn partners_are_nearest_in_ascending_order() {
         assert_eq!(partners(&[1.0, 2.0], &[1.0, 2.0, 3.0]), [0, 1]);
         assert_eq!(partners(&[2.0, 9.0], &[1.0, 2.0, 3.0, 4.0, 9.0]), [1, 4]);
-        assert_eq!(partners(&[1.0, 2.2, 3.0], &[1.0, 2.0, 3.0, 4.0]), [0, 1, 2], "a mode that differs keeps its place");
+        assert_eq!(
+            partners(&[1.0, 2.2, 3.0], &[1.0, 2.0, 3.0, 4.0]),
+            [0, 1, 2],
+            "a mode that differs keeps its place"
+        );
         assert_eq!(partners(&[5.0, 5.0], &[5.0, 5.0, 5.0]).len(), 2);
         assert!(partners(&[], &[1.0]).is_empty());
     }

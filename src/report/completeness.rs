@@ -53,8 +53,7 @@ impl Completeness {
 }
 
 /// Kinds of shapes that are no modes of the free body and do not claim to be.
-const STATIC: [&str; 4] =
-    ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
+const STATIC: [&str; 4] = ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
 
 /// How many modes of the body are static shapes.
 fn static_shapes(body: &FlexBody) -> usize {
@@ -118,7 +117,11 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
     match flexible.cmp(&nf) {
         std::cmp::Ordering::Less if nf - flexible == statics => (
             true,
-            format!("proved: {proof}; {} beside them {} no modes", counted(statics, "static shape"), if statics == 1 { "is" } else { "are" }),
+            format!(
+                "proved: {proof}; {} beside them {} no modes",
+                counted(statics, "static shape"),
+                if statics == 1 { "is" } else { "are" }
+            ),
         ),
         std::cmp::Ordering::Less => {
             (false, format!("PROVED IN PART: {proof}; {} above are not", counted(nf - flexible, "mode")))

@@ -81,8 +81,8 @@ impl CraigBamptonFacts {
             ),
         };
         let Some(own) = hertz.get(good) else { return holds };
-        let most =
-            self.too_high_at_most[good].map_or_else(String::new, |most| format!(", {} at most", percent(most)));
+        let most = self.too_high_at_most[good]
+            .map_or_else(String::new, |most| format!(", {} at most", percent(most)));
         format!(
             "{holds}; mode {} ({} Hz) is too high by about {}{most}",
             good + 1,

@@ -173,8 +173,9 @@ fn body(html: &mut String, facts: &Facts) {
 fn proof(facts: &Facts) -> Vec<(&'static str, String)> {
     let (modes, c) = (&facts.modes, &facts.completeness);
     let count = |n: Option<usize>| n.map_or_else(|| "not counted".to_owned(), |n| n.to_string());
-    let shift =
-        |hz: Option<f64>| hz.map_or_else(|| "no frequency".to_owned(), |hz| format!("{} Hz", significant(hz, 6)));
+    let shift = |hz: Option<f64>| {
+        hz.map_or_else(|| "no frequency".to_owned(), |hz| format!("{} Hz", significant(hz, 6)))
+    };
     let residual = format!(
         "{} of |K&psi;| + |&lambda;M&psi;|{}",
         significant(modes.worst_residual, 3),
@@ -199,10 +200,7 @@ fn proof(facts: &Facts) -> Vec<(&'static str, String)> {
                 format!("{} of K &minus; &sigma;M at {}", count(c.negative_pivots), shift(c.shift_hz)),
             ),
             ("Rigid modes", c.rigid_modes.to_string()),
-            (
-                "Flexible modes proved",
-                c.proved_modes.map_or_else(|| "none".to_owned(), |n| n.to_string()),
-            ),
+            ("Flexible modes proved", c.proved_modes.map_or_else(|| "none".to_owned(), |n| n.to_string())),
         ],
     };
     items.push(("Worst residual", residual));
@@ -282,7 +280,9 @@ fn modes(html: &mut String, facts: &Facts) {
     };
     let rows: Vec<_> = (0..modes.count).map(row).collect();
     let caption = match craig_bampton {
-        Some(_) => "Modes of the reduced body, ascending, and the frequencies of the free body as estimated from what the basis lacks",
+        Some(_) => {
+            "Modes of the reduced body, ascending, and the frequencies of the free body as estimated from what the basis lacks"
+        }
         None => "Flexible modes, ascending",
     };
     table(html, caption, &head, &[], &rows);

@@ -5,8 +5,8 @@ use super::schema::MASS_STRUCTURES;
 use super::schema::terms::KEPT;
 use super::value::Value;
 use crate::flex_body::{
-    Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
+    Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
+    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
 };
 use crate::invariants::{DIGITS, GeneralTerms, Invariants, ibar_of_c2, s_of_modal_mass};
 use crate::model::{BodyNumber, Coupling, Nodes};
@@ -332,11 +332,17 @@ impl Take<'_> {
 
     /// All of what a Craig-Bampton body has, or nothing of it.
     fn fixed_interface(&mut self) -> Option<FixedInterface> {
-        let [modes, motions, shift, residual] =
-            ["fixed_interface_modes", "interface_motions", "fixed_interface_shift", "fixed_interface_residual"]
-                .map(|name| format!("/certificate@{name}"));
+        let [modes, motions, shift, residual] = [
+            "fixed_interface_modes",
+            "interface_motions",
+            "fixed_interface_shift",
+            "fixed_interface_residual",
+        ]
+        .map(|name| format!("/certificate@{name}"));
         let columns = ["free_eigenvalue", "free_eigenvalue_lower"].map(|name| format!("/modes/{name}"));
-        if !self.whole(&[&modes, &motions, &shift, &residual, &columns[0], &columns[1]], "a Craig-Bampton body") {
+        if !self
+            .whole(&[&modes, &motions, &shift, &residual, &columns[0], &columns[1]], "a Craig-Bampton body")
+        {
             return None;
         }
         let [free_estimate, free_lower] = columns.map(|name| self.floats(&name));

@@ -56,7 +56,8 @@ fn estimates_and_bounds_enclose_the_frequencies_of_the_free_body() {
 #[test]
 fn the_frequencies_of_fixtures_are_told_as_well_as_free_modes_know_them() {
     for name in ["bracket_hex20", "connecting_rod"] {
-        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("fixtures/models/{name}/model.toml"));
+        let manifest =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("fixtures/models/{name}/model.toml"));
         let model = model(read_model(&read_manifest(&manifest).expect("a manifest")).expect("a model"));
         let free = converted(&model, BasisChoice::default(), 30, BodyFrame::Principal).body;
         let exact = &free.modes().eigenvalue;
@@ -101,7 +102,10 @@ fn without_fixed_interface_modes_the_body_is_statically_condensed() {
         }
         let body = body(&model, 0);
         assert_eq!(body.n_modes(), oracle.motion.ncols() - if d == 2 { 3 } else { 6 });
-        assert!(broken(&body).is_empty() && body.identities(BodyFrame::Principal).iter().all(|check| check.passed));
+        assert!(
+            broken(&body).is_empty()
+                && body.identities(BodyFrame::Principal).iter().all(|check| check.passed)
+        );
         let mass = oracle.rigid.transpose() * &oracle.m * &oracle.rigid;
         close(body.invariants().mass, mass[(0, 0)], 1e-12, &what);
         let fixed = record(&body);
@@ -118,7 +122,10 @@ fn reports_call_a_healthy_body_healthy() {
         let body = body(&model, count);
         let facts = Facts::new(&body, &RunData::default());
         let html = render(&facts, Format::Html);
-        assert!(html.contains(head) && !html.contains("verdict open") && !html.contains("ot proved"), "{html}");
+        assert!(
+            html.contains(head) && !html.contains("verdict open") && !html.contains("ot proved"),
+            "{html}"
+        );
         let text = render(&facts, Format::Text);
         let made_of = format!("craig-bampton: {count} fixed-interface modes + 12 interface motions - 6");
         assert!(text.contains(&made_of) && text.contains("of the free body"), "{text}");
@@ -130,7 +137,8 @@ fn reports_call_a_healthy_body_healthy() {
         assert_eq!(own["fixed_interface_modes"], count);
         assert_eq!(own["free_hz"].as_array().expect("a list").len(), body.n_modes());
     }
-    let attached = converted(&model, BasisChoice::CraigChang(CraigChang::default()), 10, BodyFrame::Principal).body;
+    let attached =
+        converted(&model, BasisChoice::CraigChang(CraigChang::default()), 10, BodyFrame::Principal).body;
     let facts = Facts::new(&attached, &RunData::default());
     let (html, text) = (render(&facts, Format::Html), render(&facts, Format::Text));
     assert!(html.contains("No free mode is missing.") && html.contains("<td>static shape</td>"), "{html}");

@@ -3,8 +3,9 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage, Truncation, UnitLoad,
+    Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
+    InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
+    Truncation, UnitLoad,
 };
 use flexbody::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};

@@ -23,13 +23,14 @@ pub(super) fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
 
 fn interface(body: &FlexBody, number: usize, interface: &Interface) -> Hdf5Entry {
     let (nodes, count) = (&interface.nodes, interface.nodes.len());
-    let mean = nodes.iter().map(|&i| Vector3::from(body.nodes().positions[i])).sum::<Vector3<f64>>() / count as f64;
+    let mean =
+        nodes.iter().map(|&i| Vector3::from(body.nodes().positions[i])).sum::<Vector3<f64>>() / count as f64;
     // A free interface has no reference point of its own.
     let reference = interface.reference.map_or(mean, Vector3::from);
-    let text = |name: &str, text: &str| {
-        Hdf5Contents::Text(text.to_owned()).named(name).with("datatype", "str")
-    };
-    let list = |name: &str, values: &[f64]| Hdf5Contents::list(values).named(name).with("datatype", "ndarray");
+    let text =
+        |name: &str, text: &str| Hdf5Contents::Text(text.to_owned()).named(name).with("datatype", "str");
+    let list =
+        |name: &str, values: &[f64]| Hdf5Contents::list(values).named(name).with("datatype", "ndarray");
     let members = vec![
         text("name", &interface.name),
         text("coupling", interface.coupling.map_or("not stated", |coupling| coupling.name())),
