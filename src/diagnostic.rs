@@ -76,6 +76,7 @@ codes! {
     OutputUnwritable = "FB104", Error, Resources, "output cannot be written", "check the folder, its permissions and the free space";
     OutputFolderMissing = "FB105", Error, BadInput, "folder of the output file does not exist", "make the folder first";
     FileEmpty = "FB106", Error, BadInput, "file is empty", "write the file again";
+    OutputNotFile = "FB107", Error, BadInput, "output path does not name a file", "name a file that may be made or replaced";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
@@ -172,6 +173,7 @@ codes! {
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
     CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
+    WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
     // FB7xx: flex-body files and checkpoints
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";

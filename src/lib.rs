@@ -22,6 +22,7 @@ pub mod input;
 pub mod integration;
 pub mod invariants;
 pub mod linalg;
+pub mod memory;
 pub mod model;
 pub mod output;
 pub mod progress;

@@ -1,29 +1,49 @@
 //! The `flexbody` program: parses the command line, runs, exits with a documented code.
 
-use flexbody::cli::{parse, run};
+mod process;
+
+use flexbody::cli::{Arguments, parse, run};
 use flexbody::diagnostic::{Code, Diagnostic};
 use flexbody::error::ExitCode;
 use std::io::{IsTerminal, Write};
 
-// Large blocks come and go on all threads: the system allocator gives them back each time, and the page faults and
-// interrupts of that cost more than the work (measured: half of the factorisation time on two threads).
 #[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+static ALLOCATOR: process::Allocator = process::Allocator;
 
 fn main() -> std::process::ExitCode {
     keep_freed_memory();
+    process::prepare();
     let arguments = match parse() {
         Ok(arguments) => arguments,
         Err(code) => return std::process::ExitCode::from(code as u8),
     };
-    // Where no handler can be set the work is done all the same: an interruption then leaves a temporary file.
+    // Where no handler can be set the work is done all the same: an interruption then leaves a temporary file, which the
+    // next run removes.
     let _ = ctrlc::set_handler(interrupted);
-    let code = std::panic::catch_unwind(|| run(&arguments)).unwrap_or_else(|_| {
-        // The panic itself has been printed; this says what it means and what to do.
-        eprintln!("{}", Diagnostic::new(Code::Internal, "the program stopped at a contradiction of its own"));
-        ExitCode::Bug
-    });
-    std::process::ExitCode::from(code as u8)
+    std::process::ExitCode::from(work(arguments) as u8)
+}
+
+/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread grows during it
+/// and ends the process by a signal where there is no memory left.
+fn work(arguments: Arguments) -> ExitCode {
+    const STACK: usize = 8 << 20;
+    match std::thread::Builder::new()
+        .name("flexbody".to_owned())
+        .stack_size(STACK)
+        .spawn(move || run(&arguments))
+    {
+        Ok(worker) => worker.join().unwrap_or_else(|_| {
+            // The panic itself has been printed; this says what it means and what to do.
+            let message = "the program stopped at a contradiction of its own";
+            eprintln!("{}", Diagnostic::new(Code::Internal, message));
+            ExitCode::Bug
+        }),
+        Err(error) => {
+            let message = format!("not enough memory: no thread can be started: {error}");
+            eprintln!("{}", Diagnostic::new(Code::MemoryShort, message));
+            ExitCode::Resources
+        }
+    }
 }
 
 /// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by page, cleared
@@ -48,5 +68,5 @@ fn interrupted() {
     // A progress bar may stand on the line.
     let line_end = if stderr.is_terminal() { "\n" } else { "" };
     let _ = writeln!(stderr, "{line_end}interrupted: no unfinished file is left");
-    std::process::exit(ExitCode::Interrupted as i32);
+    process::end(ExitCode::Interrupted);
 }

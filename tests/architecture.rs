@@ -245,14 +245,14 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The room of a file below `src/` and the depth of its module (`crate::a` is 1); `lib.rs` is no room and `main.rs`
-/// belongs to the command line.
+/// The room of a file below `src/` and the depth of its module (`crate::a` is 1); `lib.rs` is no room; `main.rs` and its
+/// module `process.rs` belong to the command line.
 fn room_of(relative: &Path) -> Option<(String, usize)> {
     let parts: Vec<String> =
         relative.iter().map(|p| p.to_string_lossy().trim_end_matches(".rs").to_owned()).collect();
     match parts[0].as_str() {
         "lib" => None,
-        "main" => Some(("cli".to_owned(), 1)),
+        "main" | "process" => Some(("cli".to_owned(), 1)),
         room => {
             let is_mod = parts[parts.len() - 1] == "mod";
             Some((room.to_owned(), parts.len() - usize::from(is_mod)))

@@ -128,7 +128,7 @@ fn outputs_that_cannot_be_written_are_refused_before_the_work() {
     let before = members(folder.path());
     for (line, code, said) in [
         ("-o no/such/b.h5", 2, "error[FB105]: cannot write no/such/b.h5: folder no/such does not exist"),
-        ("-o taken", 4, "error[FB104]: cannot write taken: it is a folder"),
+        ("-o taken", 2, "error[FB107]: cannot write taken: it is a folder"),
         ("-o b.h5 --report taken/no/r.json", 2, "error[FB105]: cannot write taken/no/r.json"),
         ("-o b.h5 --report taken/", 2, "error[FB801]: report taken/ has no known extension"),
     ] {

@@ -19,6 +19,7 @@ use files::{Triangle, write_model};
 use flexbody::error::ExitCode;
 use mesh::Mesh;
 use std::io::Read;
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -113,4 +114,55 @@ fn an_interrupted_convert_goes_on_from_its_checkpoint() {
     assert!(output.status.success(), "{output:?}");
     assert!(String::from_utf8_lossy(&output.stdout).contains("FB711"), "{output:?}");
     assert_eq!(members(&out), ["body.flex.h5", "search.h5"]);
+}
+
+/// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of these names.
+fn small_convert(out: &Path) -> Command {
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/cube_hex8/model.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
+    command.arg("convert").arg(model).args(["--output", "new.flex.h5", "--report", "new.json"]);
+    command.current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// Kills runs at times spread over their length; `FLEXBODY_KILLS` is the number of times for each signal.
+#[test]
+fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else() {
+    let kills: u32 = std::env::var("FLEXBODY_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(6);
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path();
+    let (body, report) = (out.join("new.flex.h5"), out.join("new.json"));
+    let began = Instant::now();
+    assert!(small_convert(out).status().expect("the program").success());
+    let whole = began.elapsed();
+    let is_old = |path: &Path| std::fs::read(path).expect("an output") == b"old";
+    for signal in ["KILL", "INT", "TERM"] {
+        for kill in 0..kills {
+            std::fs::write(&body, "old").expect("a file");
+            std::fs::write(&report, "old").expect("a file");
+            let mut child = small_convert(out).spawn().expect("the program");
+            // Most of what is delicate happens at the end.
+            let part = 1.0 - 0.7 * (f64::from(kill) / f64::from(kills)).powi(2);
+            std::thread::sleep(whole.mul_f64(part));
+            // It may have ended by itself.
+            let _ = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).output();
+            let status = child.wait().expect("a child");
+            if !is_old(&body) {
+                flexbody::store::read(&body).expect("a whole body");
+            }
+            if !is_old(&report) {
+                let text = std::fs::read_to_string(&report).expect("text");
+                serde_json::from_str::<serde_json::Value>(&text).expect("a whole report");
+            }
+            if signal != "KILL" {
+                // Before the handler stands the system ends the program, which has made nothing yet.
+                let handled = matches!(status.code(), Some(0 | 130));
+                assert!(handled || (status.signal().is_some() && is_old(&body)), "SIG{signal}: {status:?}");
+                assert_eq!(is_old(&body), is_old(&report), "SIG{signal}: one of two outputs");
+                assert_eq!(members(out), ["new.flex.h5", "new.json"], "SIG{signal}");
+            }
+        }
+        assert!(small_convert(out).status().expect("the program").success());
+        assert_eq!(members(out), ["new.flex.h5", "new.json"], "after SIG{signal} and another run");
+    }
 }

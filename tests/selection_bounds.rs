@@ -4,7 +4,7 @@ mod support;
 
 use flexbody::dynamics::{BodyPoint, Terms};
 use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::scene::{Measure, OutputErrors, Point, Recording, Scene, Trace, simulate, trace_at};
+use flexbody::scene::{Measure, OutputErrors, Point, Recording, Scene, Stage, Trace, simulate, trace_at};
 use flexbody::selection::{Bench, Norms, Situation};
 use nalgebra::{DMatrix, DVector, Vector3};
 use proptest::prelude::*;
@@ -100,6 +100,8 @@ impl Broken {
 
 /// What breaks a bound in a scene: of amplitudes and errors, with every set of groups, at both tiers, a priori and along the motion.
 fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
+    let stage = Stage::new(body, scene).expect("one frame");
+    let (body, scene) = (&*stage.body, &*stage.scene);
     let tested = Tested::new(body, scene);
     let driven = tested.situation.driven.as_ref().expect("bounds");
     let root: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
@@ -278,7 +280,8 @@ proptest! {
 
 /// Whether the body can be simulated with every set of groups.
 fn follows(body: &FlexBody, scene: &Scene) -> bool {
-    let tested = Tested::new(body, scene);
+    let stage = Stage::new(body, scene).expect("one frame");
+    let tested = Tested::new(&stage.body, &stage.scene);
     combinations().all(|kept| tested.bench().motion(kept).is_ok() && tested.bench().fine_motion(kept).is_ok())
 }
 

@@ -69,11 +69,19 @@ fn a_missing_folder_is_known_before_the_work() {
 #[test]
 fn folders_and_empty_names_are_no_outputs() {
     let folder = tempfile::tempdir().unwrap();
-    for path in [folder.path().to_path_buf(), "".into(), "/".into(), folder.path().join("..")] {
+    for path in [
+        folder.path().to_path_buf(),
+        "".into(),
+        "/".into(),
+        folder.path().join(".."),
+        folder.path().join(""),
+        folder.path().join("new/"),
+    ] {
         let error = store::prepare_output(&path).unwrap_err();
-        assert!(error.has(Code::OutputUnwritable), "{path:?}: {error}");
-        assert_eq!(error.exit_code(), ExitCode::Resources);
+        assert!(error.has(Code::OutputNotFile), "{path:?}: {error}");
+        assert_eq!(error.exit_code(), ExitCode::BadInput);
     }
+    assert!(members(folder.path()).is_empty());
 }
 
 #[cfg(unix)]
@@ -84,7 +92,7 @@ mod unix {
     #[test]
     fn devices_are_not_replaced() {
         let error = store::prepare_output("/dev/null").unwrap_err();
-        assert!(error.has(Code::OutputUnwritable), "{error}");
+        assert!(error.has(Code::OutputNotFile), "{error}");
         assert!(error.to_string().contains("not a regular file"), "{error}");
     }
 
@@ -108,6 +116,60 @@ mod unix {
         OutputSlot::prepare(&link).unwrap().write(b"new").unwrap();
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(std::fs::read(&target).unwrap(), b"new");
+    }
+
+    #[test]
+    fn a_link_to_a_file_that_is_not_there_yet_makes_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir(at("data")).unwrap();
+        std::os::unix::fs::symlink("data/target.h5", at("first")).unwrap();
+        std::os::unix::fs::symlink("first", at("second")).unwrap();
+        OutputSlot::prepare(at("second")).unwrap().write(b"new").unwrap();
+        assert_eq!(members(folder.path()), ["data", "first", "second"]);
+        assert_eq!(members(&at("data")), ["target.h5"]);
+        assert_eq!(std::fs::read(at("second")).unwrap(), b"new");
+        std::os::unix::fs::symlink("no/such.h5", at("nowhere")).unwrap();
+        let error = OutputSlot::prepare(at("nowhere")).unwrap_err();
+        assert!(error.has(Code::OutputFolderMissing), "{error}");
+        std::os::unix::fs::symlink("circle", at("circle")).unwrap();
+        let error = OutputSlot::prepare(at("circle")).unwrap_err();
+        assert!(error.has(Code::OutputNotFile) && error.to_string().contains("circle"), "{error}");
+    }
+
+    #[test]
+    fn outputs_appear_together_or_what_was_there_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a"), "old a").unwrap();
+        let slots: Vec<_> = ["a", "b", "c"].map(|name| OutputSlot::prepare(at(name)).unwrap()).into();
+        for slot in &slots {
+            slot.fill(b"new").unwrap();
+        }
+        // What no rename can replace stands in the way of the last.
+        std::fs::create_dir(at("c")).unwrap();
+        assert!(OutputSlot::commit_all(slots).is_err());
+        assert_eq!(members(folder.path()), ["a", "c"]);
+        assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "old a");
+        let slots: Vec<_> = ["a", "b"].map(|name| OutputSlot::prepare(at(name)).unwrap()).into();
+        OutputSlot::commit_all(slots).unwrap();
+        assert_eq!(members(folder.path()), ["a", "b", "c"]);
+        assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "");
+    }
+
+    #[test]
+    fn what_a_killed_process_left_goes_and_what_a_living_one_holds_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (held, left) =
+            (folder.path().join(".flexbody-aaaaaa.tmp"), folder.path().join(".flexbody-bbbbbb.tmp"));
+        for path in [&held, &left] {
+            std::fs::write(path, "half").unwrap();
+        }
+        std::fs::write(folder.path().join("else.tmp"), "of somebody else").unwrap();
+        let holder = std::fs::File::open(&held).unwrap();
+        holder.lock().unwrap();
+        drop(OutputSlot::prepare(folder.path().join("body.flex.h5")).unwrap());
+        assert_eq!(members(folder.path()), [".flexbody-aaaaaa.tmp", "else.tmp"]);
     }
 
     #[cfg(target_os = "linux")]

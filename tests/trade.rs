@@ -215,7 +215,7 @@ fn model() -> FeModel {
 #[test]
 fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let model = model();
-    let (sources, _) = conversions(&model, 4, None, SILENT).expect("bodies");
+    let (sources, _) = conversions(&model, 4, None, None, SILENT).expect("bodies");
     assert!(sources.iter().all(|source| source.preprocessing().is_some_and(|seconds| seconds > 0.0)));
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.15 * rate, 0.5);
@@ -248,7 +248,7 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
 #[test]
 fn what_nodal_equations_do_not_have_is_refused() {
     let model = model();
-    let (sources, _) = conversions(&model, 2, None, SILENT).expect("bodies");
+    let (sources, _) = conversions(&model, 2, None, None, SILENT).expect("bodies");
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.1 * rate, 0.1);
     scene.requirements.damping = Some(0.01);

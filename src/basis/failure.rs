@@ -106,9 +106,19 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
                 available as f64 * 1e-9
             ),
         ),
+        EigenFailure::TooLong { wanted, seconds, bytes } => Diagnostic::new(
+            Code::WorkLong,
+            format!(
+                "{wanted} modes of a model with {} degrees of freedom take about {:.1} hours on one processor, and {:.3} GB",
+                model.stiffness().n(),
+                seconds / 3600.0,
+                bytes as f64 * 1e-9
+            ),
+        )
+        .with_help("ask for fewer modes or a lower frequency, or say --allow-long"),
         EigenFailure::TooLarge => Diagnostic::new(
             Code::MemoryShort,
-            "the node graph has more than 2^31 entries, too many for the ordering",
+            "the ordering fails: it is out of memory, or the node graph has more than 2^31 entries",
         ),
     };
     diagnostic.into()

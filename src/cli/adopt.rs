@@ -38,7 +38,6 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(render(&facts, format).as_bytes())?;
     }
-    slot.commit()?;
-    reports.into_iter().try_for_each(OutputSlot::commit)?;
+    OutputSlot::commit_all(std::iter::once(slot).chain(reports))?;
     Ok(Outcome { text: render(&facts, Format::Text), json: render(&facts, Format::Json), passed: true })
 }

@@ -146,6 +146,9 @@ pub struct TradeArguments {
     /// Table to write the candidates to
     #[arg(long, value_name = "TRADE.csv")]
     pub csv: Option<PathBuf>,
+    /// Do work that is estimated to take more than half an hour for its number of modes
+    #[arg(long)]
+    pub allow_long: bool,
     /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
@@ -178,6 +181,9 @@ pub struct SelectArguments {
     /// Of a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub modes: Option<u32>,
+    /// Do work that is estimated to take more than half an hour for its number of modes
+    #[arg(long)]
+    pub allow_long: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
@@ -222,7 +228,7 @@ pub struct ConvertArguments {
     #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "frame", "lumped", "lumped_modes", "scene", "checkpoint", "split"])]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "checkpoint", "split"])]
     pub from: Option<String>,
     /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
@@ -272,6 +278,9 @@ pub struct ConvertArguments {
     /// Memory that the program may use: a number with K, M, G or T [default: what the machine and its control groups leave]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
+    /// Do work that is estimated to take more than half an hour for its number of modes
+    #[arg(long)]
+    pub allow_long: bool,
     /// Frame of the body
     #[arg(long, value_enum, default_value_t = FrameName::Principal)]
     pub frame: FrameName,

@@ -5,7 +5,7 @@ use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, Fr
 use super::checkpoint::resume;
 use super::output::{Outcome, tell};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
-use super::resources::{memory_left, peak_memory_bytes, resident_bytes, use_threads};
+use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::watcher::Watcher;
 use crate::basis::{
     BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
@@ -62,7 +62,8 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         tell(arguments.printing, &done.diagnostics);
-        return done.finish();
+        OutputSlot::commit_all(done.slots)?;
+        return Ok(done.outcome);
     }
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
@@ -84,7 +85,9 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         finished.push(done);
     }
     // Nothing appears before everything is done.
-    let outcomes = finished.into_iter().map(Done::finish).collect::<Result<Vec<_>>>()?;
+    let (slots, outcomes): (Vec<_>, Vec<_>) =
+        finished.into_iter().map(|done| (done.slots, done.outcome)).unzip();
+    OutputSlot::commit_all(slots.into_iter().flatten())?;
     let texts: Vec<String> = outcomes.iter().map(|outcome| outcome.text.clone()).collect();
     let reports: Vec<&str> = outcomes.iter().map(|outcome| outcome.json.trim_end()).collect();
     Ok(Outcome { text: texts.join("\n"), json: format!("[{}]", reports.join(",\n")), passed: true })
@@ -110,13 +113,6 @@ struct Done {
     slots: Vec<OutputSlot>,
     outcome: Outcome,
     diagnostics: Vec<Diagnostic>,
-}
-
-impl Done {
-    fn finish(self) -> Result<Outcome> {
-        self.slots.into_iter().try_for_each(OutputSlot::commit)?;
-        Ok(self.outcome)
-    }
 }
 
 impl Job<'_> {
@@ -209,6 +205,7 @@ impl Job<'_> {
                     FactorName::F32 => FactorChoice::Always(Precision::Single),
                 },
                 memory: memory_left(arguments.memory_limit),
+                longest: longest(arguments.allow_long),
                 ..ModeSettings::default()
             },
             basis,

@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         slot.fill(&bytes)?;
         slots.push(slot);
     }
-    slots.into_iter().try_for_each(OutputSlot::commit)?;
+    OutputSlot::commit_all(slots)?;
 
     let line = |(path, size): &(PathBuf, usize)| {
         format!("{}, {} bytes: {} for {}\n", path.display(), size, format.name(), format.reader())

@@ -1,6 +1,7 @@
 //! Printing of results and diagnostics, and the exit code.
 
 use super::arguments::{Arguments, Command, Printing};
+use super::resources::use_threads;
 use super::{audit, check, compare, convert, export, inspect, select, simulate, trade};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::error::{ExitCode, Result};
@@ -41,6 +42,13 @@ fn first_paragraph(error: &clap::Error) -> String {
 
 /// Runs the command and prints its outcome.
 pub fn run(arguments: &Arguments) -> ExitCode {
+    use_threads(match &arguments.command {
+        Command::Convert(arguments) => arguments.threads,
+        Command::Trade(arguments) => arguments.threads,
+        Command::Select(arguments) => arguments.threads,
+        Command::Simulate(arguments) => arguments.threads,
+        _ => None,
+    });
     let (printing, outcome) = match &arguments.command {
         Command::Convert(arguments) => (arguments.printing, convert::run(arguments)),
         Command::Inspect(arguments) => (arguments.printing, inspect::run(arguments)),
@@ -58,10 +66,20 @@ pub fn run(arguments: &Arguments) -> ExitCode {
 fn finish(printing: Printing, outcome: Result<Outcome>) -> ExitCode {
     match outcome {
         Ok(outcome) => {
-            if printing.json {
-                print(&outcome.json);
+            let printed = if printing.json {
+                print(&outcome.json)
             } else if !printing.quiet {
-                print(&outcome.text);
+                print(&outcome.text)
+            } else {
+                Ok(())
+            };
+            if let Err(error) = printed {
+                let message = format!("the results cannot be printed: {error}");
+                tell(
+                    Printing { json: false, ..printing },
+                    &[Diagnostic::new(Code::OutputUnwritable, message)],
+                );
+                return ExitCode::Resources;
             }
             if outcome.passed { ExitCode::Done } else { ExitCode::CheckFailed }
         }
@@ -70,7 +88,8 @@ fn finish(printing: Printing, outcome: Result<Outcome>) -> ExitCode {
             if printing.json {
                 let mut json = diagnostics_json(error.diagnostics());
                 json["exit_code"] = (code as u8).into();
-                print(&format!("{json:#}"));
+                // The exit code tells it as well.
+                let _ = print(&format!("{json:#}"));
             } else {
                 tell(printing, error.diagnostics());
             }
@@ -92,9 +111,11 @@ pub(super) fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
 }
 
 /// Prints to stdout; a reader that went away (`| head`) is not an error.
-fn print(text: &str) {
+fn print(text: &str) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
     let newline = if text.ends_with('\n') { "" } else { "\n" };
-    let _ = write!(stdout, "{text}{newline}");
-    let _ = stdout.flush();
+    match write!(stdout, "{text}{newline}").and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        printed => printed,
+    }
 }

@@ -4,7 +4,7 @@ use super::arguments::ConvertArguments;
 use super::checkpoint::CheckpointFile;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
-use crate::output::OutputSlot;
+use crate::output::{OutputSlot, followed};
 use crate::report::Format;
 use crate::store;
 use std::path::{Path, PathBuf};
@@ -61,20 +61,53 @@ pub(super) fn refuse_replacing<'p>(
     inputs: impl Iterator<Item = &'p PathBuf>,
     outputs: impl Iterator<Item = &'p PathBuf>,
 ) -> Result<()> {
-    let place = |path: &Path| {
-        std::fs::canonicalize(path)
-            .unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()))
-    };
-    let mut taken: Vec<_> = inputs.map(|path| place(path)).collect();
+    let mut taken: Vec<Place> = inputs.map(|path| Place::of(path)).collect();
     for output in outputs {
-        let path = place(output);
-        if taken.contains(&path) {
+        let path = Place::of(output);
+        if taken.iter().any(|other| other.is_same(&path)) {
             let message = format!("output {} is an input or another output of this run", output.display());
             return Err(Diagnostic::new(Code::Usage, message).with_help("choose another output name").into());
         }
         taken.push(path);
     }
     Ok(())
+}
+
+/// What a path stands for, however it is spelt.
+struct Place {
+    path: PathBuf,
+    /// Device and number of an existing file: the same for all of its names.
+    file: Option<(u64, u64)>,
+}
+
+impl Place {
+    fn of(path: &Path) -> Self {
+        let followed = followed(path).unwrap_or_else(|_| path.to_path_buf());
+        // A file that does not exist yet has a folder that does.
+        let in_folder = || {
+            let folder = followed.parent().filter(|folder| !folder.as_os_str().is_empty());
+            Some(std::fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?.join(followed.file_name()?))
+        };
+        let whole = std::fs::canonicalize(path).ok().or_else(in_folder);
+        let path = whole.unwrap_or_else(|| std::path::absolute(path).unwrap_or_else(|_| path.into()));
+        Self { file: file_number(&path), path }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        self.path == other.path || (self.file.is_some() && self.file == other.file)
+    }
+}
+
+#[cfg(unix)]
+fn file_number(path: &Path) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    let meta = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+    Some((meta.dev(), meta.ino()))
+}
+
+#[cfg(not(unix))]
+fn file_number(_: &Path) -> Option<(u64, u64)> {
+    None
 }
 
 /// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`.

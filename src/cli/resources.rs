@@ -1,15 +1,58 @@
 //! What the process has used so far, where the system tells (Linux).
 
+use std::sync::{Once, mpsc};
+
 /// Ticks per second of the CPU times in /proc: fixed for user space on Linux.
 const TICKS: f64 = 100.0;
 
-/// Sets the number of threads for the whole process; the number in force.
+/// Starts the threads of the whole process: as many as `asked` for, otherwise one for each processor, or as many of them as
+/// the system lets it start; the number in force. Results do not depend on it.
 pub(super) fn use_threads(asked: Option<u16>) -> usize {
-    if let Some(threads) = asked {
-        // Fails only when a pool exists already, which then stays as it is: results are the same.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
-    }
+    let environment = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok().filter(|&threads| threads > 0);
+    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+    let wanted = asked.map(usize::from).or_else(environment).unwrap_or_else(processors);
+    start(wanted);
     rayon::current_num_threads()
+}
+
+/// Starts up to `wanted` threads and makes them the pool; without any, this thread is the pool. The pool itself cannot be
+/// tried twice: its threads are started before, and told their work when it is known how many there are.
+fn start(wanted: usize) {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let started = (0..wanted).map_while(|number| {
+            let (work, told) = mpsc::channel::<rayon::ThreadBuilder>();
+            let worker = std::thread::Builder::new().name(format!("worker {number}"));
+            worker.spawn(move || told.recv().map(rayon::ThreadBuilder::run)).ok().map(|_| work)
+        });
+        let started: Vec<_> = started.collect();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(started.len().max(1));
+        let made = if started.is_empty() {
+            pool.use_current_thread().build_global()
+        } else {
+            let mut started = started.into_iter();
+            let hand_out = move |work| {
+                let next = started.next().ok_or(std::io::ErrorKind::NotFound)?;
+                next.send(work).map_err(|_| std::io::ErrorKind::NotFound.into())
+            };
+            pool.spawn_handler(hand_out).build_global()
+        };
+        // Fails only when a pool exists already, which then stays as it is.
+        drop(made);
+    });
+}
+
+/// Seconds that a search for modes may take by its estimate, unless the user says that it may be long.
+const LONGEST: f64 = 1800.0;
+
+/// How long a search for modes may take.
+pub(super) fn longest(allow_long: bool) -> Option<f64> {
+    (!allow_long).then_some(LONGEST)
+}
+
+/// Whether another thread can be started.
+pub(super) fn has_thread() -> bool {
+    std::thread::Builder::new().spawn(|| ()).is_ok_and(|thread| thread.join().is_ok())
 }
 
 /// User and system CPU seconds of this process; zero where the system does not tell.
@@ -43,7 +86,19 @@ pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
         return Some(limit.saturating_sub(resident_bytes()));
     }
     let machine = kibibytes(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
-    machine.into_iter().chain(control_groups()).min()
+    machine.into_iter().chain(control_groups()).chain(process_limits()).min()
+}
+
+/// What the limits of this process leave (`ulimit -v` and `-d`). They count address space, of which more is reserved than is in
+/// use: who comes closer to a limit than that may still end at it.
+fn process_limits() -> Vec<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
+    let bytes = |key: &str| {
+        let line = limits.lines().find(|line| line.starts_with(key))?;
+        line[key.len()..].split_whitespace().next()?.parse::<u64>().ok()
+    };
+    let limits = ["Max address space", "Max data size"].into_iter().filter_map(bytes);
+    limits.map(|limit| limit.saturating_sub(resident_bytes())).collect()
 }
 
 /// What each memory control group of this process leaves (versions 1 and 2); files that are mapped count as free.

@@ -4,7 +4,7 @@ use super::arguments::SelectArguments;
 use super::convert::{read_loads, responses_to};
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
-use super::resources::{memory_left, use_threads};
+use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
 use crate::basis::{BasisChoice, FreeSurface, ModeSettings};
 use crate::convert::ConvertSettings;
@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
-    reports.into_iter().try_for_each(OutputSlot::commit)?;
+    OutputSlot::commit_all(reports)?;
     Ok(Outcome {
         text: facts.render(Format::Text),
         json: facts.render(Format::Json),
@@ -73,6 +73,7 @@ fn converted(
         modes: ModeSettings {
             wanted: Wanted::Lowest(wanted),
             memory: memory_left(None),
+            longest: longest(arguments.allow_long),
             ..ModeSettings::default()
         },
         basis: BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),

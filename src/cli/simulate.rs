@@ -42,6 +42,6 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
         slot.fill(facts.render(format).as_bytes())?;
     }
     // Nothing appears before everything is done.
-    motion.into_iter().chain(table).chain(reports).try_for_each(OutputSlot::commit)?;
+    OutputSlot::commit_all(motion.into_iter().chain(table).chain(reports))?;
     Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed: true })
 }

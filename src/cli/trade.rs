@@ -3,7 +3,7 @@
 use super::arguments::{ReferenceName, TradeArguments};
 use super::output::{Outcome, tell};
 use super::places::{format_of, refuse_replacing};
-use super::resources::{memory_left, use_threads};
+use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
 use crate::basis::ModeSettings;
 use crate::diagnostic::{Code, Diagnostic};
@@ -37,7 +37,10 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let checked = FeModel::from_raw(read_model(&files)?)?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
-        let (sources, found) = conversions(&checked.model, modes, memory, &|event| watcher.hear(event))?;
+        let (sources, found) =
+            conversions(&checked.model, modes, memory, longest(arguments.allow_long), &|event| {
+                watcher.hear(event)
+            })?;
         diagnostics.extend(found);
         (Some(checked.model), sources)
     } else {
@@ -59,7 +62,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         slot.fill(facts.render(format).as_bytes())?;
     }
     // Nothing appears before everything is done.
-    table.into_iter().chain(reports).try_for_each(OutputSlot::commit)?;
+    OutputSlot::commit_all(table.into_iter().chain(reports))?;
     let passed = study.recommended.row().is_some();
     Ok(Outcome { text: facts.render(Format::Text), json: facts.render(Format::Json), passed })
 }

@@ -1,6 +1,6 @@
 //! Progress on a terminal with the time that is left of each phase, and the time that each phase took.
 
-use super::resources::cpu_seconds;
+use super::resources::{cpu_seconds, has_thread};
 use crate::progress::Event;
 use crate::report::Phase;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -35,7 +35,10 @@ impl Watcher {
             });
         bar.set_style(style);
         bar.set_message(first.to_owned());
-        bar.enable_steady_tick(Duration::from_millis(200));
+        // The tick has a thread of its own.
+        if !bar.is_hidden() && has_thread() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
         let state =
             State { name: first.to_owned(), wall: Instant::now(), cpu: cpu_seconds(), phases: Vec::new() };
         Self { bar, state: Mutex::new(state) }

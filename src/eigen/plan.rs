@@ -44,15 +44,24 @@ pub struct Plan {
     pub flops: f64,
     /// Whether single precision was tried first, in vain.
     pub single_failed: bool,
+    /// About how long the search takes on one processor, in seconds, without the factorisation.
+    pub seconds: f64,
     /// Why completeness cannot be proved: bytes of the count, bytes there are.
     pub proof_too_large: Option<(u64, u64)>,
+}
+
+/// Operations per second that estimates of time assume: what one processor does of the mixed work of a search.
+const PACE: f64 = 4e9;
+
+/// Columns of the Krylov basis. Measured: five for each wanted mode.
+fn basis_columns(wanted: usize) -> usize {
+    (5 * wanted + 16).min(2 * wanted + 128)
 }
 
 /// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products, corrections, and
 /// the copy of the basis that a checkpoint is written from.
 fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
-    // Measured: five columns for each wanted mode.
-    let basis = (5 * wanted + 16).min(2 * wanted + 128);
+    let basis = basis_columns(wanted);
     let searched = basis + 4 * wanted + 24;
     let columns = match precision {
         Precision::Double => searched,
@@ -64,27 +73,60 @@ fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u
     8 * (problem.pencil.n() * (columns + saved)) as u64
 }
 
+/// What the dense path holds: both matrices, their transformed product, its eigenvectors and copies in work.
+fn dense_bytes(n: usize, wanted: usize) -> u64 {
+    let (n, wanted) = (n as u64, wanted as u64);
+    8 * (6 * n * n + 3 * n * wanted)
+}
+
+/// What a caller makes of `wanted` modes: a copy of them, and tables with numbers for each pair of modes.
+fn made_of_them(n: usize, wanted: usize) -> u64 {
+    let (n, wanted) = (n as u64, wanted as u64);
+    8 * (80 * wanted * wanted + 3 * n * wanted)
+}
+
+/// About how long a search takes: solutions with the factor, orthogonalisation against the basis, restarts, and the products of
+/// all pairs of modes; on the dense path two decompositions.
+fn seconds(n: usize, wanted: usize, factor: u64, dense: bool) -> f64 {
+    let (rows, modes) = (n as f64, wanted as f64);
+    let search = if dense {
+        30.0 * rows.powi(3)
+    } else {
+        let (basis, columns) = (basis_columns(wanted) as f64, 3.0 * modes + 100.0);
+        columns * (4.0 * factor as f64 + 8.0 * rows * basis) + 6.0 * rows * basis * modes
+    };
+    (search + 20.0 * rows * modes * modes) / PACE
+}
+
 /// What an inertia count of `inertia` numbers needs, with the modes and their products.
 fn count_bytes(problem: &EigenProblem<'_>, inertia: u64, modes: usize) -> u64 {
     8 * (inertia + (3 * modes * problem.pencil.n()) as u64)
 }
 
 impl Plan {
-    /// Decides for `wanted` modes.
+    /// Decides for `wanted` modes, which the dense path looks for or an iterative search.
     ///
     /// # Errors
-    /// [`EigenFailure::Memory`] when nothing fits.
+    /// [`EigenFailure::Memory`] when nothing fits; [`EigenFailure::TooLong`] when it would take longer than the settings allow.
     pub(super) fn new(
         problem: &EigenProblem<'_>,
         settings: &EigenSettings,
         analysis: &Analysis,
         wanted: usize,
+        dense: bool,
     ) -> Result<Self, EigenFailure> {
+        let n = problem.pencil.n();
+        let seconds = seconds(n, wanted, analysis.factor_len() as u64, dense);
         let Peaks { factor, cholesky, inertia } = analysis.peaks(rayon::current_num_threads());
         let available = settings.memory.unwrap_or(u64::MAX);
         let search = |precision: Precision| {
             let size = precision.bytes();
-            (size * cholesky).max(size * factor + vectors(problem, wanted, precision))
+            let found = if dense {
+                dense_bytes(n, wanted)
+            } else {
+                (size * cholesky).max(size * factor + vectors(problem, wanted, precision))
+            };
+            found.max(made_of_them(n, wanted))
         };
         // The factor is given back before the count.
         let count = count_bytes(problem, inertia, wanted);
@@ -106,6 +148,9 @@ impl Plan {
         if resident(needed) > available {
             return Err(EigenFailure::Memory { bytes: resident(needed), available });
         }
+        if settings.longest.is_some_and(|longest| seconds > longest) {
+            return Err(EigenFailure::TooLong { wanted, seconds, bytes: resident(needed) });
+        }
         let count = if settings.accuracy == Accuracy::Fast { 0 } else { count };
         let proof_too_large = (resident(count) > available).then_some((resident(count), available));
         Ok(Self {
@@ -113,6 +158,7 @@ impl Plan {
             bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
             factor_bytes: precision.bytes() * factor,
             flops: analysis.flops(),
+            seconds,
             single_failed: false,
             proof_too_large,
         })
@@ -131,7 +177,7 @@ impl Plan {
         wanted: usize,
     ) -> Result<Self, EigenFailure> {
         let settings = EigenSettings { factor: FactorChoice::Always(Precision::Double), ..*settings };
-        Self::new(problem, &settings, analysis, wanted)
+        Self::new(problem, &settings, analysis, wanted, false)
     }
 }
 
@@ -139,7 +185,15 @@ impl std::fmt::Display for Plan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let precision = if self.precision == Precision::Double { "double" } else { "single" };
         let (factor, all) = (gigabytes(self.factor_bytes), gigabytes(self.bytes));
-        write!(f, "factor of {factor} in {precision} precision, {:.2e} operations, {all} in all", self.flops)
+        write!(
+            f,
+            "factor of {factor} in {precision} precision, {:.2e} operations, {all} in all",
+            self.flops
+        )?;
+        match (self.seconds / 60.0).round() {
+            minutes if minutes >= 1.0 => write!(f, "; about {minutes} min for the modes on one processor"),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -88,6 +88,8 @@ pub struct EigenSettings {
     pub single_pays: f64,
     /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
     pub memory: Option<u64>,
+    /// Seconds that the search may take by its estimate, without the factorisation; `None`: as many as it needs.
+    pub longest: Option<f64>,
 }
 
 impl EigenSettings {
@@ -106,6 +108,7 @@ impl Default for EigenSettings {
             // Below, the columns that its corrections solve cost what the factorisation saves.
             single_pays: 4e11,
             memory: None,
+            longest: None,
         }
     }
 }
@@ -253,6 +256,15 @@ pub enum EigenFailure {
         bytes: u64,
         /// Bytes there are.
         available: u64,
+    },
+    /// What is asked for takes longer than it may.
+    TooLong {
+        /// Modes that are wanted, of those that there are.
+        wanted: usize,
+        /// Seconds that the search takes, estimated for one processor.
+        seconds: f64,
+        /// Bytes needed.
+        bytes: u64,
     },
     /// The pencil is too large for the ordering's 32-bit numbers.
     TooLarge,

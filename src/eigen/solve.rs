@@ -64,7 +64,6 @@ pub fn solve(
             count_below(problem, &analysis, lambda, &mut counters)?.saturating_sub(rigid)
         }
     };
-    let plan = Plan::new(problem, settings, &analysis, wanted)?;
     let dense = match settings.method {
         Method::Dense => true,
         Method::Lanczos => false,
@@ -73,6 +72,7 @@ pub fn solve(
                 || (pencil.n() <= DENSE_AT_MOST && wanted as f64 > DENSE_PART * available as f64)
         }
     };
+    let plan = Plan::new(problem, settings, &analysis, wanted, dense)?;
     let tolerance = SEARCHED * settings.accuracy.residual();
     let mut sparse = Sparse { problem, settings, analysis: &analysis, plan };
     let (mut search, finite_modes) = if dense {

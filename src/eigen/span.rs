@@ -74,7 +74,7 @@ pub fn modes_of_span(
             Some(analysis) => {
                 watch(Event::Phase("bounds"));
                 // Refuses what does not fit the memory.
-                Plan::new(problem, settings, analysis, given)?;
+                Plan::new(problem, settings, analysis, given, false)?;
                 let (modes, high) = (vectors.as_ref(), completeness.shift);
                 bounds =
                     Some(enclose(problem, analysis, modes, &eigenvalues, high, CLUSTER_GAP, &mut counters)?);

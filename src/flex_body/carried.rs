@@ -21,6 +21,9 @@ use nalgebra::Vector3;
 /// Largest part that modes may leave of the static response of the carried body before that is said.
 const RESOLVED: f64 = 0.01;
 
+/// Deformation of a rigid interface, relative to its motion, above which it is not rigid.
+const DEFORMED: f64 = 1e-4;
+
 /// Motions of the interface below this part of the largest displacement of a mode are rounding.
 const AT_REST: f64 = 1e-12;
 
@@ -154,10 +157,30 @@ impl FlexBody {
         let worst = (0..6).map(missing).fold(0.0, f64::max);
         (worst > RESOLVED).then(|| {
             let message = format!(
-                "the {nf} modes resolve {carrier} badly: of the static deflection of the body that hangs from it about {:.0} % are missing",
+                "the {nf} modes resolve {carrier} badly: where it is accelerated, about {:.0} % of the elastic energy of the body that hangs from it are missing in the worst direction",
                 100.0 * worst
             );
             Diagnostic::new(Code::CarrierUnresolved, message)
+        })
+    }
+
+    /// A warning where an interface is to be rigid and the modes of this body, as it was before it was carried, deform it: its mean motion
+    /// is carried then.
+    pub(crate) fn softened(&self, carrier: &Carrier) -> Option<Diagnostic> {
+        let Carrier::Interface(name) = carrier else { return None };
+        let interface = self.interfaces().iter().find(|interface| interface.name == *name)?;
+        let modes = self.modes();
+        let rotation = modes.rotation.as_ref().map(Mat::as_ref);
+        let rows = interface.rows(self.nodes(), modes.shape.as_ref(), rotation, self.dimension())?;
+        let (mode, misfit) = rows.deformation();
+        (interface.coupling == Some(Coupling::Rigid) && misfit > DEFORMED).then(|| {
+            let message = format!(
+                "interface `{name}` is rigid, but the modes deform it, mode {} by {:.1} % of its motion: its mean motion is carried, the nodes around it are free",
+                mode + 1,
+                100.0 * misfit
+            );
+            Diagnostic::new(Code::CarrierUnresolved, message)
+                .with_help("convert with --basis craig-bampton, which keeps rigid interfaces rigid")
         })
     }
 
@@ -168,7 +191,10 @@ impl FlexBody {
         // `residual vector: 98 % bore force x`.
         let made_for = |provenance: &str| provenance.split_once(" % ").is_some_and(|(_, load)| named(load));
         let modes = self.modes();
-        self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
+        // All motions of the model, but rigid ones.
+        let complete = self.n_modes() + 6 >= self.source().n_dofs && self.source().n_dofs > 0;
+        complete
+            || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
             || modes.truncation.iter().any(|one| named(&one.load))
             || modes.provenance.iter().any(|one| made_for(one))
     }

@@ -2,6 +2,7 @@
 //!
 //! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
 
+use crate::memory::or_go_without;
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
@@ -127,8 +128,7 @@ pub(crate) fn dataset<T: Element>(
     let elements = fit(&dims)?;
     storage(&dataset, elements, size_of::<T>(), stored)?;
     let mut values = Vec::new();
-    values
-        .try_reserve_exact(elements)
+    or_go_without(|| values.try_reserve_exact(elements))
         .map_err(|_| format!("expected an array that fits into memory, found {elements} values"))?;
     values.resize(elements, T::default());
     dataset.read_into_raw(&mut values).map_err(|e| format!("expected readable data, found {e}"))?;

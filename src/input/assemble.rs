@@ -4,6 +4,7 @@
 use super::digits::significant_digits;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::linalg::{ColumnBlock, CscMatrix, split_columns};
+use crate::memory::or_go_without;
 use crate::model::RawMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -179,9 +180,11 @@ impl Columns {
     pub(super) fn with_room(n: usize, entries: usize) -> Self {
         let (mut row_idx, mut values) = (Vec::new(), Vec::new());
         // A number that a file states: where there is no such room the lists grow as far as they have to.
-        if row_idx.try_reserve_exact(entries).is_ok() {
-            let _ = values.try_reserve_exact(entries);
-        }
+        or_go_without(|| {
+            if row_idx.try_reserve_exact(entries).is_ok() {
+                let _ = values.try_reserve_exact(entries);
+            }
+        });
         Self { counts: vec![0; n + 1], row_idx, values }
     }
 

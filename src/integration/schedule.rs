@@ -198,9 +198,12 @@ fn gauss_piece<E: From<Failure>>(
     wanted: &mut Wanted<'_>,
     observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
+    let span = piece.before - piece.from;
+    if span <= 0.0 {
+        return Ok(());
+    }
     let mut aside: Option<Gauss> = None;
     let mut before = state.to_vec();
-    let span = piece.before - piece.from;
     let steps = (span / longest * (1.0 - STEP_ROUNDING)).ceil().max(1.0);
     let length = span / steps;
     let (mut time, mut taken) = (piece.from, 0.0);

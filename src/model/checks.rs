@@ -264,8 +264,8 @@ fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
         let wrong = match name.as_str() {
             "" => Some("an interface has no name".to_owned()),
             _ if !seen.insert(name) => Some(format!("interface `{name}` is given twice")),
-            _ if name.len() > 200 || name.contains(['\0', '/']) => Some(format!(
-                "interface name `{}` is too long or has a slash or a NUL in it",
+            _ if name.len() > 200 || name.chars().any(char::is_control) => Some(format!(
+                "interface name `{}` is longer than 200 bytes or has control characters in it",
                 name.escape_debug()
             )),
             _ if set.nodes.is_empty() => Some(format!("interface `{name}` has no nodes")),

@@ -27,7 +27,7 @@ pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
 pub use extremes::{Drift, Extremes};
 pub use history::History;
 pub use peak::Peak;
-pub(crate) use prepared::damped;
+pub(crate) use prepared::{damped, ends_a_run};
 pub use read::read_scene;
 pub use recording::{Path, Recording, Resolution, Setting};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};

@@ -191,3 +191,8 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
         }
     }
 }
+
+/// Whether a run ended for a reason of its own: other models of the same scene may go on.
+pub(crate) fn ends_a_run(code: Code) -> bool {
+    matches!(code, Code::SimulationStopped | Code::RunTooLong)
+}

@@ -20,9 +20,10 @@ pub(super) fn carried(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) ->
         if found.is_none() && table.contains_key(key) { Err(()) } else { Ok(found) }
     };
     let (spin_table, translation_table) = (part("spin"), part("translation"));
-    let spin = spin_table.ok()?.map(|(table, span)| spin(walk, table, span));
-    let translation = translation_table.ok()?.map(|(table, span)| translation(walk, table, span));
-    Some(Carried { by: by?, spin: transposed(spin)?, translation: transposed(translation)? })
+    let spin = spin_table.map(|found| found.map(|(table, span)| spin(walk, table, span)));
+    let translation =
+        translation_table.map(|found| found.map(|(table, span)| translation(walk, table, span)));
+    Some(Carried { by: by?, spin: transposed(spin.ok()?)?, translation: transposed(translation.ok()?)? })
 }
 
 fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<CarriedSpin> {
@@ -49,7 +50,9 @@ fn translation(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option
         walk.wrong(span.clone(), "key `direction` is missing in [carried.translation]".to_owned());
     }
     let direction = direction(walk, table, "direction");
-    let kinds: [(&str, fn(History) -> Drive); 3] = [
+    /// What a history drives.
+    type Driven = fn(History) -> Drive;
+    let kinds: [(&str, Driven); 3] = [
         ("displacement", Drive::Displacement),
         ("velocity", Drive::Velocity),
         ("acceleration", Drive::Acceleration),

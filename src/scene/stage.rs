@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
 
 /// Centres of mass within this part of the extent of the body from the origin are at the origin.
-const AT_ORIGIN: f64 = 1e-12;
+const AT_ORIGIN: f64 = 1e-10;
 
 /// How far a prescribed rotation may be above what the scene allows, by rounding.
 const ROUNDING: f64 = 1e-6;
@@ -46,6 +46,7 @@ impl<'a> Stage<'a> {
                 let carrier = carrier(&carried.by);
                 let own = body.carried(&carrier)?;
                 let mut found = Vec::from_iter(own.unresolved(&carrier, body));
+                found.extend(body.softened(&carrier));
                 if body.loses_geometric_stiffness() {
                     let message = format!(
                         "geometric stiffness of the body does not act while {carrier} carries it: the stress comes from the reaction there"
@@ -180,25 +181,34 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
 /// Warnings about loads that do nothing.
 fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
     let mut found = Vec::new();
-    let mut tell = |message: String| found.push(Diagnostic::new(Code::LoadIdle, message));
+    let mut tell = |message: String, help: Option<&str>| {
+        let diagnostic = Diagnostic::new(Code::LoadIdle, message);
+        found.push(match help {
+            Some(help) => diagnostic.with_help(help),
+            None => diagnostic,
+        });
+    };
+    let leave = Some("leave it out, or give it its size");
     let end = scene.run.duration.unwrap_or(f64::INFINITY);
     for load in &scene.loads {
         let place = &load.at;
         if load.force == Vector3::zeros() && load.torque == Vector3::zeros()
             || load.history.is_zero_until(end)
         {
-            tell(format!("the load at {place} is zero all the time"));
+            tell(format!("the load at {place} is zero all the time"), leave);
         } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
-            tell(format!(
-                "the load at {place} bends nothing: its motion is prescribed, the reaction takes the load"
-            ));
+            let message = format!(
+                "the load at {place} bends nothing: {place} is carried, and the reaction takes the load"
+            );
+            tell(message, Some("load another place of the body, or let nothing carry this one"));
         }
     }
     let Some(gravity) = &scene.gravity else { return found };
     if *gravity == Vector3::zeros() {
-        tell("`gravity` is zero".to_owned());
+        tell("`gravity` is zero".to_owned(), leave);
     } else if scene.spin.as_ref().is_some_and(|spin| spin.hold) && is_uncoupled(body) {
-        tell("`gravity` bends nothing: [spin] holds the body at its centre of mass and mean axes, about which its weight is balanced".to_owned());
+        let message = "`gravity` bends nothing: [spin] holds the body at its centre of mass and mean axes, that is by all of its mass";
+        tell(message.to_owned(), None);
     }
     found
 }

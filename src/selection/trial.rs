@@ -6,13 +6,13 @@ use super::norms::Norms;
 use super::rows::PointRows;
 use super::situation::Situation;
 use super::variation::Variation;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Diagnostic;
 use crate::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::error::Result;
 use crate::flex_body::{FlexBody, Groups};
 use crate::scene::{
     ErrorHistory, History, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin,
-    Trace, simulate, trace, trace_at,
+    Trace, ends_a_run, simulate, trace, trace_at,
 };
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
@@ -52,7 +52,7 @@ impl Trial {
     }
 }
 
-/// A body and a scene that trials are made with.
+/// A body and a scene that trials are made with, both on their [`Stage`](crate::scene::Stage).
 pub struct Bench<'a> {
     /// The body, with the damping of the scene.
     pub body: &'a FlexBody,
@@ -104,7 +104,7 @@ impl Bench<'_> {
             History::Sine { frequency, .. } => TAU * frequency,
             _ => 0.0,
         });
-        let mut breaks = self.scene.spin.as_ref().map_or(Vec::new(), |spin| spin.rate.breaks());
+        let mut breaks = self.scene.rotation().map_or(Vec::new(), |(_, rate)| rate.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);
         let ends: Vec<f64> = ends.collect();
@@ -115,7 +115,7 @@ impl Bench<'_> {
     /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure` holds; and how its errors grow.
     ///
     /// # Errors
-    /// Those of [`simulate`] other than FB540, which the trial notes.
+    /// Those of [`simulate`] other than FB540 and FB550, which the trial notes.
     pub fn measured(
         &self,
         measure: &Measure<'_>,
@@ -138,7 +138,7 @@ impl Bench<'_> {
         scene.run.scheme = measure.trace().scheme;
         let history = match trace_at(body, &scene, &measure.trace().time) {
             Ok(trace) => Ok(measure.of_subset(&trace, modes)),
-            Err(error) if error.diagnostics().iter().all(|d| d.code() == Code::SimulationStopped) => {
+            Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
                 Err(error.diagnostics()[0].message().to_owned())
             }
             Err(error) => return Err(error),

@@ -21,6 +21,7 @@ pub fn conversions(
     model: &FeModel,
     modes: usize,
     memory: Option<u64>,
+    longest: Option<f64>,
     watch: Watch<'_>,
 ) -> Result<(Vec<Source>, Vec<Diagnostic>)> {
     let mut loads = vec![Loads::Centrifugal];
@@ -38,6 +39,7 @@ pub fn conversions(
                 wanted: Wanted::Lowest(count),
                 accuracy,
                 memory,
+                longest,
                 ..ModeSettings::default()
             },
             basis: BasisChoice::Free(FreeSurface { residual_vectors }),

@@ -9,7 +9,7 @@ use crate::flex_body::FlexBody;
 use crate::integration::Work;
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
-use crate::scene::{Measure, OutputErrors, Scene, Stage, Tolerance, Trace, trace, trace_at};
+use crate::scene::{Measure, OutputErrors, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at};
 use crate::store;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -208,7 +208,7 @@ impl Job<'_> {
         let last = candidate.modes.last().copied().unwrap_or(0);
         let outcome = match self.measured(source, &candidate) {
             Ok(measured) => Ok(measured),
-            Err(error) if error.diagnostics().iter().all(|d| d.code() == Code::SimulationStopped) => {
+            Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
                 Err(Failed(error.diagnostics()[0].clone()))
             }
             Err(error) => return Err(error),

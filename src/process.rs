@@ -1,0 +1,137 @@
+//! What the program asks of its process: limits that give errors instead of signals, and an end without memory.
+#![allow(unsafe_code)] // an allocator, and calls of the C library that set and end a process
+
+use flexbody::error::ExitCode;
+use flexbody::memory::goes_without;
+use flexbody::output::abandon_unfinished_soon;
+use mimalloc::MiMalloc;
+use std::alloc::{GlobalAlloc, Layout};
+use std::cell::Cell;
+use std::fmt::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The program's allocator. Where there is no memory left it ends the program with exit code 4 and a message, since no
+/// code that merely needs a vector could go on.
+///
+/// Large blocks come and go on all threads: the system allocator gives them back each time, and the page faults and
+/// interrupts of that cost more than the work (measured: half of the factorisation time on two threads).
+pub struct Allocator;
+
+// SAFETY: every call is passed on unchanged; a failure that is not expected does not return.
+unsafe impl GlobalAlloc for Allocator {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller keeps the contract, which is that of the inner allocator; so in the next ones.
+        sound(unsafe { MiMalloc.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as above.
+        sound(unsafe { MiMalloc.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: as above.
+        sound(unsafe { MiMalloc.realloc(block, layout, size) }, size)
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { MiMalloc.dealloc(block, layout) }
+    }
+}
+
+#[inline]
+fn sound(block: *mut u8, size: usize) -> *mut u8 {
+    if block.is_null() && !goes_without() {
+        out_of_memory(size);
+    }
+    block
+}
+
+thread_local! {
+    static ENDING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Says so, removes the unfinished files, and ends the process; none of it allocates.
+#[cold]
+fn out_of_memory(size: usize) -> ! {
+    static BEGUN: AtomicBool = AtomicBool::new(false);
+    if ENDING.replace(true) {
+        // An allocation on the way to the end after all.
+        end(ExitCode::Resources);
+    }
+    if BEGUN.swap(true, Ordering::SeqCst) {
+        // Another thread is at it.
+        std::thread::sleep(Duration::from_secs(10));
+        end(ExitCode::Resources);
+    }
+    abandon_unfinished_soon();
+    let mut line = Line { bytes: [0; 256], len: 0 };
+    // The text is shorter than the line.
+    let _ = writeln!(
+        line,
+        "error[FB601]: not enough memory: another {size} bytes are not to be had\n  help: raise the limits of memory, ask for \
+         fewer modes, use fewer threads (--threads), or a larger machine"
+    );
+    tell(&line.bytes[..line.len]);
+    end(ExitCode::Resources)
+}
+
+/// A text of limited length that lies on the stack.
+struct Line {
+    bytes: [u8; 256],
+    len: usize,
+}
+
+impl Write for Line {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        let room = self.bytes.get_mut(self.len..self.len + text.len()).ok_or(std::fmt::Error)?;
+        room.copy_from_slice(text.as_bytes());
+        self.len += text.len();
+        Ok(())
+    }
+}
+
+#[cfg(unix)]
+fn tell(text: &[u8]) {
+    // SAFETY: the bytes are there for as long as the call lasts. Nobody is left to tell when it fails.
+    let _ = unsafe { libc::write(2, text.as_ptr().cast(), text.len()) };
+}
+
+#[cfg(not(unix))]
+fn tell(text: &[u8]) {
+    let _ = std::io::Write::write_all(&mut std::io::stderr(), text);
+}
+
+/// Ends the process at once: other threads may be inside HDF5, whose own end waits for them or crashes.
+pub fn end(code: ExitCode) -> ! {
+    #[cfg(unix)]
+    // SAFETY: ends the process.
+    unsafe {
+        libc::_exit(code as i32)
+    }
+    #[cfg(not(unix))]
+    std::process::exit(code as i32)
+}
+
+/// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files may be open as
+/// the system allows, since every output holds one; the C library keeps one pool of memory for all threads, not 64 MiB of
+/// address space for each.
+pub fn prepare() {
+    #[cfg(unix)]
+    // SAFETY: sets limits of this process, before any thread is started; what fails leaves things as they are.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+        let mut files = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+        if libc::getrlimit(libc::RLIMIT_NOFILE, &mut files) == 0 && files.rlim_cur < files.rlim_max {
+            files.rlim_cur = files.rlim_max;
+            libc::setrlimit(libc::RLIMIT_NOFILE, &files);
+        }
+    }
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: as above.
+    unsafe {
+        libc::mallopt(libc::M_ARENA_MAX, 1);
+    }
+}
