@@ -7,8 +7,8 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{Accuracy, Counters, Plan, Proof, Resume, Wanted, energy_noise};
 use crate::error::Result;
 use crate::flex_body::{
-    Certificate, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates, LumpedBody,
-    MassStructure, Modes, Parts, Source, Storage, TermDecision, Truncation,
+    Certificate, FixedInterface, FlexBody, Group, Groups, Guarantee, Interface, InterfaceCoordinates,
+    LumpedBody, MassStructure, Modes, Parts, Source, Storage, TermDecision, Truncation,
 };
 use crate::invariants::{
     BodyFrame, Frame, Invariants, LumpedMasses, LumpedScheme, MassProperties, align, choose_frame,
@@ -277,6 +277,7 @@ pub fn convert_for(
     diagnostics.extend(warning.into_iter().chain(softening).chain(fits));
     let body =
         FlexBody::new(Parts { lumped, certificate: certificate(model, &found, guarantee), terms, ..parts })?;
+    diagnostics.extend(free_frequencies(&body));
     let solution = found.solution;
     Ok(Conversion {
         body,
@@ -422,6 +423,7 @@ fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option<Guarantee>
         eigenvalue_rounding: eigenvalue_rounding(model, found),
         inertia_rounding: 0.0,
         guarantee,
+        fixed_interface: found.fixed_interface.clone().map(fixed_interface),
     }
 }
 
@@ -435,6 +437,51 @@ fn eigenvalue_rounding(model: &FeModel, found: &ModalBasis) -> f64 {
     let noise = energy_noise(model.stiffness(), solution.vectors.as_ref(), f64::EPSILON);
     let relative = noise.iter().zip(&solution.eigenvalues).map(|(noise, lambda)| noise / lambda);
     ROUNDINGS * relative.fold(0.0, f64::max)
+}
+
+/// The same of the body; written out, so that neither room need know the other.
+fn fixed_interface(found: basis::FixedInterface) -> FixedInterface {
+    let basis::FixedInterface {
+        modes,
+        interface_motions,
+        counted,
+        shift,
+        next,
+        residual,
+        free_estimate,
+        free_lower,
+    } = found;
+    FixedInterface { modes, interface_motions, counted, shift, next, residual, free_estimate, free_lower }
+}
+
+/// Part by which a frequency may be too high before the user is told.
+const TOO_HIGH: f64 = 0.01;
+
+/// A note about the frequencies of the free body that a Craig-Bampton body does not hold.
+fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
+    let fixed = body.certificate().fixed_interface.as_ref()?;
+    let (theta, hertz) = (&body.modes().eigenvalue, body.frequencies_hz());
+    let holding = fixed.holding(theta, TOO_HIGH);
+    let first = *theta.get(holding)?;
+    let kept = if body.has_rigid_interfaces() { " with the same rigid interfaces" } else { "" };
+    let holds = match holding {
+        0 => format!("none is within 1 % of that of the free body{kept}"),
+        count => format!(
+            "the lowest {count} (up to {:.6} Hz) are within 1 % of those of the free body{kept}",
+            hertz[count - 1]
+        ),
+    };
+    let percent = |part: f64| format!("{:.2} %", 100.0 * part);
+    let most = fixed.largest_excess(holding, first).map(|most| format!(", {} at most", percent(most)));
+    let message = format!(
+        "of the {} frequencies of the Craig-Bampton body {holds}; that of mode {}, {:.6} Hz, is too high by {}{}",
+        theta.len(),
+        holding + 1,
+        hertz[holding],
+        percent(fixed.excess(holding, first)),
+        most.unwrap_or_default(),
+    );
+    Some(Diagnostic::new(Code::FreeFrequencies, message))
 }
 
 /// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.

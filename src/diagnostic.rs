@@ -160,9 +160,10 @@ codes! {
     ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "check the units of the damping: alpha is in 1/time, beta in time, D in mass/time";
     ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
     ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
-    ShapesRigid = "FB522", Note, Done, "rigid motions among the shapes are removed", "nothing to do: rigid motion is the body frame's";
+    ShapesRigid = "FB522", Note, Done, "rigid-body motions are taken out of the shapes: the body frame carries them out", "nothing to do: no motion is lost";
     ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
     LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
+    FreeFrequencies = "FB525", Note, Done, "frequencies of a Craig-Bampton body beside those of the free body", "take more fixed-interface modes (--modes, --max-frequency) where higher frequencies count";
     GeometricStiffnessNone = "FB530", Warning, Done, "centrifugal loads without geometric stiffness: the body softens where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to rates far below the one that is named";
     GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act along the others";
     SimulationStopped = "FB540", Error, Untrustworthy, "simulation cannot go on", "look at spin, loads and dropped terms: the motion leaves the range of the model";

@@ -86,7 +86,7 @@ fn usage_errors_end_with_2_say_what_is_wrong_and_write_nothing() {
         ("convert", "--output <BODY.flex.h5>"),
         ("convert model.toml", "--output <BODY.flex.h5>"),
         ("convert -o b.h5", "<MODEL.toml>"),
-        ("convert model.toml -o b.h5 --modes 0", "0 is not in 1.."),
+        ("convert model.toml -o b.h5 --modes 0", "--basis craig-bampton for static condensation"),
         ("convert model.toml -o b.h5 --modes ten", "invalid digit"),
         ("convert model.toml -o b.h5 --modes 5 --max-frequency 100", "cannot be used with"),
         ("convert model.toml -o b.h5 --max-frequency=-1", "a positive number is expected"),

@@ -1,5 +1,7 @@
 //! Craig-Bampton and Craig-Chang bases against dense solutions that use nothing of the library but its matrix type.
 
+#[path = "craig_bampton/free_body.rs"]
+mod free_body;
 #[path = "support/mod.rs"]
 mod support;
 

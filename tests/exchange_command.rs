@@ -41,20 +41,21 @@ fn a_lossy_export_is_refused_whole_and_allowed_with_a_warning() {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();
     prepare(place);
-    let refused = run(place, "export body.flex.h5 --to exudyn -o body.hdf5");
+    let refused = run(place, "export body.flex.h5 --to mbdyn --dialect level13 -o body.fem");
     assert_eq!(code(&refused), 2);
-    assert!(errors(&refused).starts_with("error[FB720]: exudyn cannot hold"), "{}", errors(&refused));
+    assert!(errors(&refused).starts_with("error[FB720]: mbdyn cannot hold"), "{}", errors(&refused));
     assert_eq!(names(place), ["body.flex.h5"]);
-    let allowed = run(place, "export body.flex.h5 --to exudyn -o body.hdf5 --allow-loss");
+    let allowed = run(place, "export body.flex.h5 --to mbdyn --dialect level13 -o body.fem --allow-loss");
     assert_eq!(code(&allowed), 0);
     assert!(errors(&allowed).starts_with("warning[FB721]"), "{}", errors(&allowed));
-    assert_eq!(names(place), ["body.flex.h5", "body.hdf5"]);
+    assert_eq!(names(place), ["body.fem", "body.flex.h5"]);
     let told: Value = {
-        let run = run(place, "export body.flex.h5 --to exudyn -o body.hdf5 --allow-loss --json");
+        let run =
+            run(place, "export body.flex.h5 --to mbdyn --dialect level13 -o body.fem --allow-loss --json");
         serde_json::from_slice(&run.stdout).expect("JSON")
     };
     assert_eq!(told["warnings"], 1);
-    let size = fs::metadata(place.join("body.hdf5")).expect("a file").len();
+    let size = fs::metadata(place.join("body.fem")).expect("a file").len();
     assert_eq!(told["results"]["files"][0]["bytes"].as_u64(), Some(size));
 }
 
@@ -65,6 +66,9 @@ fn files_that_belong_beside_appear_with_it_and_replace_no_input() {
     prepare(place);
     assert_eq!(code(&run(place, "export body.flex.h5 --to embedded -o body.bin")), 0);
     assert_eq!(names(place), ["body.bin", "body.flex.h5", "body.h"]);
+    // A program that joins the interfaces, named so that Python can import it.
+    assert_eq!(code(&run(place, "export body.flex.h5 --to exudyn -o rod.v2.hdf5")), 0);
+    assert_eq!(names(place), ["body.bin", "body.flex.h5", "body.h", "rod.v2.hdf5", "rod.v2_exudyn.py"]);
     let before = fs::read(place.join("body.flex.h5")).expect("a body");
     for words in [
         "export body.flex.h5 --to json -o body.flex.h5",

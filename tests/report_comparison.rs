@@ -11,7 +11,7 @@ use flexbody::diagnostic::Code;
 use flexbody::flex_body::{FlexBody, Parts};
 use flexbody::invariants::{BodyFrame, Frame, choose_frame};
 use flexbody::linalg::{CscMatrix, SymmetricMatrix};
-use flexbody::report::{BodyComparison, Tolerances, compare};
+use flexbody::report::{BodyComparison, Tolerances, compare, compare_common};
 use flexbody::units::UnitSystem;
 use nalgebra::Vector3;
 use random::Random;
@@ -197,6 +197,34 @@ fn a_repeated_eigenvalue_cut_at_the_end_is_named_as_a_possible_cause() {
     let comparison = compared(&body, &other);
     assert_eq!(failed(&comparison), ["mode shapes"]);
     assert!(comparison.notes().iter().any(|n| n.starts_with("only the last modes differ")));
+}
+
+#[test]
+fn bodies_with_different_numbers_of_modes_are_compared_in_what_they_have_in_common_when_asked() {
+    let body = block(BodyFrame::Principal);
+    let some = |modes: &[usize]| body.reduced(modes, body.groups(), Vec::new()).expect("some modes");
+    let common = |a: &FlexBody, b: &FlexBody| compare_common(a, b, &Tolerances::default());
+    let refused = compare(&body, &some(&[0, 1, 2]), &Tolerances::default()).unwrap_err();
+    assert!(refused.has(Code::BodyIncomparable) && refused.to_string().contains("--common"), "{refused}");
+    // Modes 1 and 2, and 4 and 5, have one eigenvalue each: of the last list mode 1 is no mode in common.
+    for modes in [&[0, 1, 2][..], &[2, 5], &[5], &[0, 2]] {
+        for (a, b) in [(&body, &some(modes)), (&some(modes), &body)] {
+            let comparison = common(a, b).expect("comparable");
+            assert!(comparison.passed() && comparison.same_nodes(), "{}", comparison.text());
+            let notes = comparison.notes().join("; ");
+            assert!(notes.contains("in common") && notes.contains("not compared: mode"), "{notes}");
+        }
+    }
+    let refused = common(&body, &some(&[0])).unwrap_err();
+    assert!(refused.has(Code::BodyIncomparable) && refused.to_string().contains("repeated"), "{refused}");
+    // A mode that differs is not taken for one that is missing.
+    let wrong = changed(&some(&[2, 5]), |p| {
+        p.modes.eigenvalue[1] *= 1.03;
+        p.invariants.modal_stiffness[(1, 1)] *= 1.03;
+    });
+    let comparison = common(&body, &wrong).expect("comparable");
+    assert_eq!(failed(&comparison), ["frequency", "modal stiffness"], "{}", comparison.text());
+    assert_eq!(common(&body, &body).expect("comparable").notes(), compared(&body, &body).notes());
 }
 
 #[test]

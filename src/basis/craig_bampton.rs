@@ -6,23 +6,24 @@
 //! many degrees of freedom as it has coordinates are free, and the mean determines these. The fixed-interface problem is then the
 //! pencil (T'KT, T'MT): the search, its proof of completeness and its residuals are those of any other.
 
-use super::ModeSettings;
 use super::failure::explain;
+use super::free_estimate::{FreeEstimate, Lacking, free_estimate};
 use super::free_surface::{quadratic_estimate, single_precision_note};
 use super::interface_coordinates::InterfaceCoordinates;
 use super::joints::{Joint, check_prescribable, hold, joints};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::rigid_modes::rigid_modes;
+use super::{FixedInterface, ModeSettings};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{
     Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof, Resume,
-    Wanted, modes_of_span, solve, static_responses,
+    Wanted, modes_of_span, solve, static_responses_twice,
 };
 use crate::error::Result;
 use crate::linalg::{
-    Elimination, ReducedPencil, add_combination, combine, gram, side_by_side, subtract_combination,
-    symmetric_eigen,
+    Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side,
+    subtract_combination, symmetric_eigen,
 };
 use crate::model::{Coupling, FeModel, rigid_count};
 use crate::progress::{Event, Watch};
@@ -77,6 +78,7 @@ impl Basis for CraigBampton {
                 .into());
         }
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
+        let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
         let span = found.vectors;
         let mut solution = modes_of_span(&problem, span.clone(), &all, watch).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
@@ -88,6 +90,7 @@ impl Basis for CraigBampton {
             })
             .collect();
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
+        let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
         let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
         solution.plan = parts.fixed.plan.map(|plan| Plan { bytes: plan.bytes.max(bytes), ..plan });
@@ -95,6 +98,7 @@ impl Basis for CraigBampton {
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
         basis.provenance = provenance;
         basis.coordinates = Some(coordinates);
+        basis.fixed_interface = fixed_interface;
         basis.diagnostics.extend(notes);
         Ok(basis)
     }
@@ -110,6 +114,8 @@ struct Parts<'a> {
     fixed: EigenSolution,
     /// D + T Y (N x c): the body for unit interface coordinates, nothing loaded but the interfaces, (T'KT) Y = -T'K D.
     constraint: Mat<f64>,
+    /// What the basis lacks of the responses to the inertia of the constraint modes.
+    lacking: Lacking,
 }
 
 impl<'a> Parts<'a> {
@@ -149,20 +155,25 @@ impl<'a> Parts<'a> {
         let own = reduced.bytes();
         let left =
             ModeSettings { memory: settings.memory.map(|bytes| bytes.saturating_sub(own)), ..*settings };
-        let mut fixed = solve(&problem, &left, watch).map_err(in_model)?;
+        let mut fixed = fixed_modes(&problem, &left, watch).map_err(in_model)?;
         fixed.plan = fixed.plan.map(|plan| Plan { bytes: plan.bytes + own, ..plan });
         watch(Event::Phase("constraint modes"));
         let lowest = fixed.eigenvalues.first().copied().or(fixed.next_eigenvalue).unwrap_or(first_estimate);
         let precision = fixed.plan.map_or(Precision::Double, |plan| plan.precision);
         let mut loads = elimination.restrict(pencil.apply_stiffness(moved.as_ref()).as_ref());
         loads *= faer::Scale(-1.0);
-        let interior =
-            static_responses(&problem, none.as_ref(), loads, lowest, precision, &mut fixed.counters)
+        let inertia = |interior: &Mat<f64>| {
+            let constraint = &moved + elimination.expand(interior.as_ref());
+            elimination.restrict(pencil.apply_mass(constraint.as_ref()).as_ref())
+        };
+        let [interior, correction] =
+            static_responses_twice(&problem, loads, inertia, lowest, precision, &mut fixed.counters)
                 .map_err(in_model)?;
+        let lacking = lacking(&problem, correction, &fixed);
         let mut constraint = moved + elimination.expand(interior.as_ref());
         restore_rigid_motion(joints, rigid.as_ref(), &mut constraint)
             .ok_or_else(|| failed(EigenFailure::Inaccurate { residual: f64::NAN }))?;
-        Ok(Self { joints, names: names.collect(), elimination, reduced, fixed, constraint })
+        Ok(Self { joints, names: names.collect(), elimination, reduced, fixed, constraint, lacking })
     }
 
     fn fixed_shapes(&self) -> Mat<f64> {
@@ -177,22 +188,35 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// What became of shapes that add nothing: as many as there are rigid motions, which the constraint modes hold.
-    fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
+    /// Shapes that add nothing, ascending.
+    fn removed_shapes(found: &Independent) -> Vec<usize> {
         let removed = found.rigid.iter().chain(found.dependent.iter().map(|(j, _)| j));
         let mut removed: Vec<usize> = removed.chain(&found.massless).copied().collect();
         removed.sort_unstable();
-        let expected = removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len();
-        let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
+        removed
+    }
+
+    /// Whether the shapes that add nothing are constraint modes, as many as there are rigid motions, which the constraint modes hold.
+    fn lacks_rigid_motion_only(&self, found: &Independent, rigid: usize) -> bool {
+        let removed = Self::removed_shapes(found);
+        removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
+    }
+
+    /// What became of shapes that add nothing.
+    fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
+        let removed = Self::removed_shapes(found);
         let of = found.kept.len() + removed.len();
-        let which = named(which.collect());
-        let note = if expected {
+        let note = if self.lacks_rigid_motion_only(found, rigid) {
+            let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
-                "the constraint modes hold the {rigid} rigid motions, which leaves {} of {of} shapes; without: {which}",
+                "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame carries out: with {fixed} fixed-interface modes that leaves {} ways to deform",
                 found.kept.len()
             );
             Diagnostic::new(Code::ShapesRigid, message)
+                .with_help("nothing to do: every Craig-Bampton body is counted in this way")
         } else {
+            let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
+            let which = named(which.collect());
             let message = format!(
                 "{} of {of} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
                 removed.len()
@@ -200,6 +224,41 @@ impl<'a> Parts<'a> {
             Diagnostic::new(Code::ShapesDependent, message)
         };
         vec![note]
+    }
+
+    /// What the basis is made of; `whole`: it spans all motions of the interfaces, without which there are no lower bounds. `None` where
+    /// the estimates leave the range of numbers.
+    fn fixed_interface(
+        &self,
+        rigid: MatRef<'_, f64>,
+        solution: &EigenSolution,
+        whole: bool,
+    ) -> Option<FixedInterface> {
+        let Completeness { proof, shift, negative_pivots, .. } = self.fixed.completeness;
+        let modes = self.fixed.eigenvalues.len();
+        let counted = negative_pivots.filter(|_| proof == Proof::InertiaCount);
+        // A mode that is left out although it is below the shift is known by its eigenvalue.
+        let next = self.fixed.next_eigenvalue.filter(|_| counted.is_some_and(|counted| counted > modes));
+        let cut = counted.and(next.map(|next| next * (1.0 - KNOWN)).or(Some(shift)));
+        let (of_rigid, of_modes) =
+            (coordinates_of(self.joints, rigid), coordinates_of(self.joints, solution.vectors.as_ref()));
+        let FreeEstimate { estimate, lower } = free_estimate(
+            &solution.eigenvalues,
+            of_rigid.as_ref(),
+            of_modes.as_ref(),
+            &self.lacking,
+            cut.filter(|_| whole),
+        )?;
+        Some(FixedInterface {
+            modes,
+            interface_motions: self.constraint.ncols(),
+            counted,
+            shift,
+            next,
+            residual: self.fixed.residuals.iter().copied().fold(0.0, f64::max),
+            free_estimate: estimate,
+            free_lower: lower,
+        })
     }
 
     /// What the user should know of the fixed-interface modes.
@@ -221,7 +280,7 @@ impl<'a> Parts<'a> {
             );
             notes.push(Diagnostic::new(Code::CompletenessUnproved, message));
         }
-        if let (Wanted::Lowest(_), Some(more)) =
+        if let (Wanted::Lowest(1..), Some(more)) =
             (settings.wanted, completeness.modes_below.checked_sub(given).filter(|more| *more > 0))
         {
             let hertz =
@@ -237,31 +296,31 @@ impl<'a> Parts<'a> {
         notes
     }
 
-    /// The modes of the span are no eigenvectors; what is proved is proved of the fixed-interface modes.
+    /// The modes of the span are no eigenvectors of the free body; what is proved is proved of the fixed-interface modes.
     fn completeness(&self, model: &FeModel, solution: &EigenSolution) -> Completeness {
         let (fixed, held) = (self.fixed.eigenvalues.len(), &self.fixed.completeness);
+        let hertz = model.units().frequency_of(held.shift);
+        let more = held.modes_below.saturating_sub(fixed);
         let proved = match held.proof {
-            Proof::InertiaCount => {
-                let hertz = model.units().frequency_of(held.shift);
+            Proof::NotProved => {
+                format!("its {fixed} fixed-interface modes are not proved complete: {}", held.remark)
+            }
+            Proof::InertiaCount if more == 0 => {
                 format!(
                     "its {fixed} fixed-interface modes are all there are below {hertz:.6} Hz (inertia count)"
                 )
             }
-            Proof::NotProved => format!("nor are its {fixed} fixed-interface modes: {}", held.remark),
+            Proof::InertiaCount => format!(
+                "of the {} fixed-interface modes below {hertz:.6} Hz (inertia count) it has {fixed}",
+                held.modes_below
+            ),
         };
-        let proved = match held.modes_below.checked_sub(fixed) {
-            Some(more) if more > 0 && held.proof == Proof::InertiaCount => format!("{proved} but {more}"),
-            _ => proved,
-        };
-        let given = solution.eigenvalues.len();
         Completeness {
             proof: Proof::NotProved,
             shift: solution.eigenvalues.last().copied().unwrap_or(0.0),
             negative_pivots: None,
-            modes_below: given,
-            remark: format!(
-                "the {given} modes are those of a Craig-Bampton basis, no eigenvectors; {proved}"
-            ),
+            modes_below: solution.eigenvalues.len(),
+            remark: format!("a Craig-Bampton basis has no modes of the free body; {proved}"),
         }
     }
 
@@ -318,6 +377,50 @@ impl<'a> Parts<'a> {
             (0..moving / d + turning).map(move |i| first + d * i)
         };
         starts(self.joints).flat_map(of).collect()
+    }
+}
+
+/// Relative error of a fixed-interface eigenvalue that was computed, far above what the residuals leave.
+const KNOWN: f64 = 1e-8;
+
+/// The fixed-interface modes that are wanted. Where none are (static condensation) the first is computed nevertheless: it says how far the
+/// basis goes.
+fn fixed_modes(
+    problem: &EigenProblem<'_>,
+    settings: &ModeSettings,
+    watch: Watch<'_>,
+) -> std::result::Result<EigenSolution, EigenFailure> {
+    if settings.wanted != Wanted::Lowest(0) {
+        return solve(problem, settings, watch);
+    }
+    let first = solve(problem, &ModeSettings { wanted: Wanted::Lowest(1), ..*settings }, watch)?;
+    Ok(EigenSolution {
+        next_eigenvalue: first.eigenvalues.first().copied(),
+        eigenvalues: Vec::new(),
+        vectors: Mat::zeros(problem.pencil.n(), 0),
+        residuals: Vec::new(),
+        rounding_floors: Vec::new(),
+        bounds: None,
+        ..first
+    })
+}
+
+/// G and H of the responses y to the inertia of the constraint modes, without their part along the fixed-interface modes.
+fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> Lacking {
+    let pencil = &problem.pencil;
+    let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
+    for _ in 0..2 {
+        let along = gram(fixed.vectors.as_ref(), pencil.apply_mass(response.as_ref()).as_ref());
+        subtract_combination(response.as_mut(), fixed.vectors.as_ref(), along.as_ref());
+    }
+    let symmetric = |products: Mat<f64>| {
+        let a = gram(response.as_ref(), products.as_ref());
+        Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))
+    };
+    Lacking {
+        whole,
+        stiffness: symmetric(pencil.apply_stiffness(response.as_ref())),
+        mass: symmetric(pencil.apply_mass(response.as_ref())),
     }
 }
 

@@ -1,6 +1,6 @@
 //! What every basis gives, and what is checked of it whichever it is.
 
-use super::{InterfaceCoordinates, ModeSettings};
+use super::{FixedInterface, InterfaceCoordinates, ModeSettings};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::eigen::{EigenProblem, EigenSolution, Resume, Wanted, energy_noise};
 use crate::error::Result;
@@ -64,6 +64,8 @@ pub struct ModalBasis {
     pub truncation: Vec<Truncation>,
     /// K and M in interface coordinates, of a basis that has them.
     pub coordinates: Option<InterfaceCoordinates>,
+    /// What the basis is made of and how far it goes, of one with fixed-interface modes.
+    pub fixed_interface: Option<FixedInterface>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -155,6 +157,7 @@ impl ModalBasis {
             provenance,
             truncation: Vec::new(),
             coordinates: None,
+            fixed_interface: None,
             diagnostics,
         })
     }

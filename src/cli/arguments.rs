@@ -254,8 +254,8 @@ pub struct ConvertArguments {
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
-    /// Number of flexible modes, up to all of them; static shapes of the basis come on top [default: 20; imported shapes: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
+    /// Number of flexible modes, up to all of them; static shapes of the basis come on top, and with --basis craig-bampton may stand alone (0: static condensation) [default: 20; imported shapes: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32), conflicts_with = "max_frequency")]
     pub modes: Option<u32>,
     /// All flexible modes up to this frequency instead
     #[arg(long, value_name = "HZ", value_parser = positive)]
@@ -350,6 +350,9 @@ pub struct CompareArguments {
     /// What is compared with it
     #[arg(value_name = "B.flex.h5")]
     pub b: PathBuf,
+    /// Of bodies with different numbers of modes, compare the modes that both have: those of the body with fewer, each with the nearest of the other
+    #[arg(long)]
+    pub common: bool,
     /// Largest relative difference of a frequency
     #[arg(long, value_name = "REL", value_parser = positive)]
     pub frequency: Option<f64>,

@@ -3,7 +3,7 @@
 use super::arguments::CompareArguments;
 use super::output::Outcome;
 use crate::error::Result;
-use crate::report::{Tolerances, compare};
+use crate::report::{Tolerances, compare, compare_common};
 use crate::store;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
@@ -18,6 +18,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
         inertia: arguments.inertia.unwrap_or(usual.inertia),
         invariants: arguments.invariants.unwrap_or(usual.invariants),
     };
+    let compare = if arguments.common { compare_common } else { compare };
     let comparison = compare(&a, &b, &tolerances)?;
     Ok(Outcome {
         text: comparison.text(),

@@ -33,6 +33,12 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
         return adopt::run(arguments, from);
     }
+    if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
+        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
+        return Err(Diagnostic::new(Code::Usage, message)
+            .with_help("give at least 1, or --basis craig-bampton for static condensation")
+            .into());
+    }
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // What the command line says replaces what the manifest says.

@@ -5,7 +5,7 @@ use super::output::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
-use crate::export::{ExportOptions, Points, export, find_format};
+use crate::export::{ExportOptions, Exported, Points, export, find_format};
 use crate::input::parse_units;
 use crate::output::OutputSlot;
 use crate::store;
@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let beside: Vec<(PathBuf, Vec<u8>)> = exported
         .beside
         .into_iter()
-        .map(|(extension, bytes)| (arguments.output.with_extension(extension), bytes))
+        .map(|(ending, bytes)| (Exported::place_beside(&arguments.output, ending), bytes))
         .collect();
     let taken: Vec<&PathBuf> = inputs.into_iter().chain(std::iter::once(&arguments.output)).collect();
     refuse_replacing(taken.into_iter(), beside.iter().map(|(path, _)| path))?;

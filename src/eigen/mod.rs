@@ -29,4 +29,4 @@ pub use refine::{relative_residual, residual_scale};
 pub use solve::solve;
 pub use span::modes_of_span;
 pub use start::{Resume, Save, Snapshot};
-pub use static_response::static_responses;
+pub use static_response::{static_responses, static_responses_twice};

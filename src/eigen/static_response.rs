@@ -37,6 +37,39 @@ pub fn static_responses(
     precision: Precision,
     counters: &mut Counters,
 ) -> Result<Mat<f64>, EigenFailure> {
+    let respond = |responses: &Responses<'_>, counters: &mut Counters| responses.of(loads, counters);
+    with_responses(problem, modes, first, precision, counters, respond)
+}
+
+/// The responses of a body that is held, K^-1 f, and with the same factor those to further loads that these responses tell.
+///
+/// # Errors
+/// As [`static_responses`].
+pub fn static_responses_twice(
+    problem: &EigenProblem<'_>,
+    loads: Mat<f64>,
+    further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
+    first: f64,
+    precision: Precision,
+    counters: &mut Counters,
+) -> Result<[Mat<f64>; 2], EigenFailure> {
+    let none = Mat::zeros(problem.pencil.n(), 0);
+    let respond = |responses: &Responses<'_>, counters: &mut Counters| {
+        let x = responses.of(loads, counters)?;
+        let loads = further(&x);
+        Ok([x, responses.of(loads, counters)?])
+    };
+    with_responses(problem, none.as_ref(), first, precision, counters, respond)
+}
+
+fn with_responses<T>(
+    problem: &EigenProblem<'_>,
+    modes: MatRef<'_, f64>,
+    first: f64,
+    precision: Precision,
+    counters: &mut Counters,
+    respond: impl FnOnce(&Responses<'_>, &mut Counters) -> Result<T, EigenFailure>,
+) -> Result<T, EigenFailure> {
     let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
     let known = side_by_side(&[problem.rigid, modes]);
     // Without known modes K itself is definite, and its factor the solution but for rounding.
@@ -44,11 +77,11 @@ pub fn static_responses(
     match precision {
         Precision::Double => {
             let factor: Cholesky<'_, f64> = factorise(problem, &analysis, tau, counters)?;
-            Responses::new(&problem.pencil, &known, &factor).of(loads, counters)
+            respond(&Responses::new(&problem.pencil, &known, &factor), counters)
         }
         Precision::Single => {
             let factor: Cholesky<'_, f32> = factorise(problem, &analysis, tau, counters)?;
-            Responses::new(&problem.pencil, &known, &factor).of(loads, counters)
+            respond(&Responses::new(&problem.pencil, &known, &factor), counters)
         }
     }
 }

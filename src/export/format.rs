@@ -3,6 +3,7 @@
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
+use std::path::{Path, PathBuf};
 
 /// A format that other programs read.
 pub trait ExportFormat: Sync {
@@ -66,11 +67,24 @@ pub enum Points {
 pub struct Exported {
     /// The file itself.
     pub file: Vec<u8>,
-    /// Further files, each with the extension that takes the place of that of the file.
+    /// Further files, each with the ending that takes the place of the extension of the file: `M.mtx` stands for a file `body.M.mtx` beside
+    /// `body.csv`, `_exudyn.py` for a file `body_exudyn.py` beside `body.hdf5`.
     pub beside: Vec<(&'static str, Vec<u8>)>,
 }
 
 impl Exported {
+    /// Where a further file belongs, for the ending that it has.
+    pub fn place_beside(file: &Path, ending: &str) -> PathBuf {
+        match (ending.strip_prefix('_'), file.file_stem()) {
+            (Some(_), Some(stem)) => {
+                let mut name = stem.to_owned();
+                name.push(ending);
+                file.with_file_name(name)
+            }
+            _ => file.with_extension(ending),
+        }
+    }
+
     /// A single file.
     pub fn single(file: Vec<u8>) -> Self {
         Self { file, beside: Vec::new() }

@@ -81,13 +81,6 @@ pub(super) fn rotations(body: &FlexBody) -> Option<String> {
     body.modes().rotation.is_some().then(|| "the rotations of the nodes in the modes".to_owned())
 }
 
-/// Interfaces, for a format without.
-pub(super) fn interfaces(body: &FlexBody) -> Option<String> {
-    let names: Vec<String> =
-        body.interfaces().iter().map(|interface| format!("`{}`", interface.name)).collect();
-    (!names.is_empty()).then(|| format!("the interfaces {}", names.join(", ")))
-}
-
 /// Rows of the modes that belong to no node.
 pub(super) fn internal_rows(body: &FlexBody) -> Option<String> {
     let internal = body.modes().internal.as_ref()?;

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
-use crate::model::{GeometricStiffness, Nodes, extents};
+use crate::model::{Coupling, GeometricStiffness, Nodes, extents};
 use crate::units::UnitSystem;
 use faer::Mat;
 
@@ -142,6 +142,11 @@ impl FlexBody {
     /// Interfaces.
     pub fn interfaces(&self) -> &[Interface] {
         &self.parts.interfaces
+    }
+
+    /// Whether an interface was declared to move as a rigid body.
+    pub fn has_rigid_interfaces(&self) -> bool {
+        self.parts.interfaces.iter().any(|interface| interface.coupling == Some(Coupling::Rigid))
     }
 
     /// K and M in interface coordinates, of a basis that has them.

@@ -1,6 +1,9 @@
 //! A body with its numbers in other units.
 
-use super::{Certificate, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts};
+use super::{
+    Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes,
+    Parts,
+};
 use crate::error::Result;
 use crate::invariants::{GeneralTerms, Invariants};
 use crate::model::{GeometricStiffness, LoadKind};
@@ -92,6 +95,13 @@ impl Change {
                 eigenvalue_lower: of_time(&guarantee.eigenvalue_lower),
                 eigenvalue_upper: of_time(&guarantee.eigenvalue_upper),
                 ..guarantee.clone()
+            }),
+            fixed_interface: given.fixed_interface.as_ref().map(|fixed| FixedInterface {
+                shift: fixed.shift * self.eigenvalue(),
+                next: fixed.next.map(|next| next * self.eigenvalue()),
+                free_estimate: of_time(&fixed.free_estimate),
+                free_lower: of_time(&fixed.free_lower),
+                ..*fixed
             }),
             ..given.clone()
         }

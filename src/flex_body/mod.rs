@@ -3,6 +3,7 @@
 mod body;
 mod carried;
 mod cross_checks;
+mod fixed_interface;
 mod in_units;
 mod interface;
 mod model_axes;
@@ -17,6 +18,7 @@ pub use crate::invariants::{Frame, Group, Groups};
 pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 pub use body::FlexBody;
 pub use carried::Carrier;
+pub use fixed_interface::FixedInterface;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,

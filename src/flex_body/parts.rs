@@ -1,6 +1,6 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use super::{Interface, InterfaceCoordinates, Storage, TermDecision};
+use super::{FixedInterface, Interface, InterfaceCoordinates, Storage, TermDecision};
 use crate::invariants::{DIGITS, Frame, Invariants};
 use crate::model::{BodyNumber, GeometricStiffness, Nodes};
 use crate::provenance::SourceFile;
@@ -102,6 +102,8 @@ pub struct Certificate {
     pub inertia_rounding: f64,
     /// What accuracy `certified` adds.
     pub guarantee: Option<Guarantee>,
+    /// Of a Craig-Bampton basis, whose modes are none of the free body: what it is made of and how far it goes.
+    pub fixed_interface: Option<FixedInterface>,
 }
 
 /// Guaranteed bounds, about K, M, nodes and modes as they are stored (theory section 8, "Certified").

@@ -1,7 +1,8 @@
 //! A body with some of its modes, and some groups of its kinetic energy.
 
 use super::{
-    Certificate, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts, Storage, TermDecision,
+    Certificate, FixedInterface, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts,
+    Storage, TermDecision,
 };
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -119,6 +120,11 @@ impl Certificate {
             proved_modes: self.proved_modes.filter(|_| complete),
             remark: if complete { self.remark.clone() } else { left_out() },
             guarantee: self.guarantee.as_ref().map(guarantee),
+            fixed_interface: self.fixed_interface.as_ref().map(|fixed| FixedInterface {
+                free_estimate: entries(&fixed.free_estimate, modes),
+                free_lower: entries(&fixed.free_lower, modes),
+                ..*fixed
+            }),
             ..*self
         }
     }

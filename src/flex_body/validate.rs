@@ -45,6 +45,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
         [c.shift, c.rigid_noise, c.rigid_residual, c.eigenvalue_rounding, c.inertia_rounding],
     );
     check.guarantee(parts, nf);
+    check.fixed_interface(parts, nf);
     check.terms(parts);
     check.interfaces(parts, n);
     check.coordinates(parts, nf);
@@ -277,6 +278,26 @@ impl Check {
             for (norm, value) in &body.comparison {
                 self.text(&format!("{name} error norm"), norm);
                 self.finite(&format!("{name} {norm}"), [*value]);
+            }
+        }
+    }
+
+    fn fixed_interface(&mut self, parts: &Parts, nf: usize) {
+        let Some(fixed) = &parts.certificate.fixed_interface else { return };
+        self.finite("fixed_interface", [fixed.shift, fixed.residual, fixed.next.unwrap_or(0.0)]);
+        for (name, column) in [
+            ("fixed_interface.free_estimate", &fixed.free_estimate),
+            ("fixed_interface.free_lower", &fixed.free_lower),
+        ] {
+            self.length(name, column.len(), nf, "mode");
+            self.finite(name, column.iter().copied());
+        }
+        let free = fixed.free_estimate.iter().zip(&fixed.free_lower);
+        for (j, (value, (estimate, lower))) in parts.modes.eigenvalue.iter().zip(free).enumerate() {
+            if !(0.0 <= *lower && lower <= estimate && *estimate > 0.0 && estimate <= value) {
+                self.add(format!(
+                    "eigenvalue {value:e} of mode {j} has the estimate {estimate:e} and the bound {lower:e} of the free body, expected descending numbers"
+                ));
             }
         }
     }

@@ -146,6 +146,7 @@ pub fn adopt(foreign: &Foreign, source: SourceFile, units: UnitSystem) -> Result
             eigenvalue_rounding: 0.0,
             inertia_rounding: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: interfaces(given),
         coordinates: None,

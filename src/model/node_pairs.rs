@@ -160,6 +160,10 @@ fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign:
     true
 }
 
+/// An order that the rows of M may stand in: whether the model can have it, the row that each row of the file would stand for, and what to
+/// do about it.
+type Order<'o> = (bool, &'o dyn Fn(usize) -> usize, &'static str);
+
 /// What to do when the mass fits the stiffness in another order of its rows.
 fn other_order(body: &Assembled) -> Option<&'static str> {
     let Assembled { nodes, rows, stiffness, mass, row_to_internal, .. } = body;
@@ -176,7 +180,7 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
     let blocked = |row: usize| per_node * (row % rows.nodes) + row / rows.nodes;
     let transposed = |row: usize| rows.nodes * (row % per_node) + row / per_node;
     // The internal row that each row of the mass file would stand for.
-    let orders: [(bool, &dyn Fn(usize) -> usize, &str); 5] = [
+    let orders: [Order<'_>; 5] = [
         (
             true,
             &|row| by_label[row],

@@ -7,9 +7,13 @@ use std::ops::Range;
 /// show rounding as a difference.
 const GAP: f64 = 1e-5;
 
+/// Whether the eigenvalue `i` (from 1) of `values` (ascending) is in one space with the one before it.
+pub(super) fn close(values: &[f64], i: usize) -> bool {
+    values[i] - values[i - 1] <= GAP * values[i]
+}
+
 /// Ranges of modes that are close to each other in `a` or in `b` (both ascending, the same number).
 pub(super) fn clusters(a: &[f64], b: &[f64]) -> Vec<Range<usize>> {
-    let close = |values: &[f64], i: usize| values[i] - values[i - 1] <= GAP * values[i];
     let mut ranges = Vec::new();
     let mut start = 0;
     for i in 1..=a.len() {

@@ -2,6 +2,7 @@
 //! order of the nodes and to the body frame.
 
 use super::clusters::clusters;
+use super::common_modes::CommonModes;
 use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
 use super::numbers::{plain, significant};
 use crate::diagnostic::{Code, Diagnostic};
@@ -76,7 +77,8 @@ pub struct BodyComparison {
 /// model; with such a one the body frames are taken as the same.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units or numbers of modes differ.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units or numbers of modes differ; [`compare_common`] compares bodies with different
+/// numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
     let placed = is_placed(a) && is_placed(b);
@@ -121,6 +123,22 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     Ok(comparison)
 }
 
+/// The same of two bodies one of which may have fewer modes: each of its modes is compared with that of the other whose frequency is nearest, in
+/// ascending order. The notes say which modes were compared and which were not.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units differ, or no mode is in common.
+pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
+    if a.n_modes() == b.n_modes() {
+        return compare(a, b, tolerances);
+    }
+    let common = CommonModes::of(a, b)?;
+    let some = |body: &FlexBody, modes: &[usize]| body.reduced(modes, body.groups(), Vec::new());
+    let mut comparison = compare(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
+    comparison.notes.splice(0..0, common.notes);
+    Ok(comparison)
+}
+
 /// Whether it is known where in the model the body frame is.
 fn is_placed(body: &FlexBody) -> bool {
     body.source().n_dofs > 0
@@ -135,21 +153,23 @@ fn in_own_frame(body: &FlexBody) -> Result<FlexBody> {
 
 fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
     let mut problems = Vec::new();
-    let mut refuse = |message: String| problems.push(Diagnostic::new(Code::BodyIncomparable, message));
+    let incomparable = |message: String| Diagnostic::new(Code::BodyIncomparable, message);
     let (ua, ub) = (a.units(), b.units());
     for (what, x, y) in
         [("length", &ua.length, &ub.length), ("mass", &ua.mass, &ub.mass), ("time", &ua.time, &ub.time)]
     {
         if x.to_si() != y.to_si() {
-            refuse(format!(
+            problems.push(incomparable(format!(
                 "unit of {what} is `{}` in the first body and `{}` in the second",
                 x.name(),
                 y.name()
-            ));
+            )));
         }
     }
     if a.n_modes() != b.n_modes() {
-        refuse(format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes()));
+        let message = format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes());
+        let help = "--common compares the modes that both have, and names those that it leaves out";
+        problems.push(incomparable(message).with_help(help));
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
 }

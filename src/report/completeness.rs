@@ -1,13 +1,19 @@
 //! Whether the modes are all there, in one sentence that claims no more than the certificate proves.
 
+use super::craig_bampton;
 use super::numbers::{counted, plain, significant};
 use crate::flex_body::FlexBody;
 
 /// The certificate of a body, judged.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub(super) struct Completeness {
-    /// The certificate proves that no mode is missing among the first `n_modes`.
+    /// The certificate proves that none is missing of the modes that the basis is made of: modes of the free body or, of Craig-Bampton, those with
+    /// the interfaces held. Static shapes beside them have no completeness.
     pub proved: bool,
+    /// `proved`; `given`: shapes that claim to be no modes, of which nothing is to be proved; `open`.
+    pub verdict: &'static str,
+    #[serde(skip)]
+    pub head: &'static str,
     pub sentence: String,
     /// Flexible modes below the shift, as counted.
     pub proved_modes: Option<usize>,
@@ -28,8 +34,11 @@ impl Completeness {
         let hertz = body.units().hertz() / std::f64::consts::TAU;
         let shift_hz = (c.shift >= 0.0).then(|| c.shift.sqrt() * hertz);
         let (proved, sentence) = judge(body, shift_hz);
+        let (verdict, head) = head(body, proved);
         Self {
             proved,
+            verdict,
+            head,
             sentence,
             proved_modes: c.proved_modes,
             rigid_modes: c.rigid_modes,
@@ -43,12 +52,51 @@ impl Completeness {
     }
 }
 
+/// Kinds of shapes that are no modes of the free body and do not claim to be.
+const STATIC: [&str; 4] = ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
+
+/// How many modes of the body are static shapes.
+fn static_shapes(body: &FlexBody) -> usize {
+    body.modes().provenance.iter().filter(|origin| is_static(origin)).count()
+}
+
+/// Whether a mode of this origin is a static shape.
+pub(super) fn is_static(origin: &str) -> bool {
+    STATIC.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
+}
+
+/// Verdict about shapes of which nothing is to be proved.
+const GIVEN: &str = "given";
+
+/// The verdict in one word, and in a few.
+fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
+    let basis = body.source().settings["basis"].as_str().unwrap_or_default();
+    match (&body.certificate().fixed_interface, proved) {
+        (Some(fixed), true) if fixed.modes == 0 => ("proved", "Static condensation."),
+        (Some(_), true) => ("proved", "No fixed-interface mode is missing."),
+        (Some(_), false) => ("open", "Fixed-interface modes not proved complete."),
+        (None, true) if static_shapes(body) > 0 => ("proved", "No free mode is missing."),
+        (None, true) => ("proved", "No mode is missing."),
+        // Files of earlier versions tell what was proved in the remark only.
+        (None, false) if basis == "craig-bampton" => (GIVEN, "Craig-Bampton basis."),
+        // Without a count nothing spoke against them either.
+        (None, false) if basis == "imported" && body.certificate().negative_pivots.is_none() => {
+            (GIVEN, "Shapes as given.")
+        }
+        (None, false) => ("open", "Not proved complete."),
+    }
+}
+
 /// A certificate is proof only when its numbers agree with each other and with the modes of the body.
 fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
     let (c, nf) = (body.certificate(), body.n_modes());
+    if let Some(fixed) = &c.fixed_interface {
+        return craig_bampton::judge(fixed, body);
+    }
     let Some(flexible) = c.proved_modes else {
         let why = if c.remark.is_empty() { "no inertia count was made".to_owned() } else { plain(&c.remark) };
-        return (false, format!("NOT PROVED: {why}"));
+        let verdict = if head(body, false).0 == GIVEN { "not proved" } else { "NOT PROVED" };
+        return (false, format!("{verdict}: {why}"));
     };
     let shift = significant(shift_hz.unwrap_or(f64::NAN), 5);
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();
@@ -65,7 +113,16 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         "{flexible} flexible + {} below {shift} Hz (inertia count {count})",
         counted(c.rigid_modes, "rigid mode")
     );
+    let statics = static_shapes(body);
     match flexible.cmp(&nf) {
+        std::cmp::Ordering::Less if nf - flexible == statics => (
+            true,
+            format!(
+                "proved: {proof}; {} beside them {} no modes",
+                counted(statics, "static shape"),
+                if statics == 1 { "is" } else { "are" }
+            ),
+        ),
         std::cmp::Ordering::Less => {
             (false, format!("PROVED IN PART: {proof}; {} above are not", counted(nf - flexible, "mode")))
         }

@@ -1,6 +1,7 @@
 //! The facts of a body and of the run that made it, computed once; every format renders these.
 
-use super::completeness::Completeness;
+use super::completeness::{Completeness, is_static};
+use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, softening_hz};
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
@@ -17,7 +18,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 3;
+const MINOR: u32 = 4;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -129,7 +130,10 @@ pub(super) struct ModeFacts {
     /// What the modes lack of static responses, for the loads of residual vectors.
     pub truncation: Vec<Truncation>,
     pub damping_ratio: Vec<f64>,
+    /// Of the modes that are to be eigenvectors: static shapes are none; of a Craig-Bampton body that of its fixed-interface modes.
     pub worst_residual: f64,
+    /// Of a Craig-Bampton body: its coordinates, and its frequencies beside those of the free body.
+    pub craig_bampton: Option<CraigBamptonFacts>,
     /// Where damping was given.
     pub damping: Option<DampingFacts>,
     /// For each unit load.
@@ -229,7 +233,8 @@ impl Facts {
                 damping: DampingFacts::of(body),
                 geometric_stiffness: GeometricStiffnessFacts::of(body),
                 softening_hz: softening_hz(body),
-                worst_residual: body.modes().residual.iter().copied().fold(0.0, f64::max),
+                worst_residual: worst_residual(body),
+                craig_bampton: CraigBamptonFacts::of(body),
             },
             terms: TermFacts::of(body),
             completeness: Completeness::of(body),
@@ -240,6 +245,16 @@ impl Facts {
             diagnostics: run.diagnostics.clone(),
         }
     }
+}
+
+/// Largest residual of what is to be an eigenvector.
+fn worst_residual(body: &FlexBody) -> f64 {
+    if let Some(fixed) = &body.certificate().fixed_interface {
+        return fixed.residual;
+    }
+    let modes = body.modes();
+    let claimed = |j: &usize| !modes.provenance.get(*j).is_some_and(|origin| is_static(origin));
+    (0..body.n_modes()).filter(claimed).map(|j| modes.residual[j]).fold(0.0, f64::max)
 }
 
 impl ModelFacts {
@@ -295,6 +310,25 @@ impl ModelFacts {
 }
 
 impl ModeFacts {
+    /// The residual of a mode; a static shape is no eigenvector and has none.
+    pub fn residual_in_words(&self, j: usize) -> String {
+        match self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
+            true => "static shape".to_owned(),
+            false => significant(self.residual[j], 2),
+        }
+    }
+
+    /// Whose residual the worst is, where not of all modes.
+    pub fn whose_residual(&self) -> &'static str {
+        if self.craig_bampton.is_some() {
+            " of the fixed-interface modes"
+        } else if self.provenance.iter().any(|origin| is_static(origin)) {
+            " of the free modes"
+        } else {
+            ""
+        }
+    }
+
     /// How many modes come from which kind of shape, in the order of their first ones; empty where all are free modes.
     pub fn origins(&self) -> Vec<(&str, usize)> {
         let mut origins: Vec<(&str, usize)> = Vec::new();

@@ -92,14 +92,23 @@ fn texts<const N: usize>(cells: [&str; N]) -> Vec<String> {
 
 fn verdict(html: &mut String, facts: &Facts) {
     let c = &facts.completeness;
-    let (class, head) =
-        if c.proved { ("", "No mode is missing.") } else { (" open", "Not proved complete.") };
+    let class = match c.verdict {
+        "proved" => "",
+        "given" => " given",
+        _ => " open",
+    };
+    let free = facts.modes.craig_bampton.as_ref().map(|craig_bampton| {
+        let holds = craig_bampton.holds(&facts.modes.frequency_hz);
+        format!(" {}.", escape(&sentence(&holds)))
+    });
     html.push_str(&format!(
-        "<p class=\"verdict{class}\"><strong>{head}</strong> {} flexible modes, {} to {} Hz. {}.</p>\n",
+        "<p class=\"verdict{class}\"><strong>{}</strong> {} flexible modes, {} to {} Hz. {}.{}</p>\n",
+        c.head,
         facts.modes.count,
         facts.modes.frequency_hz.first().map_or_else(String::new, |f| significant(*f, 5)),
         facts.modes.frequency_hz.last().map_or_else(String::new, |f| significant(*f, 5)),
         escape(&sentence(&c.sentence)),
+        free.unwrap_or_default(),
     ));
 }
 
@@ -160,29 +169,56 @@ fn body(html: &mut String, facts: &Facts) {
     }
 }
 
+/// What the proof of completeness rests on: of a Craig-Bampton body with the interfaces held, of others without supports.
+fn proof(facts: &Facts) -> Vec<(&'static str, String)> {
+    let (modes, c) = (&facts.modes, &facts.completeness);
+    let count = |n: Option<usize>| n.map_or_else(|| "not counted".to_owned(), |n| n.to_string());
+    let shift = |hz: Option<f64>| {
+        hz.map_or_else(|| "no frequency".to_owned(), |hz| format!("{} Hz", significant(hz, 6)))
+    };
+    let residual = format!(
+        "{} of |K&psi;| + |&lambda;M&psi;|{}",
+        significant(modes.worst_residual, 3),
+        modes.whose_residual()
+    );
+    let mut items = match &modes.craig_bampton {
+        Some(own) => vec![
+            ("Coordinates", escape(&own.made_of())),
+            (
+                "Negative pivots",
+                format!(
+                    "{} of K &minus; &sigma;M with the interfaces held, at {}",
+                    count(own.counted),
+                    shift(own.shift_hz)
+                ),
+            ),
+            ("Free body", escape(&sentence(&own.holds(&modes.frequency_hz)))),
+        ],
+        None => vec![
+            (
+                "Negative pivots",
+                format!("{} of K &minus; &sigma;M at {}", count(c.negative_pivots), shift(c.shift_hz)),
+            ),
+            ("Rigid modes", c.rigid_modes.to_string()),
+            ("Flexible modes proved", c.proved_modes.map_or_else(|| "none".to_owned(), |n| n.to_string())),
+        ],
+    };
+    items.push(("Worst residual", residual));
+    items.push((
+        "Noise of the input",
+        format!(
+            "rigid eigenvalues {} of the first flexible one; |K R| {} of |K| |R|",
+            significant(c.rigid_noise, 3),
+            significant(c.rigid_residual, 3)
+        ),
+    ));
+    items
+}
+
 fn modes(html: &mut String, facts: &Facts) {
     let (modes, c) = (&facts.modes, &facts.completeness);
     section(html, "Completeness of the modes");
-    let count = |n: Option<usize>| n.map_or_else(|| "not counted".to_owned(), |n| n.to_string());
-    let shift =
-        c.shift_hz.map_or_else(|| "no frequency".to_owned(), |hz| format!("{} Hz", significant(hz, 6)));
-    let mut items = vec![
-        ("Negative pivots", format!("{} of K &minus; &sigma;M at {shift}", count(c.negative_pivots))),
-        ("Rigid modes", c.rigid_modes.to_string()),
-        ("Flexible modes proved", c.proved_modes.map_or_else(|| "none".to_owned(), |n| n.to_string())),
-        (
-            "Worst residual",
-            format!("{} of |K&psi;| + |&lambda;M&psi;|", significant(modes.worst_residual, 3)),
-        ),
-        (
-            "Noise of the input",
-            format!(
-                "rigid eigenvalues {} of the first flexible one; |K R| {} of |K| |R|",
-                significant(c.rigid_noise, 3),
-                significant(c.rigid_residual, 3)
-            ),
-        ),
-    ];
+    let mut items = proof(facts);
     if !c.remark.is_empty() {
         items.push(("Remark", escape(&c.remark)));
     }
@@ -203,7 +239,12 @@ fn modes(html: &mut String, facts: &Facts) {
     // Without damping a column of zeros would say nothing.
     let damped = modes.damping_ratio.iter().any(|&d| d != 0.0);
     let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(&facts.model.units.time));
-    let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue, "Residual"]);
+    let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue]);
+    let craig_bampton = modes.craig_bampton.as_ref();
+    head.extend(match craig_bampton {
+        Some(_) => texts(["Free body (Hz)", "Too high by about", "At most"]),
+        None => texts(["Residual"]),
+    });
     head.extend(damped.then(|| "Damping ratio".to_owned()));
     let origins = !modes.origins().is_empty();
     head.extend(origins.then(|| "Origin".to_owned()));
@@ -216,8 +257,15 @@ fn modes(html: &mut String, facts: &Facts) {
             (j + 1).to_string(),
             significant(modes.frequency_hz[j], 8),
             significant(modes.eigenvalue[j], 8),
-            significant(modes.residual[j], 2),
         ];
+        cells.extend(match craig_bampton {
+            Some(own) => vec![
+                significant(own.free_hz[j], 8),
+                percent(own.too_high[j]),
+                own.too_high_at_most[j].map_or_else(|| "no bound".to_owned(), percent),
+            ],
+            None => vec![modes.residual_in_words(j)],
+        });
         cells.extend(damped.then(|| significant(modes.damping_ratio[j], 4)));
         cells.extend(origins.then(|| escape(&modes.provenance[j])));
         cells.extend(guarantee.iter().flat_map(|g| {
@@ -231,7 +279,13 @@ fn modes(html: &mut String, facts: &Facts) {
         cells
     };
     let rows: Vec<_> = (0..modes.count).map(row).collect();
-    table(html, "Flexible modes, ascending", &head, &[], &rows);
+    let caption = match craig_bampton {
+        Some(_) => {
+            "Modes of the reduced body, ascending, and the frequencies of the free body as estimated from what the basis lacks"
+        }
+        None => "Flexible modes, ascending",
+    };
+    table(html, caption, &head, &[], &rows);
     if !modes.truncation.is_empty() {
         let row = |t: &Truncation| vec![escape(&t.load), significant(t.before, 3), significant(t.after, 3)];
         let rows: Vec<_> = modes.truncation.iter().map(row).collect();

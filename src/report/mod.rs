@@ -3,8 +3,10 @@
 mod audit;
 mod bar_chart;
 mod clusters;
+mod common_modes;
 mod comparison;
 mod completeness;
+mod craig_bampton;
 mod facts;
 mod geometric_stiffness;
 mod guarantee;
@@ -25,7 +27,7 @@ mod text;
 mod trade;
 
 pub use audit::{audit_json, audit_text};
-pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare};
+pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use output::output_json;

@@ -136,10 +136,12 @@ fn modes(page: &mut Page, facts: &Facts) {
     let accuracy = facts.run.as_ref().map(|run| plain(&run.accuracy)).filter(|name| !name.is_empty());
     let accuracy = accuracy.map_or(String::new(), |name| format!(", {name} accuracy"));
     let residual = significant(modes.worst_residual, 2);
-    page.entry("modes", &format!("{} flexible, worst residual {residual}{accuracy}", modes.count));
+    let whose = modes.whose_residual();
+    page.entry("modes", &format!("{} flexible, worst residual {residual}{whose}{accuracy}", modes.count));
     page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
     if let Some(basis) = facts.model.settings["basis"].as_str().filter(|basis| *basis != "free") {
-        page.entry("basis", &plain(basis));
+        let made_of = modes.craig_bampton.as_ref().map_or(String::new(), |cb| format!(": {}", cb.made_of()));
+        page.entry("basis", &format!("{}{made_of}", plain(basis)));
     }
     let origins = modes.origins();
     page.list("origin", &origins, |(origin, count)| {
@@ -162,6 +164,9 @@ fn modes(page: &mut Page, facts: &Facts) {
     page.entry("complete", &completeness.sentence);
     if completeness.proved_modes.is_some() && !completeness.remark.is_empty() {
         page.entry("", &plain(&completeness.remark));
+    }
+    if let Some(craig_bampton) = &modes.craig_bampton {
+        page.entry("free body", &craig_bampton.holds(hz));
     }
     if let Some(guarantee) = &facts.guarantee {
         page.entry("guaranteed", &guarantee.eigenvalues());

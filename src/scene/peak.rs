@@ -54,7 +54,8 @@ impl Peak {
 /// Where the parabola through three points is largest, if the middle one is the largest of them.
 fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<(f64, f64)> {
     let (before, after) = (b.0 - a.0, c.0 - b.0);
-    if !(b.1 >= a.1 && b.1 >= c.1) || !(before < UNEVEN * after && after < UNEVEN * before) {
+    let (largest, even) = (b.1 >= a.1 && b.1 >= c.1, before < UNEVEN * after && after < UNEVEN * before);
+    if !largest || !even {
         return None;
     }
     let (rise, fall) = ((b.1 - a.1) / before, (c.1 - b.1) / after);

@@ -5,8 +5,8 @@ use super::schema::MASS_STRUCTURES;
 use super::schema::terms::KEPT;
 use super::value::Value;
 use crate::flex_body::{
-    Certificate, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
+    Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
+    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
 };
 use crate::invariants::{DIGITS, GeneralTerms, Invariants, ibar_of_c2, s_of_modal_mass};
 use crate::model::{BodyNumber, Coupling, Nodes};
@@ -328,7 +328,48 @@ impl Take<'_> {
             eigenvalue_rounding: self.optional_float("/certificate@eigenvalue_rounding").unwrap_or(0.0),
             inertia_rounding: self.optional_float("/certificate@inertia_rounding").unwrap_or(0.0),
             guarantee: self.guarantee(),
+            fixed_interface: self.fixed_interface(),
         }
+    }
+
+    /// All of what a Craig-Bampton body has, or nothing of it.
+    fn fixed_interface(&mut self) -> Option<FixedInterface> {
+        let [modes, motions, shift, residual] = [
+            "fixed_interface_modes",
+            "interface_motions",
+            "fixed_interface_shift",
+            "fixed_interface_residual",
+        ]
+        .map(|name| format!("/certificate@{name}"));
+        let columns = ["free_eigenvalue", "free_eigenvalue_lower"].map(|name| format!("/modes/{name}"));
+        if !self
+            .whole(&[&modes, &motions, &shift, &residual, &columns[0], &columns[1]], "a Craig-Bampton body")
+        {
+            return None;
+        }
+        let [free_estimate, free_lower] = columns.map(|name| self.floats(&name));
+        Some(FixedInterface {
+            modes: self.count(&modes),
+            interface_motions: self.count(&motions),
+            counted: self.optional_count("/certificate@fixed_interface_counted"),
+            shift: self.float(&shift),
+            next: self.optional_float("/certificate@fixed_interface_next"),
+            residual: self.float(&residual),
+            free_estimate,
+            free_lower,
+        })
+    }
+
+    /// Whether all of these entries are there; a part of them is a problem.
+    fn whole(&mut self, names: &[&String], what: &str) -> bool {
+        let missing: Vec<&&String> =
+            names.iter().filter(|name| !self.scan.values.contains_key(**name)).collect();
+        if let Some(first) = missing.first()
+            && missing.len() < names.len()
+        {
+            self.scan.add(format!("{first}: expected with the other entries of {what}, found nothing"));
+        }
+        missing.is_empty()
     }
 
     /// All of what accuracy `certified` adds, or nothing of it.
@@ -336,14 +377,8 @@ impl Take<'_> {
         let digits = DIGITS.map(|name| format!("/certificate@digits_{name}"));
         let columns = ["eigenvalue_lower", "eigenvalue_upper", "shape_error"].map(|n| format!("/modes/{n}"));
         let counts = ["shift_below", "negative_pivots_below"].map(|n| format!("/certificate@{n}"));
-        let names = || digits.iter().chain(&columns).chain(&counts);
-        let missing: Vec<&String> = names().filter(|name| !self.scan.values.contains_key(*name)).collect();
-        if let Some(first) = missing.first() {
-            if missing.len() < names().count() {
-                self.scan.add(format!(
-                    "{first}: expected with the other entries of accuracy `certified`, found nothing"
-                ));
-            }
+        let names: Vec<&String> = digits.iter().chain(&columns).chain(&counts).collect();
+        if !self.whole(&names, "accuracy `certified`") {
             return None;
         }
         let [eigenvalue_lower, eigenvalue_upper, shape_error] = columns.map(|name| self.floats(&name));

@@ -9,7 +9,7 @@ use super::value::{Units, Value, count, matrix, rows, shape_rows, small, text};
 use crate::flex_body::{Group as TermGroup, MassStructure, Storage};
 use crate::invariants::GENERAL_REMARK;
 use crate::provenance;
-use certificate::{CERTIFICATE, INVARIANT_DIGITS, guarantee};
+use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
 use geometric_stiffness::GEOMETRIC_STIFFNESS;
 use interfaces::{COORDINATES, INTERFACES};
 use terms::TERMS;
@@ -317,6 +317,24 @@ const MODES: &[Item] = &[
         |v| Some(Value::Floats(guarantee(v)?.shape_error.clone())),
     )
     .added(1),
+    dataset(
+        "free_eigenvalue",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda~",
+        "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
+        |v| Some(Value::Floats(fixed_interface(v)?.free_estimate.clone())),
+    )
+    .added(4),
+    dataset(
+        "free_eigenvalue_lower",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda~-",
+        "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
+        |v| Some(Value::Floats(fixed_interface(v)?.free_lower.clone())),
+    )
+    .added(4),
     dataset(
         "shape",
         Floats(&[Modes, Nodes, Fixed(3)]),

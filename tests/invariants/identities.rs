@@ -20,6 +20,7 @@ fn expected() -> Expected<'static> {
         origin: Vector3::zeros(),
         eigenvalues: Some(&EIGENVALUES),
         eigenvalue_noise: 0.0,
+        eigenvalue_rounding: 0.0,
     }
 }
 

@@ -116,6 +116,7 @@ pub fn engine_mount() -> FlexBody {
             eigenvalue_rounding: 0.0,
             inertia_rounding: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: vec![Interface {
             name: "base".to_owned(),
@@ -265,6 +266,7 @@ pub fn condensed(
             eigenvalue_rounding: 0.0,
             inertia_rounding: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: vec![],
         coordinates: None,

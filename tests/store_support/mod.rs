@@ -3,8 +3,9 @@
 
 use faer::Mat;
 use flexbody::flex_body::{
-    Certificate, FlexBody, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage, Truncation, UnitLoad,
+    Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
+    InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
+    Truncation, UnitLoad,
 };
 use flexbody::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
@@ -217,6 +218,16 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             eigenvalue_rounding: 1.5e-9,
             inertia_rounding: 2.5e-7,
             guarantee: (n * nf % 2 == 1).then(|| guarantee(&mut r, &bounded)),
+            fixed_interface: (n * nf % 2 == 1).then(|| FixedInterface {
+                modes: nf,
+                interface_motions: 6,
+                counted: Some(nf),
+                shift: 2.5,
+                next: Some(3.5),
+                residual: 1e-12,
+                free_estimate: bounded.iter().map(|lambda| 0.75 * lambda).collect(),
+                free_lower: bounded.iter().map(|lambda| 0.5 * lambda).collect(),
+            }),
         },
         interfaces: (0..interfaces)
             .map(|i| Interface {

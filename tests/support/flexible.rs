@@ -136,6 +136,7 @@ pub fn made_of(
             eigenvalue_rounding: 0.0,
             inertia_rounding: 0.0,
             guarantee: None,
+            fixed_interface: None,
         },
         interfaces: Vec::new(),
         coordinates: None,

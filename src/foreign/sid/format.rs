@@ -19,7 +19,9 @@ const HEAD: usize = 4096;
 /// Axes that are no rotation, beyond what few digits leave of one.
 fn unsound(checks: &[AuditCheck]) -> Vec<String> {
     const FEW_DIGITS: f64 = 1e-2;
-    let broken = |check: &&AuditCheck| check.code == Code::AuditFrame && !(check.value <= FEW_DIGITS);
+    let broken = |check: &&AuditCheck| {
+        check.code == Code::AuditFrame && (check.value > FEW_DIGITS || check.value.is_nan())
+    };
     checks.iter().filter(broken).map(|check| check.meaning.clone()).collect()
 }
 

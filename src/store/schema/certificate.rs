@@ -4,7 +4,7 @@ use super::super::item::Item;
 use super::super::item::Kind::{Float, Int, Text};
 use super::super::value::{Value, View, count, text};
 use super::{ONE, PER_TIME2, attribute};
-use crate::flex_body::Guarantee;
+use crate::flex_body::{FixedInterface, Guarantee};
 
 pub(super) const CERTIFICATE: &[Item] = &[
     attribute(
@@ -88,7 +88,59 @@ pub(super) const CERTIFICATE: &[Item] = &[
         |v| count(guarantee(v)?.pivots_below),
     )
     .added(1),
+    attribute(
+        "fixed_interface_modes",
+        Int,
+        ONE,
+        "fixed-interface modes of a Craig-Bampton body; 0: static condensation",
+        |v| count(fixed_interface(v)?.modes),
+    )
+    .added(4),
+    attribute(
+        "interface_motions",
+        Int,
+        ONE,
+        "motions of the interfaces (constraint modes) of a Craig-Bampton body",
+        |v| count(fixed_interface(v)?.interface_motions),
+    )
+    .added(4),
+    attribute(
+        "fixed_interface_counted",
+        Int,
+        ONE,
+        "fixed-interface modes below `fixed_interface_shift`: negative pivots of K - sigma M with the interfaces held; absent: not counted",
+        |v| fixed_interface(v)?.counted.and_then(count),
+    )
+    .added(4),
+    attribute(
+        "fixed_interface_shift",
+        Float,
+        PER_TIME2,
+        "shift sigma of the count with the interfaces held",
+        |v| Some(Value::Float(fixed_interface(v)?.shift)),
+    )
+    .added(4),
+    attribute(
+        "fixed_interface_next",
+        Float,
+        PER_TIME2,
+        "eigenvalue of the first fixed-interface mode that is left out; absent: not computed",
+        |v| Some(Value::Float(fixed_interface(v)?.next?)),
+    )
+    .added(4),
+    attribute(
+        "fixed_interface_residual",
+        Float,
+        ONE,
+        "largest residual of a fixed-interface mode, as those of `/modes/residual`; 0 without any",
+        |v| Some(Value::Float(fixed_interface(v)?.residual)),
+    )
+    .added(4),
 ];
+
+pub(super) fn fixed_interface<'a>(view: &View<'a>) -> Option<&'a FixedInterface> {
+    view.body.certificate.fixed_interface.as_ref()
+}
 
 pub(super) fn guarantee<'a>(view: &View<'a>) -> Option<&'a Guarantee> {
     view.body.certificate.guarantee.as_ref()

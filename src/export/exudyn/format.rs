@@ -5,16 +5,17 @@
 //! mPsiTildePsiTilde = int S_j~' S_k~ = -I9, mPhitTPsi = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4,
 //! mXRefTildePsiTilde = int x~' S_j~ = I8.
 
-use super::hdf5_file::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
-use super::inertia::inertia;
-use super::{ExportFormat, ExportOptions, Exported, losses};
+use super::super::hdf5_file::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
+use super::super::inertia::inertia;
+use super::super::{ExportFormat, ExportOptions, Exported, losses};
+use super::interfaces;
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::invariants::Numbered;
 use nalgebra::{Matrix3, Vector3};
 
 /// The format.
-pub(super) struct Exudyn;
+pub(in crate::export) struct Exudyn;
 
 impl ExportFormat for Exudyn {
     fn name(&self) -> &'static str {
@@ -33,7 +34,6 @@ impl ExportFormat for Exudyn {
             losses::geometric_stiffness(body, |_| false),
             losses::damping(body),
             losses::rotations(body),
-            losses::interfaces(body),
             losses::internal_rows(body),
         ]
         .into_iter()
@@ -42,7 +42,10 @@ impl ExportFormat for Exudyn {
     }
 
     fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {
-        hdf5_bytes(&entries(body)).map(Exported::single)
+        let file = hdf5_bytes(&entries(body))?;
+        let script = (!body.interfaces().is_empty())
+            .then(|| (interfaces::SCRIPT_NAME, interfaces::SCRIPT.as_bytes().to_vec()));
+        Ok(Exported { file, beside: script.into_iter().collect() })
     }
 }
 
@@ -71,6 +74,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
         array("chiUtilde", square(&center.cross_matrix())),
     ];
     all.extend(coupling(&told, nf));
+    all.extend(interfaces::entries(body));
     all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
     all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
     all
