@@ -58,10 +58,10 @@ fn succeed(command: &mut Command) {
 
 impl Compiled {
     fn new(exported: Exported, flags: &[&str]) -> Self {
-        Self::compiled(exported, C, flags)
+        Self::in_language(exported, C, flags)
     }
 
-    fn compiled(exported: Exported, language: &[&str], flags: &[&str]) -> Self {
+    fn in_language(exported: Exported, language: &[&str], flags: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
         let [("h", header)] = &exported.beside[..] else { panic!("a header beside the file") };
@@ -419,7 +419,7 @@ fn the_header_is_cpp_too() {
         let body = laden(body, &mut Random(6));
         let (points, standard) = (some_points(&body), format!("-std={standard}"));
         let language = ["c++", standard.as_str(), "-x", "c++"];
-        let compiled = Compiled::compiled(exported(&body, "double", &points), &language, &["-O1"]);
+        let compiled = Compiled::in_language(exported(&body, "double", &points), &language, &["-O1"]);
         assert!(error(&compiled, &body, &points, 8) < ROUNDINGS * 0.5 * f64::EPSILON, "{standard}");
     }
 }

@@ -68,7 +68,7 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
 fn names_that_no_text_can_hold_are_refused() {
     for name in ["", "a\nb", "\u{7f}"] {
         let folder = model(&[name]);
-        let error = flexbody::input::read_manifest(&folder.path().join("model.toml")).expect_err("refused");
+        let error = flexbody::input::read_manifest(folder.path().join("model.toml")).expect_err("refused");
         assert!(error.has(Code::ManifestSyntax), "{name:?}: {error}");
     }
 }

@@ -12,7 +12,7 @@ use flexbody::linalg::{gram, multiply};
 use flexbody::model::FeModel;
 use flexbody::progress::SILENT;
 use flexbody::scene::{
-    Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Run, Scene, Scheme, Spin,
+    Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Run, Scene, Scheme, Spin, Stage,
     Tolerance, Trace, trace, trace_at,
 };
 use nalgebra::Vector3;
@@ -172,7 +172,8 @@ fn what_is_too_small_to_count_is_measured_against_the_least_that_counts() {
     let recording = motion(&body, &at_rest);
     let other = changed(&recording, |_, q| q[0] += 1e-20);
     let errors = Measure::new(&body, &recording).of_subset(&other, &[0, 1, 2, 3]).largest();
-    let least = Resolution::new(&body, None);
+    // The extent of a body is that along the axes of the model.
+    let least = Resolution::new(&Stage::new(&body, &at_rest).expect("a stage").body, None);
     let lambda = body.modes().eigenvalue[0];
     let expected = (0.5 * lambda).sqrt() * 1e-20 / least.root_energy;
     assert!((errors.stress.expect("modes") / expected - 1.0).abs() < 1e-12);

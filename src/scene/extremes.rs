@@ -49,10 +49,9 @@ pub(super) struct Survey<'b> {
     body: &'b FlexBody,
     watched: &'b [BodyPoint],
     nodes: LivelyNodes,
-    /// Largest deflections among `nodes`, and the modal coordinates at the largest that was seen.
+    /// Deflection among `nodes`, and where it was largest.
     deflection: Peak,
-    largest_seen: f64,
-    most_deflected: Vec<f64>,
+    bulges: Bulges,
     paths: Vec<Peak>,
     amplitudes: Vec<Peak>,
     /// Roots of the energies: they grow like displacements do.
@@ -71,8 +70,7 @@ impl<'b> Survey<'b> {
             watched,
             nodes: LivelyNodes::of_modes(body),
             deflection: Peak::default(),
-            largest_seen: 0.0,
-            most_deflected: vec![0.0; body.n_modes()],
+            bulges: Bulges::default(),
             paths: vec![Peak::default(); watched.len()],
             amplitudes: vec![Peak::default(); body.n_modes()],
             elastic: Peak::default(),
@@ -87,11 +85,8 @@ impl<'b> Survey<'b> {
     /// Sees the deformation at a place of the motion.
     pub fn see_shape(&mut self, time: f64, q: &[f64], elastic: f64) {
         let deflection = self.nodes.longest(q);
-        if deflection > self.largest_seen || deflection.is_nan() {
-            self.largest_seen = deflection;
-            self.most_deflected.copy_from_slice(q);
-        }
         self.deflection.see(time, deflection);
+        self.bulges.see(time, deflection, q);
         self.elastic.see(time, elastic.max(0.0).sqrt());
         for (peak, point) in self.paths.iter_mut().zip(self.watched) {
             peak.see(time, point.deflection(q).norm());
@@ -119,13 +114,10 @@ impl<'b> Survey<'b> {
     /// * `size`: mass and radius of gyration of the body.
     /// * `least_energy`: energies below it are rounding.
     pub fn extremes(self, size: (f64, f64), least_energy: f64) -> Extremes {
-        // The node that is deflected most may be another than the modes know, at the same time.
-        let of_all = longest_of_all(self.body.modes().shape.as_ref(), &self.most_deflected);
-        let raised = (of_all / self.largest_seen).max(1.0);
-        let factor = if raised.is_finite() { raised } else { 1.0 } / self.body.extent();
+        let deflection = self.bulges.largest(self.body, self.deflection.value);
         let internal = self.internal.value.powi(2);
         Extremes {
-            deflection: self.deflection.scaled(factor),
+            deflection,
             watched: self.paths,
             amplitudes: self.amplitudes.iter().map(|peak| peak.value).collect(),
             elastic: self.elastic.value.powi(2),
@@ -135,6 +127,60 @@ impl<'b> Survey<'b> {
             reaction: (self.reaction[0].value, self.reaction[1].value),
             drift: self.differences.drift(internal, size, least_energy),
         }
+    }
+}
+
+/// How many deformations are kept whose nodes are all looked at in the end.
+const KEPT: usize = 16;
+
+/// The deformations at which the nodes that the modes move most are deflected most. Another node may be deflected more then, or at another of
+/// these times.
+#[derive(Debug, Clone, Default)]
+struct Bulges {
+    /// Time, deflection and modal coordinates, the largest deflection first.
+    kept: Vec<(f64, f64, Vec<f64>)>,
+    /// The last one that was seen.
+    last: (f64, f64, Vec<f64>),
+    /// Whether the deflection grew until then.
+    grows: bool,
+}
+
+impl Bulges {
+    fn see(&mut self, time: f64, deflection: f64, q: &[f64]) {
+        if deflection < self.last.1 {
+            self.keep_last();
+        }
+        // Not a number is not less than anything, and nothing is less than it.
+        self.grows = self.last.2.is_empty() || deflection.is_nan() || deflection >= self.last.1;
+        (self.last.0, self.last.1) = (time, deflection);
+        self.last.2.clear();
+        self.last.2.extend_from_slice(q);
+    }
+
+    /// Keeps the last deformation where the deflection grew until then and it is one of the largest.
+    fn keep_last(&mut self) {
+        let at = self.kept.partition_point(|kept| kept.1 >= self.last.1);
+        if self.grows && at < KEPT {
+            self.kept.insert(at, self.last.clone());
+            self.kept.truncate(KEPT);
+        }
+    }
+
+    /// The largest deflection of any node relative to the extent of `body`. What the peak of the nodes that the modes move most has beyond what
+    /// was seen of them holds for the others.
+    fn largest(mut self, body: &FlexBody, peak: f64) -> Peak {
+        self.keep_last();
+        let seen = self.kept.first().map_or(0.0, |kept| kept.1);
+        let beyond = if seen > 0.0 { peak / seen } else { 1.0 };
+        let shape = body.modes().shape.as_ref();
+        let mut largest = Peak::default();
+        for (time, _, q) in &self.kept {
+            let value = longest_of_all(shape, q) * beyond / body.extent();
+            if value > largest.value || value.is_nan() {
+                largest = Peak::at(*time, value);
+            }
+        }
+        largest
     }
 }
 

@@ -37,10 +37,9 @@ impl Peak {
         }
     }
 
-    /// The peak of the function times `factor`.
-    pub fn scaled(self, factor: f64) -> Self {
-        let square = |(time, value): (f64, f64)| (time, value * factor * factor);
-        Self { value: self.value * factor, time: self.time, last: self.last.map(|one| one.map(square)) }
+    /// A known peak.
+    pub fn at(time: f64, value: f64) -> Self {
+        Self { value, time, ..Self::default() }
     }
 
     /// The peak of `values` at `times`.
