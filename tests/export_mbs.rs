@@ -308,7 +308,8 @@ fn interfaces_of_exudyn_are_nodes_whose_mean_motion_is_that_of_the_interface() {
         assert_eq!(groups.len(), body.interfaces().len());
         for (group, interface) in groups.iter().zip(body.interfaces()) {
             let text = |name: &str| {
-                let text: hdf5::types::VarLenUnicode =
+                // Fixed length, as every reader takes it.
+                let text: hdf5::types::FixedAscii<64> =
                     group.dataset(name).expect(name).read_scalar().expect("text");
                 text.as_str().to_owned()
             };

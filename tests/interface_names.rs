@@ -45,13 +45,13 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
     let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
     assert_eq!(names, NAMES);
     assert_eq!(store::validate(folder.path().join("b.flex.h5")), vec![]);
-    let formats = ["exudyn", "simscape", "sid", "npz", "json"];
+    let formats = ["exudyn", "sid", "npz", "json"];
     for format in formats {
         let file = format!("b.{format}");
         let output =
             run(folder.path(), &["export", "b.flex.h5", "--to", format, "-o", &file, "--allow-loss"]);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() || said.contains("invalid value"), "{format}: {said}");
+        assert!(output.status.success(), "{format}: {said}");
     }
     let scene = "[run]\nduration = 1e-3\noutputs = 5\n[[watch]]\ninterface = \"left/right\"\n";
     std::fs::write(folder.path().join("scene.toml"), scene).expect("a scene");

@@ -115,7 +115,8 @@ fn a_limit_of_file_size_is_a_short_disk_and_leaves_nothing() {
 fn few_open_files_give_a_message() {
     let folder = folder_with_body();
     let before = members(folder.path());
-    for files in [3, 4, 5, 6, 8] {
+    // With three the system cannot load the program.
+    for files in [4, 5, 6, 8] {
         let output = run(
             folder.path(),
             &format!("ulimit -n {files}"),
@@ -174,7 +175,14 @@ fn so_many_modes_that_it_takes_hours_are_refused_before_the_search() {
     let output = run(
         folder.path(),
         "true",
-        &["convert", fixture("cube_hex8").to_str().expect("our path"), "-o", "b.h5", "--modes", "1000000000"],
+        &[
+            "convert",
+            fixture("frame_beams").to_str().expect("our path"),
+            "-o",
+            "b.h5",
+            "--modes",
+            "1000000000",
+        ],
     );
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("FB509"), "{said}");

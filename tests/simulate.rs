@@ -226,7 +226,7 @@ fn terms_are_those_of_the_scene() {
 #[test]
 fn a_recording_that_does_not_fit_is_refused_before_any_work() {
     let folder = folder_with("bracket_hex20", 2);
-    scene(folder.path(), "[run]\nduration = 1e6\noutputs = 1000000\n");
+    scene(folder.path(), "[run]\nduration = 1e-3\noutputs = 1000000\n");
     let body = store::read(folder.path().join("body.flex.h5")).expect("a body");
     let described = read_scene(folder.path().join("scene.toml")).expect("a scene");
     let error =

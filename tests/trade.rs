@@ -120,7 +120,10 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let mut parts = body.clone().into_parts();
     parts.invariants = lumped.invariants;
     let other = FlexBody::new(parts).expect("a body");
-    let [a, b] = [&body, &other].map(|body| simulate(body, &scene, None, |_| ()).expect("a motion").0);
+    // So many instants that a peak between them is no larger by much.
+    let mut often = scene.clone();
+    often.run.outputs = 6000;
+    let [a, b] = [&body, &other].map(|body| simulate(body, &often, None, |_| ()).expect("a motion").0);
     let energy = |q: &mut dyn Iterator<Item = f64>| -> f64 {
         q.zip(&body.modes().eigenvalue).map(|(q, lambda)| 0.5 * lambda * q * q).sum()
     };
@@ -136,8 +139,8 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let row = found.rows.iter().find(|row| row.candidate.lumped.as_deref() == Some("diagonal-scaling"));
     let errors = row.expect("a row").outcome.as_ref().expect("a motion").errors;
     assert!(stress > 0.01, "a coarse mesh: {stress}");
-    assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 1e-9, "{errors:?} {stress}");
-    assert!((errors.attitude - attitude).abs() < 1e-7, "{errors:?} {attitude}");
+    assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 2e-3, "{errors:?} {stress}");
+    assert!((errors.attitude / attitude - 1.0).abs() < 2e-3, "{errors:?} {attitude}");
 }
 
 #[test]

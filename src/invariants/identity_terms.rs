@@ -4,6 +4,7 @@ use super::cauchy_schwarz::scaled;
 use super::dense::{entries, spectral_norm, symmetric_eigenvalues, worst};
 use super::derived::{CYCLIC, inertia_of};
 use super::{CauchySchwarz, Invariants};
+use crate::linalg::dense_cholesky;
 use faer::Mat;
 use nalgebra::Matrix3;
 
@@ -230,8 +231,21 @@ pub(super) fn matrix(a: &Matrix3<f64>) -> Mat<f64> {
     Mat::from_fn(3, 3, |k, l| a[(k, l)])
 }
 
-/// How negative the smallest eigenvalue of a symmetric matrix is, relative to `scale`.
+/// Matrices of more rows than this are held to a Cholesky factorisation: eigenvalues take a hundred times as long.
+const MANY_ROWS: usize = 400;
+
+/// What a large matrix is shifted by to be factored, relative to its scale: a part of what rounding may leave.
+const SHIFT: f64 = 2e-13;
+
+/// How negative the smallest eigenvalue of a symmetric matrix is, relative to `scale`; of a large matrix, at most.
 fn negative(a: &Mat<f64>, scale: f64) -> f64 {
+    let shifted = || {
+        let entry = |i: usize, j: usize| a[(i, j)] + if i == j { SHIFT * scale } else { 0.0 };
+        Mat::from_fn(a.nrows(), a.ncols(), entry)
+    };
+    if a.nrows() > MANY_ROWS && scale.is_finite() && dense_cholesky(shifted()).is_some() {
+        return SHIFT;
+    }
     let smallest = symmetric_eigenvalues(a.as_ref()).map(|values| values.first().copied().unwrap_or(0.0));
     smallest.map_or(f64::NAN, |value| scaled(value.min(0.0), scale))
 }

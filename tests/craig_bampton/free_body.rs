@@ -47,10 +47,13 @@ fn estimates_and_bounds_enclose_the_frequencies_of_the_free_body() {
         let model = model(raw);
         for count in [0, 1, 4, 10, 25, usize::MAX] {
             let found = check_against(&exact, &craig_bampton(&model, count), &held, &what);
+            // A single fixed-interface mode leaves most of the motion to the bound.
+            let allowed = if count < 4 { 1.7 } else { 1.25 };
+            assert!(found[0] > 0.95 && found[1] < allowed, "effectivity with {count} modes: {found:?}");
             (least, most) = (least.min(found[0]), most.max(found[1]));
         }
     }
-    assert!(least > 0.95 && most < 1.5, "effectivity: estimate {least}, bound {most}");
+    assert!(least < 1.0 && most > 1.0, "some of them miss something: {least}, {most}");
 }
 
 #[test]

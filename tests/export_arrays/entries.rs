@@ -36,6 +36,10 @@ fn of_hdf5(body: &FlexBody) -> (Contents, Vec<String>) {
     let mut found = Contents::default();
     let mut short = Vec::new();
     walk(&file, "", &mut found, &mut short);
+    // Digests are of the file, not of the body.
+    for digest in ["@digests", "@sha256"] {
+        assert!(found.attributes.remove(digest).is_some(), "{digest}");
+    }
     (found, short)
 }
 
