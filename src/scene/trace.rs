@@ -60,10 +60,10 @@ impl Trace {
 
 /// The continuous motion of `body` in `scene`, and what has to be said about it.
 ///
-/// * `memory`, `watch`: as for [`simulate`].
+/// * `memory`, `watch`: as for [`simulate`](super::simulate).
 ///
 /// # Errors
-/// As [`simulate`].
+/// As [`simulate`](super::simulate).
 pub fn trace(
     body: &FlexBody,
     scene: &Scene,
@@ -101,7 +101,7 @@ pub fn trace(
 /// * `times`: ascending, from 0 to the end of the scene.
 ///
 /// # Errors
-/// As [`simulate`].
+/// As [`simulate`](super::simulate).
 pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Trace> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
