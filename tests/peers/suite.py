@@ -59,6 +59,7 @@ PEERS = [
     ("pymbs", "pymbs_sid.rows", True),
     ("welib", "sid.rows", True),
     ("h5py, numpy, scipy", "suite.other_libraries", True),
+    ("scipy's integrator", "scipy_spin.rows", True),
     ("compilers", "compilers.rows", True),
     ("ARM compiler", "suite.arm_table", True),
 ]
