@@ -33,6 +33,9 @@ def entries(path):
                 attributes[name] = {key: plain(value) for key, value in item.attrs.items()}
 
         attributes["/"] = {key: plain(value) for key, value in f.attrs.items()}
+        # Digests are of the file, not of the body.
+        for digest in ["digests", "sha256"]:
+            del attributes["/"][digest]
         f.visititems(visit)
     return datasets, attributes
 
