@@ -3,6 +3,8 @@
 
 mod support;
 
+use faer::Mat;
+use flexbody::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
 use flexbody::convert::{Conversion, ConvertSettings, convert};
 use flexbody::diagnostic::Code;
 use flexbody::eigen::{Accuracy, Method, Wanted};
@@ -10,10 +12,13 @@ use flexbody::error::ExitCode;
 use flexbody::flex_body::{FlexBody, MassStructure, Parts};
 use flexbody::invariants::BodyFrame;
 use flexbody::linalg::CscMatrix;
-use flexbody::model::{Damping, FeModel, RawModel};
+use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel, RawShapes};
 use flexbody::progress::SILENT;
 use flexbody::verification::{accept, own_identities};
 use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use std::path::PathBuf;
 use support::elements::{Kind, MassRule, Material};
 use support::general::raw_fixture;
 use support::mesh::{Mesh, entries};
@@ -114,32 +119,64 @@ fn parts_that_are_joined_weakly_are_a_body() {
     }
 }
 
-/// Inertia of random sizes about random axes at random nodes, up to a hundred times that of the frame.
-#[test]
-fn random_masses_of_nodes_are_bodies() {
-    let raw = raw_fixture("frame_beams");
-    let labels = raw.dofs.clone().expect("labels");
+/// M with inertia of the sizes `10^size` about random axes added at random nodes.
+fn with_random_inertia(raw: &RawModel, seed: u64, sizes: &[f64]) -> RawModel {
+    let labels = raw.dofs.as_deref().expect("labels");
     let row = |node: i64, direction: u8| {
-        labels
-            .iter()
-            .position(|label| (label.node, label.direction) == (node, direction))
-            .map(|row| row as u32)
+        let same = labels.iter().position(|label| (label.node, label.direction) == (node, direction));
+        same.map(|row| row as u32)
     };
-    for seed in 0..10 {
-        let mut random = Random(seed);
-        let mut added = Vec::new();
-        for _ in 0..3 {
-            let node = labels[(random.next_u64() % labels.len() as u64) as usize].node;
-            let axis = Vector3::from_fn(|_, _| random.signed());
-            let size = 10f64.powf(4.0 * random.signed());
-            for (k, l) in (0..3u8).flat_map(|k| (0..3u8).map(move |l| (k, l))) {
-                if let (Some(i), Some(j)) = (row(node, 4 + k), row(node, 4 + l)) {
-                    added.push((i, j, size * axis[usize::from(k)] * axis[usize::from(l)]));
-                }
+    let mut random = Random(seed);
+    let mut added = Vec::new();
+    for size in sizes.iter().map(|size| 10f64.powf(*size)) {
+        let node = labels[(random.next_u64() % labels.len() as u64) as usize].node;
+        let axis = Vector3::from_fn(|_, _| random.signed());
+        for (k, l) in (0..3u8).flat_map(|k| (0..3u8).map(move |l| (k, l))) {
+            if let (Some(i), Some(j)) = (row(node, 4 + k), row(node, 4 + l)) {
+                added.push((i, j, size * axis[usize::from(k)] * axis[usize::from(l)]));
             }
         }
-        let conversion = converted(with_mass(&raw, &added), 8, Method::Auto, Accuracy::Standard);
-        assert_accepted(&conversion, &format!("seed {seed}"));
+    }
+    with_mass(raw, &added)
+}
+
+/// Every kind of basis that the program offers, for a frame with its first and last node as interfaces.
+fn bases(model: &FeModel) -> Vec<BasisChoice> {
+    let shapes = Mat::from_fn(model.rows().len(), 4, |i, j| Random((97 * i + j) as u64).signed());
+    let raw = RawShapes { matrix: shapes, digits: 17, path: PathBuf::new(), source: None };
+    let with_residual_vectors =
+        |loads| FreeSurface { residual_vectors: vec![loads], ..FreeSurface::default() };
+    vec![
+        BasisChoice::default(),
+        BasisChoice::Free(with_residual_vectors(Loads::Centrifugal)),
+        BasisChoice::Free(with_residual_vectors(Loads::Interfaces)),
+        BasisChoice::Imported(ImportedShapes::new(model, raw).expect("shapes of the model")),
+        BasisChoice::CraigBampton(CraigBampton),
+        BasisChoice::CraigChang(CraigChang::default()),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, rng_seed: RngSeed::Fixed(15), ..ProptestConfig::default() })]
+
+    /// Inertia of random sizes about random axes at random nodes, up to ten thousand times and down to a ten thousandth of that of the
+    /// frame, in every basis.
+    #[test]
+    fn random_masses_of_nodes_are_bodies(seed in any::<u64>(), sizes in proptest::collection::vec(-4.0..4.0f64, 1..5), fast in any::<bool>()) {
+        let mut raw = with_random_inertia(&raw_fixture("frame_beams"), seed, &sizes);
+        let ids = &raw.nodes.ids;
+        let ends = [("first", ids[0]), ("last", ids[ids.len() - 1])];
+        raw.interfaces = ends
+            .map(|(name, node)| NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new(name, vec![node]) })
+            .into();
+        let model = FeModel::from_raw(raw).expect("a body").model;
+        for basis in bases(&model) {
+            let about = format!("seed {seed}, sizes {sizes:?}, {basis:?}");
+            let mut settings = ConvertSettings { basis, ..ConvertSettings::default() };
+            settings.modes.wanted = Wanted::Lowest(8);
+            settings.modes.accuracy = if fast { Accuracy::Fast } else { Accuracy::Standard };
+            assert_accepted(&convert(&model, &settings, SILENT).expect(&about), &about);
+        }
     }
 }
 

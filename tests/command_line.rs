@@ -13,6 +13,7 @@ use std::process::Command;
 use support::elements::{Kind, MassRule, Material};
 use support::files::{DofOrder, Numbering, Triangle, reordered, write_model};
 use support::mesh::{Assembly, Mesh};
+use support::program::members;
 use tempfile::TempDir;
 
 /// What a run of the program gave.
@@ -52,13 +53,6 @@ fn done(folder: &Path, line: &str) -> Run {
     let run = flexbody(folder, line);
     assert_eq!(run.code, 0, "{line}: {}{}", run.out, run.err);
     run
-}
-
-fn members(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 fn fixture(name: &str) -> PathBuf {

@@ -225,4 +225,13 @@ fn runs_of_more_steps_than_allowed_are_refused_before_they_begin() {
     let mut short = scene(&body, 5.0, 10, &History::Constant(1.0));
     short.run.most_steps = 3;
     assert_eq!(refused(&short), Code::RunTooLong);
+    // What is allowed is counted in steps of the method, whatever breaks the histories have.
+    let pulse = History::Table { times: vec![0.0, 0.5, 0.6, 0.8], values: vec![0.0, 0.0, 1.0, 0.0] };
+    let mut exact = scene(&body, 1.0, 10, &pulse);
+    exact.run.scheme = Scheme::Conserving { order: 4, step: Some(0.01) };
+    let taken = simulate(&body, &exact, None, |_| ()).expect("a motion").0.work.steps;
+    exact.run.most_steps = taken;
+    simulate(&body, &exact, None, |_| ()).expect("as many steps as are allowed");
+    exact.run.most_steps = taken - 1;
+    assert_eq!(refused(&exact), Code::RunTooLong);
 }

@@ -1,36 +1,18 @@
 //! An interrupted program ends at once, says so, and leaves nothing but what was there before.
 #![cfg(unix)]
 
-#[path = "support/elements.rs"]
-#[allow(dead_code)] // shared with other tests, as the next ones
-mod elements;
-#[path = "support/files.rs"]
-#[allow(dead_code)]
-mod files;
-#[path = "support/mesh.rs"]
-#[allow(dead_code)]
-mod mesh;
-#[path = "support/random.rs"]
-#[allow(dead_code)]
-mod random;
+mod support;
 
-use elements::{Kind, MassRule, Material};
-use files::{Triangle, write_model};
 use flexbody::error::ExitCode;
-use mesh::Mesh;
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-
-fn members(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("test folder");
-    let mut names: Vec<String> =
-        entries.map(|e| e.expect("test folder").file_name().into_string().expect("our own names")).collect();
-    names.sort();
-    names
-}
+use support::elements::{Kind, MassRule, Material};
+use support::files::{Triangle, write_model};
+use support::mesh::Mesh;
+use support::program::members;
 
 /// Waits until both outputs have been reserved: the handler stands since before that.
 fn wait_for_temporary_files(folder: &Path, child: &mut Child) {

@@ -2,20 +2,15 @@
 //! nothing behind. Never a signal, never a panic.
 #![cfg(target_os = "linux")]
 
+mod support;
+
 use flexbody::error::ExitCode;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use support::program::members;
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name).join("model.toml")
-}
-
-fn members(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("a folder");
-    let mut names: Vec<_> =
-        entries.map(|e| e.expect("an entry").file_name().into_string().expect("our own names")).collect();
-    names.sort();
-    names
 }
 
 /// Runs the program in `folder` under `limit`, which the shell sets.

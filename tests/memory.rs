@@ -19,6 +19,7 @@ use std::sync::Mutex;
 use support::elements::{Kind, MassRule, Material};
 use support::files::{Triangle, write_model};
 use support::mesh::{Assembly, Mesh};
+use support::program::members;
 
 fn block(cells: [i32; 3], size: [f64; 3]) -> Assembly {
     Mesh::block(Kind::Hex8, cells, size).assemble(&Material::STEEL, MassRule::Consistent)
@@ -50,14 +51,6 @@ fn report(folder: &Path, options: &str) -> Value {
 
 fn estimate(report: &Value) -> f64 {
     report["run"]["memory_estimate_bytes"].as_f64().expect("an estimate")
-}
-
-fn members(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("a folder");
-    let mut names: Vec<_> =
-        entries.map(|e| e.expect("an entry").file_name().into_string().expect("our own names")).collect();
-    names.sort();
-    names
 }
 
 #[cfg(target_os = "linux")] // elsewhere the peak is not told

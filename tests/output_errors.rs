@@ -219,7 +219,7 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     let mut turning = scene(3.0 / rate);
     turning.initial.angular_velocity *= 0.3 * rate;
     let whole = motion(&reference, &turning);
-    let recordings = [trace_at(&candidate, &turning, &whole.time).expect("a motion"), whole];
+    let recordings = [trace_at(&candidate, &turning, &whole.time, None).expect("a motion"), whole];
     let found = Measure::new(&reference, &recordings[1]).of_other(&recordings[0], &modes).largest();
 
     // Displacements of all rows, and their energy, one instant after the other.

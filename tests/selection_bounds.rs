@@ -67,7 +67,7 @@ impl<'t> Tested<'t> {
 
     /// That with some groups, where that of the whole body was looked at.
     fn beside(&self, whole: &Trace, kept: Groups) -> Trace {
-        trace_at(self.body, &self.with(kept), &whole.time).expect("a motion")
+        trace_at(self.body, &self.with(kept), &whole.time, None).expect("a motion")
     }
 
     fn with(&self, kept: Groups) -> Scene {

@@ -40,7 +40,7 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f64> {
     let (reference, _) = trace(whole, scene, None, |_| ()).ok()?;
     let own = reduced(whole, selection);
-    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time).expect("a motion");
+    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, None).expect("a motion");
     let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
     Some(errors.worst(&scene.requirements.tolerance))
 }

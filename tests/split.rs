@@ -17,6 +17,7 @@ use std::process::{Command, Output};
 use support::elements::{Kind, MassRule, Material};
 use support::files::{Triangle, write_model};
 use support::mesh::{Mesh, entries};
+use support::program::members;
 
 fn labels(raw: &RawModel) -> Vec<DofLabel> {
     let implied = |&node: &i64| (1..=3).map(move |direction| DofLabel { node, direction });
@@ -185,13 +186,6 @@ fn flexbody(folder: &Path, line: &str) -> Output {
         .current_dir(folder)
         .output()
         .unwrap()
-}
-
-fn members(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 fn files(raw: &RawModel) -> tempfile::TempDir {

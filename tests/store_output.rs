@@ -1,20 +1,14 @@
 //! Output files appear whole or not at all, and an unusable place is known before the work.
 
 mod store_support;
+mod support;
 
 use flexbody::diagnostic::Code;
 use flexbody::error::ExitCode;
 use flexbody::output::OutputSlot;
 use flexbody::store;
-use std::path::Path;
 use store_support::body;
-
-fn members(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
+use support::program::members;
 
 #[test]
 fn a_dropped_slot_leaves_nothing_and_keeps_the_old_file() {

@@ -44,7 +44,9 @@ impl Method {
 pub enum Sight {
     /// An instant that was asked for.
     Instant,
-    /// The start, the end of a step, and both sides of a break.
+    /// The start of a stretch without breaks: the first instant, and the far side of every break.
+    Start,
+    /// The end of a step.
     End,
     /// A place within a step.
     Within,
@@ -73,7 +75,7 @@ pub fn integrate<E: From<Failure>>(
 ) -> Result<(), E> {
     integrate_closely(method, system, state, instants, breaks, 1, |sight, time, state| match sight {
         Sight::Instant => observe(time, state),
-        Sight::End | Sight::Within => Ok(()),
+        Sight::Start | Sight::End | Sight::Within => Ok(()),
     })
 }
 
@@ -96,7 +98,7 @@ pub fn integrate_closely<E: From<Failure>>(
     mut observe: impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {
     let (Some(&start), Some(&last)) = (instants.first(), instants.last()) else { return Ok(()) };
-    observe(Sight::End, start, state)?;
+    observe(Sight::Start, start, state)?;
     observe(Sight::Instant, start, state)?;
     let mut wanted = Wanted { rest: &instants[1..] };
     let mut from = start;
@@ -113,7 +115,7 @@ pub fn integrate_closely<E: From<Failure>>(
             }
         }
         if piece.before < stop {
-            observe(Sight::End, stop, state)?;
+            observe(Sight::Start, stop, state)?;
         }
         while let Some(instant) = wanted.next_until(stop) {
             observe(Sight::Instant, instant, state)?;
@@ -158,6 +160,7 @@ impl Wanted<'_> {
     }
 }
 
+/// Integrates over a stretch with the explicit method; instants and places within a step are interpolated.
 fn explicit_piece<E: From<Failure>>(
     method: &mut Explicit,
     system: &mut dyn System,
@@ -189,6 +192,7 @@ fn explicit_piece<E: From<Failure>>(
     Ok(())
 }
 
+/// Integrates over a stretch in equal steps of the method of Gauss; an instant within a step is reached by a shorter step aside.
 fn gauss_piece<E: From<Failure>>(
     method: &mut Gauss,
     longest: f64,

@@ -9,6 +9,7 @@ use crate::dynamics::{BodyPoint, Configuration, EquationsOfMotion, Motion, Rotat
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
 use crate::integration::{Explicit, Failure, Gauss, Method, Sight, System, Work, integrate_closely};
+use nalgebra::Vector3;
 use std::borrow::Cow;
 
 /// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by much, or it would not be stable.
@@ -36,6 +37,9 @@ pub(super) struct Finished {
     pub least_energy: f64,
 }
 
+/// Force and torque about the origin of the frame, axes of the body, that a prescribed motion takes.
+pub(super) type Reaction = (Vector3<f64>, Vector3<f64>);
+
 /// Why an integration ends early.
 pub(super) enum Stop {
     Failed(Failure),
@@ -56,6 +60,8 @@ impl From<Failure> for Stop {
 }
 
 impl<'a> Prepared<'a> {
+    /// The equations of motion, loads, start and integration scheme of `body` in `scene`.
+    ///
     /// # Errors
     /// FB212 where the scene does not fit the body; FB550 and FB551, before any work.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
@@ -71,7 +77,7 @@ impl<'a> Prepared<'a> {
         Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
     }
 
-    /// Shows a place of the motion, between those that are written, to `survey`.
+    /// Shows a place of the motion, between those that are written, to `survey`. Answers the reaction there where something is prescribed.
     ///
     /// # Errors
     /// Where the body has no motion at this state.
@@ -82,18 +88,19 @@ impl<'a> Prepared<'a> {
         time: f64,
         state: &[f64],
         motion: &mut Motion<'_>,
-    ) -> std::result::Result<(), Failure> {
+    ) -> std::result::Result<Option<Reaction>, Failure> {
         let (_, q) = motion.shape(state);
         survey.see_shape(time, q, self.equations.elastic_energy(q));
         if sight == Sight::Within && !self.scene.prescribes() {
-            return Ok(());
+            return Ok(None);
         }
         let now = motion.evaluate(time, state)?;
-        survey.see_reaction(time, &now.reaction());
-        if sight == Sight::End {
+        let reaction = now.reaction();
+        survey.see_reaction(time, &reaction);
+        if sight != Sight::Within {
             survey.see_balance(time, &now.balance(), &now.configuration().omega);
         }
-        Ok(())
+        Ok(self.scene.prescribes().then_some(reaction))
     }
 
     /// Integrates over `instants` and shows the motion, at so many parts of every explicit step.
@@ -118,10 +125,10 @@ impl<'a> Prepared<'a> {
                 step: step.unwrap_or(self.duration),
             },
         };
-        let mut ends = 0;
+        let mut steps = 0;
         let observe = |sight: Sight, time: f64, state: &[f64]| {
-            ends += u64::from(sight == Sight::End);
-            match ends > self.scene.run.most_steps {
+            steps += u64::from(sight == Sight::End);
+            match steps > self.scene.run.most_steps {
                 true => Err(Stop::Steps { time }),
                 false => show(sight, time, state, &mut observer).map_err(Into::into),
             }

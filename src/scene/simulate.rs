@@ -8,6 +8,7 @@ use crate::dynamics::{Evaluation, Motion};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::integration::{Failure, Sight, Work};
+use crate::memory::refuse_beyond;
 use crate::model::LoadKind;
 use nalgebra::Vector3;
 
@@ -60,7 +61,7 @@ pub fn simulate(
     let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if sight != Sight::Instant {
             watch(time / run.duration);
-            return run.survey(&mut survey, sight, time, state, motion);
+            return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
         }
         let now = motion.evaluate(time, state)?;
         recording.time.push(time);
@@ -83,21 +84,13 @@ pub fn simulate(
     Ok((recording, found))
 }
 
+/// # Errors
+/// FB601 when the recording does not fit the memory.
 fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
     let numbers = NUMBERS + 2 * body.n_modes() + 6 * scene.watched.len();
-    let needed = (scene.run.outputs + 1) as f64 * numbers as f64 * BYTES;
-    match memory {
-        Some(left) if needed > left as f64 => {
-            let message = format!(
-                "recording {} instants takes {:.3} GB, {:.3} GB are left",
-                scene.run.outputs + 1,
-                needed / 1e9,
-                left as f64 / 1e9
-            );
-            Err(Diagnostic::new(Code::MemoryShort, message).with_help("record fewer `outputs`").into())
-        }
-        _ => Ok(()),
-    }
+    let instants = scene.run.outputs + 1;
+    let needed = instants as f64 * numbers as f64 * BYTES;
+    refuse_beyond(memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
 }
 
 /// What has to be said about a motion with these extremes.

@@ -1,7 +1,7 @@
 //! A continuous motion, as errors are measured along it.
 
 use super::extremes::Survey;
-use super::prepared::{Finished, PARTS, Prepared, Stop, damped};
+use super::prepared::{Finished, PARTS, Prepared, Reaction, Stop, damped};
 use super::simulate::remarks;
 use super::{Extremes, Resolution, Scene, Scheme, Stage};
 use crate::diagnostic::Diagnostic;
@@ -9,6 +9,7 @@ use crate::dynamics::{Configuration, EulerParameters, Motion};
 use crate::error::Result;
 use crate::flex_body::FlexBody;
 use crate::integration::{Failure, Sight, Work};
+use crate::memory::refuse_beyond;
 use nalgebra::Vector3;
 
 /// The continuous motion of a body: at the ends of the steps of its integration, at both sides of every break, and at places within the
@@ -86,8 +87,8 @@ pub fn trace(
             return Err(Stop::Memory { time });
         }
         watch(time / run.duration);
-        tracer.see(time, state, motion)?;
-        run.survey(&mut survey, sight, time, state, motion)?;
+        let reaction = run.survey(&mut survey, sight, time, state, motion)?;
+        tracer.see(time, state, motion, reaction);
         Ok(())
     };
     let finished = run.integrate(&[0.0, run.duration], PARTS, look)?;
@@ -99,17 +100,27 @@ pub fn trace(
 /// The motion of `body` in `scene` where another motion was looked at, to be compared with it. Of the extremes there are none.
 ///
 /// * `times`: ascending, from 0 to the end of the scene.
+/// * `memory`: bytes that there are for the motion; `None` where it is not known.
 ///
 /// # Errors
 /// As [`simulate`](super::simulate).
-pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Trace> {
+pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], memory: Option<u64>) -> Result<Trace> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
     let run = Prepared::new(body, &stage.scene)?;
+    let needed = times.len() as f64 * Trace::bytes_of_instant(body.n_modes(), run.watched.len());
+    refuse_beyond(
+        memory,
+        needed,
+        &format!("the motion at {} instants", times.len()),
+        "simulate a shorter `duration`",
+    )?;
     let mut tracer = Tracer::new(&run);
     let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if sight == Sight::Instant {
-            tracer.see(time, state, motion)?;
+            let prescribes = stage.scene.prescribes();
+            let reaction = if prescribes { Some(motion.evaluate(time, state)?.reaction()) } else { None };
+            tracer.see(time, state, motion, reaction);
         }
         Ok::<(), Failure>(())
     };
@@ -143,8 +154,8 @@ impl<'r> Tracer<'r> {
         Self { run, trace }
     }
 
-    /// Sees the motion at a place.
-    fn see(&mut self, time: f64, state: &[f64], motion: &mut Motion<'_>) -> std::result::Result<(), Failure> {
+    /// Keeps the motion at a place.
+    fn see(&mut self, time: f64, state: &[f64], motion: &Motion<'_>, reaction: Option<Reaction>) {
         let (attitude, q) = motion.shape(state);
         let trace = &mut self.trace;
         trace.time.push(time);
@@ -155,9 +166,8 @@ impl<'r> Tracer<'r> {
             path.push(point.deflection(q));
         }
         if let Some(reactions) = &mut trace.reactions {
-            reactions.push(motion.evaluate(time, state)?.reaction());
+            reactions.extend(reaction);
         }
-        Ok(())
     }
 
     fn finish(self, finished: Finished, extremes: Extremes) -> Trace {

@@ -136,7 +136,7 @@ impl Bench<'_> {
         scene.run.terms = Terms::ALL.held(kept);
         // The same steps: errors are those of the model.
         scene.run.scheme = measure.trace().scheme;
-        let history = match trace_at(body, &scene, &measure.trace().time) {
+        let history = match trace_at(body, &scene, &measure.trace().time, self.memory) {
             Ok(trace) => Ok(measure.of_subset(&trace, modes)),
             Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
                 Err(error.diagnostics()[0].message().to_owned())

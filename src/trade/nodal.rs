@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
 use crate::integration::{Explicit, Failure, Method, integrate};
 use crate::linalg::{combine, multiply};
+use crate::memory::refuse_beyond;
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
 use crate::scene::{Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace};
@@ -182,18 +183,8 @@ impl<'m> NodalReference<'m> {
 fn refuse_too_much(model: &FeModel, motion: &Trace, memory: Option<u64>) -> Result<()> {
     const DOUBLE: f64 = 8.0;
     let needed = DOUBLE * motion.time.len() as f64 * (model.rows().len() + 3 * model.nodes().len()) as f64;
-    match memory {
-        Some(left) if needed > left as f64 => {
-            let message = format!(
-                "the motion of all nodes takes {:.3} GB, {:.3} GB are left",
-                needed / 1e9,
-                left as f64 / 1e9
-            );
-            let help = "take --reference full, or simulate a shorter `duration`";
-            Err(Diagnostic::new(Code::MemoryShort, message).with_help(help).into())
-        }
-        _ => Ok(()),
-    }
+    let help = "take --reference full, or simulate a shorter `duration`";
+    refuse_beyond(memory, needed, "the motion of all nodes", help)
 }
 
 /// What the reference cannot be.

@@ -7,6 +7,7 @@ use crate::dynamics::{EquationsOfMotion, Terms};
 use crate::error::{Error, Result};
 use crate::flex_body::FlexBody;
 use crate::integration::Work;
+use crate::memory::refuse_beyond;
 use crate::model::FeModel;
 use crate::progress::{Event, Watch};
 use crate::scene::{Measure, OutputErrors, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at};
@@ -225,7 +226,7 @@ impl Job<'_> {
         let body = candidate.body(source)?;
         let mut scene = self.own_scene(source, &body, candidate);
         scene.run.scheme = self.motion.scheme;
-        let motion = trace_at(&body, &scene, &self.motion.time)?;
+        let motion = trace_at(&body, &scene, &self.motion.time, None)?;
         let history = match self.nodal {
             Some(nodal) => nodal.errors(&body, &motion),
             None => source.errors(self.measure, &body, &candidate.modes, &motion),
@@ -291,17 +292,6 @@ fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -
     let motion = reference.bytes(most(&FlexBody::n_modes) as usize);
     let threads = rayon::current_num_threads() as f64;
     let needed = threads * (DOUBLE * 2.0 * body + motion);
-    match memory {
-        Some(left) if needed > left as f64 => {
-            let message = format!(
-                "a trade study on {threads} threads takes {:.3} GB, {:.3} GB are left",
-                needed / 1e9,
-                left as f64 / 1e9
-            );
-            Err(Diagnostic::new(Code::MemoryShort, message)
-                .with_help("use fewer --threads or modes, or a shorter `duration`")
-                .into())
-        }
-        _ => Ok(()),
-    }
+    let what = format!("a trade study on {threads} threads");
+    refuse_beyond(memory, needed, &what, "use fewer --threads or modes, or a shorter `duration`")
 }

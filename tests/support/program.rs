@@ -15,3 +15,12 @@ pub fn flexbody(folder: &Path, words: &[&str]) -> Output {
         .output()
         .expect("the program runs")
 }
+
+/// Names of what a folder holds, sorted.
+pub fn members(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let mut names: Vec<_> =
+        entries.map(|e| e.expect("an entry").file_name().into_string().expect("our own names")).collect();
+    names.sort();
+    names
+}
