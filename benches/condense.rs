@@ -6,7 +6,7 @@ mod cuboid;
 
 use cuboid::Cuboid;
 use faer::Mat;
-use flexbody::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped};
+use flexbody::body::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped};
 use std::time::Instant;
 
 /// CPU seconds of this process, or `None` where the system does not tell.

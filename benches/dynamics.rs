@@ -7,14 +7,14 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use flexbody::dynamics::{
+use flexbody::body::flex_body::Frame;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::model::FeModel;
+use flexbody::motion::dynamics::{
     EquationsOfMotion, EulerParameters, Evaluation, NodalConfiguration, NodalEquations, NodalMotion,
     ReferenceConditions, Terms,
 };
-use flexbody::flex_body::Frame;
-use flexbody::integration::System;
-use flexbody::invariants::BodyFrame;
-use flexbody::model::FeModel;
+use flexbody::numerics::integration::System;
 use nalgebra::{DVector, Vector3};
 use std::time::Instant;
 use support::equations::State;

@@ -7,10 +7,11 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::export::{ExportOptions, Points, find_format};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::export::{ExportOptions, Points};
+use flexbody::formats::find_format;
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use std::path::Path;
 use std::process::Command;
 use support::flexible::{fixture, lively_state};

@@ -3,8 +3,8 @@
 
 use faer::Mat;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::linalg::{Analysis, Cholesky, CscMatrix, Inertia, Pencil, Real, Solve};
 use flexbody::model::FeModel;
+use flexbody::numerics::linalg::{Analysis, Cholesky, CscMatrix, Inertia, Pencil, Real, Solve};
 use std::time::Instant;
 
 #[global_allocator]

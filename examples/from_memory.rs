@@ -2,16 +2,16 @@
 //!
 //!     cargo run --release --example from_memory -- truss.flex.h5
 
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::eigen::Wanted;
-use flexbody::error::Result;
-use flexbody::flex_body::FlexBody;
-use flexbody::linalg::CscMatrix;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::formats::flex_body_file;
 use flexbody::model::{FeModel, NodeSet, Nodes, RawModel};
-use flexbody::progress::SILENT;
-use flexbody::store;
-use flexbody::units::UnitSystem;
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::CscMatrix;
 use sprs::{CsMat, TriMat};
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub fn write_truss(path: &Path) -> Result<FlexBody> {
         ..ConvertSettings::default()
     };
     let conversion = convert(&checked.model, &settings, SILENT)?;
-    store::write(&conversion.body, path)?;
+    flex_body_file::write(&conversion.body, path)?;
     Ok(conversion.body)
 }
 

@@ -5,7 +5,7 @@
 //!
 //! With folders of models as arguments it prints their rows only.
 
-use flexbody::diagnostic::Code;
+use flexbody::base::diagnostic::Code;
 use flexbody::input::{ModelFiles, read_manifest, read_model};
 use flexbody::model::{FeModel, Plausibility, RawModel};
 use std::collections::{BTreeMap, BTreeSet};

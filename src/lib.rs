@@ -7,31 +7,13 @@
 //!
 //! Rooms and the arrows between them: `ARCHITECTURE.md`; `tests/architecture.rs` holds them.
 
-pub mod basis;
+pub mod base;
+pub mod body;
 pub mod cli;
-pub mod convert;
-pub mod diagnostic;
-pub mod dynamics;
-pub mod eigen;
-pub mod error;
-pub mod export;
-pub mod flex_body;
-pub mod foreign;
-mod hdf5_file;
+pub mod formats;
 pub mod input;
-pub mod integration;
-pub mod invariants;
-pub mod linalg;
-pub mod memory;
 pub mod model;
-pub mod output;
-pub mod progress;
-pub mod provenance;
+pub mod motion;
+pub mod numerics;
 pub mod report;
-pub mod scene;
-pub mod selection;
-pub mod store;
-pub mod tailoring;
-pub mod trade;
-pub mod units;
-pub mod verification;
+pub mod study;

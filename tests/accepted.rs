@@ -4,17 +4,17 @@
 mod support;
 
 use faer::Mat;
-use flexbody::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Accuracy, Method, Wanted};
-use flexbody::error::ExitCode;
-use flexbody::flex_body::{FlexBody, MassStructure, Parts};
-use flexbody::invariants::BodyFrame;
-use flexbody::linalg::CscMatrix;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::ExitCode;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::flex_body::{FlexBody, MassStructure, Parts};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::body::verification::{accept, own_identities};
 use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel, RawShapes};
-use flexbody::progress::SILENT;
-use flexbody::verification::{accept, own_identities};
+use flexbody::numerics::eigen::{Accuracy, Method, Wanted};
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -7,7 +7,7 @@
 //! what `flexbody select` prints; with a file `export` (arguments) what `flexbody export` prints. With a file `audit` (arguments) it is what
 //! `flexbody audit` finds. A new case needs no code. `FLEXBODY_BLESS=1 cargo test --test bad_input` writes the reports; read the difference.
 
-use flexbody::diagnostic::Code;
+use flexbody::base::diagnostic::Code;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

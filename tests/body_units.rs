@@ -2,15 +2,15 @@
 
 mod support;
 
-use flexbody::basis::{BasisChoice, CraigBampton, ModeSettings};
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::base::progress::SILENT;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::{FeModel, LoadKind};
-use flexbody::progress::SILENT;
-use flexbody::units::UnitSystem;
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
+use flexbody::numerics::eigen::Wanted;
 use support::flexible::{fixture, stressed};
 use support::general::raw_fixture;
 use support::random::Random;

@@ -4,17 +4,17 @@
 mod support;
 
 use faer::Mat;
-use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::dynamics::{Orientation, RotationVector};
-use flexbody::flex_body::{Carrier, FlexBody};
+use flexbody::base::diagnostic::{Code, Diagnostic};
+use flexbody::base::progress::SILENT;
+use flexbody::body::flex_body::{Carrier, FlexBody};
+use flexbody::body::invariants::{BodyFrame, condense};
+use flexbody::formats::flex_body_file;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::{BodyFrame, condense};
-use flexbody::linalg::SymmetricMatrix;
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
-use flexbody::progress::SILENT;
-use flexbody::scene::{Recording, read_scene, simulate};
-use flexbody::selection::select;
-use flexbody::store;
+use flexbody::motion::dynamics::{Orientation, RotationVector};
+use flexbody::motion::scene::{Recording, read_scene, simulate};
+use flexbody::numerics::linalg::SymmetricMatrix;
+use flexbody::study::selection::select;
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::fs;
 use std::path::Path;
@@ -419,7 +419,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     let (ids, u) = clamped_static(place, Vector3::new(0.0, 0.0, -9810.0), &base.nodes);
     let at = ids.iter().position(|id| *id == 20000).expect("a node");
     let expected = Vector3::new(u[3 * at], u[3 * at + 1], u[3 * at + 2]);
-    let body = store::read(place.join("b.flex.h5")).expect("a body");
+    let body = flex_body_file::read(place.join("b.flex.h5")).expect("a body");
     let described = read_scene(place.join("scene.toml")).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     let own = recording.paths[0].deflection[5];

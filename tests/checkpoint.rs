@@ -1,12 +1,12 @@
 //! A search for modes that goes on from a checkpoint gives what a fresh one gives, with less work; a file that is no
 //! checkpoint of the model is refused.
 
-use flexbody::basis::{ModalBasis, ModeSettings, free_surface, free_surface_resumed};
-use flexbody::eigen::{Accuracy, Method, Proof, Resume, Snapshot, Wanted};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{ModalBasis, ModeSettings, free_surface, free_surface_resumed};
 use flexbody::input::{read_manifest, read_model};
-use flexbody::linalg::gram;
 use flexbody::model::FeModel;
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{Accuracy, Method, Proof, Resume, Snapshot, Wanted};
+use flexbody::numerics::linalg::gram;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Mutex;

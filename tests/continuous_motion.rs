@@ -2,15 +2,15 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::Terms;
-use flexbody::flex_body::FlexBody;
-use flexbody::progress::SILENT;
-use flexbody::scene::{
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{
     Axes, History, Initial, Load, Point, Recording, Requirements, Run, Scene, Scheme, Stage, Tolerance,
     simulate,
 };
-use flexbody::selection::select;
+use flexbody::study::selection::select;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::f64::consts::TAU;

@@ -7,18 +7,20 @@ mod support;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef};
-use flexbody::basis::{Basis, BasisChoice, CraigBampton, CraigChang, Loads, ModalBasis, ModeSettings, Task};
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
-use flexbody::error::Result;
-use flexbody::flex_body::FlexBody;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{
+    Basis, BasisChoice, CraigBampton, CraigChang, Loads, ModalBasis, ModeSettings, Task,
+};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::body::verification::verify;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::BodyFrame;
-use flexbody::linalg::{CscMatrix, gram};
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
-use flexbody::progress::SILENT;
-use flexbody::verification::verify;
+use flexbody::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
+use flexbody::numerics::linalg::{CscMatrix, gram};
 use std::path::Path;
 use support::elements::{Kind, MassRule, Material};
 use support::mesh::Mesh;

@@ -5,14 +5,14 @@ mod support;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef};
-use flexbody::basis::{BasisChoice, CraigBampton, ModeSettings};
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::FlexBody;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::verification::verify;
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
-use flexbody::progress::SILENT;
-use flexbody::verification::verify;
+use flexbody::numerics::eigen::Wanted;
 use std::path::Path;
 use support::reference::symmetric_eigen;
 

@@ -2,17 +2,17 @@
 
 mod support;
 
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::Wanted;
-use flexbody::error::Result;
-use flexbody::invariants::BodyFrame;
-use flexbody::linalg::CscMatrix;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::flex_body_file;
 use flexbody::model::{Damping, DampingBand, FeModel, RawMatrix, RawModel};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::CscMatrix;
 use flexbody::report::{Facts, Format, RunData, render};
-use flexbody::store;
-use flexbody::units::UnitSystem;
 use support::elements::{Kind, MassRule, Material};
 use support::mesh::{Assembly, Mesh, entries};
 
@@ -140,8 +140,8 @@ fn damping_is_in_the_file_and_in_every_report() {
     let body = converted(rayleigh_matrix(0.0, 2e-6)).body;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("b.flex.h5");
-    store::write(&body, &path).unwrap();
-    assert_eq!(store::read(&path).unwrap(), body);
+    flex_body_file::write(&body, &path).unwrap();
+    assert_eq!(flex_body_file::read(&path).unwrap(), body);
     let facts = Facts::new(&body, &RunData::default());
     let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).unwrap();
     let schema = serde_json::from_str(include_str!("../schemas/report.schema.json")).unwrap();

@@ -1,8 +1,9 @@
 //! Generated documents are what the code generates. `FLEXBODY_BLESS=1 cargo test --test docs_generated` writes them.
 //! Written ones lead to files and codes that exist.
 
-use flexbody::diagnostic::{Code, Severity};
-use flexbody::{diagnostic, store};
+use flexbody::base::diagnostic::{Code, Severity};
+use flexbody::base::diagnostic;
+use flexbody::formats::flex_body_file;
 use std::path::{Path, PathBuf};
 
 #[track_caller]
@@ -20,12 +21,12 @@ fn assert_generated(path: &str, generated: &str) {
 
 #[test]
 fn format_description() {
-    assert_generated("docs/format.md", &store::format_markdown());
+    assert_generated("docs/format.md", &flex_body_file::format_markdown());
 }
 
 #[test]
 fn format_schema() {
-    assert_generated("schemas/flexbody-file.schema.json", &store::format_schema());
+    assert_generated("schemas/flexbody-file.schema.json", &flex_body_file::format_schema());
 }
 
 #[test]
@@ -83,7 +84,7 @@ fn codes_are_unique_and_their_exit_codes_fit_their_severity() {
     ids.dedup();
     assert_eq!(ids.len(), Code::ALL.len());
     for code in Code::ALL {
-        let fails = code.exit_code() != flexbody::error::ExitCode::Done;
+        let fails = code.exit_code() != flexbody::base::error::ExitCode::Done;
         assert_eq!(fails, code.severity() == Severity::Error, "{}", code.id());
     }
 }

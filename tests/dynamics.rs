@@ -3,10 +3,10 @@
 mod support;
 
 use faer::Mat;
-use flexbody::dynamics::{AngularVelocity, BodyPoint, EquationsOfMotion, Evaluation, Terms};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::LoadKind;
+use flexbody::motion::dynamics::{AngularVelocity, BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use nalgebra::{DMatrix, DVector, Vector3};
 use support::equations::{Coriolis, State};
 use support::flexible::{

@@ -2,15 +2,15 @@
 
 mod support;
 
-use flexbody::dynamics::{
+use flexbody::body::flex_body::Frame;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::model::{Damping, FeModel, RawModel};
+use flexbody::motion::dynamics::{
     BodyPoint, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes,
     LoadJacobian, Motion, NodalConfiguration, NodalEquations, NodalEvaluation, NodalMotion, Orientation,
     Prescribed, ReferenceConditions, RotationVector, Terms,
 };
-use flexbody::flex_body::Frame;
-use flexbody::integration::{Explicit, Gauss, System as _};
-use flexbody::invariants::BodyFrame;
-use flexbody::model::{Damping, FeModel, RawModel};
+use flexbody::numerics::integration::{Explicit, Gauss, System as _};
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

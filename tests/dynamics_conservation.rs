@@ -2,10 +2,10 @@
 
 mod support;
 
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::LoadKind;
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use support::flexible::{fixture, oracle, soft_block, stressed};
 use support::integrate;

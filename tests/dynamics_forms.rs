@@ -2,12 +2,12 @@
 
 mod support;
 
-use flexbody::dynamics::{
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::motion::dynamics::{
     AngularVelocity, EquationsOfMotion, EulerParameters, Evaluation, Orientation, PlaneAngle, RotationVector,
     Terms,
 };
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector, Vector2, Vector3};
 use support::flexible::{body_of, fixture, oracle};
 use support::plane::rectangle;

@@ -3,10 +3,10 @@
 mod support;
 
 use faer::Mat;
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::{GeometricStiffness, LoadKind, UnitLoad};
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use nalgebra::{DMatrix, DVector, Vector3};
 use support::flexible::{fixture, invariants_of, made_of, stressed};
 use support::general::{NodalBody, Row, RowKind, random_matrix, to_faer};

@@ -2,12 +2,12 @@
 
 mod support;
 
-use flexbody::dynamics::{
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::model::{Coupling, InterfaceMotion, LoadKind, NodeSet, Reference};
+use flexbody::motion::dynamics::{
     BodyPoint, EquationsOfMotion, Evaluation, LoadAxes, LoadJacobian, Orientation, RotationVector, Terms,
 };
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
-use flexbody::model::{Coupling, InterfaceMotion, LoadKind, NodeSet, Reference};
 use nalgebra::{DVector, Matrix3, Vector3};
 use support::elements::{Kind, MassRule, Material};
 use support::flexible::{body_of, fixture, stressed};

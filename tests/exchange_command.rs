@@ -182,7 +182,7 @@ fn an_audit_says_what_is_wrong_and_exits_with_1() {
 fn every_format_has_its_page_and_its_line() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     let table = fs::read_to_string(docs.join("export.md")).expect("docs/export.md");
-    for format in flexbody::export::FORMATS {
+    for format in flexbody::formats::FORMATS {
         let name = format.name();
         assert!(table.contains(&format!("(formats/{name}.md)")), "docs/export.md: {name}");
         let page = fs::read_to_string(docs.join(format!("formats/{name}.md"))).expect("a page");

@@ -4,17 +4,18 @@
 mod support;
 
 use faer::Mat;
-use flexbody::basis::{BasisChoice, CraigBampton, ModeSettings};
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
-use flexbody::eigen::Wanted;
-use flexbody::export::{ExportFrame, ExportOptions, Exported, Points, export, find_format, frames};
-use flexbody::flex_body::{FlexBody, Groups};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::{FlexBody, Groups};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::export::{ExportFrame, ExportOptions, Exported, Points, frames};
+use flexbody::formats::{export, find_format};
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::BodyFrame;
 use flexbody::model::{FeModel, LoadKind};
-use flexbody::progress::SILENT;
+use flexbody::motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
+use flexbody::numerics::eigen::Wanted;
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -527,7 +528,7 @@ fn the_page_has_the_layout_that_is_written() {
     let page = std::fs::read_to_string(&path).expect("the page");
     let (before, rest) = page.split_once("<!-- layout -->\n").expect("a place for the tables");
     let (own, after) = rest.split_once("<!-- end of layout -->").expect("their end");
-    let written = flexbody::export::embedded_markdown();
+    let written = flexbody::formats::embedded_markdown();
     if std::env::var_os("FLEXBODY_BLESS").is_some_and(|v| v == "1") {
         let text = format!("{before}<!-- layout -->\n{written}<!-- end of layout -->{after}");
         std::fs::write(&path, text).expect("writable");

@@ -3,12 +3,14 @@
 mod support;
 
 use faer::Mat;
-use flexbody::diagnostic::Code;
-use flexbody::export::{ExportOptions, Points, export, find_format, frames};
-use flexbody::flex_body::{FlexBody, LoadKind};
-use flexbody::foreign::{Foreign, audit, find_foreign, recognise};
+use flexbody::base::diagnostic::Code;
+use flexbody::body::flex_body::{FlexBody, LoadKind};
+use flexbody::body::invariants::{BodyFrame, CauchySchwarz, Invariants, primary_differences};
+use flexbody::formats::export::{ExportOptions, Points, frames};
+use flexbody::formats::import::{Foreign, audit};
+use flexbody::formats::{export, find_format};
+use flexbody::formats::{find_foreign, recognise};
 use flexbody::input::InputFile;
-use flexbody::invariants::{BodyFrame, CauchySchwarz, Invariants, primary_differences};
 use flexbody::model::FeModel;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Vector3};
@@ -188,7 +190,7 @@ impl Sums {
             let mut unit = Mat::zeros(n, 1);
             unit[(column, 0)] = 1.0;
             let mut product = Mat::zeros(n, 1);
-            flexbody::linalg::multiply(ms, 1, unit.as_ref(), product.as_mut());
+            flexbody::numerics::linalg::multiply(ms, 1, unit.as_ref(), product.as_mut());
             mass.extend((0..n).map(|row| (row, column, product[(row, 0)])).filter(|entry| entry.2 != 0.0));
         }
         Self { body, mass }

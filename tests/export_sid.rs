@@ -3,13 +3,15 @@
 mod support;
 
 use faer::Mat;
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::export::{ExportFormat, ExportOptions, Points, export, find_format};
-use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::foreign::{Foreign, find_foreign};
+use flexbody::body::flex_body::{FlexBody, Groups};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::export::{ExportFormat, ExportOptions, Points};
+use flexbody::formats::find_foreign;
+use flexbody::formats::import::Foreign;
+use flexbody::formats::{export, find_format};
 use flexbody::input::InputFile;
-use flexbody::invariants::BodyFrame;
 use flexbody::model::{GeometricStiffness, LoadKind, UnitLoad};
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::path::Path;
 use support::flexible::{fixture, stressed};
@@ -414,7 +416,7 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
         assert_eq!(losses.is_empty(), points == Points::Usual, "{losses:?}");
         let foreign = read(&text(&body, &options)).body;
         assert_eq!(foreign.frames.len(), count);
-        let expected = flexbody::export::frames(&body, &points);
+        let expected = flexbody::formats::export::frames(&body, &points);
         for (frame, own) in foreign.frames.iter().zip(&expected) {
             assert_eq!(frame.label, own.id.to_string());
             assert_eq!(frame.position, own.position);

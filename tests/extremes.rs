@@ -4,16 +4,16 @@
 mod support;
 
 use faer::Mat;
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::eigen::{Method, Wanted};
-use flexbody::error::Result;
+use flexbody::base::diagnostic::{Code, Diagnostic};
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::invariants::{BodyFrame, Frame, RigidMotion, compare_invariants, condense_general};
+use flexbody::body::verification::verify;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::{BodyFrame, Frame, RigidMotion, compare_invariants, condense_general};
-use flexbody::linalg::{CscMatrix, SymmetricMatrix, gram};
 use flexbody::model::{FeModel, RawModel, check};
-use flexbody::progress::SILENT;
-use flexbody::verification::verify;
+use flexbody::numerics::eigen::{Method, Wanted};
+use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix, gram};
 use nalgebra::{Matrix3, Vector3};
 use support::elements::{Kind, MassRule, Material};
 use support::files::{Triangle, write_model};

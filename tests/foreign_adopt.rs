@@ -3,14 +3,14 @@
 mod support;
 
 use faer::Mat;
-use flexbody::diagnostic::Code;
-use flexbody::flex_body::FlexBody;
-use flexbody::foreign::{Adopted, Audit, Foreign, ForeignBody, ForeignFrame, adopt, audit};
-use flexbody::invariants::{BodyFrame, Invariants, condense, primary_differences};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::provenance::SourceFile;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::{BodyFrame, Invariants, condense, primary_differences};
+use flexbody::formats::import::{Adopted, Audit, Foreign, ForeignBody, ForeignFrame, adopt, audit};
 use flexbody::model::{FeModel, GeometricStiffness};
-use flexbody::provenance::SourceFile;
 use flexbody::report::{Tolerances, compare};
-use flexbody::units::UnitSystem;
 use std::path::Path;
 use support::elements::{Kind, MassRule, Material};
 use support::flexible::{body_of, fixture};
@@ -56,7 +56,7 @@ fn foreign(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Foreig
     }
 }
 
-fn adopted(foreign: &Foreign) -> Result<Adopted, flexbody::error::Error> {
+fn adopted(foreign: &Foreign) -> Result<Adopted, flexbody::base::error::Error> {
     let source = SourceFile::new("body", Path::new("block.file"), "0".repeat(64));
     adopt(foreign, source, UnitSystem::default())
 }

@@ -2,16 +2,18 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::error::Error;
-use flexbody::export::{ExportOptions, Points, export, find_format};
-use flexbody::flex_body::FlexBody;
-use flexbody::foreign::{Foreign, adopt, audit, find_foreign, recognise};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Error;
+use flexbody::base::provenance::SourceFile;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
+use flexbody::formats::export::{ExportOptions, Points};
+use flexbody::formats::import::{Foreign, adopt, audit};
+use flexbody::formats::{export, find_format};
+use flexbody::formats::{find_foreign, recognise};
 use flexbody::input::InputFile;
-use flexbody::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
 use flexbody::model::FeModel;
-use flexbody::provenance::SourceFile;
-use flexbody::units::UnitSystem;
 use hdf5_metno as hdf5;
 use proptest::prelude::*;
 use std::path::Path;

@@ -2,15 +2,17 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::error::Error;
-use flexbody::export::{ExportOptions, Points, export, find_format};
-use flexbody::foreign::{Foreign, ForeignFormat, adopt, audit, find_foreign, recognise};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Error;
+use flexbody::base::provenance::SourceFile;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::export::{ExportOptions, Points};
+use flexbody::formats::import::{Foreign, ForeignFormat, adopt, audit};
+use flexbody::formats::{export, find_format};
+use flexbody::formats::{find_foreign, recognise};
 use flexbody::input::InputFile;
-use flexbody::invariants::BodyFrame;
 use flexbody::model::LoadKind;
-use flexbody::provenance::SourceFile;
-use flexbody::units::UnitSystem;
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;

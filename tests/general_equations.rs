@@ -4,13 +4,13 @@
 mod support;
 
 use faer::Mat;
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
-use flexbody::linalg::CscMatrix;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
 use flexbody::model::FeModel;
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::Value;
 use std::path::Path;
@@ -404,12 +404,13 @@ fn the_general_condensation_of_a_solid_is_that_of_its_scalar_mass() {
                 columns.iter().zip(values).map(move |(&j, &v)| (row, 3 * j + row % 3, v)).collect::<Vec<_>>()
             })
             .collect();
-        let whole = flexbody::linalg::SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries));
+        let whole =
+            flexbody::numerics::linalg::SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries));
         let whole = whole.expect("symmetric");
         let mut random = Random(3);
         let shapes = Mat::from_fn(n, 5, |_, _| random.signed());
         let axes = random.rotation();
-        let frame = flexbody::invariants::Frame { origin: Vector3::new(0.3, -0.1, 0.2), axes };
+        let frame = flexbody::body::invariants::Frame { origin: Vector3::new(0.3, -0.1, 0.2), axes };
         let mut turned = shapes.clone();
         frame.rotate_shapes(&mut turned);
         let stiffness = Mat::identity(5, 5);

@@ -2,18 +2,18 @@
 
 mod support;
 
-use flexbody::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Method, Wanted};
-use flexbody::error::Error;
-use flexbody::flex_body::{FlexBody, MassStructure};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Error;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::flex_body::{FlexBody, MassStructure};
+use flexbody::body::invariants::{BodyFrame, primary_differences};
+use flexbody::formats::flex_body_file;
 use flexbody::input::{ModelFiles, read_model};
-use flexbody::invariants::{BodyFrame, primary_differences};
-use flexbody::linalg::CscMatrix;
 use flexbody::model::{DofLabel, FeModel, Nodes, RawModel};
-use flexbody::progress::SILENT;
-use flexbody::store;
+use flexbody::numerics::eigen::{Method, Wanted};
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -161,8 +161,8 @@ fn bodies_come_back_from_their_files_to_the_last_bit() {
     for name in FIXTURES {
         let body = converted(raw(name), 8, Method::Auto).body;
         let path = folder.path().join(format!("{name}.flex.h5"));
-        store::write(&body, &path).expect("written");
-        assert!(store::read(&path).expect("read") == body, "{name}");
+        flex_body_file::write(&body, &path).expect("written");
+        assert!(flex_body_file::read(&path).expect("read") == body, "{name}");
     }
 }
 
@@ -279,7 +279,7 @@ fn bodies_with_rotations_and_inner_rows_are_taken_apart() {
 fn certified_says_what_it_does_not_cover() {
     let model = FeModel::from_raw(raw("frame_beams")).expect("a body").model;
     let mut settings = settings(6, Method::Auto);
-    settings.modes.accuracy = flexbody::eigen::Accuracy::Certified;
+    settings.modes.accuracy = flexbody::numerics::eigen::Accuracy::Certified;
     let error = convert(&model, &settings, SILENT).expect_err("rotations");
     assert_eq!(error.diagnostics()[0].code(), Code::Usage);
     // Bubbles are displacements.

@@ -3,22 +3,22 @@
 mod support;
 
 use faer::{Mat, Scale};
-use flexbody::basis::{BasisChoice, FreeSurface, Loads};
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::eigen::Wanted;
-use flexbody::error::Result;
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::{BodyFrame, IdentityCheck};
-use flexbody::linalg::CscMatrix;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, FreeSurface, Loads};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::{BodyFrame, IdentityCheck};
+use flexbody::body::verification::verify;
+use flexbody::formats::flex_body_file;
 use flexbody::model::{
     Damping, FeModel, GeometricStiffness, LoadKind, NodeSet, RawMatrix, RawModel, UnitLoad,
 };
-use flexbody::progress::SILENT;
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::CscMatrix;
 use flexbody::report::{Facts, Format, RunData, render};
-use flexbody::store;
-use flexbody::verification::verify;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::path::PathBuf;
 use support::elements::{Kind, MassRule, Material};
@@ -107,7 +107,7 @@ fn converted(raw: RawModel, frame: BodyFrame) -> FlexBody {
     run(raw, frame, BasisChoice::default()).expect("a sound body").body
 }
 
-fn refusal(raw: RawModel) -> flexbody::error::Error {
+fn refusal(raw: RawModel) -> flexbody::base::error::Error {
     run(raw, BodyFrame::Principal, BasisChoice::default()).expect_err("not to be converted")
 }
 
@@ -378,8 +378,8 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     let body = converted(raw.clone(), BodyFrame::Principal);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("b.flex.h5");
-    store::write(&body, &path).expect("written");
-    assert_eq!(store::read(&path).expect("read"), body);
+    flex_body_file::write(&body, &path).expect("written");
+    assert_eq!(flex_body_file::read(&path).expect("read"), body);
 
     let facts = Facts::new(&body, &RunData::default());
     let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).expect("JSON");
@@ -400,12 +400,12 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     let checks = verify(&body, &model).expect("the same nodes");
     assert_eq!(failed(&checks), Vec::<&str>::new());
     assert!(checks.iter().any(|check| check.name == "damping_recomputed"));
-    let tampered = |change: &dyn Fn(&mut flexbody::flex_body::Parts)| {
+    let tampered = |change: &dyn Fn(&mut flexbody::body::flex_body::Parts)| {
         let mut parts = body.clone().into_parts();
         change(&mut parts);
         let path = folder.path().join("tampered.flex.h5");
-        store::write(&FlexBody::new(parts).expect("valid"), &path).expect("written");
-        failed(&verify(&store::read(&path).expect("read"), &model).expect("the same nodes"))
+        flex_body_file::write(&FlexBody::new(parts).expect("valid"), &path).expect("written");
+        failed(&verify(&flex_body_file::read(&path).expect("read"), &model).expect("the same nodes"))
     };
     let damping = ["damping_recomputed"];
     assert_eq!(tampered(&|p| p.modes.damping_ratio[0] *= 1.001), damping);
@@ -532,11 +532,11 @@ fn files_without_the_group_are_older_and_those_that_break_it_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("b.flex.h5");
     let changed = |change: &dyn Fn(&hdf5_metno::File)| {
-        store::write(&body, &path).expect("written");
+        flex_body_file::write(&body, &path).expect("written");
         let file = hdf5_metno::File::open_rw(&path).expect("a file");
         change(&file);
         file.close().expect("closed");
-        store::read(&path)
+        flex_body_file::read(&path)
     };
     // Digests came with format 1.4.
     let older = changed(&|file| {

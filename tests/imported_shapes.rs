@@ -5,14 +5,14 @@
 mod support;
 
 use faer::Mat;
-use flexbody::basis::{BasisChoice, ImportedShapes, ModalBasis, ModeSettings, Task, free_surface};
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Accuracy, Proof, Resume, Wanted};
-use flexbody::error::Result;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, ImportedShapes, ModalBasis, ModeSettings, Task, free_surface};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
 use flexbody::input::{MatrixLocation, read_manifest, read_model, read_shapes};
 use flexbody::model::{FeModel, RawShapes, rigid_fields};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{Accuracy, Proof, Resume, Wanted};
 use flexbody::report::{Tolerances, compare};
 use hdf5_metno::File;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Damaged files: whatever is changed in a valid file, reading it ends in a model or in a report, never in a panic.
 
-use flexbody::diagnostic::Severity;
+use flexbody::base::diagnostic::Severity;
 use flexbody::input::{ModelFiles, read_manifest, read_model};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};

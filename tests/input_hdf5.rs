@@ -1,10 +1,10 @@
 //! HDF5 matrices: layouts, types, roles, declared triangles.
 
-use flexbody::diagnostic::Code;
-use flexbody::error::Result;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Result;
 use flexbody::input::{MatrixLocation, MatrixRole, read_matrix};
-use flexbody::linalg::CscMatrix;
 use flexbody::model::RawMatrix;
+use flexbody::numerics::linalg::CscMatrix;
 use hdf5_metno::types::VarLenUnicode;
 use hdf5_metno::{File, Group, H5Type};
 use proptest::prelude::*;

@@ -1,26 +1,26 @@
 //! Matrix readers: every registered format on its fixtures, every dialect of Matrix Market.
 
-use flexbody::diagnostic::Code;
+use flexbody::base::diagnostic::Code;
 use flexbody::input::{MatrixLocation, MatrixRole, READERS, read_matrix};
-use flexbody::linalg::CscMatrix;
 use flexbody::model::RawMatrix;
+use flexbody::numerics::linalg::CscMatrix;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-fn read_file(path: &Path) -> flexbody::error::Result<RawMatrix> {
+fn read_file(path: &Path) -> flexbody::base::error::Result<RawMatrix> {
     read_matrix(&MatrixLocation { path: path.into(), group: None }, MatrixRole::Stiffness)
 }
 
-fn read_bytes(name: &str, bytes: &[u8]) -> flexbody::error::Result<RawMatrix> {
+fn read_bytes(name: &str, bytes: &[u8]) -> flexbody::base::error::Result<RawMatrix> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     read_file(&path)
 }
 
-fn read_text(text: &str) -> flexbody::error::Result<RawMatrix> {
+fn read_text(text: &str) -> flexbody::base::error::Result<RawMatrix> {
     read_bytes("K.mtx", text.as_bytes())
 }
 

@@ -1,7 +1,7 @@
 //! Manifest, tables and whole models.
 
-use flexbody::diagnostic::{Code, Severity};
-use flexbody::error::Result;
+use flexbody::base::diagnostic::{Code, Severity};
+use flexbody::base::error::Result;
 use flexbody::input::{InterfaceNodes, MatrixLocation, ModelFiles, read_manifest, read_model};
 use flexbody::model::{DofLabel, RawModel};
 use std::fmt::Write;
@@ -288,9 +288,9 @@ fn a_whole_model_is_read_with_its_fingerprints() {
     assert_eq!(roles, ["stiffness", "mass", "nodes", "dofs", "interface"]);
     assert_eq!(of("nodes").name, "nodes.csv");
     let bytes = std::fs::read(path("K.mtx")).unwrap();
-    assert_eq!(of("stiffness").sha256, flexbody::provenance::sha256_hex(&bytes));
+    assert_eq!(of("stiffness").sha256, flexbody::base::provenance::sha256_hex(&bytes));
     // The empty message of FIPS 180-4.
-    assert!(flexbody::provenance::sha256_hex(b"").starts_with("e3b0c44298fc1c14"));
+    assert!(flexbody::base::provenance::sha256_hex(b"").starts_with("e3b0c44298fc1c14"));
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Integrators: orders of convergence, what they keep, interpolation, jumps, and refusals.
 
-use flexbody::integration::{Explicit, Failure, Gauss, Method, Oscillator, System, Work, integrate};
+use flexbody::numerics::integration::{
+    Explicit, Failure, Gauss, Method, Oscillator, System, Work, integrate,
+};
 
 /// y' = f(t, y) with unit scales.
 struct Equation<F> {

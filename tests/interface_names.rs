@@ -1,7 +1,7 @@
 //! Names of interfaces are data: whatever they are, the file gives them back.
 
-use flexbody::diagnostic::Code;
-use flexbody::store;
+use flexbody::base::diagnostic::Code;
+use flexbody::formats::flex_body_file;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -41,10 +41,10 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
     let folder = model(&NAMES);
     let output = run(folder.path(), &["convert", "model.toml", "-o", "b.flex.h5", "--modes", "4"]);
     assert!(output.status.success(), "{output:?}");
-    let body = store::read(folder.path().join("b.flex.h5")).expect("a body");
+    let body = flex_body_file::read(folder.path().join("b.flex.h5")).expect("a body");
     let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
     assert_eq!(names, NAMES);
-    assert_eq!(store::validate(folder.path().join("b.flex.h5")), vec![]);
+    assert_eq!(flex_body_file::validate(folder.path().join("b.flex.h5")), vec![]);
     let formats = ["exudyn", "sid", "npz", "json"];
     for format in formats {
         let file = format!("b.{format}");

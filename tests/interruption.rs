@@ -3,7 +3,7 @@
 
 mod support;
 
-use flexbody::error::ExitCode;
+use flexbody::base::error::ExitCode;
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -130,7 +130,7 @@ fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else(
             let _ = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).output();
             let status = child.wait().expect("a child");
             if !is_old(&body) {
-                flexbody::store::read(&body).expect("a whole body");
+                flexbody::formats::flex_body_file::read(&body).expect("a whole body");
             }
             if !is_old(&report) {
                 let text = std::fs::read_to_string(&report).expect("text");

@@ -4,7 +4,7 @@
 
 mod support;
 
-use flexbody::error::ExitCode;
+use flexbody::base::error::ExitCode;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use support::program::members;

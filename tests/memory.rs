@@ -3,15 +3,15 @@
 #[path = "support/mod.rs"]
 mod support;
 
-use flexbody::basis::{ModeSettings, free_surface};
-use flexbody::convert::{Conversion, ConvertSettings, convert as convert_model};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
-use flexbody::error::ExitCode;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::ExitCode;
+use flexbody::base::progress::{Event, SILENT};
+use flexbody::body::basis::{ModeSettings, free_surface};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert as convert_model};
+use flexbody::formats::flex_body_file;
 use flexbody::model::check;
-use flexbody::progress::{Event, SILENT};
+use flexbody::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use flexbody::report::{Facts, Format, RunData, render};
-use flexbody::store;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -154,8 +154,8 @@ fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
         found.diagnostics.iter().find(|d| d.code() == Code::CompletenessUnproved).expect("a warning");
     assert!(warning.message().contains(why) && warning.help().contains("--memory-limit"), "{warning}");
     let folder = tempfile::tempdir().expect("a folder");
-    store::write(&found.body, folder.path().join("b.h5")).expect("a file");
-    let body = store::read(folder.path().join("b.h5")).expect("a body");
+    flex_body_file::write(&found.body, folder.path().join("b.h5")).expect("a file");
+    let body = flex_body_file::read(folder.path().join("b.h5")).expect("a body");
     assert_eq!(body.certificate().proved_modes, None);
     assert!(body.certificate().remark.starts_with(why), "{}", body.certificate().remark);
     let run = RunData { diagnostics: found.diagnostics, ..RunData::default() };

@@ -2,13 +2,13 @@
 
 mod support;
 
-use flexbody::dynamics::{
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::motion::dynamics::{
     Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place,
     Prescribed, Surroundings, Terms,
 };
-use flexbody::flex_body::FlexBody;
-use flexbody::integration::Method;
-use flexbody::invariants::BodyFrame;
+use flexbody::numerics::integration::Method;
 use nalgebra::{DVector, Vector3};
 use support::flexible::{fixture, soft_block};
 use support::integrate as reference;

@@ -3,18 +3,18 @@
 mod support;
 
 use faer::Mat;
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::dynamics::{
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::{FlexBody, Frame};
+use flexbody::input::{ModelFiles, read_model};
+use flexbody::model::{Damping, DofLabel, FeModel, RawModel};
+use flexbody::motion::dynamics::{
     BodyPoint, Configuration, EquationsOfMotion, EulerParameters, Evaluation, NodalEquations, NodalError,
     NodalEvaluation, NodalModes, Orientation, ReferenceConditions, Terms,
 };
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::{FlexBody, Frame};
-use flexbody::input::{ModelFiles, read_model};
-use flexbody::linalg::{CscMatrix, sum_terms};
-use flexbody::model::{Damping, DofLabel, FeModel, RawModel};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::{CscMatrix, sum_terms};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 use support::elements::Kind;
@@ -534,7 +534,7 @@ fn what_has_no_nodal_equations_says_why() {
     let equations =
         NodalEquations::new(&block, &Frame::model(), &ReferenceConditions::MeanAxes).expect("equations");
     let zero = vec![0.0; equations.n_rows()];
-    let at = |u: Vec<f64>| flexbody::dynamics::NodalConfiguration {
+    let at = |u: Vec<f64>| flexbody::motion::dynamics::NodalConfiguration {
         origin: Vector3::zeros(),
         attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
         velocity: Vector3::zeros(),

@@ -2,18 +2,18 @@
 
 mod support;
 
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::dynamics::{
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::model::{FeModel, RawModel};
+use flexbody::motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Motion, NodalConfiguration,
     NodalEquations, NodalEvaluation, NodalModes, NodalMotion, Place, ReferenceConditions, Surroundings,
     Terms,
 };
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::FlexBody;
-use flexbody::integration::{Explicit, Failure, Gauss, Method, integrate};
-use flexbody::model::{FeModel, RawModel};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::integration::{Explicit, Failure, Gauss, Method, integrate};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use support::elements::Kind;
 use support::flexible::oracle;

@@ -3,18 +3,18 @@
 mod support;
 
 use faer::Mat;
-use flexbody::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::dynamics::{EulerParameters, Orientation, Terms};
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::FlexBody;
-use flexbody::linalg::{gram, multiply};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
 use flexbody::model::FeModel;
-use flexbody::progress::SILENT;
-use flexbody::scene::{
+use flexbody::motion::dynamics::{EulerParameters, Orientation, Terms};
+use flexbody::motion::scene::{
     Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Run, Scene, Scheme, Spin, Stage,
     Tolerance, Trace, trace, trace_at,
 };
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::{gram, multiply};
 use nalgebra::Vector3;
 use support::flexible::soft_block;
 

@@ -2,12 +2,12 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::{
+use flexbody::base::diagnostic::Code;
+use flexbody::body::flex_body::{FlexBody, Group, Groups, TermDecision};
+use flexbody::body::invariants::{BodyFrame, error_norms, primary_differences};
+use flexbody::motion::dynamics::{
     Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms,
 };
-use flexbody::flex_body::{FlexBody, Group, Groups, TermDecision};
-use flexbody::invariants::{BodyFrame, error_norms, primary_differences};
 use nalgebra::Vector3;
 use support::flexible::{body_of, fixture, lively_state, soft_block};
 use support::general::quasi_velocities;

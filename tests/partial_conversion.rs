@@ -2,16 +2,16 @@
 
 mod support;
 
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{Conversion, ConvertSettings, convert, convert_for};
-use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::eigen::{Accuracy, Resume, Wanted};
-use flexbody::flex_body::{FlexBody, Groups, TermDecision};
+use flexbody::base::diagnostic::{Code, Diagnostic};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{Conversion, ConvertSettings, convert, convert_for};
+use flexbody::body::flex_body::{FlexBody, Groups, TermDecision};
+use flexbody::body::invariants::{BodyFrame, primary_differences};
+use flexbody::body::verification::verify;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::{BodyFrame, primary_differences};
 use flexbody::model::{Damping, FeModel};
-use flexbody::progress::SILENT;
-use flexbody::verification::verify;
+use flexbody::numerics::eigen::{Accuracy, Resume, Wanted};
 use std::path::Path;
 use support::partial::{combinations, decisions};
 use support::plane::rectangle;

@@ -3,11 +3,11 @@
 mod store_support;
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::flex_body::{FlexBody, Group, Groups};
-use flexbody::invariants::BodyFrame;
+use flexbody::base::diagnostic::Code;
+use flexbody::body::flex_body::{FlexBody, Group, Groups};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::flex_body_file;
 use flexbody::report::{Facts, Format, RunData, Tolerances, compare, dropped_text, render};
-use flexbody::store;
 use hdf5_metno as hdf5;
 use proptest::prelude::*;
 use serde_json::Value;
@@ -29,7 +29,7 @@ fn bodies() -> [FlexBody; 4] {
 fn written(body: &FlexBody) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");
-    store::write(body, &path).expect("writes");
+    flex_body_file::write(body, &path).expect("writes");
     (folder, path)
 }
 
@@ -40,14 +40,14 @@ fn names(structure: &Value, group: &str) -> Vec<String> {
 
 #[test]
 fn every_combination_of_groups_is_read_as_it_was_written() {
-    let schema: Value = serde_json::from_str(&store::format_schema()).expect("JSON");
+    let schema: Value = serde_json::from_str(&flex_body_file::format_schema()).expect("JSON");
     let validator = jsonschema::validator_for(&schema).expect("a schema");
     for body in bodies() {
         for groups in combinations() {
             let partial = with_groups(&body, groups);
             let (folder, path) = written(&partial);
-            assert_eq!(store::read(&path).unwrap_or_else(|e| panic!("{groups:?}: {e}")), partial);
-            let structure = store::structure(&path).expect("a structure");
+            assert_eq!(flex_body_file::read(&path).unwrap_or_else(|e| panic!("{groups:?}: {e}")), partial);
+            let structure = flex_body_file::structure(&path).expect("a structure");
             let errors: Vec<_> = validator.iter_errors(&structure).map(|e| e.to_string()).collect();
             assert!(errors.is_empty(), "{groups:?}: {errors:#?}");
             for place in ["invariants", "lumped/groups/row-sum"] {
@@ -68,7 +68,7 @@ fn every_combination_of_groups_is_read_as_it_was_written() {
                 assert!(["C1", "C2", "I0", "modal_mass"].iter().all(|name| there.iter().any(|n| n == name)));
             }
             let again = folder.path().join("again.flex.h5");
-            store::write(&store::read(&path).expect("read"), &again).expect("writes");
+            flex_body_file::write(&flex_body_file::read(&path).expect("read"), &again).expect("writes");
             assert!(std::fs::read(&path).expect("bytes") == std::fs::read(&again).expect("bytes"));
         }
     }
@@ -84,7 +84,7 @@ proptest! {
         let groups = combinations().nth(bits).expect("one of eight");
         let body = with_groups(&wild_body(seed, n, modes.min(3 * n), 0, 1), groups);
         let (_folder, path) = written(&body);
-        let read = store::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        let read = flex_body_file::read(&path).unwrap_or_else(|e| panic!("{e}"));
         prop_assert_eq!(fingerprint(&read), fingerprint(&body));
         prop_assert_eq!(&read, &body);
     }
@@ -98,12 +98,12 @@ fn bounds_and_limits_that_are_not_known_are_absent() {
     terms.reverse(); // A body has them in the order of the groups.
     let partial = body.reduced(&[0, 1, 2], Groups::NONE, terms).expect("a body");
     let (_folder, path) = written(&partial);
-    let structure = store::structure(&path).expect("a structure");
+    let structure = flex_body_file::structure(&path).expect("a structure");
     let attributes = structure.pointer("/groups/terms/attributes").expect("attributes");
     assert_eq!(attributes["W1"], "dropped");
     assert_eq!((attributes.get("W1_bound"), attributes.get("W1_limit")), (None, None));
     assert_eq!((&attributes["W2_bound"], &attributes["W2_tier"]), (&Value::from(1e-4), &Value::from(2)));
-    assert_eq!(store::read(&path).expect("read"), partial);
+    assert_eq!(flex_body_file::read(&path).expect("read"), partial);
 }
 
 /// Damages the file of a body without W1 and gives what the reader says.
@@ -112,7 +112,7 @@ fn refused(body: &FlexBody, damage: impl FnOnce(&hdf5::File)) -> String {
     let file = hdf5::File::open_rw(&path).expect("opens");
     damage(&file);
     file.close().expect("closes");
-    let error = store::read(&path).expect_err("the file contradicts itself");
+    let error = flex_body_file::read(&path).expect_err("the file contradicts itself");
     assert!(error.diagnostics().iter().all(|d| d.code() == Code::BodySchema), "{error}");
     error.to_string()
 }

@@ -3,11 +3,11 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::error::{Error, ExitCode};
-use flexbody::linalg::CscMatrix;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::{Error, ExitCode};
+use flexbody::base::units::UnitSystem;
 use flexbody::model::{Coupling, DofLabel, FeModel, NodeSet, Plausibility, RawModel, Reference};
-use flexbody::units::UnitSystem;
+use flexbody::numerics::linalg::CscMatrix;
 use std::collections::BTreeMap;
 use support::elements::{Kind, MassRule, Material};
 use support::general::raw_fixture;

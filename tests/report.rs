@@ -5,9 +5,9 @@ mod bodies;
 mod store_support;
 
 use bodies::{engine_mount, run_data};
-use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::flex_body::{FlexBody, Guarantee, Parts};
-use flexbody::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, identities};
+use flexbody::base::diagnostic::{Code, Diagnostic};
+use flexbody::body::flex_body::{FlexBody, Guarantee, Parts};
+use flexbody::body::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, identities};
 use flexbody::report::{
     Facts, Format, LumpedModes, RunData, diagnostics_json, identities_json, identities_text, render,
 };
@@ -41,7 +41,7 @@ fn line<'a>(text: &'a str, label: &str) -> &'a str {
 /// Compares with a file of the repository; FLEXBODY_BLESS=1 writes it instead.
 fn golden(name: &str, found: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
-    let found = found.replace(&flexbody::provenance::generator(), "flexbody VERSION");
+    let found = found.replace(&flexbody::base::provenance::generator(), "flexbody VERSION");
     if std::env::var_os("FLEXBODY_BLESS").is_some() {
         std::fs::write(&path, found).unwrap();
         return;
@@ -309,13 +309,14 @@ fn lumped_modes_say_how_far_frequencies_move_or_why_there_are_none() {
 #[test]
 fn assumed_units_and_lumped_input_are_not_passed_over() {
     let body = changed(|p| {
-        p.units = flexbody::units::UnitSystem::default();
-        p.source.mass_structure = flexbody::flex_body::MassStructure::Diagonal;
+        p.units = flexbody::base::units::UnitSystem::default();
+        p.source.mass_structure = flexbody::body::flex_body::MassStructure::Diagonal;
     });
     let summary = text(&body, &RunData::default());
     assert!(line(&summary, "body").contains("m, kg, s assumed, none stated"));
     assert!(line(&summary, "model").contains("DIAGONAL"));
-    let sized = changed(|p| p.units = flexbody::units::UnitSystem::parse("0.0254", "lb", "ms").unwrap());
+    let sized =
+        changed(|p| p.units = flexbody::base::units::UnitSystem::parse("0.0254", "lb", "ms").unwrap());
     assert!(line(&text(&sized, &RunData::default()), "inertia").ends_with("lb [0.0254 m]^2 (principal)"));
 }
 

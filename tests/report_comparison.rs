@@ -7,12 +7,12 @@ mod random;
 
 use bodies::{block, condensed, engine_mount, mesh, shapes};
 use faer::Mat;
-use flexbody::diagnostic::Code;
-use flexbody::flex_body::{FlexBody, Parts};
-use flexbody::invariants::{BodyFrame, Frame, choose_frame};
-use flexbody::linalg::{CscMatrix, SymmetricMatrix};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::{FlexBody, Parts};
+use flexbody::body::invariants::{BodyFrame, Frame, choose_frame};
+use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 use flexbody::report::{BodyComparison, Tolerances, compare, compare_common};
-use flexbody::units::UnitSystem;
 use nalgebra::Vector3;
 use random::Random;
 

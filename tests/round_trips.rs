@@ -3,13 +3,15 @@
 mod support;
 
 use faer::Mat;
-use flexbody::export::{ExportFormat, ExportOptions, FORMATS, Points, export};
-use flexbody::flex_body::FlexBody;
-use flexbody::foreign::{Adopted, Foreign, ForeignFormat, adopt, audit, find_foreign, recognise};
+use flexbody::base::provenance::SourceFile;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::{BodyFrame, Invariants, primary_differences};
+use flexbody::formats::export::{ExportFormat, ExportOptions, Points};
+use flexbody::formats::import::{Adopted, Foreign, ForeignFormat, adopt, audit};
+use flexbody::formats::{FORMATS, export};
+use flexbody::formats::{find_foreign, recognise};
 use flexbody::input::InputFile;
-use flexbody::invariants::{BodyFrame, Invariants, primary_differences};
 use flexbody::model::LoadKind;
-use flexbody::provenance::SourceFile;
 use std::path::Path;
 use support::flexible::fixture;
 
@@ -55,7 +57,7 @@ fn written(body: &FlexBody, format: &dyn ExportFormat, dialect: Option<&str>, fo
 
 fn taken(foreign: &Foreign) -> Adopted {
     let source = SourceFile::new("body", Path::new("body.file"), "0".repeat(64));
-    adopt(foreign, source, flexbody::units::UnitSystem::default()).expect("a body")
+    adopt(foreign, source, flexbody::base::units::UnitSystem::default()).expect("a body")
 }
 
 /// What no foreign format tells of a general mass: W0 beyond C1.
@@ -99,7 +101,7 @@ fn what_is_written_comes_back() {
                 complain("the missing coupling is not found".to_owned());
             }
             let Adopted { body: back, diagnostics } = taken(&foreign);
-            if diagnostics.iter().any(|d| d.code() == flexbody::diagnostic::Code::ForeignChanged) {
+            if diagnostics.iter().any(|d| d.code() == flexbody::base::diagnostic::Code::ForeignChanged) {
                 complain("the modes were changed".to_owned());
             }
             let (own, told) = (body.invariants(), back.invariants());

@@ -3,14 +3,14 @@
 #[path = "support/mod.rs"]
 mod support;
 
-use flexbody::dynamics::{Orientation, RotationVector};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::base::progress::SILENT;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::{Coupling, NodeSet, RawModel};
-use flexbody::progress::SILENT;
-use flexbody::scene::{Recording, Scene, read_scene, simulate};
-use flexbody::selection::select;
-use flexbody::trade::{Settings, Source, trade};
+use flexbody::motion::dynamics::{Orientation, RotationVector};
+use flexbody::motion::scene::{Recording, Scene, read_scene, simulate};
+use flexbody::study::selection::select;
+use flexbody::study::trade::{Settings, Source, trade};
 use nalgebra::Vector3;
 use std::fs;
 use support::elements::{Kind, MassRule, Material};
@@ -144,7 +144,8 @@ fn selections_and_studies_do_not_know_the_frame() {
         let selections: Vec<_> = selections.collect();
         for other in &selections[1..] {
             assert_eq!((other.groups, &other.modes), (selections[0].groups, &selections[0].modes), "{name}");
-            let worst = |one: &flexbody::selection::Selection| one.chosen.as_ref().expect("measured").worst;
+            let worst =
+                |one: &flexbody::study::selection::Selection| one.chosen.as_ref().expect("measured").worst;
             assert!((worst(other) - worst(&selections[0])).abs() < 1e-5, "{name}");
         }
     }

@@ -59,7 +59,7 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     let words = ["convert", &manifest, "--scene", "scene.toml", "-o", "small.flex.h5", "--quiet"];
     assert!(flexbody(place, &words).status.success());
     assert!(flexbody(place, &["check", "small.flex.h5"]).status.success());
-    let small = flexbody::store::read(place.join("small.flex.h5")).expect("a body");
+    let small = flexbody::formats::flex_body_file::read(place.join("small.flex.h5")).expect("a body");
     assert!(small.source().files.iter().any(|file| file.role == "scene" && file.name == "scene.toml"));
     assert_eq!(small.terms().len(), 3);
     let again = flexbody(place, &["select", &manifest, "--scene", "scene.toml", "--json"]);

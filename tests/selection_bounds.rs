@@ -2,10 +2,12 @@
 
 mod support;
 
-use flexbody::dynamics::{BodyPoint, Terms};
-use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::scene::{Measure, OutputErrors, Point, Recording, Scene, Stage, Trace, simulate, trace_at};
-use flexbody::selection::{Bench, Norms, Situation};
+use flexbody::body::flex_body::{FlexBody, Groups};
+use flexbody::motion::dynamics::{BodyPoint, Terms};
+use flexbody::motion::scene::{
+    Measure, OutputErrors, Point, Recording, Scene, Stage, Trace, simulate, trace_at,
+};
+use flexbody::study::selection::{Bench, Norms, Situation};
 use nalgebra::{DMatrix, DVector, Vector3};
 use proptest::prelude::*;
 use support::equations::ReducedBody;

@@ -2,14 +2,14 @@
 
 mod support;
 
-use flexbody::dynamics::{EquationsOfMotion, Terms};
-use flexbody::flex_body::{FlexBody, Groups};
-use flexbody::progress::SILENT;
-use flexbody::scene::{
+use flexbody::base::progress::SILENT;
+use flexbody::body::flex_body::{FlexBody, Groups};
+use flexbody::motion::dynamics::{EquationsOfMotion, Terms};
+use flexbody::motion::scene::{
     AttachmentKind, Initial, Measure, MotionRange, Range, Requirements, Run, Scene, Scheme, Tolerance,
     simulate, trace, trace_at,
 };
-use flexbody::selection::{Selection, select};
+use flexbody::study::selection::{Selection, select};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use support::scenes::{bodies, doing, seeded, some_modes};
@@ -66,7 +66,7 @@ proptest! {
         scene.requirements.tolerance =
             Tolerance { attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None };
         let own = match &scene.spin {
-            Some(spin) => flexbody::selection::Variation::of(&spin.rate, scene.run.duration.expect("given")).largest,
+            Some(spin) => flexbody::study::selection::Variation::of(&spin.rate, scene.run.duration.expect("given")).largest,
             None => scene.initial.angular_velocity.norm(),
         };
         scene.requirements.motion.angular_velocity = range.map(|range| Range::Any(range * own));

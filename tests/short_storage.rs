@@ -3,18 +3,18 @@
 mod store_support;
 mod support;
 
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::{FlexBody, Groups, Storage};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::{FlexBody, Groups, Storage};
+use flexbody::body::invariants::{BodyFrame, CauchySchwarz, primary_differences};
+use flexbody::body::verification::verify;
+use flexbody::formats::flex_body_file;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::invariants::{BodyFrame, CauchySchwarz, primary_differences};
 use flexbody::model::FeModel;
-use flexbody::progress::SILENT;
-use flexbody::store;
-use flexbody::verification::verify;
+use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
+use flexbody::numerics::eigen::Wanted;
 use hdf5_metno as hdf5;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -44,13 +44,13 @@ fn converted(name: &str, modes: usize) -> (FeModel, FlexBody) {
 fn written(body: &FlexBody) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");
-    store::write(body, &path).expect("writes");
+    flex_body_file::write(body, &path).expect("writes");
     (folder, path)
 }
 
 #[test]
 fn rounded_bodies_are_read_bit_for_bit_and_pass_their_checks() {
-    let schema: Value = serde_json::from_str(&store::format_schema()).expect("JSON");
+    let schema: Value = serde_json::from_str(&flex_body_file::format_schema()).expect("JSON");
     let validator = jsonschema::validator_for(&schema).expect("a schema");
     for (name, modes) in
         [("connecting_rod", 12), ("shell_folded", 8), ("hex8_bubbles", 6), ("plane_frame", 6)]
@@ -66,8 +66,11 @@ fn rounded_bodies_are_read_bit_for_bit_and_pass_their_checks() {
         for groups in combinations() {
             let partial = with_groups(&short, groups);
             let (_folder, path) = written(&partial);
-            assert_eq!(store::read(&path).unwrap_or_else(|e| panic!("{name}: {groups:?}: {e}")), partial);
-            let structure = store::structure(&path).expect("a structure");
+            assert_eq!(
+                flex_body_file::read(&path).unwrap_or_else(|e| panic!("{name}: {groups:?}: {e}")),
+                partial
+            );
+            let structure = flex_body_file::structure(&path).expect("a structure");
             let errors: Vec<_> = validator.iter_errors(&structure).map(|e| e.to_string()).collect();
             assert!(errors.is_empty(), "{name}: {groups:?}: {errors:#?}");
             assert_eq!(structure["attributes"]["storage"], "f32");
@@ -142,7 +145,7 @@ fn refused(body: &FlexBody, damage: impl FnOnce(&hdf5::File)) -> String {
     let file = hdf5::File::open_rw(&path).expect("opens");
     damage(&file);
     file.close().expect("closes");
-    store::read(&path).expect_err("the file contradicts itself").to_string()
+    flex_body_file::read(&path).expect_err("the file contradicts itself").to_string()
 }
 
 fn say(file: &hdf5::File, storage: &str) {

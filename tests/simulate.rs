@@ -2,10 +2,10 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::Terms;
-use flexbody::scene::{read_scene, simulate};
-use flexbody::store;
+use flexbody::base::diagnostic::Code;
+use flexbody::formats::flex_body_file;
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{read_scene, simulate};
 use hdf5_metno as hdf5;
 use serde_json::Value;
 use std::fs;
@@ -86,7 +86,7 @@ fn the_gyroscope_senses_its_rate() {
     let steady = text.replace("rate = { to = 8.7e-6, duration = 500 }", "rate = 8.7e-6");
     assert_ne!(steady, text);
     scene(folder.path(), &steady);
-    let body = store::read(folder.path().join("body.flex.h5")).expect("a body");
+    let body = flex_body_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let described = read_scene(folder.path().join("scene.toml")).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     let (drive, sense) = (1, 2);
@@ -128,13 +128,13 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
         assert!(a == b, "{file} differs between runs");
     }
 
-    let body = store::read(place.join("body.flex.h5")).expect("a body");
+    let body = flex_body_file::read(place.join("body.flex.h5")).expect("a body");
     let described = read_scene(place.join("scene.toml")).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     assert_eq!(recording.time.len(), 41);
     let file = hdf5::File::open(first.path().join("motion.h5")).expect("HDF5");
     let array = |name: &str| file.dataset(name).expect(name).read_raw::<f64>().expect("numbers");
-    let flat = |of: fn(&flexbody::dynamics::Configuration) -> Vec<f64>| -> Vec<f64> {
+    let flat = |of: fn(&flexbody::motion::dynamics::Configuration) -> Vec<f64>| -> Vec<f64> {
         recording.states.iter().flat_map(of).collect()
     };
     assert_eq!(array("time"), recording.time);
@@ -171,7 +171,7 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
 fn prescribed_spin_takes_the_torque_of_a_rigid_body_and_that_of_the_load() {
     // So slow that the body stays rigid: the torque is I alpha, and that which holds the load.
     let folder = folder_with("connecting_rod", 4);
-    let body = store::read(folder.path().join("body.flex.h5")).expect("a body");
+    let body = flex_body_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let inertia = body.invariants().inertia()[(2, 2)];
     scene(
         folder.path(),
@@ -204,7 +204,7 @@ fn plane_bodies_move_in_their_plane() {
             assert_eq!(row[column(name)], 0.0, "{name}");
         }
     }
-    let body = store::read(folder.path().join("body.flex.h5")).expect("a body");
+    let body = flex_body_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let momentum = |row: &[f64]| row[column("linear_momentum_y")];
     let impulse = momentum(rows.last().unwrap()) - momentum(&rows[0]);
     let weight = 9.81 * body.invariants().mass;
@@ -227,7 +227,7 @@ fn terms_are_those_of_the_scene() {
 fn a_recording_that_does_not_fit_is_refused_before_any_work() {
     let folder = folder_with("bracket_hex20", 2);
     scene(folder.path(), "[run]\nduration = 1e-3\noutputs = 1000000\n");
-    let body = store::read(folder.path().join("body.flex.h5")).expect("a body");
+    let body = flex_body_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let described = read_scene(folder.path().join("scene.toml")).expect("a scene");
     let error =
         simulate(&body, &described, Some(1_000_000_000), |_| ()).expect_err("a gigabyte is not enough");

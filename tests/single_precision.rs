@@ -3,15 +3,15 @@
 #[path = "support/mod.rs"]
 mod support;
 
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{Conversion, ConvertSettings, convert};
-use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::eigen::{FactorChoice, Method, Precision, Wanted};
-use flexbody::error::{ExitCode, Result};
+use flexbody::base::diagnostic::{Code, Diagnostic};
+use flexbody::base::error::{ExitCode, Result};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::invariants::error_norms;
 use flexbody::input::{ModelFiles, read_model};
-use flexbody::invariants::error_norms;
 use flexbody::model::{FeModel, check};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{FactorChoice, Method, Precision, Wanted};
 use std::path::{Path, PathBuf};
 use support::elements::{Kind, MassRule, Material};
 use support::mesh::Mesh;

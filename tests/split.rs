@@ -2,15 +2,15 @@
 
 mod support;
 
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::Wanted;
-use flexbody::flex_body::FlexBody;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::formats::flex_body_file;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::linalg::CscMatrix;
 use flexbody::model::{BodyNumber, Damping, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel};
-use flexbody::progress::SILENT;
-use flexbody::store;
+use flexbody::numerics::eigen::Wanted;
+use flexbody::numerics::linalg::CscMatrix;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -226,7 +226,7 @@ fn every_body_gets_files_of_its_own() {
     let schema = jsonschema::validator_for(&schema).unwrap();
     for (b, raw) in bodies.iter().enumerate() {
         let name = format!("pair-{}.flex.h5", b + 1);
-        let body = store::read(folder.path().join(&name)).unwrap();
+        let body = flex_body_file::read(folder.path().join(&name)).unwrap();
         assert_eq!(body.source().name, format!("pair-{}", b + 1));
         assert_eq!(body.source().number, Some(BodyNumber { number: b + 1, of: 2 }));
         let sets: Vec<_> = body.interfaces().iter().map(|i| (i.name.clone(), i.nodes.clone())).collect();
@@ -234,7 +234,7 @@ fn every_body_gets_files_of_its_own() {
         let own = files(&alone(&bodies, b));
         let run = flexbody(own.path(), "convert model.toml -o own.h5 --modes 5");
         assert_eq!(run.status.code(), Some(0));
-        assert_same(&body, &store::read(own.path().join("own.h5")).unwrap());
+        assert_same(&body, &flex_body_file::read(own.path().join("own.h5")).unwrap());
 
         let report = &reports["results"]["bodies"][b];
         assert!(schema.is_valid(report));
@@ -290,7 +290,7 @@ fn a_single_body_is_number_one_of_one_and_numbered_outputs_do_not_hit_inputs() {
     let folder = files(&block(2));
     let run = flexbody(folder.path(), "convert model.toml -o b.h5 --split --modes 2 --quiet");
     assert_eq!(run.status.code(), Some(0));
-    assert_eq!(store::read(folder.path().join("b-1.h5")).unwrap().source().number.unwrap().of, 1);
+    assert_eq!(flex_body_file::read(folder.path().join("b-1.h5")).unwrap().source().number.unwrap().of, 1);
 
     let folder = files(&interleaved(&[block(2), block(3)]));
     std::fs::rename(folder.path().join("K.mtx"), folder.path().join("b-2.h5")).unwrap();

@@ -2,10 +2,10 @@
 
 mod store_support;
 
-use flexbody::diagnostic::Code;
-use flexbody::flex_body::{FlexBody, Parts};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::{FlexBody, Parts};
 use flexbody::model::Coupling;
-use flexbody::units::UnitSystem;
 use store_support::{Random, body, parts};
 
 fn refused(change: impl FnOnce(&mut Parts)) -> Vec<String> {
@@ -128,7 +128,7 @@ fn names_are_unique_and_can_be_stored() {
 
 #[test]
 fn loads_of_geometric_stiffness_are_those_that_a_file_can_name() {
-    use flexbody::flex_body::LoadKind::{Force, Named, Spin};
+    use flexbody::body::flex_body::LoadKind::{Force, Named, Spin};
     // The parts have a force and a spin.
     let load = |p: &mut Parts, kind, component| {
         (p.geometric_stiffness[0].load.kind, p.geometric_stiffness[0].load.component) = (kind, component);

@@ -3,9 +3,9 @@
 mod store_support;
 
 use faer::Mat;
-use flexbody::diagnostic::Code;
-use flexbody::flex_body::FlexBody;
-use flexbody::store;
+use flexbody::base::diagnostic::Code;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::formats::flex_body_file;
 use hdf5::types::{FixedUnicode, VarLenUnicode};
 use hdf5_metno as hdf5;
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ fn sample() -> FlexBody {
 fn valid() -> Case {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
-    store::write(&sample(), &path).unwrap();
+    flex_body_file::write(&sample(), &path).unwrap();
     Case { _folder: folder, path }
 }
 
@@ -41,7 +41,7 @@ fn changed(change: impl FnOnce(&hdf5::File)) -> Case {
 
 /// What the refusal of the changed content says.
 fn refusal(change: impl FnOnce(&hdf5::File)) -> String {
-    let error = store::read(changed(change).path).expect_err("the file was changed");
+    let error = flex_body_file::read(changed(change).path).expect_err("the file was changed");
     assert_eq!(error.diagnostics().len(), 1, "{error}");
     assert_eq!(error.diagnostics()[0].code(), Code::BodyChanged, "{error}");
     error.diagnostics()[0].message().to_owned()
@@ -144,7 +144,7 @@ fn a_file_that_was_changed_and_sealed_is_read() {
         f.new_dataset::<i32>().shape([2]).create("stress/first").unwrap().write_raw(&[1, 2]).unwrap();
         seal(f);
     });
-    let read = store::read(case.path).expect("its digests are its own");
+    let read = flex_body_file::read(case.path).expect("its digests are its own");
     assert_eq!(read.modes().damping_ratio[1], 0.5 * sample().modes().damping_ratio[1]);
 }
 
@@ -170,7 +170,7 @@ fn the_layout_of_the_file_does_not_matter() {
         f.delete_attr("dimension").unwrap();
         f.new_attr::<i64>().create("dimension").unwrap().write_scalar(&value).unwrap();
     });
-    let read = store::read(&case.path).expect("the content is the same");
+    let read = flex_body_file::read(&case.path).expect("the content is the same");
     assert_eq!(fingerprint(&read), fingerprint(&sample()));
 }
 
@@ -184,10 +184,10 @@ fn files_of_older_versions_are_read_with_a_note() {
             f.group("/certificate").unwrap().delete_attr(name).unwrap();
         }
     });
-    let (body, notes) = store::read_with_notes(&case.path).expect("an older file");
+    let (body, notes) = flex_body_file::read_with_notes(&case.path).expect("an older file");
     assert_eq!((body.certificate().eigenvalue_rounding, body.certificate().inertia_rounding), (0.0, 0.0));
     assert_eq!(notes.iter().map(|note| note.code()).collect::<Vec<_>>(), [Code::BodyWithoutDigest]);
     assert!(notes[0].message().contains("1.3"), "{}", notes[0].message());
-    let (_, notes) = store::read_with_notes(valid().path).expect("a new file");
+    let (_, notes) = flex_body_file::read_with_notes(valid().path).expect("a new file");
     assert!(notes.is_empty());
 }

@@ -3,10 +3,10 @@
 mod store_support;
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::error::ExitCode;
-use flexbody::output::OutputSlot;
-use flexbody::store;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::ExitCode;
+use flexbody::base::output::OutputSlot;
+use flexbody::formats::flex_body_file;
 use store_support::body;
 use support::program::members;
 
@@ -14,10 +14,10 @@ use support::program::members;
 fn a_dropped_slot_leaves_nothing_and_keeps_the_old_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
-    drop(store::prepare_output(&path).unwrap());
+    drop(flex_body_file::prepare_output(&path).unwrap());
     assert!(members(folder.path()).is_empty());
     std::fs::write(&path, "old").unwrap();
-    let slot = store::prepare_output(&path).unwrap();
+    let slot = flex_body_file::prepare_output(&path).unwrap();
     std::fs::write(slot.temporary(), "half of the n").unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "old", "replaced before the commit");
     drop(slot);
@@ -30,9 +30,9 @@ fn a_commit_replaces_the_old_file_and_leaves_no_other() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
     std::fs::write(&path, "old").unwrap();
-    store::write(&body(1, 3, 2, 0, 0), &path).unwrap();
+    flex_body_file::write(&body(1, 3, 2, 0, 0), &path).unwrap();
     assert_eq!(members(folder.path()), ["body.flex.h5"]);
-    assert_eq!(store::read(&path).unwrap(), body(1, 3, 2, 0, 0));
+    assert_eq!(flex_body_file::read(&path).unwrap(), body(1, 3, 2, 0, 0));
     let report = folder.path().join("report.txt");
     OutputSlot::prepare(&report).unwrap().write(b"ten seconds").unwrap();
     assert_eq!(std::fs::read(&report).unwrap(), b"ten seconds");
@@ -52,11 +52,11 @@ fn a_shorter_text_leaves_nothing_of_what_the_slot_held() {
 #[test]
 fn a_missing_folder_is_known_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
-    let error = store::prepare_output(folder.path().join("no/such/body.flex.h5")).unwrap_err();
+    let error = flex_body_file::prepare_output(folder.path().join("no/such/body.flex.h5")).unwrap_err();
     assert!(error.has(Code::OutputFolderMissing), "{error}");
     assert_eq!(error.exit_code(), ExitCode::BadInput);
     std::fs::write(folder.path().join("file"), "").unwrap();
-    let error = store::prepare_output(folder.path().join("file/body.flex.h5")).unwrap_err();
+    let error = flex_body_file::prepare_output(folder.path().join("file/body.flex.h5")).unwrap_err();
     assert!(error.has(Code::OutputFolderMissing) || error.has(Code::OutputUnwritable), "{error}");
 }
 
@@ -71,7 +71,7 @@ fn folders_and_empty_names_are_no_outputs() {
         folder.path().join(""),
         folder.path().join("new/"),
     ] {
-        let error = store::prepare_output(&path).unwrap_err();
+        let error = flex_body_file::prepare_output(&path).unwrap_err();
         assert!(error.has(Code::OutputNotFile), "{path:?}: {error}");
         assert_eq!(error.exit_code(), ExitCode::BadInput);
     }
@@ -85,7 +85,7 @@ mod unix {
 
     #[test]
     fn devices_are_not_replaced() {
-        let error = store::prepare_output("/dev/null").unwrap_err();
+        let error = flex_body_file::prepare_output("/dev/null").unwrap_err();
         assert!(error.has(Code::OutputNotFile), "{error}");
         assert!(error.to_string().contains("not a regular file"), "{error}");
     }
@@ -96,7 +96,7 @@ mod unix {
         let path = folder.path().join("body.flex.h5");
         std::fs::write(&path, "reference").unwrap();
         std::fs::set_permissions(&path, PermissionsExt::from_mode(0o444)).unwrap();
-        let error = store::prepare_output(&path).unwrap_err();
+        let error = flex_body_file::prepare_output(&path).unwrap_err();
         assert!(error.has(Code::OutputUnwritable), "{error}");
         assert_eq!(members(folder.path()), ["body.flex.h5"]);
     }
@@ -173,7 +173,7 @@ mod unix {
         let folder = tempfile::tempdir().unwrap();
         let odd = folder.path().join(std::ffi::OsStr::from_bytes(b"caf\xe9"));
         std::fs::create_dir(&odd).unwrap();
-        let error = store::prepare_output(odd.join("body.flex.h5")).unwrap_err();
+        let error = flex_body_file::prepare_output(odd.join("body.flex.h5")).unwrap_err();
         assert!(error.has(Code::OutputUnwritable) && error.to_string().contains("UTF-8"), "{error}");
         OutputSlot::prepare(odd.join("report.txt")).unwrap().write(b"fine").unwrap();
         assert_eq!(members(&odd), ["report.txt"]);
@@ -196,9 +196,9 @@ fn a_lock_that_another_process_holds_does_not_keep_a_body_from_being_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
     let written = body(3, 4, 2, 1, 1);
-    store::write(&written, &path).unwrap();
+    flex_body_file::write(&written, &path).unwrap();
     let locked = std::fs::File::open(&path).unwrap();
     locked.lock().unwrap();
-    assert_eq!(store::read(&path).unwrap(), written);
-    assert_eq!(store::validate(&path), vec![]);
+    assert_eq!(flex_body_file::read(&path).unwrap(), written);
+    assert_eq!(flex_body_file::validate(&path), vec![]);
 }

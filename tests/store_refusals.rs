@@ -2,10 +2,10 @@
 
 mod store_support;
 
-use flexbody::diagnostic::Code;
-use flexbody::error::Error;
-use flexbody::flex_body::FlexBody;
-use flexbody::store;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::Error;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::formats::flex_body_file;
 use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::{Path, PathBuf};
@@ -24,13 +24,13 @@ fn valid() -> Case {
 fn stored(body: &FlexBody) -> Case {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
-    store::write(body, &path).unwrap();
+    flex_body_file::write(body, &path).unwrap();
     Case { _folder: folder, path }
 }
 
 fn refusal(path: &Path) -> Error {
-    let error = store::read(path).expect_err("the file is broken");
-    assert_eq!(store::validate(path), error.diagnostics(), "validate and read say the same");
+    let error = flex_body_file::read(path).expect_err("the file is broken");
+    assert_eq!(flex_body_file::validate(path), error.diagnostics(), "validate and read say the same");
     assert!(error.diagnostics().iter().all(|d| d.file() == Some(path)), "{error}");
     error
 }
@@ -153,7 +153,7 @@ fn a_newer_format_is_refused_by_naming_the_program_that_wrote_it() {
 #[test]
 fn a_newer_minor_with_unknown_entries_is_read() {
     let case = valid();
-    let before = store::read(&case.path).unwrap();
+    let before = flex_body_file::read(&case.path).unwrap();
     let file = hdf5::File::open_rw(&case.path).unwrap();
     set_int(&file, "/", "format_minor", 7);
     file.create_group("stress").unwrap();
@@ -161,7 +161,7 @@ fn a_newer_minor_with_unknown_entries_is_read() {
     set_text(&file.group("source").unwrap(), "comment", "checked by hand");
     seal(&file);
     file.close().unwrap();
-    assert_eq!(store::read(&case.path).unwrap(), before);
+    assert_eq!(flex_body_file::read(&case.path).unwrap(), before);
 }
 
 #[test]
@@ -511,7 +511,7 @@ fn every_truncation_is_refused() {
 fn damaged_bytes_never_panic_and_never_change_sizes() {
     let case = valid();
     let bytes = std::fs::read(&case.path).unwrap();
-    let whole = store::read(&case.path).unwrap();
+    let whole = flex_body_file::read(&case.path).unwrap();
     let mut random = Random::new(2024);
     let mut refused = 0;
     for _ in 0..400 {
@@ -526,7 +526,7 @@ fn damaged_bytes_never_panic_and_never_change_sizes() {
             }
         }
         std::fs::write(&case.path, &damaged).unwrap();
-        match store::read(&case.path) {
+        match flex_body_file::read(&case.path) {
             // HDF5 keeps no checksum of plain numbers, the digests do: unused bytes may differ.
             Ok(read) => assert_eq!(fingerprint(&read), fingerprint(&whole)),
             Err(_) => refused += 1,

@@ -2,7 +2,7 @@
 
 mod store_support;
 
-use flexbody::store;
+use flexbody::formats::flex_body_file;
 use proptest::prelude::*;
 use store_support::{body, fingerprint, wild_body};
 
@@ -16,11 +16,11 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("body.flex.h5");
         let written = wild_body(seed, n, modes.min(3 * n), schemes, interfaces);
-        store::write(&written, &path).unwrap();
-        let read = store::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        flex_body_file::write(&written, &path).unwrap();
+        let read = flex_body_file::read(&path).unwrap_or_else(|e| panic!("{e}"));
         prop_assert_eq!(fingerprint(&read), fingerprint(&written));
         prop_assert_eq!(&read, &written);
-        prop_assert_eq!(store::validate(&path), vec![]);
+        prop_assert_eq!(flex_body_file::validate(&path), vec![]);
     }
 }
 
@@ -30,10 +30,10 @@ fn equal_bodies_are_equal_bytes_whatever_the_time_and_the_path() {
     std::fs::create_dir(folder.path().join("elsewhere")).unwrap();
     let (a, b) = (folder.path().join("a.flex.h5"), folder.path().join("elsewhere/another-name.flex.h5"));
     let body = body(7, 9, 8, 3, 3);
-    store::write(&body, &a).unwrap();
+    flex_body_file::write(&body, &a).unwrap();
     // Time stamps of HDF5 have a resolution of one second.
     std::thread::sleep(std::time::Duration::from_millis(1100));
-    std::thread::scope(|s| s.spawn(|| store::write(&body, &b).unwrap()).join().unwrap());
+    std::thread::scope(|s| s.spawn(|| flex_body_file::write(&body, &b).unwrap()).join().unwrap());
     assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap());
 }
 
@@ -41,7 +41,7 @@ fn equal_bodies_are_equal_bytes_whatever_the_time_and_the_path() {
 fn a_body_read_and_written_again_is_the_same_file() {
     let folder = tempfile::tempdir().unwrap();
     let (a, b) = (folder.path().join("a.flex.h5"), folder.path().join("b.flex.h5"));
-    store::write(&body(11, 5, 4, 2, 2), &a).unwrap();
-    store::write(&store::read(&a).unwrap(), &b).unwrap();
+    flex_body_file::write(&body(11, 5, 4, 2, 2), &a).unwrap();
+    flex_body_file::write(&flex_body_file::read(&a).unwrap(), &b).unwrap();
     assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap());
 }

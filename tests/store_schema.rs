@@ -2,19 +2,19 @@
 
 mod store_support;
 
-use flexbody::store;
+use flexbody::formats::flex_body_file;
 use serde_json::Value;
 use store_support::{body, wild_body};
 
-fn structure_of(body: &flexbody::flex_body::FlexBody) -> Value {
+fn structure_of(body: &flexbody::body::flex_body::FlexBody) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
-    store::write(body, &path).unwrap();
-    store::structure(&path).unwrap()
+    flex_body_file::write(body, &path).unwrap();
+    flex_body_file::structure(&path).unwrap()
 }
 
 fn validator() -> jsonschema::Validator {
-    let schema: Value = serde_json::from_str(&store::format_schema()).unwrap();
+    let schema: Value = serde_json::from_str(&flex_body_file::format_schema()).unwrap();
     jsonschema::draft202012::meta::validate(&schema).expect("the schema is a schema");
     jsonschema::validator_for(&schema).unwrap()
 }
@@ -92,15 +92,15 @@ fn constants_and_shapes_are_checked() {
 fn groups_that_contain_themselves_end() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.flex.h5");
-    store::write(&body(1, 3, 2, 1, 1), &path).unwrap();
+    flex_body_file::write(&body(1, 3, 2, 1, 1), &path).unwrap();
     let file = hdf5_metno::File::open_rw(&path).unwrap();
     for i in 0..20 {
         file.link_hard("/terms", &format!("terms/again{i}")).unwrap();
     }
     file.close().unwrap();
-    let error = store::read(&path).unwrap_err();
+    let error = flex_body_file::read(&path).unwrap_err();
     assert!(error.to_string().contains("no flex-body file has such an entry"), "{error}");
-    let error = store::structure(&path).unwrap_err();
+    let error = flex_body_file::structure(&path).unwrap_err();
     assert!(error.to_string().contains("more than 20000 members"), "{error}");
 }
 

@@ -1,16 +1,16 @@
 //! `flexbody convert --scene`: the file holds what the scene needs, says why, and nothing is computed that bounds rule out before.
 
-use flexbody::basis::ModeSettings;
-use flexbody::convert::ConvertSettings;
-use flexbody::eigen::{Resume, Wanted};
-use flexbody::flex_body::{Group, Groups};
+use flexbody::base::progress::SILENT;
+use flexbody::base::provenance::{SourceFile, sha256_hex};
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::ConvertSettings;
+use flexbody::body::flex_body::{Group, Groups};
+use flexbody::formats::flex_body_file;
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::FeModel;
-use flexbody::progress::SILENT;
-use flexbody::provenance::{SourceFile, sha256_hex};
-use flexbody::scene::read_scene;
-use flexbody::store;
-use flexbody::tailoring::{Tailoring, convert_for_scene};
+use flexbody::motion::scene::read_scene;
+use flexbody::numerics::eigen::{Resume, Wanted};
+use flexbody::study::tailoring::{Tailoring, convert_for_scene};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -86,7 +86,7 @@ fn files_hold_what_is_selected_and_say_why() {
         let check = ["check", "one.flex.h5", "--against", model.to_str().expect("a path")];
         flexbody(folder.path(), &check);
 
-        let body = store::read(folder.path().join("one.flex.h5")).expect("a body");
+        let body = flex_body_file::read(folder.path().join("one.flex.h5")).expect("a body");
         assert_eq!(body.groups() == Groups::NONE, groups_dropped);
         let invariants = body.invariants();
         let held = [invariants.w1().is_some(), invariants.w2().is_some(), invariants.w3().is_some()];

@@ -2,14 +2,14 @@
 
 mod support;
 
-use flexbody::diagnostic::Code;
-use flexbody::dynamics::Terms;
-use flexbody::flex_body::{FlexBody, Groups, Storage};
-use flexbody::invariants::BodyFrame;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::flex_body::{FlexBody, Groups, Storage};
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::FeModel;
-use flexbody::progress::SILENT;
-use flexbody::scene::{Axes, Initial, ModeStart, Run, Scene, Scheme, simulate};
-use flexbody::trade::{
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{Axes, Initial, ModeStart, Run, Scene, Scheme, simulate};
+use flexbody::study::trade::{
     Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
 };
 use nalgebra::Vector3;
@@ -290,7 +290,7 @@ fn the_program_writes_what_its_schema_says() {
     let manifest = manifest.to_str().expect("a path");
     let made = flexbody(place, &["convert", manifest, "--modes", "4", "-o", "body.flex.h5", "--quiet"]);
     assert!(made.status.success());
-    let body = flexbody::store::read(place.join("body.flex.h5")).expect("a body");
+    let body = flexbody::formats::flex_body_file::read(place.join("body.flex.h5")).expect("a body");
     let period = std::f64::consts::TAU / first_rate(&body);
     let scene = |more: &str| {
         let text = format!(

@@ -1,11 +1,11 @@
 //! The work of the eigen-solver on the fixture models, counted: a slower algorithm fails here without any clock.
 //! `FLEXBODY_BLESS=1 cargo test --test work_counters` writes the table after a change that is meant.
 
-use flexbody::basis::{ModalBasis, ModeSettings, free_surface};
-use flexbody::eigen::{Accuracy, Method, Wanted};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{ModalBasis, ModeSettings, free_surface};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::FeModel;
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{Accuracy, Method, Wanted};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

@@ -3,15 +3,16 @@
 use super::arguments::{ConvertArguments, StorageName};
 use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
-use crate::foreign::{adopt, find_foreign};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::base::provenance::SourceFile;
+use crate::body::verification::accept;
+use crate::formats::find_foreign;
+use crate::formats::flex_body_file;
+use crate::formats::import::adopt;
 use crate::input::{InputFile, parse_units};
-use crate::output::OutputSlot;
-use crate::provenance::SourceFile;
 use crate::report::{Facts, Format, RunData, render};
-use crate::store;
-use crate::verification::accept;
 
 pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let format = find_foreign(from)?;
@@ -23,7 +24,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let outputs = std::iter::once(&arguments.output).chain(&arguments.report);
     refuse_replacing(std::iter::once(path), outputs)?;
-    let slot = store::prepare_output(&arguments.output)?;
+    let slot = flex_body_file::prepare_output(&arguments.output)?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
 
     let file = InputFile::open(path)?;
@@ -34,7 +35,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     }
     accept(&adopted.body)?;
     refuse_warnings(arguments.printing, &adopted.diagnostics)?;
-    store::fill_slot(&adopted.body, &slot)?;
+    flex_body_file::fill_slot(&adopted.body, &slot)?;
     let run = RunData { diagnostics: adopted.diagnostics, ..RunData::default() };
     let facts = Facts::new(&adopted.body, &run);
     for (slot, format) in reports.iter().zip(formats) {

@@ -1,7 +1,8 @@
 //! What can be said on the command line.
 
-use crate::export::{ExportFormat, FORMATS};
-use crate::foreign::FOREIGN_FORMATS;
+use crate::formats::FOREIGN_FORMATS;
+use crate::formats::FORMATS;
+use crate::formats::export::ExportFormat;
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;

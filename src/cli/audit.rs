@@ -2,8 +2,9 @@
 
 use super::arguments::AuditArguments;
 use super::output::Outcome;
-use crate::error::Result;
-use crate::foreign::{audit, find_foreign, recognise};
+use crate::base::error::Result;
+use crate::formats::import::audit;
+use crate::formats::{find_foreign, recognise};
 use crate::input::InputFile;
 use crate::report::{audit_json, audit_text};
 

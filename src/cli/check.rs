@@ -2,17 +2,17 @@
 
 use super::arguments::CheckArguments;
 use super::output::Outcome;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
-use crate::flex_body::FlexBody;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::body::flex_body::FlexBody;
+use crate::body::verification::{changed_sources, own_identities, verify};
+use crate::formats::flex_body_file;
 use crate::input::{read_manifest, read_model};
 use crate::model::{FeModel, RawModel};
 use crate::report::{dropped_text, identities_json, identities_text};
-use crate::store;
-use crate::verification::{changed_sources, own_identities, verify};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
-    let (body, mut diagnostics) = store::read_with_notes(&arguments.body)?;
+    let (body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     let mut checks = own_identities(&body);
     if let Some(manifest) = &arguments.against {
         let model = model_of(&body, read_model(&read_manifest(manifest)?)?)?;

@@ -1,11 +1,11 @@
 //! `--checkpoint FILE`: the search for modes starts where the file stands, and the file follows it.
 
-use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Resume, Snapshot};
-use crate::error::Result;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::formats::flex_body_file::{self, Checkpoint};
 use crate::input::ModelFiles;
 use crate::model::FeModel;
-use crate::store::{self, Checkpoint};
+use crate::numerics::eigen::{Resume, Snapshot};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -18,8 +18,8 @@ pub(super) struct CheckpointFile {
 impl CheckpointFile {
     /// Reads the file if there is one, and makes sure before the work that it can be written.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        drop(store::prepare_output(path)?);
-        let found = if path.exists() { Some(store::read_checkpoint(path)?) } else { None };
+        drop(flex_body_file::prepare_output(path)?);
+        let found = if path.exists() { Some(flex_body_file::read_checkpoint(path)?) } else { None };
         Ok(Self { path: path.to_path_buf(), found })
     }
 
@@ -62,8 +62,8 @@ impl ModelCheckpoint {
 
     /// Replaces the file. A run that took long is not ended by a checkpoint that cannot be written.
     pub(super) fn save(&self, snapshot: &Snapshot) {
-        let written = store::prepare_output(&self.path)
-            .and_then(|slot| store::write_checkpoint(snapshot, &self.model, slot));
+        let written = flex_body_file::prepare_output(&self.path)
+            .and_then(|slot| flex_body_file::write_checkpoint(snapshot, &self.model, slot));
         let failure = written.err().map(|error| {
             let message = error.diagnostics()[0].message();
             Diagnostic::new(Code::CheckpointUnwritten, format!("the checkpoint is not up to date: {message}"))

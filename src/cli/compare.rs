@@ -2,13 +2,13 @@
 
 use super::arguments::CompareArguments;
 use super::output::Outcome;
-use crate::error::Result;
+use crate::base::error::Result;
+use crate::formats::flex_body_file;
 use crate::report::{Tolerances, compare, compare_common};
-use crate::store;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
-    let (a, mut diagnostics) = store::read_with_notes(&arguments.a)?;
-    let (b, of_b) = store::read_with_notes(&arguments.b)?;
+    let (a, mut diagnostics) = flex_body_file::read_with_notes(&arguments.a)?;
+    let (b, of_b) = flex_body_file::read_with_notes(&arguments.b)?;
     diagnostics.extend(of_b);
     let usual = Tolerances::default();
     let tolerances = Tolerances {

@@ -7,27 +7,27 @@ use super::output::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::watcher::Watcher;
-use crate::basis::{
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::base::progress::Event;
+use crate::base::units::UnitSystem;
+use crate::body::basis::{
     BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
 };
-use crate::convert::{Conversion, ConvertSettings, Lumping, convert_for};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
-use crate::error::Result;
+use crate::body::convert::{Conversion, ConvertSettings, Lumping, convert_for};
+use crate::body::invariants::BodyFrame;
+use crate::body::verification::accept;
+use crate::formats::flex_body_file;
 use crate::input::{
     LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
 };
-use crate::invariants::BodyFrame;
 use crate::model::{CheckedModel, FeModel};
-use crate::output::OutputSlot;
-use crate::progress::Event;
+use crate::motion::scene::{Scene, read_scene};
+use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
-use crate::scene::{Scene, read_scene};
-use crate::selection::WantedResponses;
-use crate::store;
-use crate::tailoring::{Tailoring, convert_for_scene};
-use crate::units::UnitSystem;
-use crate::verification::accept;
+use crate::study::selection::WantedResponses;
+use crate::study::tailoring::{Tailoring, convert_for_scene};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -165,7 +165,7 @@ impl Job<'_> {
         }
         accept(&conversion.body)?;
         watcher.hear(Event::Phase("writing"));
-        store::fill_slot(&conversion.body, &reserved.body)?;
+        flex_body_file::fill_slot(&conversion.body, &reserved.body)?;
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
         let output = (places.body.display().to_string(), size);
         let phases = watcher.finish();

@@ -3,12 +3,13 @@
 use super::arguments::ExportArguments;
 use super::output::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
-use crate::export::{ExportOptions, Exported, Points, export, find_format};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::formats::export::{ExportOptions, Exported, Points};
+use crate::formats::flex_body_file;
+use crate::formats::{export, find_format};
 use crate::input::parse_units;
-use crate::output::OutputSlot;
-use crate::store;
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
@@ -23,7 +24,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     refuse_replacing(inputs.into_iter(), std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
-    let (mut body, mut diagnostics) = store::read_with_notes(&arguments.body)?;
+    let (mut body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     if let Some(units) = units {
         body = body.in_units(&units)?;
     }

@@ -2,13 +2,13 @@
 
 use super::arguments::InspectArguments;
 use super::output::Outcome;
-use crate::error::Result;
+use crate::base::error::Result;
+use crate::formats::flex_body_file;
 use crate::report::{Facts, Format, RunData, render};
-use crate::store;
 
 pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
     if arguments.structure {
-        let structure = format!("{:#}", store::structure(&arguments.body)?);
+        let structure = format!("{:#}", flex_body_file::structure(&arguments.body)?);
         return Ok(Outcome {
             text: structure.clone(),
             json: structure,
@@ -16,7 +16,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
             passed: true,
         });
     }
-    let (body, diagnostics) = store::read_with_notes(&arguments.body)?;
+    let (body, diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     let facts = Facts::new(&body, &RunData::default());
     let (text, json) = (render(&facts, Format::Text), render(&facts, Format::Json));
     Ok(Outcome { text, json, diagnostics, passed: true })

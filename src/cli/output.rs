@@ -3,8 +3,8 @@
 use super::arguments::{Arguments, Command, Printing};
 use super::resources::use_threads;
 use super::{audit, check, compare, convert, export, inspect, select, simulate, trade};
-use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::error::{Error, ExitCode, Result};
+use crate::base::diagnostic::{Code, Diagnostic, Severity};
+use crate::base::error::{Error, ExitCode, Result};
 use crate::report::output_json;
 use clap::{CommandFactory, Parser};
 use std::io::Write;

@@ -2,11 +2,11 @@
 
 use super::arguments::ConvertArguments;
 use super::checkpoint::CheckpointFile;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
-use crate::output::{OutputSlot, followed};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::{OutputSlot, followed};
+use crate::formats::flex_body_file;
 use crate::report::Format;
-use crate::store;
 use std::path::{Path, PathBuf};
 
 /// Output files of one body.
@@ -41,7 +41,7 @@ impl Places {
 
     pub(super) fn reserve(&self) -> Result<Reserved> {
         Ok(Reserved {
-            body: store::prepare_output(&self.body)?,
+            body: flex_body_file::prepare_output(&self.body)?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
             checkpoint: self.checkpoint.as_deref().map(CheckpointFile::open).transpose()?,
         })

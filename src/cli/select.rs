@@ -6,21 +6,21 @@ use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
-use crate::basis::{BasisChoice, FreeSurface, ModeSettings};
-use crate::convert::ConvertSettings;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::eigen::{Resume, Wanted};
-use crate::error::Result;
-use crate::flex_body::FlexBody;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::base::progress::{Event, Watch};
+use crate::body::basis::{BasisChoice, FreeSurface, ModeSettings};
+use crate::body::convert::ConvertSettings;
+use crate::body::flex_body::FlexBody;
+use crate::formats::flex_body_file;
 use crate::input::{read_manifest, read_model};
 use crate::model::{CheckedModel, FeModel};
-use crate::output::OutputSlot;
-use crate::progress::{Event, Watch};
+use crate::motion::scene::{Scene, read_scene};
+use crate::numerics::eigen::{Resume, Wanted};
 use crate::report::{Format, RunData, SelectionFacts};
-use crate::scene::{Scene, read_scene};
-use crate::selection::select;
-use crate::store;
-use crate::tailoring::Tailoring;
+use crate::study::selection::select;
+use crate::study::tailoring::Tailoring;
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
         converted(arguments, &scene, &watch)?
     } else {
         refuse_modes(arguments)?;
-        store::read_with_notes(&arguments.body)?
+        flex_body_file::read_with_notes(&arguments.body)?
     };
     let selection =
         select(&body, &scene, memory_left(None), &watch).map_err(|error| error.in_file(&arguments.scene))?;

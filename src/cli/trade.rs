@@ -5,17 +5,17 @@ use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
-use crate::basis::ModeSettings;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::base::progress::Event;
+use crate::body::basis::ModeSettings;
+use crate::formats::flex_body_file;
 use crate::input::{read_manifest, read_model};
 use crate::model::FeModel;
-use crate::output::OutputSlot;
-use crate::progress::Event;
+use crate::motion::scene::read_scene;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
-use crate::scene::read_scene;
-use crate::store;
-use crate::trade::{Settings, Source, conversions, trade};
+use crate::study::trade::{Settings, Source, conversions, trade};
 
 pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         diagnostics.extend(found);
         (Some(checked.model), sources)
     } else {
-        let (body, notes) = store::read_with_notes(&arguments.body)?;
+        let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
         diagnostics.extend(notes);
         (None, vec![Source::new("file", body, None)?])
     };

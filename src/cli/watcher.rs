@@ -1,7 +1,7 @@
 //! Progress on a terminal with the time that is left of each phase, and the time that each phase took.
 
 use super::resources::{cpu_seconds, has_thread};
-use crate::progress::Event;
+use crate::base::progress::Event;
 use crate::report::Phase;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;

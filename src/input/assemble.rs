@@ -2,10 +2,10 @@
 //! belong there in file order, so that the bits are the same for any number of tasks.
 
 use super::digits::significant_digits;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::{ColumnBlock, CscMatrix, split_columns};
-use crate::memory::or_go_without;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::memory::or_go_without;
 use crate::model::RawMatrix;
+use crate::numerics::linalg::{ColumnBlock, CscMatrix, split_columns};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::path::Path;

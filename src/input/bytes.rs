@@ -4,8 +4,8 @@
 // the file under it. We map input files for the length of one read and never write to them.
 #![allow(unsafe_code)]
 
-use crate::diagnostic::{Code, Diagnostic};
-use crate::provenance::Fingerprint;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::provenance::Fingerprint;
 use memmap2::Mmap;
 use std::fs::File;
 use std::io::ErrorKind;

@@ -1,6 +1,6 @@
 //! gzip and Zstandard around a text file, recognised by their first bytes whatever the file is called.
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use std::io::Read;
 use std::path::Path;
 

@@ -2,8 +2,8 @@
 
 use super::compression::Compression;
 use super::reader::{MatrixRole, MatrixSource, Reader};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
 use crate::model::RawMatrix;
 use hdf5_metno::{File, Group, LinkType};
 

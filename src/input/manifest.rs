@@ -2,9 +2,9 @@
 
 use super::model_files::{MatrixLocation, ModelFiles, stem};
 use super::walk::{Table, Value, Walk, integer, read_toml, real};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
-use crate::units::UnitSystem;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::units::UnitSystem;
 use std::ops::Range;
 use std::path::Path;
 use toml::de::DeValue;

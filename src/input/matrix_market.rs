@@ -6,8 +6,8 @@ use super::assemble::{Entry, Sides, Storage, assemble, check_size, undeclared_tr
 use super::compression::{Compression, broken};
 use super::digits::written_digits;
 use super::reader::{MatrixSource, Reader};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
 use crate::model::RawMatrix;
 use rayon::prelude::*;
 use std::io::Read;

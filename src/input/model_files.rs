@@ -1,9 +1,9 @@
 //! Which files make up a model.
 
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::units::UnitSystem;
 use crate::model::{Coupling, Damping, GeometricStiffness, Reference};
-use crate::units::UnitSystem;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! NumPy's format of one array, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
 use super::shapes::Array;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 

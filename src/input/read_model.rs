@@ -5,10 +5,10 @@ use super::compression::Compression;
 use super::model_files::{InterfaceNodes, MatrixLocation, ModelFiles};
 use super::reader::{MatrixRole, MatrixSource, reader_for};
 use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
-use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::error::{Error, Result};
+use crate::base::diagnostic::{Code, Diagnostic, Severity};
+use crate::base::error::{Error, Result};
+use crate::base::provenance::SourceFile;
 use crate::model::{Damping, GeometricStiffness, NodeSet, RawMatrix, RawModel};
-use crate::provenance::SourceFile;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,8 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
 use crate::model::RawMatrix;
 use std::path::Path;
 
@@ -24,7 +24,7 @@ impl MatrixRole {
     /// Every role.
     pub const ALL: [Self; 4] = [Self::Stiffness, Self::Mass, Self::Damping, Self::GeometricStiffness];
 
-    /// Its name in messages and in [`crate::provenance::SourceFile::role`].
+    /// Its name in messages and in [`crate::base::provenance::SourceFile::role`].
     pub fn name(self) -> &'static str {
         match self {
             Self::Stiffness => "stiffness",

@@ -7,10 +7,10 @@ use super::matrix_market::MatrixMarket;
 use super::model_files::MatrixLocation;
 use super::reader::{HEAD, Reader};
 use super::{hdf5, matrix_market, npy};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::provenance::SourceFile;
 use crate::model::RawShapes;
-use crate::provenance::SourceFile;
 use faer::Mat;
 
 /// A dense array as its file has it.

@@ -1,7 +1,7 @@
 //! Text tables: a header of column names, then one row per line.
 
 use super::bytes::InputFile;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
 /// Number of bad rows that are reported one by one.

@@ -2,7 +2,7 @@
 
 use super::bytes::InputFile;
 use super::table::{BadRows, Column, Table, integer, printable};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Nodes};
 use std::collections::HashMap;
 

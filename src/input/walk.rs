@@ -1,9 +1,9 @@
 //! Settings in TOML: reads tables and collects everything that is wrong with them, each with its line.
 
 use super::bytes::InputFile;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
-use crate::provenance::Fingerprint;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::provenance::Fingerprint;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;

@@ -9,7 +9,7 @@
 use super::checks::Assembled;
 use super::local_mass::LocalMass;
 use super::node_pairs::neighbours;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 

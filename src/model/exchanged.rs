@@ -2,8 +2,8 @@
 
 use super::checks::Assembled;
 use super::rows::Rows;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::SymmetricMatrix;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::SymmetricMatrix;
 
 /// Row sum of a stiffness relative to that of its absolute values, when translations leave it free.
 const FREE: f64 = 1e-6;

@@ -7,10 +7,10 @@ use super::{
     BodyNumber, CheckedModel, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, check,
     check_bodies,
 };
-use crate::error::Result;
-use crate::linalg::{Pencil, SymmetricMatrix};
-use crate::provenance::SourceFile;
-use crate::units::UnitSystem;
+use crate::base::error::Result;
+use crate::base::provenance::SourceFile;
+use crate::base::units::UnitSystem;
+use crate::numerics::linalg::{Pencil, SymmetricMatrix};
 use faer::Mat;
 use std::borrow::Cow;
 

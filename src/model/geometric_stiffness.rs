@@ -2,7 +2,7 @@
 
 use super::layout::name_some;
 use super::{NodeSet, RawMatrix};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use nalgebra::Matrix3;
 
 /// What kind of load stresses the body.

@@ -1,8 +1,8 @@
 //! Interfaces: named node sets, the reference point that a joint sees of them, and the motion that both share.
 
 use super::{Nodes, RawModel, centre_and_length, rigid_count, rigid_fields};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::gram;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::gram;
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;

@@ -3,7 +3,7 @@
 
 use super::rows::{Recovered, Rows};
 use super::{DofLabel, RawModel};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use rayon::prelude::*;
 use std::collections::HashMap;
 

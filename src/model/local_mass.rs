@@ -7,8 +7,8 @@
 
 use super::checks::Assembled;
 use super::node_pairs::neighbours;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::SymmetricMatrix;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};

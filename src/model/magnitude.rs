@@ -2,8 +2,8 @@
 
 use super::rigid::extents;
 use super::{Nodes, RawModel};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::SymmetricMatrix;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 
 /// Largest size, and reciprocal of the smallest, that a quantity may have: squares of all of them then stay twenty-eight decades

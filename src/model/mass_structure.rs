@@ -1,8 +1,8 @@
 //! The test M = Ms kron I_d of the displacements, block by block (d: the dimension), and Ms itself.
 
 use super::rows::Rows;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::{CscMatrix, SymmetricMatrix};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::{CscMatrix, SymmetricMatrix};
 use rayon::prelude::*;
 use std::ops::Range;
 

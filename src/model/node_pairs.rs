@@ -3,8 +3,8 @@
 use super::checks::Assembled;
 use super::layout::name_some;
 use super::rows::Rows;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::SymmetricMatrix;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::collections::HashMap;
 

@@ -4,8 +4,8 @@ use super::layout::name_some;
 use super::rigid::{centre_and_length, rigid_count};
 use super::rows::{Recovered, Rows};
 use super::{DofLabel, Nodes};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
 use faer::Mat;
 
 /// Eigenvalue of a stiffness with unit diagonal below which it does not hold its rows: rounding of sums leaves 1e-14.

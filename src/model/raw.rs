@@ -1,10 +1,10 @@
 //! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
 
 use super::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes};
-use crate::diagnostic::Diagnostic;
-use crate::linalg::CscMatrix;
-use crate::provenance::SourceFile;
-use crate::units::UnitSystem;
+use crate::base::diagnostic::Diagnostic;
+use crate::base::provenance::SourceFile;
+use crate::base::units::UnitSystem;
+use crate::numerics::linalg::CscMatrix;
 use faer::Mat;
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
 //! Rigid displacement fields of the nodes, and how far K is from annihilating them.
 
-use crate::linalg::SymmetricMatrix;
+use crate::numerics::linalg::SymmetricMatrix;
 use faer::Mat;
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 use super::checks::Assembled;
 use super::layout::name_some;
 use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::linalg::{Pencil, gram};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::{Pencil, gram};
 use faer::Mat;
 
 /// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second limit: node tables written

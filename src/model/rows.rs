@@ -5,7 +5,7 @@
 
 use super::rigid::{rigid_count, rigid_fields};
 use super::{DofLabel, Nodes};
-use crate::linalg::{SymmetricMatrix, connected_components};
+use crate::numerics::linalg::{SymmetricMatrix, connected_components};
 use faer::Mat;
 use std::ops::Range;
 

@@ -2,9 +2,9 @@
 
 use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
 use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
-use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::error::{Error, Result};
-use crate::linalg::SymmetricMatrix;
+use crate::base::diagnostic::{Code, Diagnostic, Severity};
+use crate::base::error::{Error, Result};
+use crate::numerics::linalg::SymmetricMatrix;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;

@@ -1,8 +1,8 @@
 //! An audit as text and as JSON.
 
 use super::numbers::significant;
-use crate::foreign::{Audit, AuditCheck};
-use crate::provenance::generator;
+use crate::base::provenance::generator;
+use crate::formats::import::{Audit, AuditCheck};
 use serde_json::{Value, json};
 
 /// Version of the JSON: a newer major breaks readers, a newer minor only adds keys.

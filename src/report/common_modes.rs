@@ -2,9 +2,9 @@
 
 use super::clusters::close;
 use super::numbers::{counted, significant};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
-use crate::flex_body::FlexBody;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::body::flex_body::FlexBody;
 
 /// Which modes of two bodies are compared with each other (indices from 0, ascending, the same number of both), and what is left out.
 #[derive(Debug, Clone, PartialEq)]

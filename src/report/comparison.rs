@@ -5,10 +5,10 @@ use super::clusters::clusters;
 use super::common_modes::CommonModes;
 use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
 use super::numbers::{plain, significant};
-use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
-use crate::flex_body::{FlexBody, Frame, Group};
-use crate::invariants::{CauchySchwarz, Invariants, compare_invariants};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::body::flex_body::{FlexBody, Frame, Group};
+use crate::body::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{Matrix3, Vector3};
@@ -70,7 +70,7 @@ pub struct BodyComparison {
 /// Compares `b` with `a`, in the frame of `a`.
 ///
 /// With the same node numbers in both (in any order), `b` is turned and shifted into the frame of `a`, its modes
-/// are aligned inside each cluster of close eigenvalues ([`align`](crate::invariants::align), plain product of the
+/// are aligned inside each cluster of close eigenvalues ([`align`](crate::body::invariants::align), plain product of the
 /// nodal components), and positions, shapes and every primary invariant are compared. Otherwise only what needs no
 /// common node is: mass, centre of mass, inertia, frequencies, and the norms of the invariants over clusters of
 /// modes, which no choice of signs or basis changes. A body that comes from a file of another program does not know where its frame is in the

@@ -2,7 +2,7 @@
 
 use super::craig_bampton;
 use super::numbers::{counted, plain, significant};
-use crate::flex_body::FlexBody;
+use crate::body::flex_body::FlexBody;
 
 /// The certificate of a body, judged.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -2,7 +2,7 @@
 //! body.
 
 use super::numbers::{counted, percent, significant};
-use crate::flex_body::{FixedInterface, FlexBody};
+use crate::body::flex_body::{FixedInterface, FlexBody};
 use serde::Serialize;
 
 /// Part by which a frequency may be too high to be called right.

@@ -9,11 +9,11 @@ use super::mass_properties::MassProperties;
 use super::numbers::{counted, percent, significant};
 use super::run_data::{Phase, RunData};
 use super::term_facts::TermFacts;
-use crate::diagnostic::Diagnostic;
-use crate::flex_body::{FlexBody, Interface, MassStructure, Truncation};
-use crate::invariants::GENERAL_REMARK;
-use crate::provenance::{self, SourceFile};
-use crate::units::UnitSystem;
+use crate::base::diagnostic::Diagnostic;
+use crate::base::provenance::{self, SourceFile};
+use crate::base::units::UnitSystem;
+use crate::body::flex_body::{FlexBody, Interface, MassStructure, Truncation};
+use crate::body::invariants::GENERAL_REMARK;
 use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.

@@ -1,8 +1,8 @@
 //! Geometric stiffness of a body, or what is without it.
 
 use super::numbers::significant;
-use crate::flex_body::{FlexBody, LoadKind};
-use crate::invariants::relative_norm;
+use crate::body::flex_body::{FlexBody, LoadKind};
+use crate::body::invariants::relative_norm;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

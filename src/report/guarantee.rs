@@ -1,8 +1,8 @@
 //! What accuracy `certified` guarantees, in numbers that an engineer can quote.
 
 use super::numbers::{counted, significant};
-use crate::flex_body::FlexBody;
-use crate::invariants::DIGITS;
+use crate::body::flex_body::FlexBody;
+use crate::body::invariants::DIGITS;
 use serde::{Serialize, Serializer};
 
 /// The guarantees of a body.

@@ -6,9 +6,9 @@ use super::geometric_stiffness::{GeometricStiffnessFacts, softening_in_words};
 use super::guarantee::cut;
 use super::lumped::distinct;
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
-use crate::diagnostic::{Diagnostic, Severity};
-use crate::flex_body::Truncation;
-use crate::invariants::ERROR_NORMS;
+use crate::base::diagnostic::{Diagnostic, Severity};
+use crate::body::flex_body::Truncation;
+use crate::body::invariants::ERROR_NORMS;
 use std::collections::HashMap;
 
 const STYLE: &str = include_str!("report.css");

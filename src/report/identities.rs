@@ -1,8 +1,8 @@
 //! Results of checks, and diagnostics, for terminals and programs.
 
 use super::numbers::significant;
-use crate::diagnostic::{Diagnostic, Severity};
-use crate::invariants::IdentityCheck;
+use crate::base::diagnostic::{Diagnostic, Severity};
+use crate::body::invariants::IdentityCheck;
 use serde_json::{Value, json};
 
 /// A table of identities, failed ones marked, and the count.

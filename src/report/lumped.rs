@@ -1,8 +1,8 @@
 //! What the lumped masses would have cost, ready to be told.
 
 use super::run_data::LumpedModes;
-use crate::flex_body::LumpedBody;
-use crate::invariants::ERROR_NORMS;
+use crate::body::flex_body::LumpedBody;
+use crate::body::invariants::ERROR_NORMS;
 use serde::{Serialize, Serializer};
 use std::collections::{HashMap, HashSet};
 

@@ -1,8 +1,8 @@
 //! Mass, centre of mass and principal inertia of a body, whatever its frame.
 
 use super::numbers::significant;
-use crate::flex_body::FlexBody;
-use crate::invariants::Invariants;
+use crate::body::flex_body::FlexBody;
+use crate::body::invariants::Invariants;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Products of inertia below this part of sqrt(I_kk I_ll) are rounding of a principal frame: its diagonal then is

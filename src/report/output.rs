@@ -1,7 +1,7 @@
 //! The one object that every command prints with `--json` (`schemas/output.schema.json`).
 
-use crate::diagnostic::{Diagnostic, Severity};
-use crate::error::ExitCode;
+use crate::base::diagnostic::{Diagnostic, Severity};
+use crate::base::error::ExitCode;
 use serde::Serialize;
 
 #[derive(Serialize)]

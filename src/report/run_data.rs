@@ -1,6 +1,6 @@
 //! What only the run knows: times, memory, counters, diagnostics. Never stored in the flex-body file.
 
-use crate::diagnostic::Diagnostic;
+use crate::base::diagnostic::Diagnostic;
 
 /// One phase of a run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

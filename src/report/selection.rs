@@ -6,11 +6,11 @@ use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;
 use super::text::{Page, diagnostics_lines};
-use crate::diagnostic::Diagnostic;
-use crate::flex_body::{Group, TermDecision};
-use crate::provenance::generator;
-use crate::scene::OutputErrors;
-use crate::selection::{Participation, Selection, Trial};
+use crate::base::diagnostic::Diagnostic;
+use crate::base::provenance::generator;
+use crate::body::flex_body::{Group, TermDecision};
+use crate::motion::scene::OutputErrors;
+use crate::study::selection::{Participation, Selection, Trial};
 use serde::Serialize;
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! Which groups of the kinetic energy a body holds, and why.
 
 use super::numbers::{plain, significant};
-use crate::flex_body::{FlexBody, Group};
+use crate::body::flex_body::{FlexBody, Group};
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -5,7 +5,7 @@ use super::facts::RunFacts;
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
 use super::numbers::{bytes, counted, duration, percent, plain, significant};
-use crate::diagnostic::{Diagnostic, Severity};
+use crate::base::diagnostic::{Diagnostic, Severity};
 
 /// Columns of a terminal that every terminal has.
 const WIDTH: usize = 80;

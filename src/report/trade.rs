@@ -7,11 +7,11 @@ use super::render::json;
 use super::run_data::RunData;
 use super::scatter_chart::{Chart, Series, scatter_chart};
 use super::text::{Page, diagnostics_lines};
-use crate::diagnostic::Diagnostic;
-use crate::flex_body::Storage;
-use crate::provenance::generator;
-use crate::scene::{OutputErrors, Tolerance};
-use crate::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Times, Trade};
+use crate::base::diagnostic::Diagnostic;
+use crate::base::provenance::generator;
+use crate::body::flex_body::Storage;
+use crate::motion::scene::{OutputErrors, Tolerance};
+use crate::study::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Times, Trade};
 use serde::Serialize;
 use std::fmt::Write;
 

@@ -4,7 +4,7 @@
 use crate::exact::exact;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::linalg::{
+use flexbody::numerics::linalg::{
     CscMatrix, DoubleDouble, SymmetricMatrix, gram_compensated, multiply_compensated,
     small_pencil_eigenvalues, sum_length,
 };

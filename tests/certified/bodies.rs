@@ -3,15 +3,15 @@
 use crate::exact::count_below;
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::Mesh;
-use flexbody::basis::ModeSettings;
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::eigen::{Accuracy, Method, Wanted};
-use flexbody::invariants::BodyFrame;
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::body::verification::verify;
+use flexbody::formats::flex_body_file;
 use flexbody::model::{FeModel, check};
-use flexbody::progress::SILENT;
-use flexbody::store;
-use flexbody::verification::verify;
+use flexbody::numerics::eigen::{Accuracy, Method, Wanted};
+use flexbody::numerics::linalg::SymmetricMatrix;
 
 fn settings(accuracy: Accuracy, count: usize, frame: BodyFrame) -> ConvertSettings {
     let modes = ModeSettings {
@@ -63,8 +63,8 @@ fn certified_bodies_keep_their_guarantees_through_file_and_check() {
     ] {
         let model = model(kind, [3, 2, 1], rule);
         let conversion = convert(&model, &settings(Accuracy::Certified, 10, frame), SILENT).expect("sound");
-        store::write(&conversion.body, &path).expect("written");
-        let body = store::read(&path).expect("read");
+        flex_body_file::write(&conversion.body, &path).expect("written");
+        let body = flex_body_file::read(&path).expect("read");
         let guarantee = body.certificate().guarantee.as_ref().expect("certified");
         assert_eq!(Some(guarantee), conversion.body.certificate().guarantee.as_ref());
         for (j, lambda) in body.modes().eigenvalue.iter().enumerate() {
@@ -86,10 +86,10 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
     let model = model(Kind::Hex8, [2, 1, 1], MassRule::Consistent);
     let conversion =
         convert(&model, &settings(Accuracy::Certified, 6, BodyFrame::Principal), SILENT).expect("sound");
-    let failed = |change: &dyn Fn(&mut flexbody::flex_body::Parts)| -> Vec<&'static str> {
+    let failed = |change: &dyn Fn(&mut flexbody::body::flex_body::Parts)| -> Vec<&'static str> {
         let mut parts = conversion.body.clone().into_parts();
         change(&mut parts);
-        let body = flexbody::flex_body::FlexBody::new(parts).expect("consistent in itself");
+        let body = flexbody::body::flex_body::FlexBody::new(parts).expect("consistent in itself");
         let checks = verify(&body, &model).expect("the same nodes");
         checks.iter().filter(|c| !c.passed).map(|c| c.name).collect()
     };

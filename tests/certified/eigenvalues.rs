@@ -3,12 +3,12 @@
 
 use crate::exact::count_below;
 use faer::Mat;
-use flexbody::eigen::{
+use flexbody::base::progress::SILENT;
+use flexbody::numerics::eigen::{
     Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Resume,
     Wanted, solve,
 };
-use flexbody::linalg::{CscMatrix, Pencil, SymmetricMatrix};
-use flexbody::progress::SILENT;
+use flexbody::numerics::linalg::{CscMatrix, Pencil, SymmetricMatrix};
 use proptest::prelude::*;
 
 /// Springs and masses on one line, with one rigid motion.

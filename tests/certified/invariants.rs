@@ -3,10 +3,10 @@
 use crate::exact::exact;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::invariants::{
+use flexbody::body::invariants::{
     CauchySchwarz, CertifiedInvariants, DIGITS, Derived, Invariants, condense, condense_certified,
 };
-use flexbody::linalg::{CscMatrix, SymmetricMatrix};
+use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
@@ -231,7 +231,7 @@ fn the_certified_condensation_equals_the_plain_one_up_to_rounding() {
     let axes = Matrix3::from_columns(&[Vector3::y(), Vector3::z(), Vector3::x()]);
     let unturned = condense_certified(&mass, &positions, shapes.as_ref(), &stiffness, &Matrix3::identity());
     let plain = condense(&mass, &positions, shapes.as_ref(), modal);
-    for (name, difference) in flexbody::invariants::primary_differences(&unturned.invariants, &plain) {
+    for (name, difference) in flexbody::body::invariants::primary_differences(&unturned.invariants, &plain) {
         assert!(difference < 1e-14, "{name}: {difference:e}");
     }
     // Axes turn nothing but K_ff, which is theirs.

@@ -2,7 +2,7 @@
 //! static condensation.
 
 use super::*;
-use flexbody::flex_body::FixedInterface;
+use flexbody::body::flex_body::FixedInterface;
 use flexbody::report::{Facts, Format, RunData, render};
 
 /// Eigenvalues below this part of the first that is left out are estimated well.
@@ -156,9 +156,9 @@ fn the_record_goes_with_the_body() {
     let body = body(&model(bracket([Coupling::Rigid, Coupling::Rigid])), 5);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");
-    flexbody::store::write(&body, &path).expect("written");
-    assert_eq!(record(&flexbody::store::read(&path).expect("read")), record(&body));
-    let milliseconds = flexbody::units::UnitSystem::parse("mm", "t", "ms").expect("units");
+    flexbody::formats::flex_body_file::write(&body, &path).expect("written");
+    assert_eq!(record(&flexbody::formats::flex_body_file::read(&path).expect("read")), record(&body));
+    let milliseconds = flexbody::base::units::UnitSystem::parse("mm", "t", "ms").expect("units");
     let other = body.in_units(&milliseconds).expect("in other units");
     for (a, b) in record(&other).free_estimate.iter().zip(&record(&body).free_estimate) {
         close(*a, 1e-6 * b, 1e-14, "lambda");

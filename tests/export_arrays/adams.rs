@@ -2,7 +2,7 @@
 
 use crate::export_support::{bodies, file};
 use crate::support::random::Random;
-use flexbody::export::{Points, frames};
+use flexbody::formats::export::{Points, frames};
 use nalgebra::Matrix3;
 use serde_json::Value;
 

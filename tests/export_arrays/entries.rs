@@ -2,8 +2,8 @@
 
 use crate::export_support::{bodies, file, losses};
 use crate::store_support::wild_body;
-use flexbody::flex_body::{FlexBody, Storage};
-use flexbody::store;
+use flexbody::body::flex_body::{FlexBody, Storage};
+use flexbody::formats::flex_body_file;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 use hdf5_metno as hdf5;
 use serde_json::{Map, Value, json};
@@ -31,7 +31,7 @@ const ABOUT: [&str; 3] = ["symbol", "units", "description"];
 fn of_hdf5(body: &FlexBody) -> (Contents, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");
-    store::write(body, &path).expect("writes");
+    flex_body_file::write(body, &path).expect("writes");
     let file = hdf5::File::open(&path).expect("opens");
     let mut found = Contents::default();
     let mut short = Vec::new();

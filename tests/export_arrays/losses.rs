@@ -2,9 +2,10 @@
 
 use crate::export_support::{bodies, exported, losses};
 use crate::store_support::wild_body;
-use flexbody::diagnostic::Code;
-use flexbody::export::{ExportOptions, export, find_format};
-use flexbody::flex_body::FlexBody;
+use flexbody::base::diagnostic::Code;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::formats::export::ExportOptions;
+use flexbody::formats::{export, find_format};
 
 const FORMATS: [&str; 6] = ["json", "npz", "adams-invariants", "openradioss", "chrono", "simscape"];
 

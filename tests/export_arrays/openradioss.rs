@@ -6,9 +6,10 @@ use crate::store_support::wild_body;
 use crate::support::general::raw_fixture;
 use crate::support::mesh::entries;
 use crate::support::random::Random;
-use flexbody::diagnostic::Code;
-use flexbody::export::{ExportOptions, Points, export, find_format, frames};
-use flexbody::flex_body::FlexBody;
+use flexbody::base::diagnostic::Code;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::formats::export::{ExportOptions, Points, frames};
+use flexbody::formats::{export, find_format};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
 /// Eleven digits, of negative numbers with two-digit exponents.
@@ -324,7 +325,7 @@ fn products_are_those_of_the_finite_element_matrices() {
         };
         let rotation = fxb.rotation;
         let (rigid, local) = (field(&fxb.rigid, &Matrix3::identity()), field(&fxb.local, &rotation));
-        let times = |matrix: &flexbody::linalg::CscMatrix, fields: &DMatrix<f64>| {
+        let times = |matrix: &flexbody::numerics::linalg::CscMatrix, fields: &DMatrix<f64>| {
             let mut product = DMatrix::zeros(fields.nrows(), fields.ncols());
             for (r, c, v) in entries(matrix) {
                 (0..fields.ncols()).for_each(|j| product[(r as usize, j)] += v * fields[(c as usize, j)]);

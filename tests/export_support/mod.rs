@@ -7,14 +7,15 @@ use super::support::general::raw_fixture;
 use super::support::partial::{combinations, with_groups};
 use super::support::plane::rectangle;
 use super::support::program::fixtures;
-use flexbody::basis::{BasisChoice, CraigBampton};
-use flexbody::convert::{ConvertSettings, convert};
-use flexbody::eigen::Wanted;
-use flexbody::export::{ExportOptions, Exported, export, find_format};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, CraigBampton};
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::export::{ExportOptions, Exported};
+use flexbody::formats::{export, find_format};
 use flexbody::model::{Coupling, Damping, FeModel, RawModel};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::Wanted;
 use std::sync::OnceLock;
 
 /// Names of all fixture models.
@@ -97,7 +98,11 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
 }
 
 /// What an export writes, told or not.
-pub fn exported(body: &FlexBody, format: &str, dialect: Option<&str>) -> flexbody::error::Result<Exported> {
+pub fn exported(
+    body: &FlexBody,
+    format: &str,
+    dialect: Option<&str>,
+) -> flexbody::base::error::Result<Exported> {
     let options = ExportOptions { dialect: dialect.map(str::to_owned), ..ExportOptions::default() };
     export(body, find_format(format).expect("a format"), &options, true).map(|(exported, _)| exported)
 }

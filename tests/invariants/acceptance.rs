@@ -7,7 +7,7 @@ use crate::models::{self, Model};
 use crate::nodal::{deviation, inertia_forces, random_state, reduced};
 use crate::random::Random;
 use faer::Mat;
-use flexbody::invariants::{BodyFrame, choose_frame, condense};
+use flexbody::body::invariants::{BodyFrame, choose_frame, condense};
 
 /// Deviation of the reduced forces and, for comparison, of the forces with the misprinted Coriolis terms.
 fn deviations(body: &Body, random: &mut Random, displacement: f64) -> (f64, f64) {

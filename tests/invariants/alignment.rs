@@ -3,7 +3,7 @@
 use crate::bodies::{Body, random_matrix};
 use crate::random::Random;
 use faer::{Mat, MatRef};
-use flexbody::invariants::{Invariants, align, compare_invariants, condense};
+use flexbody::body::invariants::{Invariants, align, compare_invariants, condense};
 
 /// Rotation by an angle in the plane of modes p and q.
 fn plane_rotation(nf: usize, p: usize, q: usize, angle: f64) -> Mat<f64> {

@@ -5,8 +5,8 @@ use crate::models::symmetric;
 use crate::nodal::expand;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::invariants::{Invariants, primary_differences};
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::body::invariants::{Invariants, primary_differences};
+use flexbody::numerics::linalg::SymmetricMatrix;
 use nalgebra::{Matrix3, Vector3};
 
 /// Ms, its expansion, node positions and shapes.

@@ -3,7 +3,7 @@
 use crate::bodies::stiffness;
 use crate::cuboid::Cuboid;
 use faer::Mat;
-use flexbody::invariants::{BodyFrame, choose_frame, condense};
+use flexbody::body::invariants::{BodyFrame, choose_frame, condense};
 use nalgebra::{Matrix3, Vector3};
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::bodies::{Body, orthonormalised, stiffness};
 use crate::cuboid::Cuboid;
 use faer::Mat;
-use flexbody::invariants::{
+use flexbody::body::invariants::{
     CauchySchwarz, ERROR_NORMS, Invariants, LumpedMasses, condense, condense_lumped, error_norms,
 };
 use nalgebra::Matrix3;

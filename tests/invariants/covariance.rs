@@ -4,7 +4,7 @@ use crate::bodies::{Body, assert_agree, random_matrix, stiffness};
 use crate::models::symmetric;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::invariants::{BodyFrame, Frame, Groups, Invariants, choose_frame, condense};
+use flexbody::body::invariants::{BodyFrame, Frame, Groups, Invariants, choose_frame, condense};
 use nalgebra::Vector3;
 
 fn condensed(body: &Body) -> Invariants {

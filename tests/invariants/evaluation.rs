@@ -5,7 +5,7 @@ use crate::models;
 use crate::nodal::brute_force;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped};
+use flexbody::body::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped};
 
 /// Independent evaluations agree to this, relative to the Cauchy-Schwarz bound of each entry.
 const LIMIT: f64 = 1e-13;

@@ -4,9 +4,9 @@ use crate::cuboid::Cuboid;
 use crate::models::symmetric;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::diagnostic::Code;
-use flexbody::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
-use flexbody::linalg::{CscMatrix, SymmetricMatrix};
+use flexbody::base::diagnostic::Code;
+use flexbody::body::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
+use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 use nalgebra::{Matrix3, Vector3};
 
 fn rigid(mass: &SymmetricMatrix, positions: &[[f64; 3]]) -> Invariants {

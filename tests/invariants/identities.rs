@@ -4,7 +4,7 @@ use crate::bodies::{Body, orthonormalised, random_matrix};
 use crate::models;
 use crate::random::Random;
 use faer::Mat;
-use flexbody::invariants::{
+use flexbody::body::invariants::{
     BodyFrame, Derived, Expected, IdentityCheck, Invariants, LumpedMasses, choose_frame, condense,
     condense_lumped, derived_identities, identities,
 };

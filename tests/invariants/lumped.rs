@@ -4,8 +4,8 @@ use crate::bodies::{Body, assert_agree};
 use crate::models::{self, Model, symmetric};
 use crate::nodal::{brute_force, expand};
 use faer::Mat;
-use flexbody::diagnostic::Code;
-use flexbody::invariants::{
+use flexbody::base::diagnostic::Code;
+use flexbody::body::invariants::{
     BodyFrame, Invariants, LumpedMasses, LumpedScheme, choose_frame, condense, condense_lumped,
 };
 use nalgebra::{Matrix3, Vector3};

@@ -3,13 +3,13 @@
 use crate::bodies::orthonormalised;
 use crate::models::{self, Model};
 use faer::Mat;
-use flexbody::eigen::{EigenProblem, EigenSettings, Resume, Wanted, solve};
-use flexbody::invariants::{
+use flexbody::base::progress::SILENT;
+use flexbody::body::invariants::{
     BodyFrame, Expected, Invariants, LumpedMasses, choose_frame, condense, condense_lumped, identities,
 };
-use flexbody::linalg::Pencil;
 use flexbody::model::rigid_fields;
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{EigenProblem, EigenSettings, Resume, Wanted, solve};
+use flexbody::numerics::linalg::Pencil;
 
 /// Modal stiffness, shapes and eigenvalues in the frame of the positions.
 struct Modes {

@@ -4,7 +4,7 @@ use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh, entries};
 use crate::support::random::Random;
 use crate::support::reference::{dense, dense_modes, rigid_data, symmetric_eigen, unit_cube_eigenvalues};
-use flexbody::linalg::CscMatrix;
+use flexbody::numerics::linalg::CscMatrix;
 
 const KINDS: [Kind; 4] = [Kind::Tet4, Kind::Tet10, Kind::Hex8, Kind::Hex20];
 

@@ -4,8 +4,10 @@ use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh};
 use crate::support::pipeline::modes;
 use faer::{Mat, MatRef};
-use flexbody::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped, error_norms};
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::body::invariants::{
+    BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped, error_norms,
+};
+use flexbody::numerics::linalg::SymmetricMatrix;
 use std::f64::consts::PI;
 
 const STEEL: Material = Material::STEEL;

@@ -6,10 +6,10 @@ use crate::support::mesh::{Assembly, Mesh, grid};
 use crate::support::pipeline::{Body, proved};
 use crate::support::random::Random;
 use faer::Mat;
-use flexbody::eigen::Method;
-use flexbody::invariants::{BodyFrame, Invariants, compare_invariants};
-use flexbody::linalg::CscMatrix;
+use flexbody::body::invariants::{BodyFrame, Invariants, compare_invariants};
 use flexbody::model::RawModel;
+use flexbody::numerics::eigen::Method;
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::Matrix3;
 use std::collections::HashMap;
 

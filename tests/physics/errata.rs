@@ -7,7 +7,7 @@ use crate::support::integrate;
 use crate::support::mesh::Mesh;
 use crate::support::nodal::reduced;
 use crate::support::pipeline::modes;
-use flexbody::invariants::BodyFrame;
+use flexbody::body::invariants::BodyFrame;
 use nalgebra::{DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// A rubber-like block without any symmetry, 10 modes, about its principal axes: W1, W2 and W3 all count.

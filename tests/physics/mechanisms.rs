@@ -6,10 +6,10 @@ use crate::support::flexible::{body_of, fixture};
 use crate::support::integrate;
 use crate::support::jointed::{End, Joint, Jointed, Scales};
 use crate::support::mesh::Mesh;
-use flexbody::dynamics::{BodyPoint, EquationsOfMotion, Terms};
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::{Coupling, NodeSet};
+use flexbody::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 

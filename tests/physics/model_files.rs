@@ -3,9 +3,9 @@
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{DofOrder, Numbering, Triangle, reordered, write_model};
 use crate::support::mesh::{Mesh, entries};
+use flexbody::base::units::UnitSystem;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::linalg::CscMatrix;
-use flexbody::units::UnitSystem;
+use flexbody::numerics::linalg::CscMatrix;
 
 /// Entries that are not zero: readers drop the others, sums of element matrices may cancel.
 fn nonzeros(matrix: &CscMatrix) -> Vec<(u32, u32, f64)> {

@@ -6,9 +6,9 @@ use crate::support::mesh::{Assembly, Mesh, grid};
 use crate::support::pipeline::{Body, solve};
 use crate::support::random::Random;
 use crate::support::reference::dense_modes;
-use flexbody::basis::ModeSettings;
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Accuracy, Method, Proof, Wanted};
+use flexbody::base::diagnostic::Code;
+use flexbody::body::basis::ModeSettings;
+use flexbody::numerics::eigen::{Accuracy, Method, Proof, Wanted};
 
 const STEEL: Material = Material::STEEL;
 

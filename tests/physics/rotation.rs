@@ -5,12 +5,12 @@ use super::support::elements::{Kind, MassRule, Material};
 use super::support::flexible::body_of;
 use super::support::mesh::Mesh;
 use super::support::motion::{adaptive, conserving, run};
-use flexbody::dynamics::{
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Place, Prescribed,
     Surroundings, Terms,
 };
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 

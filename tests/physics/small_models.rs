@@ -5,13 +5,13 @@ use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh, entries};
 use crate::support::pipeline::{proved, solve, try_modes};
 use crate::support::reference::{dense_modes, unit_cube_eigenvalues};
-use flexbody::basis::{ModeSettings, free_surface};
-use flexbody::diagnostic::Code;
-use flexbody::eigen::{Accuracy, Method, Proof, Wanted};
-use flexbody::error::ExitCode;
-use flexbody::linalg::CscMatrix;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::ExitCode;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{ModeSettings, free_surface};
 use flexbody::model::{RawModel, check};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{Accuracy, Method, Proof, Wanted};
+use flexbody::numerics::linalg::CscMatrix;
 
 const METHODS: [Method; 3] = [Method::Auto, Method::Dense, Method::Lanczos];
 

@@ -4,7 +4,7 @@ use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh};
 use crate::support::pipeline::{Body, modes, proved};
 use crate::support::reference::dense_modes;
-use flexbody::eigen::Method;
+use flexbody::numerics::eigen::Method;
 
 /// Shear wave speed 1, Poisson's ratio 0.3.
 const UNIT: Material = Material { youngs: 2.6, poisson: 0.3, density: 1.0 };

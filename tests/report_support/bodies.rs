@@ -7,16 +7,16 @@ mod cuboid;
 
 use cuboid::Cuboid;
 use faer::Mat;
-use flexbody::diagnostic::{Code, Diagnostic};
-use flexbody::flex_body::{
+use flexbody::base::diagnostic::{Code, Diagnostic};
+use flexbody::base::provenance::SourceFile;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::{
     Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
 };
-use flexbody::invariants::{BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, choose_frame, condense};
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::body::invariants::{BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, choose_frame, condense};
 use flexbody::model::{Coupling, Nodes};
-use flexbody::provenance::SourceFile;
+use flexbody::numerics::linalg::SymmetricMatrix;
 use flexbody::report::{Phase, RunData};
-use flexbody::units::UnitSystem;
 use nalgebra::{Matrix3, Vector3};
 
 /// lambda of a frequency in hertz.

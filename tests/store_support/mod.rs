@@ -2,15 +2,15 @@
 #![allow(dead_code)] // every test file uses a part of it
 
 use faer::Mat;
-use flexbody::flex_body::{
+use flexbody::base::provenance::{SourceFile, sha256_hex};
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
     InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
     Truncation, UnitLoad,
 };
-use flexbody::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
+use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
-use flexbody::provenance::{SourceFile, sha256_hex};
-use flexbody::units::UnitSystem;
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Rotation3, Vector3};

@@ -1,7 +1,7 @@
 //! Homogeneous cuboids of trilinear hexahedra: the consistent mass is a tensor product of the mass matrices of
 //! linear bars, written down here without any element code.
 
-use flexbody::linalg::{CscMatrix, SymmetricMatrix};
+use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 
 /// A grid of nx x ny x nz elements over the box `low` .. `low` + `size`.
 pub struct Cuboid {

@@ -2,8 +2,8 @@
 
 use super::mesh::entries;
 use super::random::Random;
-use flexbody::linalg::CscMatrix;
 use flexbody::model::{DofLabel, Nodes, RawMatrix, RawModel};
+use flexbody::numerics::linalg::CscMatrix;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

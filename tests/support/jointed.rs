@@ -3,10 +3,10 @@
 
 use super::equations::State;
 use super::general::quasi_velocities;
-use flexbody::dynamics::{
+use flexbody::motion::dynamics::{
     BodyPoint, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Prescribed,
 };
-use flexbody::integration::{Explicit, Failure, System};
+use flexbody::numerics::integration::{Explicit, Failure, System};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// What a joint holds on to.

@@ -4,8 +4,8 @@
 //! lattice, so that mid-edge nodes are shared without searching; cells that touch are connected.
 
 use super::elements::{Kind, MassRule, Material, TET_EDGES};
-use flexbody::linalg::CscMatrix;
 use flexbody::model::{Nodes, RawModel};
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 

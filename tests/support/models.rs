@@ -1,6 +1,6 @@
 //! Real finite element models from disk, by a reader of its own: compressed Matrix Market and the two tables.
 
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::numerics::linalg::SymmetricMatrix;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -78,7 +78,8 @@ fn assembled(path: &Path, rows: &[usize]) -> Vec<(usize, usize, f64)> {
 
 /// A symmetric matrix from both of its triangles.
 pub fn symmetric(n: usize, triplets: &[(u32, u32, f64)]) -> SymmetricMatrix {
-    SymmetricMatrix::new(flexbody::linalg::CscMatrix::from_triplets(n, n, triplets)).expect("symmetric")
+    SymmetricMatrix::new(flexbody::numerics::linalg::CscMatrix::from_triplets(n, n, triplets))
+        .expect("symmetric")
 }
 
 /// The four bodies that belong to the project.

@@ -1,9 +1,9 @@
 //! Motions of bodies by the library's integrators.
 
-use flexbody::dynamics::{
+use flexbody::motion::dynamics::{
     Balance, Configuration, EquationsOfMotion, EulerParameters, Evaluation, Motion, Orientation, Surroundings,
 };
-use flexbody::integration::{Explicit, Failure, Gauss, Method, System, integrate};
+use flexbody::numerics::integration::{Explicit, Failure, Gauss, Method, System, integrate};
 use nalgebra::{DVector, Matrix3, Vector3};
 
 /// What free motion keeps: energy, and momenta along world axes.

@@ -3,8 +3,8 @@
 use super::equations::{ReducedBody, State};
 use super::random::Random;
 use faer::Mat;
-use flexbody::invariants::{Groups, Invariants};
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::body::invariants::{Groups, Invariants};
+use flexbody::numerics::linalg::SymmetricMatrix;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// Entries of M = Ms kron I3.

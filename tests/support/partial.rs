@@ -1,6 +1,6 @@
 //! Bodies that lack groups of the kinetic energy.
 
-use flexbody::flex_body::{FlexBody, Group, Groups, TermDecision};
+use flexbody::body::flex_body::{FlexBody, Group, Groups, TermDecision};
 
 /// Every combination of groups.
 pub fn combinations() -> impl Iterator<Item = Groups> {

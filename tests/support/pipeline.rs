@@ -2,12 +2,12 @@
 
 use super::mesh::Assembly;
 use faer::Mat;
-use flexbody::basis::{ModalBasis, ModeSettings, free_surface};
-use flexbody::eigen::{Accuracy, Method, Proof, Wanted};
-use flexbody::error::Result;
-use flexbody::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{ModalBasis, ModeSettings, free_surface};
+use flexbody::body::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
 use flexbody::model::{FeModel, RawModel, check};
-use flexbody::progress::SILENT;
+use flexbody::numerics::eigen::{Accuracy, Method, Proof, Wanted};
 
 /// A checked model and its lowest flexible modes, in model axes.
 pub struct Body {

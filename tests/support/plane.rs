@@ -1,7 +1,7 @@
 //! A plane body with closed forms: a rectangle of bilinear elements in plane stress.
 
-use flexbody::linalg::CscMatrix;
 use flexbody::model::{Nodes, RawModel};
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{Matrix2, Vector2};
 
 pub const LENGTH: f64 = 2.0;

@@ -4,7 +4,7 @@
 
 use super::mesh::{Assembly, entries};
 use faer::{Mat, MatRef, Par, Side};
-use flexbody::linalg::CscMatrix;
+use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{Matrix3, Vector3};
 
 /// All modes of a body.

@@ -2,10 +2,10 @@
 
 use super::flexible::{body_of, fixture, soft_block};
 use super::plane::rectangle;
-use flexbody::dynamics::Terms;
-use flexbody::flex_body::FlexBody;
-use flexbody::invariants::BodyFrame;
-use flexbody::scene::{
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{
     Axes, History, Initial, Load, ModeStart, Point, Requirements, Run, Scene, Scheme, Spin,
 };
 use nalgebra::Vector3;

@@ -8,10 +8,10 @@ use super::plane::rectangle;
 use super::random::Random;
 use super::reference;
 use faer::Mat;
-use flexbody::dynamics::{EulerParameters, NodalConfiguration};
-use flexbody::flex_body::Frame;
-use flexbody::linalg::SymmetricMatrix;
+use flexbody::body::flex_body::Frame;
 use flexbody::model::{DofLabel, FeModel, RawModel};
+use flexbody::motion::dynamics::{EulerParameters, NodalConfiguration};
+use flexbody::numerics::linalg::SymmetricMatrix;
 use nalgebra::{DVector, Matrix3, UnitQuaternion, Vector3};
 
 /// A checked model and all its flexible modes, by the dense oracle.

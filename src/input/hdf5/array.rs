@@ -3,7 +3,7 @@
 use super::members::Members;
 use super::values::{Found, Numbers};
 use super::{DEPTH, GROUPS, layout};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::input::shapes::Array;
 use hdf5_metno::{File, Group};

@@ -6,7 +6,7 @@ use super::super::assemble::{
 };
 use super::members::{Members, POINTERS};
 use super::values::{Found, Vector, integers_of, text_of, truth_of};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::model::RawMatrix;
 use hdf5_metno::Group;

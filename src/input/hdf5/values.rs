@@ -1,7 +1,7 @@
 //! Lists of numbers and small attributes, whatever type they are stored in.
 
 use super::members::Members;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, LinkType, SliceOrIndex};
 use std::ops::Range;

@@ -2,7 +2,7 @@
 //! replaces it.
 
 use super::{MatrixLocation, Table, Walk};
-use crate::diagnostic::Code;
+use crate::base::diagnostic::Code;
 use crate::input::LoadSource;
 use std::path::Path;
 use toml::de::DeValue;

@@ -1,7 +1,7 @@
 //! The table `[damping]`.
 
 use super::{MatrixLocation, Table, Value, Walk};
-use crate::diagnostic::Code;
+use crate::base::diagnostic::Code;
 use crate::model::{Damping, DampingBand};
 use std::path::Path;
 use toml::de::DeValue;

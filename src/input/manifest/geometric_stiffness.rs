@@ -1,7 +1,7 @@
 //! The tables `[[geometric_stiffness]]`.
 
 use super::{MatrixLocation, Table, Walk};
-use crate::diagnostic::Code;
+use crate::base::diagnostic::Code;
 use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 use std::ops::Range;
 use std::path::Path;

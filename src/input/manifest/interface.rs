@@ -1,7 +1,7 @@
 //! The tables `[[interface]]`.
 
 use super::{Table, Value, Walk, integer, real};
-use crate::diagnostic::Code;
+use crate::base::diagnostic::Code;
 use crate::input::model_files::{InterfaceNodes, InterfaceSource};
 use crate::model::{Coupling, Reference};
 use std::collections::HashSet;

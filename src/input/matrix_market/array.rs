@@ -4,7 +4,7 @@ use super::header::{excerpt, has_banner, size};
 use super::line::real;
 use super::text::Blocks;
 use super::{Compression, broken, written_digits};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::input::shapes::Array;
 

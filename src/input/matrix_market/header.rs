@@ -1,6 +1,6 @@
 //! Banner, comments and size line.
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::{Code, Diagnostic};
 
 /// Which entries of the matrix are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 //! says what is wrong.
 
 use super::{Entry, header::excerpt, written_digits};
-use crate::diagnostic::Code;
+use crate::base::diagnostic::Code;
 
 /// What the header says about every line.
 #[derive(Debug, Clone, Copy)]

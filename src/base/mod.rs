@@ -1,0 +1,11 @@
+//! What every room may use: errors and the one table of diagnostic codes, units, provenance, progress, memory, and files that appear
+//! whole or not at all. Nothing here knows matrices, models or bodies.
+
+pub mod diagnostic;
+pub mod error;
+pub(crate) mod hdf5_file;
+pub mod memory;
+pub mod output;
+pub mod progress;
+pub mod provenance;
+pub mod units;

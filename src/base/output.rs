@@ -1,0 +1,387 @@
+//! Output files that appear whole or not at all: a temporary file in the same folder, synced, then renamed.
+//!
+//! A temporary file is locked as long as its process lives. A later run removes those in its output folders that nobody
+//! holds: what a process left that was killed. Several outputs of one run appear together, see [`OutputSlot::commit_all`].
+
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
+use tempfile::TempPath;
+
+/// What the names of temporary files begin and end with.
+const PREFIX: &str = ".flexbody-";
+const SUFFIX: &str = ".tmp";
+
+/// Most symbolic links that one path may lead through, as on Linux.
+const MOST_LINKS: usize = 40;
+
+/// A place for one output file, reserved before the work starts.
+///
+/// Making a slot proves that the folder exists and can be written. The target is touched only by
+/// [`OutputSlot::commit`]; dropping the slot removes the temporary file and leaves an existing target as it is.
+#[derive(Debug)]
+pub struct OutputSlot {
+    asked: PathBuf,
+    target: PathBuf,
+    temporary: Temporary,
+}
+
+/// What this process knows of its temporary files, for the case that it is interrupted.
+#[derive(Debug)]
+struct Book {
+    /// Those that exist.
+    unfinished: Vec<PathBuf>,
+    /// Folders that were searched for what killed processes left.
+    swept: Vec<PathBuf>,
+}
+
+static BOOK: Mutex<Book> = Mutex::new(Book { unfinished: Vec::new(), swept: Vec::new() });
+
+fn book() -> MutexGuard<'static, Book> {
+    BOOK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary file of every slot, for a process that ends at once: from here on it can neither reserve nor
+/// finish an output file, and a thread that tries to waits for the end. Outputs that are being put in place together are
+/// waited for.
+pub fn abandon_unfinished() {
+    abandon(book());
+}
+
+/// The same for a process without memory, which allocates nothing and does not wait for long: the thread that is out of
+/// memory may hold the list itself. What then stays is removed by the next run.
+pub fn abandon_unfinished_soon() {
+    for _ in 0..100 {
+        match BOOK.try_lock() {
+            Ok(book) => return abandon(book),
+            Err(TryLockError::Poisoned(poisoned)) => return abandon(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
+        }
+    }
+}
+
+fn abandon(book: MutexGuard<'_, Book>) {
+    for file in &book.unfinished {
+        // Nothing is left to do about a file that cannot be removed.
+        let _ = std::fs::remove_file(file);
+    }
+    std::mem::forget(book);
+}
+
+/// A temporary file that the [`Book`] knows as long as it exists, and that is locked as long as this process lives.
+#[derive(Debug)]
+struct Temporary {
+    path: Option<TempPath>,
+    file: File,
+}
+
+impl Temporary {
+    fn make(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> std::io::Result<Self> {
+        let mut book = book();
+        book.sweep(folder);
+        // Between making and locking it, another process may take a file for abandoned.
+        for _ in 0..8 {
+            let (file, path) = builder.tempfile_in(folder)?.into_parts();
+            if lock(&file) && is_at(&file, &path) {
+                book.unfinished.push(path.to_path_buf());
+                return Ok(Self { path: Some(path), file });
+            }
+        }
+        Err(std::io::Error::other("temporary files vanish as soon as they are made"))
+    }
+
+    fn path(&self) -> &Path {
+        self.path.as_ref().expect("there until it is finished")
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some(path) = self.path.take() {
+            let mut book = book();
+            book.forget(&path);
+            drop(path); // removes the file, while nobody abandons
+        }
+    }
+}
+
+impl Book {
+    fn forget(&mut self, path: &Path) {
+        self.unfinished.retain(|other| other != path);
+    }
+
+    /// Removes from `folder` the temporary files of processes that are gone; once for every folder.
+    fn sweep(&mut self, folder: &Path) {
+        if self.swept.iter().any(|swept| swept == folder) {
+            return;
+        }
+        self.swept.push(folder.to_path_buf());
+        let Ok(entries) = std::fs::read_dir(folder) else { return };
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let is_ours = name.to_str().is_some_and(|n| n.starts_with(PREFIX) && n.ends_with(SUFFIX));
+            if is_ours && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+                remove_if_abandoned(&entry.path());
+            }
+        }
+    }
+}
+
+/// Locks the file of a slot; false where another process has it already. File systems without locks go without.
+#[cfg(unix)]
+fn lock(file: &File) -> bool {
+    !matches!(file.try_lock(), Err(std::fs::TryLockError::WouldBlock))
+}
+
+/// Elsewhere a lock would keep others from writing, HDF5 among them.
+#[cfg(not(unix))]
+fn lock(_: &File) -> bool {
+    true
+}
+
+#[cfg(unix)]
+fn remove_if_abandoned(path: &Path) {
+    let Ok(file) = OpenOptions::new().read(true).write(true).open(path) else { return };
+    // A file system without locks says nothing about who holds a file.
+    if file.try_lock().is_ok() && is_at(&file, path) {
+        // Somebody else's that cannot be removed does no harm.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+#[cfg(not(unix))]
+fn remove_if_abandoned(_: &Path) {}
+
+/// Whether the open `file` is the one that has this name.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let (Ok(own), Ok(named)) = (file.metadata(), std::fs::symlink_metadata(path)) else { return false };
+    (own.dev(), own.ino()) == (named.dev(), named.ino())
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// The file that an output path stands for: symbolic links are followed, to a file that does not exist yet as well.
+///
+/// # Errors
+/// Links that lead in a circle.
+pub fn followed(path: &Path) -> std::io::Result<PathBuf> {
+    let mut at = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match std::fs::symlink_metadata(&at) {
+            Ok(meta) if meta.is_symlink() => {
+                let target = std::fs::read_link(&at)?;
+                at = at.parent().unwrap_or(Path::new("")).join(target);
+            }
+            _ => return Ok(at),
+        }
+    }
+    Err(std::io::Error::other("its symbolic links lead in a circle"))
+}
+
+impl OutputSlot {
+    /// Reserves `path`. A symbolic link is followed, so that the file it points to is replaced or made, not the link.
+    ///
+    /// # Errors
+    /// [`OutputNotFile`](Code::OutputNotFile) when `path` is a folder, a device, empty or a circle of links;
+    /// [`OutputFolderMissing`](Code::OutputFolderMissing) when the folder does not exist;
+    /// [`OutputUnwritable`](Code::OutputUnwritable) when `path` is a write-protected file, or no file can be made in
+    /// the folder.
+    pub fn prepare(path: impl AsRef<Path>) -> Result<Self> {
+        let asked = path.as_ref().to_path_buf();
+        let target = target_of(&asked)?;
+        let unwritable = |why: String| fail(Code::OutputUnwritable, &asked, why);
+        let folder = folder_of(&target);
+        match std::fs::metadata(folder) {
+            Ok(meta) if meta.is_dir() => {}
+            Ok(_) => {
+                let why = format!("{} is not a folder", folder.display());
+                return Err(fail(Code::OutputFolderMissing, &asked, why));
+            }
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                let why = format!("folder {} does not exist", folder.display());
+                return Err(fail(Code::OutputFolderMissing, &asked, why));
+            }
+            Err(e) => return Err(unwritable(format!("folder {}: {e}", folder.display()))),
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        // Temporary files are private by default; this one becomes the output: mode 666 less the umask.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let temporary = Temporary::make(&builder, folder).map_err(|e| io(&asked, &e))?;
+        Ok(Self { asked, target, temporary })
+    }
+
+    /// The path as the user gave it.
+    pub fn path(&self) -> &Path {
+        &self.asked
+    }
+
+    /// The temporary file, for writers that need a path of their own.
+    pub fn temporary(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// The error for a write to [`OutputSlot::temporary`] that failed in somebody else's hands.
+    pub(crate) fn failure(&self, error: &std::io::Error) -> Error {
+        io(&self.asked, error)
+    }
+
+    /// Writes `bytes` and commits.
+    ///
+    /// # Errors
+    /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable).
+    pub fn write(self, bytes: &[u8]) -> Result<()> {
+        self.fill(bytes)?;
+        self.commit()
+    }
+
+    /// Writes `bytes` to the temporary file; they appear with [`OutputSlot::commit`].
+    ///
+    /// # Errors
+    /// As [`OutputSlot::write`].
+    pub fn fill(&self, bytes: &[u8]) -> Result<()> {
+        let written = OpenOptions::new()
+            .write(true)
+            .truncate(true)
+            .open(self.temporary())
+            .and_then(|mut file| file.write_all(bytes));
+        written.map_err(|e| self.failure(&e))
+    }
+
+    /// Makes the temporary file the output: flushes it to the disk, then renames it over the target.
+    ///
+    /// # Errors
+    /// As [`OutputSlot::write`].
+    pub fn commit(self) -> Result<()> {
+        Self::commit_all([self])
+    }
+
+    /// Makes the temporary files the outputs, all of them or none: every file is on the disk before the first gets its
+    /// name, and a signal that ends the program waits until all have theirs. Where one cannot be put in place, what stood
+    /// in the places of the others before comes back, on file systems with hard links.
+    ///
+    /// # Errors
+    /// As [`OutputSlot::write`].
+    pub fn commit_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
+        let mut slots: Vec<Self> = slots.into_iter().collect();
+        for slot in &slots {
+            slot.temporary.file.sync_all().map_err(|e| slot.failure(&e))?;
+        }
+        let placed = place_all(&mut slots);
+        // The renames themselves are durable once the folders are synced; where folders cannot be opened they are so
+        // already or cannot be made so, and the files are in place either way.
+        let mut folders: Vec<&Path> = slots.iter().map(|slot| folder_of(&slot.target)).collect();
+        folders.dedup();
+        for folder in folders {
+            if let Ok(folder) = File::open(folder) {
+                let _ = folder.sync_all();
+            }
+        }
+        placed
+    }
+
+    /// Another name for the file that stands in the place, for the case that it has to come back.
+    fn keep_old(&self) -> Option<PathBuf> {
+        let mut name = self.temporary.path().file_name()?.to_os_string();
+        name.push(SUFFIX);
+        let old = self.temporary.path().with_file_name(name);
+        std::fs::hard_link(&self.target, &old).is_ok().then_some(old)
+    }
+}
+
+/// An output in its place, and what is needed to undo that.
+struct Placed {
+    target: PathBuf,
+    /// Another name of the file that stood there before.
+    old: Option<PathBuf>,
+    replaced: bool,
+}
+
+/// Renames all files, or puts back what stood there before.
+fn place_all(slots: &mut [OutputSlot]) -> Result<()> {
+    // Held until the end: who abandons the unfinished waits for it.
+    let mut book = book();
+    let several = slots.len() > 1;
+    let mut placed: Vec<Placed> = Vec::with_capacity(slots.len());
+    for slot in slots {
+        let replaced = slot.target.exists();
+        let old = several.then(|| slot.keep_old()).flatten();
+        let path = slot.temporary.path.take().expect("there until it is finished");
+        book.forget(&path);
+        let renamed = path.persist(&slot.target);
+        let done = Placed { target: slot.target.clone(), old, replaced };
+        if let Err(e) = renamed {
+            done.forget_old();
+            placed.iter().for_each(Placed::put_back);
+            return Err(slot.failure(&e.error));
+        }
+        placed.push(done);
+    }
+    placed.iter().for_each(Placed::forget_old);
+    Ok(())
+}
+
+impl Placed {
+    fn forget_old(&self) {
+        // One that stays is removed by the next run.
+        let _ = self.old.as_ref().map(std::fs::remove_file);
+    }
+
+    /// Undoes the rename. What cannot be undone stays as it is; the error of the run is told all the same.
+    fn put_back(&self) {
+        let _ = match &self.old {
+            Some(old) => std::fs::rename(old, &self.target),
+            None if !self.replaced => std::fs::remove_file(&self.target),
+            None => Ok(()),
+        };
+    }
+}
+
+/// The file that `asked` stands for, which exists and can be replaced, or does not exist.
+fn target_of(asked: &Path) -> Result<PathBuf> {
+    let not_a_file = |why: &str| fail(Code::OutputNotFile, asked, why.to_owned());
+    if asked.as_os_str().is_empty() {
+        return Err(not_a_file("the path is empty"));
+    }
+    let ends_in_separator = asked.to_string_lossy().ends_with(std::path::is_separator);
+    if asked.is_dir() {
+        return Err(not_a_file("it is a folder"));
+    }
+    if ends_in_separator || asked.file_name().is_none() {
+        return Err(not_a_file("the path does not end in a file name"));
+    }
+    match std::fs::metadata(asked) {
+        Ok(meta) if !meta.is_file() => Err(not_a_file("it is not a regular file")),
+        Ok(meta) if meta.permissions().readonly() => {
+            Err(fail(Code::OutputUnwritable, asked, "the existing file is write-protected".to_owned()))
+        }
+        Ok(_) => std::fs::canonicalize(asked).map_err(|e| fail(Code::OutputUnwritable, asked, e.to_string())),
+        Err(_) => followed(asked).map_err(|e| not_a_file(&e.to_string())),
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn fail(code: Code, path: &Path, why: String) -> Error {
+    Diagnostic::new(code, format!("cannot write {}: {why}", path.display())).into()
+}
+
+fn io(path: &Path, error: &std::io::Error) -> Error {
+    let code = match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Code::DiskShort,
+        _ => Code::OutputUnwritable,
+    };
+    fail(code, path, error.to_string())
+}

@@ -1,0 +1,53 @@
+//! The bases there are.
+
+use super::{Basis, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
+use crate::base::provenance::SourceFile;
+
+/// Which basis a body gets: every implementation of [`Basis`] has a variant here.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BasisChoice {
+    /// Free-surface modes, with residual vectors where they are wanted.
+    Free(FreeSurface),
+    /// Shapes that were computed elsewhere.
+    Imported(ImportedShapes),
+    /// Modes with the interfaces held, and constraint modes.
+    CraigBampton(CraigBampton),
+    /// Free-surface modes, and attachment modes of the interfaces.
+    CraigChang(CraigChang),
+}
+
+impl Default for BasisChoice {
+    /// Free-surface modes alone.
+    fn default() -> Self {
+        Self::Free(FreeSurface::default())
+    }
+}
+
+impl BasisChoice {
+    /// Files that were read for it.
+    pub fn sources(&self) -> Vec<&SourceFile> {
+        match self {
+            Self::Imported(shapes) => shapes.source().into_iter().collect(),
+            _ => self.residual_vectors().iter().filter_map(Loads::source).collect(),
+        }
+    }
+
+    /// The one that is chosen.
+    pub fn basis(&self) -> &dyn Basis {
+        match self {
+            Self::Free(free) => free,
+            Self::Imported(shapes) => shapes,
+            Self::CraigBampton(fixed) => fixed,
+            Self::CraigChang(free) => free,
+        }
+    }
+
+    /// Loads, named by the user, whose static responses join the modes.
+    pub fn residual_vectors(&self) -> &[Loads] {
+        match self {
+            Self::Free(FreeSurface { residual_vectors })
+            | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
+            Self::Imported(_) | Self::CraigBampton(_) => &[],
+        }
+    }
+}

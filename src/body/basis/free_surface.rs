@@ -1,0 +1,274 @@
+//! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
+
+use super::Loads;
+use super::failure::explain;
+use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
+use super::residual_vectors::{NamedLoads, with_residual_vectors};
+use super::rigid_modes::rigid_modes;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::progress::Watch;
+use crate::model::{FeModel, centre_and_length};
+use crate::numerics::eigen::{
+    Accuracy, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve,
+};
+use crate::numerics::linalg::{
+    CscMatrix, Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen,
+};
+use faer::{Mat, MatRef};
+
+/// What is asked for.
+pub use crate::numerics::eigen::EigenSettings as ModeSettings;
+
+/// The lowest free-surface modes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FreeSurface {
+    /// Loads whose static responses join the modes.
+    pub residual_vectors: Vec<Loads>,
+}
+
+impl Basis for FreeSurface {
+    fn name(&self) -> &'static str {
+        "free"
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        if self.residual_vectors.is_empty() {
+            let Task { model, settings, resume, watch } = *task;
+            return free_surface_resumed(model, settings, resume, watch);
+        }
+        free_modes_with(&self.residual_vectors, "residual vector", task)
+    }
+}
+
+/// Free-surface modes and the static responses to `loads`, each called `what` where modes are named after it.
+pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> Result<ModalBasis> {
+    let Task { model, settings, resume, watch } = *task;
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let problem = problem_of_span(model, rigid.as_ref(), resume);
+    let loads = NamedLoads::new(&problem, model, loads, what, settings)?;
+    let free = free_surface_resumed(model, settings, resume, watch)?;
+    with_residual_vectors(model, &problem, free, &loads, settings, watch)
+}
+
+/// Computes the free-surface modes of `model`.
+///
+/// # Errors
+/// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
+pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<ModalBasis> {
+    free_surface_resumed(model, settings, Resume::default(), watch)
+}
+
+/// The same with a search that starts where an earlier one stood, or that is kept.
+///
+/// # Errors
+/// As [`free_surface`].
+pub fn free_surface_resumed(
+    model: &FeModel,
+    settings: &ModeSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<ModalBasis> {
+    compute(model, model.pencil(), settings, resume, watch)
+}
+
+/// The same with nodal masses (n), the same in every direction, in place of the model's.
+///
+/// # Errors
+/// As [`free_surface`].
+///
+/// # Panics
+/// When there is not one mass per node.
+pub fn free_surface_of(
+    model: &FeModel,
+    masses: &[f64],
+    settings: &ModeSettings,
+    watch: Watch<'_>,
+) -> Result<ModalBasis> {
+    assert_eq!(masses.len(), model.nodes().len(), "one mass per node");
+    let d = model.dimension();
+    let diagonal = |n: usize, per_row: usize| {
+        let entries = masses.iter().flat_map(|m| std::iter::repeat_n(*m, per_row)).enumerate();
+        let entries: Vec<(u32, u32, f64)> = entries.map(|(i, m)| (i as u32, i as u32, m)).collect();
+        SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries))
+            .expect("a diagonal matrix is symmetric")
+    };
+    let (mass, block) = match model.rows().are_plain() {
+        true => (diagonal(masses.len(), 1), d),
+        false => (diagonal(model.rows().len(), d), 1),
+    };
+    compute(model, Pencil::new(model.stiffness(), &mass, block), settings, Resume::default(), watch)
+}
+
+fn compute(
+    model: &FeModel,
+    pencil: Pencil<'_>,
+    settings: &ModeSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<ModalBasis> {
+    let rigid = rigid_modes(model, &pencil)?;
+    let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
+    let problem = EigenProblem {
+        pencil,
+        rigid: rigid.as_ref(),
+        first_estimate,
+        input_error: input_error(model),
+        resume,
+    };
+    let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
+    let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
+    describe(&basis.solution, settings, &problem, &mut basis.diagnostics);
+    basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
+    Ok(basis)
+}
+
+/// What the user should know about the precision of the factor.
+pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
+    let plan = solution.plan.filter(|_| settings.factor == FactorChoice::Auto)?;
+    let message = match plan.precision {
+        Precision::Single => "the factor is in single precision; the modes are corrected in double precision",
+        Precision::Double if plan.single_failed => {
+            "a single-precision factor is too poor for the conditioning of this model: factored in double precision"
+        }
+        Precision::Double => return None,
+    };
+    Some(Diagnostic::new(Code::FactorPrecision, message))
+}
+
+/// Notes about how many modes there are and how they end.
+fn describe(
+    solution: &EigenSolution,
+    settings: &ModeSettings,
+    problem: &EigenProblem<'_>,
+    notes: &mut Vec<Diagnostic>,
+) {
+    let given = solution.eigenvalues.len();
+    let pencil = &problem.pencil;
+    let at_most = pencil.n() - problem.rigid.ncols();
+    // Known from the rank of M, or because all there are were found.
+    let mut finite = solution.finite_modes;
+    if let Wanted::Lowest(wanted) = settings.wanted
+        && given < wanted
+    {
+        let message = format!(
+            "{wanted} modes were asked for, the model has {given} flexible modes with finite frequency"
+        );
+        notes.push(Diagnostic::new(Code::ModesClamped, message));
+        finite = finite.or(Some(given));
+    }
+    let massless = (0..pencil.mass().n()).filter(|&i| pencil.mass().row(i).0.is_empty()).count();
+    let singular = match finite {
+        Some(finite) if finite < at_most => {
+            Some(format!("{finite} of {at_most} flexible modes have a finite frequency"))
+        }
+        None if massless > 0 => Some(format!(
+            "{} without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
+            if pencil.block() == 1 { "rows" } else { "nodes" },
+            at_most - pencil.block() * massless
+        )),
+        _ => None,
+    };
+    notes.extend(
+        singular.map(|what| {
+            Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {what}"))
+        }),
+    );
+    let below = solution.completeness.modes_below;
+    if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
+        let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);
+        notes.push(
+            Diagnostic::new(Code::RepeatedSplit, message)
+                .with_help(format!("ask for {below} modes to keep the body's symmetry")),
+        );
+    }
+    if solution.completeness.proof == Proof::NotProved {
+        let message =
+            format!("completeness of the {given} modes is not proved: {}", solution.completeness.remark);
+        let note = Diagnostic::new(Code::CompletenessUnproved, message);
+        notes.push(match settings.accuracy {
+            Accuracy::Fast => note,
+            _ => note.with_help(
+                "the modes keep their accuracy; a larger --memory-limit or machine allows the proof",
+            ),
+        });
+    }
+}
+
+/// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper
+/// bound of the first flexible eigenvalue, within a factor of two for a uniform body. Nodal rotations are half the curl of
+/// the field, rows without a place stay zero.
+pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
+    let positions = &model.nodes().positions;
+    let (centre, length) = centre_and_length(positions);
+    let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+    let d = model.dimension();
+    let mut fields = Mat::zeros(pencil.n(), exponents.len() * d);
+    let local = |i: usize| [0, 1, 2].map(|k| (positions[i][k] - centre[k]) / length);
+    let factor = |r: &[f64; 3], b: usize| r.get(b).copied().unwrap_or(1.0);
+    for i in 0..positions.len() {
+        let r = local(i);
+        for (e, &(a, b)) in exponents.iter().enumerate() {
+            for k in 0..d {
+                fields[(d * i + k, d * e + k)] = r[a] * factor(&r, b);
+            }
+        }
+    }
+    let rows = model.rows();
+    for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
+        let r = local(node as usize);
+        let (l, m) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
+        for (e, &(a, b)) in exponents.iter().enumerate() {
+            let slope = |p: usize| {
+                let first = if a == p { factor(&r, b) } else { 0.0 };
+                (first + if b == p { r[a] } else { 0.0 }) / length
+            };
+            // (curl v e_k) along (k, l, m) cyclic: dv/dl along m for k = m, -dv/dm for k = l.
+            for (k, curl) in [(m, slope(l)), (l, -slope(m))] {
+                if k < d {
+                    fields[(row, d * e + k)] = 0.5 * curl;
+                }
+            }
+        }
+    }
+    let mass = |fields: &Mat<f64>| gram(fields.as_ref(), pencil.apply_mass(fields.as_ref()).as_ref());
+    let before = mass(&fields);
+    for _ in 0..2 {
+        let along = gram(rigid, pencil.apply_mass(fields.as_ref()).as_ref());
+        subtract_combination(fields.as_mut(), rigid, along.as_ref());
+    }
+    let mut m = mass(&fields);
+    for i in 0..m.nrows() {
+        // A rigid field, or one that a singular mass matrix does not see: rounding only.
+        if m[(i, i)] < 1e-10 * before[(i, i)] {
+            m[(i, i)] = 0.0;
+        }
+    }
+    let k = gram(fields.as_ref(), pencil.apply_stiffness(fields.as_ref()).as_ref());
+    smallest_ratio(&k, &m).unwrap_or_else(|| trace_ratio(pencil))
+}
+
+/// Smallest eigenvalue of the small pencil (K, M) on the well-conditioned part of M.
+fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>) -> Option<f64> {
+    let scale: Vec<f64> =
+        (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
+    let scaled = |a: &Mat<f64>| {
+        Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]) * scale[i] * scale[j])
+    };
+    let eigen = symmetric_eigen(scaled(m).as_ref())?;
+    let largest = *eigen.values.last()?;
+    let kept: Vec<usize> = (0..eigen.values.len()).filter(|&i| eigen.values[i] > 1e-6 * largest).collect();
+    let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
+        eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
+    });
+    let projected = gram(root.as_ref(), combine(scaled(k).as_ref(), root.as_ref()).as_ref());
+    let ratios = symmetric_eigen(projected.as_ref())?;
+    ratios.values.first().copied().filter(|v| *v > 0.0 && v.is_finite())
+}
+
+/// Mean stiffness over mean mass: a scale when nothing better is known.
+fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
+    let k: f64 = pencil.stiffness().diagonal().iter().sum();
+    let m: f64 = pencil.mass().diagonal().iter().sum::<f64>() * pencil.block() as f64;
+    k / m
+}

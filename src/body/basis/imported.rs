@@ -1,0 +1,101 @@
+//! Shapes that were computed elsewhere: checked, brought into the order of the model, freed from rigid motion,
+//! M-orthonormalised. Nothing is factored unless eigenvectors are to be proved complete.
+
+use super::columns::columns;
+use super::failure::explain;
+use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
+use super::pseudo_free_surface::independent;
+use super::rigid_modes::rigid_modes;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::provenance::SourceFile;
+use crate::model::{FeModel, RawShapes};
+use crate::numerics::eigen::{Accuracy, EigenFailure, Proof, Wanted, modes_of_span};
+use faer::Mat;
+
+/// Shapes in the order of a model's degrees of freedom.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedShapes {
+    /// N x k, by internal rows.
+    shapes: Mat<f64>,
+    digits: u8,
+    source: Option<SourceFile>,
+}
+
+impl ImportedShapes {
+    /// Shapes for `model`, given by its matrix rows.
+    ///
+    /// # Errors
+    /// [`ShapesSize`](Code::ShapesSize) when the rows are not those of the matrices,
+    /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
+    pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
+        let (digits, source) = (raw.digits, raw.source.clone());
+        Ok(Self { shapes: columns(model, raw, "shape")?, digits, source })
+    }
+
+    /// The file that they were read from.
+    pub fn source(&self) -> Option<&SourceFile> {
+        self.source.as_ref()
+    }
+
+    /// Part of its M-norm that must be left of a shape after those before it: digits that the values do not have say nothing.
+    fn dependent(&self) -> f64 {
+        10f64.powi(2 - i32::from(self.digits)).max(1e-8)
+    }
+}
+
+impl Basis for ImportedShapes {
+    fn name(&self) -> &'static str {
+        "imported"
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        let Task { model, settings, resume, watch } = *task;
+        let rigid = rigid_modes(model, &model.pencil())?;
+        let problem = problem_of_span(model, rigid.as_ref(), resume);
+        let criterion = self.dependent();
+        let failed = |failure| explain(model, failure);
+        let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
+            .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+        let notes = independent.notes("imported shapes", criterion, |j| format!("shape {}", j + 1));
+        if independent.kept.is_empty() {
+            let message = format!("none of {} imported shapes deforms the body", self.shapes.ncols());
+            return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
+        }
+        let solution = modes_of_span(&problem, independent.vectors, settings, watch).map_err(failed)?;
+        let mut basis = ModalBasis::new(model, &problem, settings, solution, "imported shape")?;
+        basis.diagnostics.extend(notes);
+        let given = basis.solution.eigenvalues.len();
+        if let Wanted::Lowest(wanted) = settings.wanted
+            && wanted > given
+            && wanted < usize::MAX
+        {
+            let message = format!("{wanted} modes were asked for, the shapes give {given}");
+            basis.diagnostics.push(Diagnostic::new(Code::ModesClamped, message));
+        }
+        basis.describe_span(settings.accuracy);
+        Ok(basis)
+    }
+}
+
+impl ModalBasis {
+    /// Notes about modes of a subspace: which are no eigenvectors, and whether the others are complete.
+    fn describe_span(&mut self, accuracy: Accuracy) {
+        let solution = &self.solution;
+        let (residuals, completeness) = (&solution.residuals, &solution.completeness);
+        let promised = accuracy.residual();
+        let worst = residuals.iter().copied().fold(0.0, f64::max);
+        let others = solution.residuals.len() - solution.eigenvectors(accuracy);
+        if others > 0 {
+            let message = format!(
+                "{others} of {} modes are no eigenvectors but the best that the span of the shapes has: K-residual up to {worst:.0e}, eigenvectors have {promised:.0e}",
+                residuals.len()
+            );
+            self.diagnostics.push(Diagnostic::new(Code::ShapesSpan, message));
+        }
+        if completeness.proof == Proof::NotProved && others < residuals.len() {
+            let message = format!("completeness of the modes is not proved: {}", completeness.remark);
+            self.diagnostics.push(Diagnostic::new(Code::CompletenessUnproved, message));
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have (theory section 8).
+
+use super::columns::columns;
+use super::failure::explain;
+use super::joints::{AXES, Joint, joints};
+use super::modal_basis::ModalBasis;
+use super::pseudo_free_surface::independent;
+use super::{ModeSettings, Truncation};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::progress::{Event, Watch};
+use crate::base::provenance::SourceFile;
+use crate::model::{FeModel, RawShapes, centre_and_length};
+use crate::numerics::eigen::{
+    Accuracy, EigenFailure, EigenProblem, EigenSolution, Precision, Wanted, modes_of_span, static_responses,
+};
+use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
+use faer::Mat;
+
+/// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
+const LEFT: f64 = 1e-8;
+
+/// Part of a load that must be left without its resultants: what moves the body only as a whole needs no mode.
+const SELF_EQUILIBRATED: f64 = 1e-10;
+
+/// Loads whose static responses are to be in the basis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Loads {
+    /// The six centrifugal loads that any constant angular velocity about the centre of mass is made of, f(w) = sum_kl w_k w_l f_kl:
+    /// f_kl = -e_k x (M B_x e_l) - e_l x (M B_x e_k), once for k = l, at displacements (theory sections 3 and 6). For M = Ms kron I3
+    /// f_kl = -Ms (e_k x (e_l x x) + e_l x (e_k x x)).
+    Centrifugal,
+    /// Unit force and unit torque along every model axis at the reference point of every interface, distributed over its nodes as
+    /// a rigid motion of these would be (averaging coupling, also where another joins the nodes rigidly); unit forces at the
+    /// nodes of a free interface.
+    Interfaces,
+    /// Nodal forces.
+    User(UserLoads),
+}
+
+/// Nodal forces in the order of a model's degrees of freedom, one load in each column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UserLoads {
+    loads: Mat<f64>,
+    source: Option<SourceFile>,
+}
+
+impl UserLoads {
+    /// Loads for `model`, given by its matrix rows.
+    ///
+    /// # Errors
+    /// As [`ImportedShapes::new`](super::ImportedShapes::new).
+    pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
+        let source = raw.source.clone();
+        Ok(Self { loads: columns(model, raw, "load")?, source })
+    }
+}
+
+impl Loads {
+    /// Name in files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Centrifugal => "centrifugal",
+            Self::Interfaces => "interfaces",
+            Self::User(_) => "loads",
+        }
+    }
+
+    /// The file that they were read from.
+    pub fn source(&self) -> Option<&SourceFile> {
+        match self {
+            Self::User(loads) => loads.source.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// Names and nodal forces.
+    fn forces(&self, problem: &EigenProblem<'_>, model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
+        match self {
+            Self::Centrifugal => Ok(centrifugal(problem, model)),
+            Self::Interfaces => interfaces(model),
+            Self::User(UserLoads { loads, .. }) => Ok((0..loads.ncols())
+                .map(|j| (format!("load {}", j + 1), loads.as_ref().subcols(j, 1).to_owned()))
+                .collect()),
+        }
+    }
+}
+
+fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
+    let (mut loads, d) = (Vec::new(), model.dimension());
+    let pencil = &problem.pencil;
+    let turning = model.rigid_fields(centre_of_mass(problem, model), 1.0);
+    let momenta = pencil.apply_mass(turning.as_ref().subcols(d, turning.ncols() - d));
+    // A plane body spins about z alone.
+    let spins: &[(usize, usize)] =
+        if d == 2 { &[(2, 2)] } else { &[(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] };
+    let displacements = model.rows().displacements();
+    for &(k, l) in spins {
+        let mut load = Mat::zeros(pencil.n(), 1);
+        // -e_k x (M B_x e_l) at every displacement, where (a, b) follow k in cyclic order.
+        for (k, l) in if k == l { vec![(k, l)] } else { vec![(k, l), (l, k)] } {
+            let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+            let momentum = momenta.col(if d == 2 { 0 } else { l });
+            for first in (0..displacements).step_by(d) {
+                let along = |axis: usize| if axis < d { momentum[first + axis] } else { 0.0 };
+                for (axis, value) in [(a, along(b)), (b, -along(a))] {
+                    if axis < d {
+                        load[(first + axis, 0)] += value;
+                    }
+                }
+            }
+        }
+        loads.push((format!("centrifugal {}{}", AXES[k], AXES[l]), load));
+    }
+    loads
+}
+
+/// Centre of mass in model coordinates.
+fn centre_of_mass(problem: &EigenProblem<'_>, model: &FeModel) -> [f64; 3] {
+    let (centre, _) = centre_and_length(&model.nodes().positions);
+    let rigid = model.rigid_fields(centre, 1.0);
+    let g = gram(rigid.as_ref(), problem.pencil.apply_mass(rigid.as_ref()).as_ref());
+    // R'MR = [m I, -c~; c~, I0].
+    let offset = match model.dimension() {
+        2 => [g[(1, 2)], -g[(0, 2)], 0.0],
+        _ => [0, 1, 2].map(|k| 0.5 * (g[((k + 1) % 3, 3 + (k + 2) % 3)] - g[((k + 2) % 3, 3 + (k + 1) % 3)])),
+    };
+    [0, 1, 2].map(|k| centre[k] + offset[k] / g[(0, 0)])
+}
+
+/// The load on each coordinate of every interface.
+fn interfaces(model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
+    let joints = joints(model, "interface loads")?;
+    let one = |joint: &Joint, j: usize| {
+        let mut load = Mat::zeros(model.pencil().n(), 1);
+        joint.scatter(joint.measure().subcols(j, 1), &mut load, 0);
+        (format!("{} {}", joint.name, joint.loads[j]), load)
+    };
+    Ok(joints.iter().flat_map(|joint| (0..joint.loads.len()).map(move |j| one(joint, j))).collect())
+}
+
+/// All loads side by side.
+pub(super) struct NamedLoads {
+    /// What a static response is called.
+    what: String,
+    names: Vec<String>,
+    /// N x m.
+    forces: Mat<f64>,
+}
+
+impl NamedLoads {
+    /// The loads of a model.
+    ///
+    /// # Errors
+    /// [`InterfaceNode`](Code::InterfaceNode) without interfaces, [`Usage`](Code::Usage) at accuracy `certified`: residual vectors have no
+    /// guaranteed bounds.
+    pub fn new(
+        problem: &EigenProblem<'_>,
+        model: &FeModel,
+        loads: &[Loads],
+        what: &str,
+        settings: &ModeSettings,
+    ) -> Result<Self> {
+        if settings.accuracy == Accuracy::Certified {
+            let message = format!("{what}s are no eigenvectors and cannot be certified");
+            return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+        }
+        let named = loads.iter().map(|loads| loads.forces(problem, model)).collect::<Result<Vec<_>>>()?;
+        let (names, forces): (Vec<String>, Vec<Mat<f64>>) = named.into_iter().flatten().unzip();
+        let forces: Vec<_> = forces.iter().map(Mat::as_ref).collect();
+        Ok(Self { what: what.to_owned(), names, forces: side_by_side(&forces) })
+    }
+}
+
+/// Adds the static responses to `loads` to free-surface modes: M-orthonormalised against them and among each other, Ritz
+/// vectors of the span. What they add nothing to is left out and said.
+pub(super) fn with_residual_vectors(
+    model: &FeModel,
+    problem: &EigenProblem<'_>,
+    free: ModalBasis,
+    loads: &NamedLoads,
+    settings: &ModeSettings,
+    watch: Watch<'_>,
+) -> Result<ModalBasis> {
+    let NamedLoads { what, names, forces } = loads;
+    watch(Event::Phase(&format!("{what}s")));
+    let failed = |failure: EigenFailure| explain(model, failure);
+    let pencil = &problem.pencil;
+    let modes = &free.solution.vectors;
+    let lambda = &free.solution.eigenvalues;
+    let mut counters = free.solution.counters;
+    let precision = free.solution.plan.map_or(Precision::Double, |plan| plan.precision);
+    let responses =
+        static_responses(problem, modes.as_ref(), forces.clone(), lambda[0], precision, &mut counters)
+            .map_err(failed)?;
+    // K^+ f = Psi Lambda^-1 Psi'f + what the modes do not have.
+    let modal = gram(modes.as_ref(), forces.as_ref());
+    let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);
+    let mut whole = responses.clone();
+    add_combination(whole.as_mut(), modes.as_ref(), amplitudes.as_ref());
+    let energy = column_products(whole.as_ref(), pencil.apply_stiffness(whole.as_ref()).as_ref());
+    let mass = column_products(whole.as_ref(), pencil.apply_mass(whole.as_ref()).as_ref());
+    let left = column_products(responses.as_ref(), pencil.apply_mass(responses.as_ref()).as_ref());
+    let missed = column_products(responses.as_ref(), pencil.apply_stiffness(responses.as_ref()).as_ref());
+    let equilibrated = {
+        let resultants = gram(problem.rigid, forces.as_ref());
+        forces - pencil.apply_mass(problem.rigid) * resultants
+    };
+    let deforms = |j: usize| {
+        equilibrated.col(j).norm_l2() > SELF_EQUILIBRATED * forces.col(j).norm_l2() && energy[j] > 0.0
+    };
+    let error = |part: f64, j: usize| if deforms(j) { (part.max(0.0) / energy[j]).sqrt() } else { 0.0 };
+
+    let mut dropped: Vec<String> = Vec::new();
+    let mut used = Vec::new();
+    for (j, name) in names.iter().enumerate() {
+        if !deforms(j) {
+            dropped.push(format!("{name} (deforms nothing)"));
+        } else if left[j].max(0.0).sqrt() < LEFT * mass[j].sqrt() {
+            dropped.push(format!("{name} ({:.0e})", (left[j].max(0.0) / mass[j]).sqrt()));
+        } else {
+            used.push(j);
+        }
+    }
+    let candidates = Mat::from_fn(responses.nrows(), used.len(), |i, j| responses[(i, used[j])]);
+    let known = side_by_side(&[problem.rigid, modes.as_ref()]);
+    let found = independent(pencil, known.as_ref(), candidates, LEFT)
+        .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+    dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({left:.0e})", names[used[j]])));
+    dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", names[used[j]])));
+    dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", names[used[j]])));
+
+    let span = side_by_side(&[modes.as_ref(), found.vectors.as_ref()]);
+    let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
+    let ritz = modes_of_span(problem, span.clone(), &all, watch).map_err(failed)?;
+    let parts = gram(span.as_ref(), pencil.apply_mass(ritz.vectors.as_ref()).as_ref());
+    let count = lambda.len();
+    let provenance = (0..ritz.eigenvalues.len())
+        .map(|p| {
+            let share = |c: usize| parts[(c, p)].powi(2);
+            if (0..count).map(share).sum::<f64>() > 0.5 {
+                return "free mode".to_owned();
+            }
+            let largest = (count..span.ncols()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
+            let largest = largest.expect("the span is more than the free modes");
+            let name = &names[used[found.kept[largest - count]]];
+            format!("{what}: {:.0} % {name}", 100.0 * share(largest))
+        })
+        .collect();
+
+    let modal = gram(ritz.vectors.as_ref(), forces.as_ref());
+    let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
+    let mut rest = whole;
+    add_combination(rest.as_mut(), ritz.vectors.as_ref(), amplitudes.as_ref());
+    let rest = column_products(rest.as_ref(), pencil.apply_stiffness(rest.as_ref()).as_ref());
+    let truncation = names.iter().enumerate().map(|(j, name)| Truncation {
+        load: name.clone(),
+        before: error(missed[j], j),
+        after: error(rest[j], j),
+    });
+    let truncation = truncation.collect();
+
+    let mut notes = free.diagnostics;
+    if !dropped.is_empty() {
+        let message = format!(
+            "{} of {} {what}s are left out, they add less than {LEFT:.0e} of their M-norm: {}",
+            dropped.len(),
+            names.len(),
+            dropped.join(", ")
+        );
+        notes.push(Diagnostic::new(Code::LoadsCovered, message));
+    }
+    counters.stiffness_columns += ritz.counters.stiffness_columns;
+    counters.mass_columns += ritz.counters.mass_columns;
+    // What was proved of the free modes stays: the Ritz values of the others lie above the next eigenvalue.
+    let solution = EigenSolution {
+        eigenvalues: ritz.eigenvalues,
+        vectors: ritz.vectors,
+        residuals: ritz.residuals,
+        rounding_floors: ritz.rounding_floors,
+        counters,
+        ..free.solution
+    };
+    let mut basis = ModalBasis::new(model, problem, settings, solution, "")?;
+    (basis.provenance, basis.truncation, basis.diagnostics) = (provenance, truncation, notes);
+    Ok(basis)
+}

@@ -1,0 +1,187 @@
+//! Modes of a model in the frame of its body, and back.
+
+use crate::body::flex_body::{FlexBody, Frame, InternalRows};
+use crate::body::invariants::{
+    Invariants, RigidMotion, condense, condense_general, condense_general_linear, condense_linear,
+};
+use crate::model::{FeModel, rigid_count};
+use crate::numerics::eigen::canonical_basis;
+use crate::numerics::linalg::{SymmetricMatrix, gram};
+use faer::{Mat, MatRef};
+use nalgebra::Vector3;
+
+/// The body frame and the node positions in it.
+pub(crate) struct Place {
+    pub frame: Frame,
+    pub positions: Vec<[f64; 3]>,
+}
+
+impl Place {
+    pub fn new(model: &FeModel, frame: Frame) -> Self {
+        Self { frame, positions: frame.to_body(&model.nodes().positions) }
+    }
+}
+
+/// Unit translations along the axes of a frame and unit rotations about them (rows of the model).
+fn rigid_fields(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let mut fields = model.rigid_fields(frame.origin.into(), 1.0);
+    frame.rotate_rigid(&mut fields);
+    fields
+}
+
+/// R'MR of the unit translations and rotations of a frame.
+pub(crate) fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let rigid = rigid_fields(model, frame);
+    gram(rigid.as_ref(), model.pencil().apply_mass(rigid.as_ref()).as_ref())
+}
+
+/// The modes of a body.
+pub(crate) struct BodyModes {
+    /// In the rows and axes of the model.
+    pub vectors: Mat<f64>,
+    /// Displacements in body axes, three per node and then per vector without a place.
+    pub displacements: Mat<f64>,
+    /// Rotations in body axes, three per node, zero where a node has none.
+    pub rotations: Option<Mat<f64>>,
+    /// Rows without a place: vectors in body axes, then massless rows.
+    pub internal: Option<InternalRows>,
+    /// What the modes of the search were multiplied by.
+    pub signs: Vec<f64>,
+    nodes: usize,
+}
+
+impl BodyModes {
+    /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest magnitude is
+    /// positive, rotations of nodes times the size of the body.
+    pub fn new(model: &FeModel, place: &Place, vectors: &Mat<f64>) -> Self {
+        let rows = model.rows();
+        let (nodes, nf) = (model.nodes().len(), vectors.ncols());
+        let mut displacements =
+            in_space(vectors.as_ref().subrows(0, rows.displacements()), model.dimension());
+        place.frame.rotate_shapes(&mut displacements);
+        let mut rotations = (!rows.rotations().is_empty()).then(|| {
+            let mut rotations = Mat::zeros(3 * nodes, nf);
+            for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
+                for j in 0..nf {
+                    rotations[(3 * node as usize + usize::from(axis), j)] = vectors[(row, j)];
+                }
+            }
+            place.frame.rotate_shapes(&mut rotations);
+            rotations
+        });
+        let size = place.positions.iter().map(|x| Vector3::from(*x).norm()).fold(0.0, f64::max);
+        let moved = 3 * nodes;
+        let turned = rotations.as_ref().map_or(0, Mat::nrows);
+        let mut signed =
+            Mat::from_fn(moved + turned, nf, |row, j| match (row.checked_sub(moved), &rotations) {
+                (Some(row), Some(rotations)) => size * rotations[(row, j)],
+                _ => displacements[(row, j)],
+            });
+        let unsigned = signed.clone();
+        canonical_basis(signed.as_mut(), &[]);
+        let kept = |j: usize| (0..signed.nrows()).all(|i| signed[(i, j)] == unsigned[(i, j)]);
+        let signs: Vec<f64> = (0..nf).map(|j| if kept(j) { 1.0 } else { -1.0 }).collect();
+        let flip = |shapes: &mut Mat<f64>| {
+            (0..nf).for_each(|j| shapes.col_as_slice_mut(j).iter_mut().for_each(|v| *v *= signs[j]));
+        };
+        let mut vectors = vectors.clone();
+        flip(&mut vectors);
+        flip(&mut displacements);
+        rotations.iter_mut().for_each(flip);
+        let internal = internal(model, &vectors, &displacements);
+        Self { vectors, displacements, rotations, internal, signs, nodes }
+    }
+
+    /// The modes of a body that was made of `model`; `None` when it lacks rows of the model, or has others.
+    pub fn of_body(model: &FeModel, body: &FlexBody) -> Option<Self> {
+        let modes = body.modes();
+        Some(Self {
+            vectors: body.vectors_of(model)?,
+            displacements: body.displacements_of(model)?,
+            rotations: modes.rotation.clone(),
+            internal: modes.internal.clone(),
+            signs: vec![1.0; body.n_modes()],
+            nodes: model.nodes().len(),
+        })
+    }
+
+    /// Displacements of the nodes (3n x nf).
+    pub fn of_nodes(&self) -> MatRef<'_, f64> {
+        self.displacements.as_ref().subrows(0, 3 * self.nodes)
+    }
+
+    /// The invariants, by the formulas that the mass of `model` allows.
+    pub fn condensed(&self, model: &FeModel, place: &Place, modal_stiffness: Mat<f64>) -> Invariants {
+        self.by(model, place, modal_stiffness, condense, condense_general)
+    }
+
+    /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
+    pub fn condensed_linear(&self, model: &FeModel, place: &Place, modal_stiffness: Mat<f64>) -> Invariants {
+        self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
+    }
+
+    /// Columns that the condensation with and without W2 or W3 multiplies by M.
+    pub fn condensed_columns(&self, model: &FeModel, linear: bool) -> u64 {
+        let nf = self.vectors.ncols() as u64;
+        match (model.scalar_mass(), linear) {
+            (Some(_), true) => 4,
+            (Some(_), false) => 4 + 3 * nf,
+            (None, true) => rigid_count(model.dimension()) as u64,
+            (None, false) if model.dimension() == 2 => 3 + 2 * nf,
+            (None, false) => 6 + 4 * nf,
+        }
+    }
+
+    fn by(
+        &self,
+        model: &FeModel,
+        place: &Place,
+        modal_stiffness: Mat<f64>,
+        solid: impl Fn(&SymmetricMatrix, &[[f64; 3]], MatRef<'_, f64>, Mat<f64>) -> Invariants,
+        general: impl Fn(&SymmetricMatrix, &RigidMotion<'_>, MatRef<'_, f64>, Mat<f64>) -> Invariants,
+    ) -> Invariants {
+        if let Some(mass) = model.scalar_mass() {
+            return solid(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
+        }
+        let fields = rigid_fields(model, &place.frame);
+        let motion = RigidMotion {
+            fields: fields.as_ref(),
+            displacements: model.rows().displacements(),
+            axes: place.frame.axes,
+        };
+        general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
+    }
+}
+
+/// The rows without a place of modes in model rows (`vectors`), of which `displacements` has the vectors in body axes.
+fn internal(model: &FeModel, vectors: &Mat<f64>, displacements: &Mat<f64>) -> Option<InternalRows> {
+    let [moving, massless] = model.rows().without_place();
+    let label = |row: usize| {
+        let label = model.label(row);
+        [label.node, i64::from(label.direction)]
+    };
+    // In the plane vectors have two rows here and three in space, as nodes have.
+    let of_vectors = moving.step_by(model.dimension()).flat_map(|row| {
+        let [node, _] = label(row);
+        (1..=3).map(move |direction| [node, direction])
+    });
+    let dofs: Vec<[i64; 2]> = of_vectors.chain(massless.clone().map(label)).collect();
+    let first = 3 * model.nodes().len();
+    let split = displacements.nrows() - first;
+    let shape = Mat::from_fn(dofs.len(), vectors.ncols(), |row, j| match row.checked_sub(split) {
+        None => displacements[(first + row, j)],
+        Some(after) => vectors[(massless.start + after, j)],
+    });
+    (!dofs.is_empty()).then_some(InternalRows { dofs, shape })
+}
+
+/// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
+fn in_space(shapes: MatRef<'_, f64>, dimension: usize) -> Mat<f64> {
+    if dimension == 3 {
+        return shapes.to_owned();
+    }
+    Mat::from_fn(shapes.nrows() / 2 * 3, shapes.ncols(), |row, j| match row % 3 {
+        2 => 0.0,
+        k => shapes[(row / 3 * 2 + k, j)],
+    })
+}

@@ -1,0 +1,78 @@
+//! Geometric stiffness of the modes: what the user gives for unit loads, reduced to them and turned into body axes.
+
+use super::reduced;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::body::basis::{BasisChoice, Loads};
+use crate::body::invariants::Invariants;
+use crate::model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
+use faer::{Mat, MatRef, Scale};
+use nalgebra::Matrix3;
+
+/// Direction cosines up to this are rounding.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Rates of different axes within this part are the same.
+const ALIKE: f64 = 1e-9;
+
+/// Beyond this what follows from the entries would not be finite.
+const LARGEST: f64 = 1e290;
+
+/// Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit loads along the
+/// columns of `axes`. Components that were not given count as zero, so that K_geo of any load is the same in all axes; what
+/// nothing given contributes to is left out. Kinds in the order of the model, components in theirs.
+///
+/// # Errors
+/// [`MatrixNotFinite`](Code::MatrixNotFinite) when the products overflow.
+pub(crate) fn modal_geometric_stiffness(
+    model: &FeModel,
+    vectors: MatRef<'_, f64>,
+    axes: &Matrix3<f64>,
+) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
+    let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
+    for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
+        let own = reduced(matrix, vectors);
+        if own.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > LARGEST)) {
+            let message = format!("geometric stiffness for {load} overflows on the modes");
+            return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
+        }
+        let along = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);
+        for (component, factor) in along {
+            let load = UnitLoad { kind: load.kind.clone(), component };
+            let part = &own * Scale(factor);
+            match out.iter_mut().find(|known| known.load == load) {
+                Some(sum) => sum.matrix += part,
+                None => out.push(GeometricStiffness { load, matrix: part }),
+            }
+        }
+    }
+    let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
+    out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
+    Ok(out)
+}
+
+/// A warning when centrifugal loads are wanted in the basis, so that the body spins, but geometric stiffness for spin is
+/// not given: at what rate the softening begins to count.
+pub(super) fn softening_warning(
+    model: &FeModel,
+    basis: &BasisChoice,
+    invariants: &Invariants,
+) -> Option<Diagnostic> {
+    let BasisChoice::Free(free) = basis else { return None };
+    let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    if given || !free.residual_vectors.contains(&Loads::Centrifugal) {
+        return None;
+    }
+    let axes = if model.dimension() == 2 { 2..3 } else { 0..3 };
+    let rates: Vec<(f64, usize)> =
+        axes.filter_map(|axis| Some((invariants.softening_rate(axis)?, axis))).collect();
+    let lowest = rates.iter().map(|(rate, _)| *rate).reduce(f64::min)?;
+    // The first of axes that are alike but for rounding.
+    let &(rate, axis) = rates.iter().find(|(rate, _)| *rate <= (1.0 + ALIKE) * lowest)?;
+    let axis = ["x", "y", "z"][axis];
+    let hertz = model.units().frequency_of(rate * rate);
+    let message = format!(
+        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about body axis {axis}"
+    );
+    Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
+}

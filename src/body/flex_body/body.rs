@@ -1,0 +1,192 @@
+//! The validated body.
+
+use super::storage::relaxed;
+use super::validate::problems;
+use super::{
+    Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source, Storage,
+    TermDecision,
+};
+use crate::base::error::{Error, Result};
+use crate::base::units::UnitSystem;
+use crate::body::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
+use crate::model::{Coupling, GeometricStiffness, Nodes, extents};
+use faer::Mat;
+
+/// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexBody {
+    parts: Parts,
+}
+
+impl FlexBody {
+    /// Checks `parts` and makes a body of them.
+    ///
+    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1, 1 <= nf <= 3n (where the nodes are all of a model); every array has the shape that [`Parts`] states and
+    /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
+    /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
+    /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty;
+    /// loads of geometric stiffness are those of the dimension, each once; interfaces name existing nodes, those declared free have no
+    /// reference point; matrices in interface coordinates are symmetric;
+    /// a group of the kinetic energy is dropped by a decision of [`Parts::terms`] or held, here and by the lumped comparators;
+    /// no text contains a NUL character (no file could hold it).
+    ///
+    /// # Errors
+    /// [`BodySchema`](crate::base::diagnostic::Code::BodySchema), one diagnostic per violation.
+    pub fn new(mut parts: Parts) -> Result<Self> {
+        // As files have them.
+        parts.terms.sort_by_key(|term| term.group);
+        let problems = problems(&parts);
+        if problems.is_empty() { Ok(Self { parts }) } else { Err(Error::new(problems)) }
+    }
+
+    /// All parts.
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Gives the parts away, to change them and build a new body.
+    pub fn into_parts(self) -> Parts {
+        self.parts
+    }
+
+    /// Number of nodes n.
+    pub fn n_nodes(&self) -> usize {
+        self.parts.nodes.len()
+    }
+
+    /// Number of modes nf.
+    pub fn n_modes(&self) -> usize {
+        self.parts.modes.eigenvalue.len()
+    }
+
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    pub fn dimension(&self) -> usize {
+        self.parts.dimension
+    }
+
+    /// Provenance.
+    pub fn source(&self) -> &Source {
+        &self.parts.source
+    }
+
+    /// Units of all numbers.
+    pub fn units(&self) -> &UnitSystem {
+        &self.parts.units
+    }
+
+    /// Body frame in model coordinates.
+    pub fn frame(&self) -> &Frame {
+        &self.parts.frame
+    }
+
+    /// Node numbers and positions in the body frame.
+    pub fn nodes(&self) -> &Nodes {
+        &self.parts.nodes
+    }
+
+    /// Largest extent of the nodes along an axis of the body frame. Unit: length.
+    pub fn extent(&self) -> f64 {
+        extents(&self.parts.nodes.positions).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Largest displacement of a node by mode `j` at unit amplitude.
+    ///
+    /// # Panics
+    /// When `j` is not below the number of modes.
+    pub fn largest_displacement(&self, j: usize) -> f64 {
+        let shape = &self.parts.modes.shape;
+        let square = |i: usize| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>();
+        (0..self.n_nodes()).map(square).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Modes.
+    pub fn modes(&self) -> &Modes {
+        &self.parts.modes
+    }
+
+    /// D (nf x nf): the modal damping or, where there is none, diag(2 zeta_j omega_j). Unit: 1/time.
+    pub fn damping(&self) -> Mat<f64> {
+        let modes = &self.parts.modes;
+        let of_ratio = |j: usize| 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt();
+        modes.modal_damping.clone().unwrap_or_else(|| {
+            Mat::from_fn(self.n_modes(), self.n_modes(), |i, j| if i == j { of_ratio(j) } else { 0.0 })
+        })
+    }
+
+    /// f_j = sqrt(lambda_j) / (2 pi) in hertz (nf), whatever the body's unit of time is.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        let hertz = self.parts.units.hertz();
+        self.parts.modes.eigenvalue.iter().map(|l| l.sqrt() / std::f64::consts::TAU * hertz).collect()
+    }
+
+    /// Exact invariants about the frame origin, body axes.
+    pub fn invariants(&self) -> &Invariants {
+        &self.parts.invariants
+    }
+
+    /// Geometric stiffness of unit loads along body axes, reduced to the modes.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<Mat<f64>>] {
+        &self.parts.geometric_stiffness
+    }
+
+    /// Lumped comparators.
+    pub fn lumped(&self) -> &[LumpedBody] {
+        &self.parts.lumped
+    }
+
+    /// Proof of completeness and noise floor.
+    pub fn certificate(&self) -> &Certificate {
+        &self.parts.certificate
+    }
+
+    /// Interfaces.
+    pub fn interfaces(&self) -> &[Interface] {
+        &self.parts.interfaces
+    }
+
+    /// Whether an interface was declared to move as a rigid body.
+    pub fn has_rigid_interfaces(&self) -> bool {
+        self.parts.interfaces.iter().any(|interface| interface.coupling == Some(Coupling::Rigid))
+    }
+
+    /// K and M in interface coordinates, of a basis that has them.
+    pub fn coordinates(&self) -> Option<&InterfaceCoordinates> {
+        self.parts.coordinates.as_ref()
+    }
+
+    /// What was decided about the groups of the kinetic energy; empty where nobody asked.
+    pub fn terms(&self) -> &[TermDecision] {
+        &self.parts.terms
+    }
+
+    /// Precision of shapes and of the inertia of the modes.
+    pub fn storage(&self) -> Storage {
+        self.parts.storage
+    }
+
+    /// The groups of the kinetic energy that the body holds.
+    pub fn groups(&self) -> Groups {
+        self.parts.invariants.groups
+    }
+
+    /// Every identity that the file itself can be held to (theory section 10), those of the interface coordinates included; `frame` is what the
+    /// body frame was meant to be. Limits of a body with 32-bit arrays have room for their rounding.
+    pub fn identities(&self, frame: BodyFrame) -> Vec<IdentityCheck> {
+        let expected = Expected {
+            mass_normalised: true,
+            free_surface: true,
+            frame,
+            origin: self.parts.frame.origin,
+            eigenvalues: Some(&self.parts.modes.eigenvalue),
+            eigenvalue_noise: self.parts.certificate.rigid_noise,
+            eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
+        };
+        let checks = identities(&self.parts.invariants, &expected);
+        // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.
+        let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
+        let mut checks = relaxed(checks, rounding + self.parts.certificate.inertia_rounding);
+        checks.extend(self.parts.interface_identities());
+        checks.extend(self.parts.cross_checks());
+        checks
+    }
+}

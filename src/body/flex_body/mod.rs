@@ -1,0 +1,27 @@
+//! The product: a validated flexible body, independent of the files it came from and goes to.
+
+mod body;
+mod carried;
+mod cross_checks;
+mod fixed_interface;
+mod in_units;
+mod interface;
+mod model_axes;
+mod model_rows;
+mod parts;
+mod reduced;
+mod storage;
+mod terms;
+mod validate;
+
+pub use crate::body::invariants::{Frame, Group, Groups};
+pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
+pub use body::FlexBody;
+pub use carried::Carrier;
+pub use fixed_interface::FixedInterface;
+pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
+pub use parts::{
+    Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+};
+pub use storage::Storage;
+pub use terms::TermDecision;

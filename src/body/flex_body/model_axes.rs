@@ -1,0 +1,123 @@
+//! A body in a frame along the axes of its model.
+
+use super::{FlexBody, GeometricStiffness, InternalRows, LumpedBody, UnitLoad};
+use crate::base::error::Result;
+use crate::model::LoadKind;
+use faer::{Mat, MatRef, Scale};
+use nalgebra::{Matrix3, Vector3};
+
+/// Direction cosines up to this are rounding.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+impl FlexBody {
+    /// The same body in a frame whose axes are those of the model and whose origin is at `origin` (body frame). Nothing but the
+    /// description changes: modal coordinates, mode shapes in space and energies stay what they are. Interface coordinates are left out.
+    ///
+    /// Positions x' = A (x - d), shapes A psi with A = `frame().axes`; the invariants by (5.1) of the theory. Geometric stiffness for spin and
+    /// angular acceleration about the new origin follows from that for acceleration, a = a' - alpha x d - omega x (omega x d).
+    ///
+    /// # Errors
+    /// Those of [`FlexBody::new`], when numbers overflow.
+    pub fn in_model_axes(&self, origin: Vector3<f64>) -> Result<Self> {
+        let (to_model, to_body) = (self.frame().axes, self.frame().axes.transpose());
+        let mut parts = self.parts().clone();
+        parts.frame.origin += to_model * origin;
+        parts.frame.axes = Matrix3::identity();
+        let moved = |x: &[f64; 3]| (to_model * (Vector3::from(*x) - origin)).into();
+        parts.nodes.positions = parts.nodes.positions.iter().map(moved).collect();
+        for interface in &mut parts.interfaces {
+            interface.reference = interface.reference.as_ref().map(moved);
+        }
+        parts.modes.shape = turned(parts.modes.shape.as_ref(), &to_model, usize::MAX);
+        parts.modes.rotation =
+            parts.modes.rotation.map(|rotation| turned(rotation.as_ref(), &to_model, usize::MAX));
+        parts.modes.internal = parts.modes.internal.map(|internal| InternalRows {
+            // Rows that are no vectors come last.
+            shape: turned(internal.shape.as_ref(), &to_model, vectors(&internal)),
+            ..internal
+        });
+        parts.invariants = parts.invariants.shifted(origin).rotated(&to_body);
+        parts.lumped = parts
+            .lumped
+            .into_iter()
+            .map(|lumped| LumpedBody {
+                invariants: lumped.invariants.shifted(origin).rotated(&to_body),
+                ..lumped
+            })
+            .collect();
+        let about_origin = shifted(&parts.geometric_stiffness, &origin, parts.dimension);
+        parts.geometric_stiffness = along(&about_origin, &to_body);
+        parts.coordinates = None;
+        Self::new(parts)
+    }
+}
+
+/// Rows of vectors, three per vector: they stand first, and are labelled with the directions 1, 2, 3.
+fn vectors(internal: &InternalRows) -> usize {
+    let complete =
+        |dofs: &[[i64; 2]]| dofs.len() == 3 && (0..3).all(|k| dofs[k] == [dofs[0][0], (k + 1) as i64]);
+    3 * internal.dofs.chunks(3).take_while(|dofs| complete(dofs)).count()
+}
+
+/// Vectors in groups of three rows, in other axes; rows from `end` on stay.
+fn turned(shape: MatRef<'_, f64>, axes: &Matrix3<f64>, end: usize) -> Mat<f64> {
+    Mat::from_fn(shape.nrows(), shape.ncols(), |row, j| {
+        if row >= end {
+            return shape[(row, j)];
+        }
+        let (first, k) = (row / 3 * 3, row % 3);
+        (0..3).map(|l| axes[(k, l)] * shape[(first + l, j)]).sum()
+    })
+}
+
+/// Geometric stiffness for motion of the point `d` instead of the origin.
+fn shifted(
+    given: &[GeometricStiffness<Mat<f64>>],
+    d: &Vector3<f64>,
+    dimension: usize,
+) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let mut all = given.to_vec();
+    if *d == Vector3::zeros() {
+        return all;
+    }
+    let unit = |axis: usize| Vector3::ith(axis, 1.0);
+    for one in given.iter().filter(|one| one.load.kind == LoadKind::Acceleration) {
+        let along = one.load.component;
+        for kind in [LoadKind::AngularAcceleration, LoadKind::Spin] {
+            for &component in kind.of_dimension(dimension) {
+                let acceleration = match kind {
+                    LoadKind::Spin => {
+                        let (a, b) = LoadKind::SPIN[component];
+                        let part = |a: usize, b: usize| unit(a).cross(&unit(b).cross(d));
+                        if a == b { part(a, b) } else { part(a, b) + part(b, a) }
+                    }
+                    _ => unit(component).cross(d),
+                };
+                let part = &one.matrix * Scale(-acceleration[along]);
+                if acceleration[along] != 0.0 {
+                    add(&mut all, UnitLoad { kind: kind.clone(), component }, part);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Geometric stiffness for loads along the columns of `axes` (present axes).
+fn along(given: &[GeometricStiffness<Mat<f64>>], axes: &Matrix3<f64>) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let mut all = Vec::new();
+    for GeometricStiffness { load, matrix } in given {
+        let factors = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);
+        for (component, factor) in factors {
+            add(&mut all, UnitLoad { kind: load.kind.clone(), component }, matrix * Scale(factor));
+        }
+    }
+    all
+}
+
+fn add(all: &mut Vec<GeometricStiffness<Mat<f64>>>, load: UnitLoad, part: Mat<f64>) {
+    match all.iter_mut().find(|known| known.load == load) {
+        Some(sum) => sum.matrix += part,
+        None => all.push(GeometricStiffness { load, matrix: part }),
+    }
+}

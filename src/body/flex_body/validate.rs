@@ -1,0 +1,430 @@
+//! What must hold for the parts of a flexible body, checked once, all violations collected.
+
+use super::{Group, Groups, MassStructure, Parts};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::body::invariants::{DIGITS, Invariants};
+use crate::model::{Coupling, UnitLoad};
+use faer::{Mat, MatRef};
+use nalgebra::Matrix3;
+use std::collections::HashSet;
+
+/// Axes come out of an eigen-decomposition of a 3x3 matrix: 1e-15 is normal, a typed-in rotation may have 12
+/// digits; anything worse rotates the invariants by more than their own accuracy.
+const AXES_TOLERANCE: f64 = 1e-10;
+
+/// Invariants are sums of products: numbers beyond this overflow in them.
+const LARGEST: f64 = 1e300;
+
+/// Longest name of an interface or lumping scheme in bytes: it names a group in the file.
+const LONGEST_NAME: usize = 1000;
+
+pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
+    let mut check = Check { problems: Vec::new() };
+    let (n, nf) = (parts.nodes.ids.len(), parts.modes.eigenvalue.len());
+    check.sizes(n, nf, parts);
+    check.plane(parts);
+    check.frame(parts);
+    check.nodes(parts);
+    check.modes(parts, n, nf);
+    if !(parts.units.hertz().is_finite() && parts.units.hertz() * LARGEST.sqrt() <= LARGEST) {
+        check.add(format!(
+            "`units.time` is {} s, too short for frequencies in hertz",
+            parts.units.time.name()
+        ));
+    }
+    check.invariants("invariants", &parts.invariants, nf);
+    if parts.invariants.mass.is_finite() && parts.invariants.mass <= 0.0 {
+        check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass));
+    }
+    check.structure(parts);
+    check.geometric_stiffness(parts, nf);
+    check.lumped(parts, nf);
+    let c = &parts.certificate;
+    check.finite(
+        "certificate",
+        [c.shift, c.rigid_noise, c.rigid_residual, c.eigenvalue_rounding, c.inertia_rounding],
+    );
+    check.guarantee(parts, nf);
+    check.fixed_interface(parts, nf);
+    check.terms(parts);
+    check.interfaces(parts, n);
+    check.coordinates(parts, nf);
+    check.text("source.name", &parts.source.name);
+    if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
+        check.add(format!("`source.number` is {number}"));
+    }
+    check.text("certificate.remark", &c.remark);
+    check.problems
+}
+
+struct Check {
+    problems: Vec<Diagnostic>,
+}
+
+impl Check {
+    fn add(&mut self, message: String) {
+        self.problems.push(Diagnostic::new(Code::BodySchema, message));
+    }
+
+    /// Reports the first value that is not finite, or so large that what follows from it would not be.
+    fn finite(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
+        if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > LARGEST) {
+            self.add(format!(
+                "`{name}` has the value {v:e} at index {i}, expected finite numbers up to {LARGEST:e}"
+            ));
+        }
+    }
+
+    fn length(&mut self, name: &str, found: usize, expected: usize, per: &str) {
+        if found != expected {
+            self.add(format!("`{name}` has {found} values, expected {expected}, one per {per}"));
+        }
+    }
+
+    fn matrix(&mut self, name: &str, m: &Mat<f64>, rows: usize, columns: usize) {
+        if (m.nrows(), m.ncols()) != (rows, columns) {
+            let (r, c) = (m.nrows(), m.ncols());
+            self.add(format!("`{name}` is {r} x {c}, expected {rows} x {columns}"));
+        }
+        self.finite(name, values(m.as_ref()));
+    }
+
+    /// A text that the file can hold.
+    fn text(&mut self, name: &str, text: &str) {
+        if text.contains('\0') {
+            self.add(format!("`{name}` contains a NUL character, expected text"));
+        }
+    }
+
+    fn names<'a>(&mut self, what: &str, names: impl Iterator<Item = &'a String>) {
+        let mut seen = HashSet::new();
+        for name in names {
+            if name.is_empty() {
+                self.add(format!("empty name of {what}"));
+            } else if name.len() > LONGEST_NAME {
+                self.add(format!("name of {what} has {} bytes, expected at most {LONGEST_NAME}", name.len()));
+            } else if !seen.insert(name) {
+                self.add(format!("{what} `{name}` is given twice"));
+            }
+        }
+    }
+
+    fn sizes(&mut self, n: usize, nf: usize, parts: &Parts) {
+        let modes = &parts.modes;
+        let internal = modes.internal.as_ref().map_or(0, |internal| internal.dofs.len());
+        let rows = if modes.rotation.is_some() { 6 * n } else { 3 * n } + internal;
+        if n == 0 {
+            self.add("`nodes` is empty, expected at least one node".to_owned());
+        }
+        if nf == 0 {
+            self.add("`modes` is empty, expected at least one mode".to_owned());
+        } else if n > 0 && nf > rows && parts.source.n_dofs > 0 {
+            self.add(format!("{nf} modes of {n} nodes, expected at most {rows}"));
+        }
+    }
+
+    /// A plane body has its frame in the plane, and neither nodes nor modes leave it.
+    fn plane(&mut self, parts: &Parts) {
+        match parts.dimension {
+            3 => return,
+            2 => {}
+            other => return self.add(format!("`dimension` is {other}, expected 2 or 3")),
+        }
+        let z = parts.frame.axes.column(2);
+        if (z[0], z[1], z[2]) != (0.0, 0.0, 1.0) {
+            self.add(format!(
+                "`frame.axes` of a plane body have the third axis {:?}, expected z",
+                [z[0], z[1], z[2]]
+            ));
+        }
+        if let Some(i) = parts.nodes.positions.iter().position(|x| x[2] != 0.0) {
+            self.add(format!(
+                "`nodes.positions` of a plane body has z = {:e} at index {i}",
+                parts.nodes.positions[i][2]
+            ));
+        }
+        let shape = &parts.modes.shape;
+        if (0..shape.ncols()).any(|j| (2..shape.nrows()).step_by(3).any(|row| shape[(row, j)] != 0.0)) {
+            self.add("`modes.shape` of a plane body has components along z".to_owned());
+        }
+    }
+
+    fn frame(&mut self, parts: &Parts) {
+        let frame = &parts.frame;
+        self.finite("frame.origin", frame.origin.iter().copied());
+        self.finite("frame.axes", frame.axes.iter().copied());
+        let defect = (frame.axes.transpose() * frame.axes - Matrix3::identity()).amax();
+        if defect.is_finite() && defect > AXES_TOLERANCE {
+            self.add(format!(
+                "`frame.axes` are not orthonormal: max |A'A - I| = {defect:.1e}, expected at most {AXES_TOLERANCE:e}"
+            ));
+        } else if frame.axes.determinant() < 0.0 {
+            self.add("`frame.axes` are left-handed, expected right-handed axes".to_owned());
+        }
+    }
+
+    fn nodes(&mut self, parts: &Parts) {
+        let nodes = &parts.nodes;
+        self.length("nodes.positions", nodes.positions.len(), nodes.ids.len(), "node");
+        self.finite("nodes.positions", nodes.positions.iter().flatten().copied());
+        let mut seen = HashSet::with_capacity(nodes.ids.len());
+        if let Some(id) = nodes.ids.iter().find(|&&id| !seen.insert(id)) {
+            self.add(format!("`nodes.ids` has node {id} twice, expected unique node numbers"));
+        }
+    }
+
+    fn modes(&mut self, parts: &Parts, n: usize, nf: usize) {
+        let modes = &parts.modes;
+        self.finite("modes.eigenvalue", modes.eigenvalue.iter().copied());
+        if let Some(j) = modes.eigenvalue.iter().position(|&l| l <= 0.0) {
+            let l = modes.eigenvalue[j];
+            self.add(format!("`modes.eigenvalue` is {l:e} at mode {j}, expected positive values"));
+        }
+        if let Some(j) = modes.eigenvalue.windows(2).position(|w| w[0] > w[1]) {
+            let (a, b) = (modes.eigenvalue[j], modes.eigenvalue[j + 1]);
+            self.add(format!(
+                "`modes.eigenvalue` falls from {a:e} to {b:e} at mode {}, expected ascending values",
+                j + 1
+            ));
+        }
+        for (name, column) in
+            [("modes.residual", &modes.residual), ("modes.damping_ratio", &modes.damping_ratio)]
+        {
+            self.length(name, column.len(), nf, "mode");
+            self.finite(name, column.iter().copied());
+            if let Some(j) = column.iter().position(|&v| v < 0.0) {
+                self.add(format!(
+                    "`{name}` is {:e} at mode {j}, expected values that are not negative",
+                    column[j]
+                ));
+            }
+        }
+        if !modes.provenance.is_empty() {
+            self.length("modes.provenance", modes.provenance.len(), nf, "mode");
+        }
+        self.finite("modes.truncation", modes.truncation.iter().flat_map(|t| [t.before, t.after]));
+        self.matrix("modes.shape", &modes.shape, 3 * n, nf);
+        if let Some(rotation) = &modes.rotation {
+            self.matrix("modes.rotation", rotation, 3 * n, nf);
+        }
+        if let Some(internal) = &modes.internal {
+            self.matrix("modes.internal", &internal.shape, internal.dofs.len(), nf);
+        }
+        if let Some(damping) = &modes.modal_damping {
+            self.matrix("modes.modal_damping", damping, nf, nf);
+        }
+    }
+
+    fn invariants(&mut self, name: &str, invariants: &Invariants, nf: usize) {
+        self.finite(&format!("{name}.mass"), [invariants.mass]);
+        self.finite(&format!("{name}.first_moment"), invariants.first_moment.iter().copied());
+        self.finite(&format!("{name}.second_moment"), invariants.second_moment.iter().copied());
+        self.matrix(&format!("{name}.c1"), &invariants.c1, 3, nf);
+        for k in 0..3 {
+            for l in 0..3 {
+                let block = &invariants.ibar[k][l];
+                self.length(&format!("{name}.ibar[{k}][{l}]"), block.len(), nf, "mode");
+                self.finite(&format!("{name}.ibar[{k}][{l}]"), block.iter().copied());
+                self.matrix(&format!("{name}.s[{k}][{l}]"), &invariants.s[k][l], nf, nf);
+            }
+        }
+        self.matrix(&format!("{name}.modal_stiffness"), &invariants.modal_stiffness, nf, nf);
+        if let Some(general) = &invariants.general {
+            self.matrix(&format!("{name}.w0"), &general.w0, 3, 3 * nf);
+            self.matrix(&format!("{name}.w3"), &general.w3, 3 * nf, nf);
+            self.matrix(&format!("{name}.modal_mass"), &general.modal_mass, nf, nf);
+        }
+    }
+
+    /// A body has the terms of a general mass when its mass is one, and lumped masses never have.
+    fn structure(&mut self, parts: &Parts) {
+        let general = parts.source.mass_structure == MassStructure::General;
+        if general != parts.invariants.general.is_some() {
+            self.add(
+                "`invariants.W0` is there for the mass structure `general`, and only for that".to_owned(),
+            );
+        }
+        if parts.invariants.general.as_ref().is_some_and(|terms| terms.plane != (parts.dimension == 2)) {
+            self.add(format!("general terms of another dimension than {}", parts.dimension));
+        }
+        if parts.lumped.iter().any(|lumped| lumped.invariants.general.is_some()) {
+            self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
+        }
+    }
+
+    fn geometric_stiffness(&mut self, parts: &Parts, nf: usize) {
+        let labels: Vec<String> = parts.geometric_stiffness.iter().map(|one| one.load.label()).collect();
+        self.names("geometric stiffness", labels.iter());
+        for (one, label) in parts.geometric_stiffness.iter().zip(&labels) {
+            self.text("geometric_stiffness", label);
+            self.matrix(&format!("geometric_stiffness `{label}`"), &one.matrix, nf, nf);
+            let load = &one.load;
+            // A file knows the load by this name only.
+            if UnitLoad::from_label(label).as_ref() != Some(load) {
+                self.add(format!("geometric stiffness `{label}` has no component, interface or name"));
+            } else if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
+                let dimension = parts.dimension;
+                self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
+            }
+        }
+    }
+
+    fn lumped(&mut self, parts: &Parts, nf: usize) {
+        self.names("a lumping scheme", parts.lumped.iter().map(|l| &l.scheme));
+        for body in &parts.lumped {
+            let name = format!("lumped `{}`", body.scheme);
+            self.invariants(&name, &body.invariants, nf);
+            self.names(&format!("an error norm of {name}"), body.comparison.iter().map(|(norm, _)| norm));
+            for (norm, value) in &body.comparison {
+                self.text(&format!("{name} error norm"), norm);
+                self.finite(&format!("{name} {norm}"), [*value]);
+            }
+        }
+    }
+
+    fn fixed_interface(&mut self, parts: &Parts, nf: usize) {
+        let Some(fixed) = &parts.certificate.fixed_interface else { return };
+        self.finite("fixed_interface", [fixed.shift, fixed.residual, fixed.next.unwrap_or(0.0)]);
+        for (name, column) in [
+            ("fixed_interface.free_estimate", &fixed.free_estimate),
+            ("fixed_interface.free_lower", &fixed.free_lower),
+        ] {
+            self.length(name, column.len(), nf, "mode");
+            self.finite(name, column.iter().copied());
+        }
+        let free = fixed.free_estimate.iter().zip(&fixed.free_lower);
+        for (j, (value, (estimate, lower))) in parts.modes.eigenvalue.iter().zip(free).enumerate() {
+            if !(0.0 <= *lower && lower <= estimate && *estimate > 0.0 && estimate <= value) {
+                self.add(format!(
+                    "eigenvalue {value:e} of mode {j} has the estimate {estimate:e} and the bound {lower:e} of the free body, expected descending numbers"
+                ));
+            }
+        }
+    }
+
+    fn guarantee(&mut self, parts: &Parts, nf: usize) {
+        let Some(g) = &parts.certificate.guarantee else { return };
+        let rigid = parts.certificate.rigid_modes;
+        if g.pivots_below != rigid {
+            self.add(format!(
+                "`certificate.guarantee` counts {} eigenvalues below the modes, expected the {rigid} rigid modes",
+                g.pivots_below
+            ));
+        }
+        self.finite("guarantee.shift_below", [g.shift_below]);
+        for (name, column) in [
+            ("guarantee.eigenvalue_lower", &g.eigenvalue_lower),
+            ("guarantee.eigenvalue_upper", &g.eigenvalue_upper),
+            ("guarantee.shape_error", &g.shape_error),
+        ] {
+            self.length(name, column.len(), nf, "mode");
+            self.finite(name, column.iter().copied());
+        }
+        let bounds = g.eigenvalue_lower.iter().zip(&g.eigenvalue_upper);
+        for (j, (value, (lower, upper))) in parts.modes.eigenvalue.iter().zip(bounds).enumerate() {
+            if !(g.shift_below <= *lower && lower <= value && value <= upper) {
+                self.add(format!(
+                    "eigenvalue {value:e} of mode {j} has the bounds {lower:e} and {upper:e} above the shift {:e}, \
+                     expected ascending numbers",
+                    g.shift_below
+                ));
+            }
+        }
+        if let Some(j) = g.shape_error.iter().position(|e| !(0.0..=1.0).contains(e)) {
+            self.add(format!(
+                "`guarantee.shape_error` is {:e} at mode {j}, expected 0 to 1",
+                g.shape_error[j]
+            ));
+        }
+        for (name, digits) in DIGITS.iter().zip(g.digits) {
+            if !(0.0..=16.0).contains(&digits) {
+                self.add(format!("guaranteed digits of `{name}` are {digits:e}, expected 0 to 16"));
+            }
+        }
+    }
+
+    /// A group is dropped by a decision, or held.
+    fn terms(&mut self, parts: &Parts) {
+        let held = parts.invariants.groups;
+        for (at, term) in parts.terms.iter().enumerate() {
+            let name = term.group.name();
+            self.text(&format!("terms.{name}.reason"), &term.reason);
+            if parts.terms[..at].iter().any(|earlier| earlier.group == term.group) {
+                self.add(format!("`terms` has two decisions about {name}"));
+            }
+            if term.kept && !held.has(term.group) {
+                self.add(format!("`terms` keeps {name}, but `invariants` does not hold it"));
+            }
+            if term.tier > 2 {
+                self.add(format!("`terms.{name}.tier` is {}, expected 0, 1 or 2", term.tier));
+            }
+            for (what, value) in [("bound", term.bound), ("limit", term.limit)] {
+                if value.is_nan() || value < 0.0 {
+                    self.add(format!(
+                        "`terms.{name}.{what}` is {value:e}, expected a number that is not negative"
+                    ));
+                }
+            }
+        }
+        let dropped = |group: Group| parts.terms.iter().any(|term| term.group == group && !term.kept);
+        for group in Group::ALL {
+            let name = group.name();
+            match (held.has(group), dropped(group)) {
+                (true, true) => self.add(format!("`terms` drops {name}, but `invariants` holds it")),
+                (false, false) => self
+                    .add(format!("`invariants` does not hold {name}, but no decision of `terms` drops it")),
+                _ => {}
+            }
+        }
+        for lumped in parts.lumped.iter().filter(|lumped| lumped.invariants.groups != held) {
+            self.add(format!(
+                "lumped `{}` holds other groups of the kinetic energy than `invariants`",
+                lumped.scheme
+            ));
+        }
+        // What follows takes the shapes of all arrays for granted.
+        if !self.problems.is_empty() || held == Groups::ALL {
+            return;
+        }
+        let all = std::iter::once(&parts.invariants).chain(parts.lumped.iter().map(|l| &l.invariants));
+        if !all.into_iter().all(Invariants::holds_its_groups_only) {
+            self.add("`invariants` has entries of groups that it does not hold".to_owned());
+        }
+    }
+
+    fn interfaces(&mut self, parts: &Parts, n: usize) {
+        self.names("an interface", parts.interfaces.iter().map(|i| &i.name));
+        for interface in &parts.interfaces {
+            let name = &interface.name;
+            if interface.nodes.is_empty() {
+                self.add(format!("interface `{name}` has no nodes"));
+            }
+            if let Some(node) = interface.nodes.iter().find(|&&node| node >= n) {
+                self.add(format!("interface `{name}` names node index {node}, expected indices below {n}"));
+            }
+            self.finite(&format!("interface `{name}` reference"), interface.reference.into_iter().flatten());
+            if interface.coupling == Some(Coupling::Free) && interface.reference.is_some() {
+                self.add(format!("interface `{name}` is free, but has a reference point"));
+            }
+        }
+    }
+
+    fn coordinates(&mut self, parts: &Parts, nf: usize) {
+        let Some(coordinates) = &parts.coordinates else { return };
+        let size = coordinates.names.len();
+        coordinates.names.iter().for_each(|name| self.text("coordinates.names", name));
+        self.matrix("coordinates.of_modes", &coordinates.of_modes, size, nf);
+        for (name, matrix) in
+            [("coordinates.stiffness", &coordinates.stiffness), ("coordinates.mass", &coordinates.mass)]
+        {
+            self.matrix(name, matrix, size, size);
+            if (matrix.nrows(), matrix.ncols()) == (size, size) && *matrix != matrix.transpose() {
+                self.add(format!("`{name}` is not symmetric"));
+            }
+        }
+    }
+}
+
+fn values(m: MatRef<'_, f64>) -> impl Iterator<Item = f64> + '_ {
+    (0..m.ncols()).flat_map(move |j| (0..m.nrows()).map(move |i| m[(i, j)]))
+}

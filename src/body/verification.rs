@@ -1,0 +1,314 @@
+//! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
+
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::body::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness, rigid_mass};
+use crate::body::flex_body::{FlexBody, Storage};
+use crate::body::invariants::{
+    BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
+};
+use crate::model::{Damping, FeModel, GeometricStiffness, UnitLoad};
+use crate::numerics::eigen::{relative_residual, residual_scale, rounding_residual};
+use crate::numerics::linalg::{SymmetricMatrix, gram};
+use faer::Mat;
+
+/// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
+const RECOMPUTED: f64 = 1e-12;
+
+/// Name of K_ff among the [`primary_differences`].
+const STIFFNESS: &str = "modal_stiffness";
+
+/// What another evaluation of K psi may leave, in units of the rounding estimate eps | |K| |psi| |: the shapes were also
+/// turned into body axes and back.
+const ROUNDING: f64 = 30.0;
+
+/// What must hold for `body` without its model: the identities of `flexbody check`.
+pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
+    body.identities(frame_of(body))
+}
+
+/// What the frame of `body` was meant to be.
+fn frame_of(body: &FlexBody) -> BodyFrame {
+    let name = body.source().settings["frame"].as_str();
+    BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model)
+}
+
+/// Refuses a body that [`own_identities`] would not pass: what is written is what `flexbody check` accepts.
+///
+/// # Errors
+/// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one for every identity that does not hold.
+pub fn accept(body: &FlexBody) -> Result<()> {
+    let failed = own_identities(body).into_iter().filter(|check| !check.passed);
+    let told: Vec<Diagnostic> = failed
+        .map(|check| {
+            let IdentityCheck { name, formula, value, limit, .. } = check;
+            let message = format!(
+                "the body breaks `{name}` ({formula}): {value:.1e}, where at most {limit:.1e} is rounding"
+            );
+            Diagnostic::new(Code::BodyUntrustworthy, message)
+        })
+        .collect();
+    if told.is_empty() { Ok(()) } else { Err(Error::new(told)) }
+}
+
+/// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) when the nodes differ.
+pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
+    if body.dimension() != model.dimension() {
+        let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    }
+    if body.nodes().ids != model.nodes().ids {
+        let message = format!(
+            "the body has {} nodes, the model {} with other numbers or in another order",
+            body.nodes().ids.len(),
+            model.nodes().ids.len()
+        );
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    }
+    let check = |name, formula, value: f64, limit: f64| IdentityCheck {
+        name,
+        formula,
+        value,
+        limit,
+        passed: value <= limit,
+    };
+    let frame = body.frame();
+    let place = Place::new(model, *frame);
+    let Some(modes) = BodyModes::of_body(model, body) else {
+        let message = "the rows of the body's modes are not those of the model";
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    };
+    let positions = &place.positions;
+    let size = positions.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+    let moved = positions
+        .iter()
+        .flatten()
+        .zip(body.nodes().positions.iter().flatten())
+        .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+    let in_model = &modes.vectors;
+    let pencil = model.pencil();
+    let kx = pencil.apply_stiffness(in_model.as_ref());
+    let mx = pencil.apply_mass(in_model.as_ref());
+    let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());
+    let own = modes.condensed(model, &place, modal_stiffness);
+    let differences = primary_differences(body.invariants(), &own);
+    let worst_of = |kept: &dyn Fn(&str) -> bool| {
+        let kept = differences.iter().filter(|(name, _)| kept(name));
+        kept.fold(0.0f64, |m, (_, d)| if d.is_nan() { f64::INFINITY } else { m.max(*d) })
+    };
+    // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that is more.
+    let inertia = body.invariants().inertia().diagonal();
+    let storage = body.storage();
+    let recomputed =
+        RECOMPUTED + storage.rounding() + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
+    // K is huge beside its lowest eigenvalues: what its products round away is no error of the body.
+    let rounding: Vec<f64> = rounding_residual(model.stiffness(), in_model.as_ref())
+        .into_iter()
+        .map(|rounding| storage.roundings() * rounding)
+        .collect();
+    let (mut residual, mut stored, mut long, mut loose) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+    for (j, &lambda) in body.modes().eigenvalue.iter().enumerate() {
+        let size = residual_scale(kx.col(j), mx.col(j), lambda);
+        residual = residual.max(relative_residual(kx.col(j), mx.col(j), lambda));
+        stored = stored.max(body.modes().residual[j]).max(ROUNDING * rounding[j] / size);
+        // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
+        long = long.max(in_model.col(j).norm_l2() / lambda.sqrt());
+        loose = loose.max(rounding[j] / lambda.sqrt());
+    }
+    let orthonormality =
+        gram(in_model.as_ref(), mx.as_ref()) - Mat::<f64>::identity(in_model.ncols(), in_model.ncols());
+    let mut checks = vec![
+        check("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12),
+        check(
+            "invariants_recomputed",
+            "m, c, J, C1, Ibar, S from the matrices",
+            // Where m_ff = I was taken for granted, `orthonormal_recomputed` is about it.
+            worst_of(&|name| name != STIFFNESS && (body.groups().w2 || name != "modal_mass")),
+            recomputed,
+        ),
+        check(
+            "rigid_inertia_recomputed",
+            "R' M R = [m, -c~; c~, I0]",
+            rigid_inertia_error(body, &rigid_mass(model, frame)),
+            recomputed,
+        ),
+        check(
+            "stiffness_recomputed",
+            "K_ff = Psi' K Psi",
+            worst_of(&|name| name == STIFFNESS),
+            RECOMPUTED + storage.rounding() + long * loose,
+        ),
+        check(
+            "residual_recomputed",
+            "|K psi - lambda M psi| / (|K psi| + |lambda M psi|)",
+            residual,
+            2.0 * stored,
+        ),
+        check(
+            "orthonormal_recomputed",
+            "Psi' M Psi = I",
+            orthonormality.norm_max(),
+            1e-9 + storage.rounding(),
+        ),
+    ];
+    checks.extend(damping_check(body, model, in_model, &own)?.map(|found| {
+        check(
+            "damping_recomputed",
+            "D_ff = Psi' D Psi, zeta = D_jj / (2 omega_j)",
+            found.largest,
+            found.allowed,
+        )
+    }));
+    checks.extend(geometric_check(body, model, in_model)?.map(|found| {
+        check(
+            "geometric_stiffness_recomputed",
+            "Psi' K_geo Psi for every unit load",
+            found.largest,
+            found.allowed,
+        )
+    }));
+    if let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, model.scalar_mass()) {
+        let (stored, shapes) = (&body.nodes().positions, modes.displacements.as_ref());
+        let own = condense_certified(mass, stored, shapes, model.stiffness(), &frame.axes);
+        let excess =
+            primary_differences(body.invariants(), &own.invariants).iter().fold(0.0f64, |m, (name, d)| {
+                let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| *known == name);
+                let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
+                if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * scale) }
+            });
+        // Stored modes are rounded: their quotients follow the eigenvalues to what any other check of modes allows.
+        let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
+        let modal_mass = own.invariants.modal_mass();
+        let outside = bounds.enumerate().fold(0.0f64, |m, (j, (lower, upper))| {
+            let quotient = own.invariants.modal_stiffness[(j, j)] / modal_mass[(j, j)];
+            m.max((lower - quotient) / lower).max((quotient - upper) / upper)
+        });
+        checks.push(check("digits_recomputed", "invariants to their guaranteed digits", excess, 1.0));
+        checks.push(check(
+            "bounds_recomputed",
+            "psi' K psi / psi' M psi between the bounds of lambda",
+            outside,
+            1e-9 + body.certificate().rigid_noise,
+        ));
+    }
+    Ok(checks)
+}
+
+/// How far stored and recomputed matrices are from each other, relative to the largest entry, and what rounding allows.
+#[derive(Clone, Copy)]
+struct Difference {
+    largest: f64,
+    allowed: f64,
+}
+
+impl Difference {
+    /// Of entries up to `size`, recomputed with a rounding of `rounding`.
+    fn new(largest: f64, size: f64, rounding: f64) -> Self {
+        let relative = |value: f64| if value > 0.0 { value / size } else { 0.0 };
+        // Twice the size is what two matrices of nothing but rounding differ by at the most.
+        Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
+    }
+
+    /// The one that comes closer to what is allowed, or goes further beyond it.
+    fn worse(self, other: Self) -> Self {
+        if other.largest * self.allowed > self.largest * other.allowed { other } else { self }
+    }
+}
+
+/// What rounding leaves in |psi_p' A psi_q|, at the most.
+fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 {
+    let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
+    ROUNDING
+        * storage.roundings()
+        * longest
+        * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)
+}
+
+/// Stored damping against that of the model; `None` when neither has any.
+fn damping_check(
+    body: &FlexBody,
+    model: &FeModel,
+    shapes: &Mat<f64>,
+    own: &Invariants,
+) -> Result<Option<Difference>> {
+    let modes = body.modes();
+    let nf = modes.eigenvalue.len();
+    let found = modal_damping(model, shapes.as_ref(), &modes.eigenvalue, own)?;
+    if found.is_none()
+        && modes.modal_damping.is_none()
+        && modes.damping_ratio.iter().all(|ratio| *ratio == 0.0)
+    {
+        return Ok(None);
+    }
+    let none = || Mat::zeros(nf, nf);
+    let (matrix, ratio) =
+        found.map_or_else(|| (none(), vec![0.0; nf]), |damping| (damping.matrix, damping.ratio));
+    let stored = modes.modal_damping.clone().unwrap_or_else(none);
+    let of_ratio =
+        |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
+    let largest =
+        modes.eigenvalue.iter().enumerate().map(of_ratio).fold((&stored - &matrix).norm_max(), f64::max);
+    let rounding = match model.damping() {
+        Some(Damping::Matrix(d)) => rounding_of(d, shapes, body.storage()),
+        Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes, body.storage()),
+        _ => 0.0,
+    };
+    Ok(Some(Difference::new(largest, matrix.norm_max().max(stored.norm_max()), rounding)))
+}
+
+/// Stored geometric stiffness against that of the model; `None` when neither has any.
+fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
+    let nf = shapes.ncols();
+    let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes)?;
+    let stored = body.geometric_stiffness();
+    let of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
+        let one = list.iter().find(|one| one.load == *load);
+        one.map_or_else(|| Mat::zeros(nf, nf), |one| one.matrix.clone())
+    };
+    let loads = stored.iter().chain(&found).map(|one| &one.load);
+    let difference = |load: &UnitLoad| {
+        let (stored, own) = (of(stored, load), of(&found, load));
+        // Every component of the kind may contribute.
+        let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
+        let rounding = given.map(|one| rounding_of(&one.matrix, shapes, body.storage())).sum();
+        let size = stored.norm_max().max(own.norm_max());
+        Difference::new((&stored - &own).norm_max(), size, rounding)
+    };
+    Ok(loads.map(difference).reduce(Difference::worse))
+}
+
+/// How far R'MR of the unit translations and rotations of the body frame (in the plane 3 x 3) is from m, c and I0 of the body,
+/// relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
+fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
+    let own = body.parts().rigid_mass();
+    let mut worst = 0.0f64;
+    for i in 0..own.nrows() {
+        for j in 0..own.ncols() {
+            let error = (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
+            worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
+        }
+    }
+    worst
+}
+
+/// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.
+pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
+    let files = &body.source().files;
+    files
+        .iter()
+        .enumerate()
+        .filter_map(|(i, file)| {
+            // Several files may have one role: they are compared in their order.
+            let before = files[..i].iter().filter(|other| other.role == file.role).count();
+            let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
+            (now.sha256 != file.sha256).then(|| {
+                let message =
+                    format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);
+                Diagnostic::new(Code::BodySourceChanged, message)
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,91 @@
+//! What a format is, and the registry.
+
+use crate::base::error::Result;
+use crate::body::flex_body::FlexBody;
+use std::path::{Path, PathBuf};
+
+/// A format that other programs read.
+pub trait ExportFormat: Sync {
+    /// Name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// What reads it, in a few words.
+    fn reader(&self) -> &'static str;
+
+    /// Variants of the format, the usual one first; empty where there is a single one.
+    fn dialects(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Whether the file has places of the body that can be chosen ([`ExportOptions::points`]).
+    fn has_points(&self) -> bool {
+        false
+    }
+
+    /// What this format cannot hold of `body` with these options: fragments of sentences with the facts, in the order of importance.
+    /// What concerns the origin of the numbers only (certificate, lumped comparators, provenance) is in no format and is not told.
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String>;
+
+    /// What its program must be told to use all of the file: settings without which a part of it is ignored. Sentences without a full stop.
+    fn needs(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The file. Called with options that the format has.
+    ///
+    /// # Errors
+    /// [`ExportLoses`](Code::ExportLoses) for a body of which no file of this format can be made.
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported>;
+}
+
+/// What can be asked of an export. What a format does not have is refused by [`export`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExportOptions {
+    /// Variant of the format, one of [`ExportFormat::dialects`]; none: the usual one.
+    pub dialect: Option<String>,
+    /// Which places of the body the file has.
+    pub points: Points,
+}
+
+/// Which places of the body a file has.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Points {
+    /// What the format needs: all nodes, or of a format with frames the interfaces where the body has some.
+    #[default]
+    Usual,
+    /// All nodes.
+    Nodes,
+    /// The reference points of the interfaces and the nodes of free ones.
+    Interfaces,
+    /// Nodes with these numbers.
+    Some(Vec<i64>),
+}
+
+/// What an export makes: the file, and others that belong beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exported {
+    /// The file itself.
+    pub file: Vec<u8>,
+    /// Further files, each with the ending that takes the place of the extension of the file: `M.mtx` stands for a file `body.M.mtx` beside
+    /// `body.csv`, `_exudyn.py` for a file `body_exudyn.py` beside `body.hdf5`.
+    pub beside: Vec<(&'static str, Vec<u8>)>,
+}
+
+impl Exported {
+    /// Where a further file belongs, for the ending that it has.
+    pub fn place_beside(file: &Path, ending: &str) -> PathBuf {
+        match (ending.strip_prefix('_'), file.file_stem()) {
+            (Some(_), Some(stem)) => {
+                let mut name = stem.to_owned();
+                name.push(ending);
+                file.with_file_name(name)
+            }
+            _ => file.with_extension(ending),
+        }
+    }
+
+    /// A single file.
+    pub fn single(file: Vec<u8>) -> Self {
+        Self { file, beside: Vec::new() }
+    }
+}

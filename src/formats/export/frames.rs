@@ -1,0 +1,84 @@
+//! Places of a body that joints and forces take hold of: what formats call nodes or frames.
+
+use super::Points;
+use crate::body::flex_body::{FlexBody, Interface};
+use faer::Mat;
+
+/// One place of a body and its motion in every mode, body axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportFrame {
+    /// Number: that of the node; of the reference point of an interface that is no node of the body, one above all node numbers.
+    pub id: i64,
+    /// Name of the interface.
+    pub name: Option<String>,
+    /// Undeformed position. Unit: length.
+    pub position: [f64; 3],
+    /// Displacement of each mode (3 x nf).
+    pub translation: Mat<f64>,
+    /// Rotation of each mode (3 x nf); `None` where the body does not know it, as of nodes of solid elements.
+    pub rotation: Option<Mat<f64>>,
+}
+
+/// The places of `body` that `points` names: nodes in the order of the body, reference points in the order of the interfaces. Of a free
+/// interface, and of one whose nodes determine no motion of a reference point, all nodes.
+///
+/// [`Points::Usual`] stands for the interfaces where there are some, else for all nodes.
+pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
+    let all = || (0..body.n_nodes()).map(|i| node(body, i)).collect();
+    match points {
+        Points::Usual if body.interfaces().is_empty() => all(),
+        Points::Usual | Points::Interfaces => interfaces(body),
+        Points::Nodes => all(),
+        Points::Some(ids) => (0..body.n_nodes())
+            .filter(|&i| ids.contains(&body.nodes().ids[i]))
+            .map(|i| node(body, i))
+            .collect(),
+    }
+}
+
+fn node(body: &FlexBody, i: usize) -> ExportFrame {
+    let modes = body.modes();
+    let rows = |a: &Mat<f64>| a.as_ref().subrows(3 * i, 3).to_owned();
+    let turns = |a: &Mat<f64>| a.col_iter().any(|column| column.iter().any(|v| *v != 0.0));
+    ExportFrame {
+        id: body.nodes().ids[i],
+        name: None,
+        position: body.nodes().positions[i],
+        translation: rows(&modes.shape),
+        // Nodes without rotations have zeros in their place.
+        rotation: modes.rotation.as_ref().map(rows).filter(turns),
+    }
+}
+
+fn interfaces(body: &FlexBody) -> Vec<ExportFrame> {
+    let above = body.nodes().ids.iter().copied().max().unwrap_or(0);
+    let mut found: Vec<ExportFrame> = Vec::new();
+    for (number, interface) in body.interfaces().iter().enumerate() {
+        let reference = reference(body, interface, above.saturating_add(1 + number as i64));
+        let nodes = || {
+            interface
+                .nodes
+                .iter()
+                .map(|&i| ExportFrame { name: Some(interface.name.clone()), ..node(body, i) })
+        };
+        let frames: Vec<ExportFrame> = reference.map_or_else(|| nodes().collect(), |frame| vec![frame]);
+        let ids: Vec<i64> = found.iter().map(|frame| frame.id).collect();
+        found.extend(frames.into_iter().filter(|frame| !ids.contains(&frame.id)));
+    }
+    found
+}
+
+/// The reference point of an interface: the node itself where it is a single one that lies there.
+fn reference(body: &FlexBody, interface: &Interface, id: i64) -> Option<ExportFrame> {
+    let (modes, nodes) = (body.modes(), body.nodes());
+    let position = interface.reference?;
+    let name = Some(interface.name.clone());
+    if let [single] = interface.nodes[..]
+        && nodes.positions[single] == position
+    {
+        return Some(ExportFrame { name, ..node(body, single) });
+    }
+    let rotation = modes.rotation.as_ref().map(Mat::as_ref);
+    let rows = interface.rows(nodes, modes.shape.as_ref(), rotation, body.dimension())?;
+    Some(ExportFrame { id, name, position, translation: rows.translation, rotation: rows.rotation })
+}

@@ -1,0 +1,13 @@
+//! What the formats that are written share: the trait, frames, losses, containers.
+
+pub(crate) mod arrays;
+mod format;
+pub(crate) mod frames;
+pub(crate) mod hdf5_contents;
+pub(crate) mod inertia;
+pub(crate) mod interface_matrices;
+pub(crate) mod losses;
+pub(crate) mod mat5;
+
+pub use format::{ExportFormat, ExportOptions, Exported, Points};
+pub use frames::{ExportFrame, frames};

@@ -1,0 +1,87 @@
+//! With how many digits a file of text writes its numbers.
+
+/// How the numbers of a file, or of a part of it, are written.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Digits {
+    /// Most decimals of numbers without an exponent, where there are such.
+    fixed: Option<u32>,
+    /// Whether there are numbers with one.
+    exponents: bool,
+    /// Most significant digits of any number.
+    significant: u32,
+    /// Numbers that are not zero.
+    count: usize,
+}
+
+/// Fewer numbers say nothing: a small body by hand has short ones that are exact.
+const FEW: usize = 20;
+
+impl Digits {
+    /// Takes a number as it is written into account.
+    pub(crate) fn see(&mut self, text: &str) {
+        let mantissa = text.split(['e', 'E', 'd', 'D']).next().unwrap_or("");
+        let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count() as u32;
+        let significant = digits(mantissa.trim_start_matches(['+', '-', '0', '.']));
+        self.significant = self.significant.max(significant);
+        self.count += usize::from(significant > 0);
+        if mantissa.len() < text.len() {
+            self.exponents = true;
+        } else {
+            let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| digits(decimals));
+            self.fixed = self.fixed.max(Some(decimals));
+        }
+    }
+
+    /// The most of both.
+    pub(crate) fn most(self, other: Self) -> Self {
+        Self {
+            fixed: self.fixed.max(other.fixed),
+            exponents: self.exponents || other.exponents,
+            significant: self.significant.max(other.significant),
+            count: self.count + other.count,
+        }
+    }
+
+    /// Whether there are too few numbers to tell how many digits the program writes.
+    pub(crate) fn are_few(self) -> bool {
+        self.count < FEW
+    }
+
+    /// `6 decimals without exponents`, `7 significant digits`.
+    pub(crate) fn words(self) -> String {
+        match self.fixed.filter(|_| !self.exponents) {
+            Some(decimals) => format!("{decimals} decimals without exponents"),
+            None => format!("{} significant digits", self.significant),
+        }
+    }
+
+    /// Half a unit of the last digit of an array whose largest number is `size`: short numbers of a file with long ones are exact.
+    pub(crate) fn rounding(self, size: f64) -> f64 {
+        let half = |digits: u32| 0.5 * 0.1f64.powi(digits.min(400) as i32);
+        match self.fixed.filter(|_| !self.exponents) {
+            Some(decimals) => half(decimals),
+            None => half(self.significant) * 10.0 * size,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_a_unit_of_the_last_digit() {
+        let of = |texts: &[&str]| {
+            let mut digits = Digits::default();
+            texts.iter().for_each(|text| digits.see(text));
+            digits
+        };
+        let six = of(&["0.123456", "1.5", "-12.000001"]);
+        assert!((six.rounding(3.0) - 5e-7).abs() < 1e-20);
+        let scientific = of(&["1.23456D+03", "-0.00D+00"]);
+        assert!((scientific.rounding(1.0) - 5e-6).abs() < 1e-18);
+        let full = of(&["7", "1e-05", "0.12345678901234567"]);
+        assert!(full.rounding(7.0) < 1e-15);
+        assert!(full.are_few() && !of(&["1.5"; FEW]).are_few() && of(&["0.0"; FEW]).are_few());
+    }
+}

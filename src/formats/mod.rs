@@ -1,0 +1,21 @@
+//! Files of flexible bodies: our own, and one folder or file for every format of another program. What all formats share that are
+//! written stands in `export`, what all share that are read in `import`; `registry` lists them.
+
+mod adams;
+mod chrono;
+mod embedded;
+pub mod export;
+mod exudyn;
+pub mod flex_body_file;
+pub mod import;
+mod json;
+mod mbdyn;
+mod mbsim;
+mod npz;
+mod openradioss;
+mod registry;
+mod sid;
+mod simscape;
+
+pub use embedded::embedded_markdown;
+pub use registry::{FOREIGN_FORMATS, FORMATS, export, find_foreign, find_format, recognise};

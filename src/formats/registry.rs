@@ -1,0 +1,119 @@
+//! Every format of other programs: those that are written, and those that are read.
+
+use super::export::{ExportFormat, ExportOptions, Exported, Points};
+use super::import::ForeignFormat;
+use super::{adams, chrono, embedded, exudyn, json, mbdyn, mbsim, npz, openradioss, sid, simscape};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::body::flex_body::FlexBody;
+use crate::input::InputFile;
+
+/// Every format, in the order of the documentation.
+pub const FORMATS: &[&dyn ExportFormat] = &[
+    &exudyn::write::Exudyn,
+    &sid::write::Sid,
+    &mbdyn::write::Mbdyn,
+    &mbsim::write::Mbsim,
+    &openradioss::OpenRadioss,
+    &chrono::Chrono,
+    &simscape::Simscape,
+    &adams::AdamsInvariants,
+    &npz::Npz,
+    &json::Json,
+    &embedded::Embedded,
+];
+
+/// The format of that name.
+///
+/// # Errors
+/// [`Usage`](Code::Usage), with the names that there are.
+pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
+    FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("`{name}` is no export format");
+        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    })
+}
+
+/// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every setting that its program needs.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
+/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of [`ExportFormat::write`].
+pub fn export(
+    body: &FlexBody,
+    format: &dyn ExportFormat,
+    options: &ExportOptions,
+    allow_loss: bool,
+) -> Result<(Exported, Vec<Diagnostic>)> {
+    check_options(body, format, options)?;
+    let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
+    let losses: Vec<Diagnostic> = format
+        .losses(body, options)
+        .into_iter()
+        .map(|loss| Diagnostic::new(code, format!("{} cannot hold {loss}", format.name())))
+        .collect();
+    if !(allow_loss || losses.is_empty()) {
+        return Err(Error::new(losses));
+    }
+    let needs = format.needs(body, options).into_iter().map(|need| Diagnostic::new(Code::ExportNeeds, need));
+    let exported = format.write(body, options)?;
+    Ok((exported, losses.into_iter().chain(needs).collect()))
+}
+
+fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {
+    let refuse =
+        |message: String, help: String| Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    let name = format.name();
+    if let Some(dialect) = &options.dialect
+        && !format.dialects().contains(&dialect.as_str())
+    {
+        let known = format.dialects().join(", ");
+        let help = if known.is_empty() { format!("{name} has no dialects") } else { known };
+        return refuse(format!("`{dialect}` is no dialect of {name}"), help);
+    }
+    if options.points != Points::Usual && !format.has_points() {
+        return refuse(format!("{name} has all nodes or none"), "leave --points out".to_owned());
+    }
+    if options.points == Points::Interfaces && body.interfaces().is_empty() {
+        return refuse("the body has no interfaces".to_owned(), "--points nodes, or node numbers".to_owned());
+    }
+    if let Points::Some(ids) = &options.points {
+        let strange = ids.iter().find(|&id| !body.nodes().ids.contains(id));
+        if let Some(id) = strange {
+            return refuse(
+                format!("the body has no node {id}"),
+                "flexbody inspect names the nodes".to_owned(),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Every format, in the order in which files are recognised.
+pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] =
+    &[&sid::read::SidFile, &mbdyn::read::Mbdyn, &mbsim::read::Mbsim, &exudyn::read::Exudyn];
+
+/// The format of that name.
+///
+/// # Errors
+/// [`Usage`](Code::Usage), with the names that there are.
+pub fn find_foreign(name: &str) -> Result<&'static dyn ForeignFormat> {
+    FOREIGN_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = FOREIGN_FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("`{name}` is no format that is read");
+        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    })
+}
+
+/// The format of a file.
+///
+/// # Errors
+/// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is none of them.
+pub fn recognise(file: &InputFile) -> Result<&'static dyn ForeignFormat> {
+    FOREIGN_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
+        let names: Vec<&str> = FOREIGN_FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("the file is of no format that is read: {}", names.join(", "));
+        Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()).into()
+    })
+}

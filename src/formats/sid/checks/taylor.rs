@@ -1,0 +1,261 @@
+//! An object of the file: sizes and the entries that are listed.
+
+use crate::base::diagnostic::Diagnostic;
+use crate::formats::import::digits::Digits;
+use crate::formats::sid::read::lines::{Line, Lines};
+use faer::Mat;
+
+/// An entry, indices from 0; of `m0` the third is not used.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    index: [usize; 3],
+    line: usize,
+    value: f64,
+}
+
+/// An object M0 + sum_k M1_k q_k as it is listed.
+#[derive(Debug)]
+pub(crate) struct Taylor {
+    pub(crate) name: String,
+    /// Line of its name.
+    pub(crate) line: usize,
+    pub(crate) nrow: usize,
+    pub(crate) ncol: usize,
+    nq: usize,
+    structure: usize,
+    /// Whether the file has no `structure` of it.
+    pub(crate) inferred: bool,
+    m0: Vec<Entry>,
+    m1: Vec<Entry>,
+    /// How its entries are written.
+    pub(crate) digits: Digits,
+}
+
+/// Where `m1` has the index of the mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ModeIndex {
+    Middle,
+    Last,
+}
+
+impl ModeIndex {
+    /// (column, mode) of the second and third index.
+    fn split(self, [_, second, third]: [usize; 3]) -> (usize, usize) {
+        match self {
+            Self::Middle => (third, second),
+            Self::Last => (second, third),
+        }
+    }
+}
+
+const SIZES: [&str; 6] = ["order", "nrow", "ncol", "nq", "nqn", "structure"];
+
+impl Taylor {
+    /// Reads up to `end NAME`.
+    pub(crate) fn read(lines: &mut Lines<'_>, head: &Line<'_>) -> Result<Self, Diagnostic> {
+        let (name, end) = (head.key.clone(), format!("end {}", head.key));
+        let mut sizes: [Option<usize>; 6] = [None; 6];
+        let (mut m0, mut m1) = (Vec::new(), Vec::new());
+        let mut digits = Digits::default();
+        loop {
+            let line = lines.next(&name)?;
+            if line.key == end {
+                break;
+            }
+            if let Some(at) = SIZES.iter().position(|size| *size == line.key) {
+                if sizes[at].replace(lines.count(&line)?).is_some() {
+                    return Err(lines.unreadable(line.number, format!("`{}` is given twice", line.key)));
+                }
+                continue;
+            }
+            let Some((order, index)) = place(&line.key) else {
+                let message = format!("`{}` in `{name}`, expected a size, an entry or `{end}`", line.key);
+                return Err(lines.unreadable(line.number, message));
+            };
+            let (value, text) = lines.number(&line)?;
+            digits.see(text);
+            [&mut m0, &mut m1][order].push(Entry { index, line: line.number, value });
+        }
+        let of = |at: usize| {
+            let message = format!("`{name}` has no `{}`", SIZES[at]);
+            sizes[at].ok_or_else(|| lines.unreadable(head.number, message))
+        };
+        let object = Self {
+            line: head.number,
+            nrow: of(1)?,
+            ncol: of(2)?,
+            nq: of(3)?,
+            structure: sizes[5].unwrap_or_else(|| inferred_structure(&name, &m0, &m1)),
+            inferred: sizes[5].is_none(),
+            name: name.clone(),
+            m0,
+            m1,
+            digits,
+        };
+        let order = of(0)?;
+        let wrong = if order > 1 || sizes[4].is_some_and(|nqn| nqn > 0) {
+            Some("is of an order above 1")
+        } else if order == 0 && !object.m1.is_empty() {
+            Some("is of order 0, but has entries `m1`")
+        } else if object.structure > 4 {
+            Some("has a `structure` other than 0 to 4")
+        } else {
+            None
+        };
+        match wrong {
+            Some(wrong) => Err(lines.unreadable(head.number, format!("`{name}` {wrong}"))),
+            None => Ok(object),
+        }
+    }
+
+    /// Number of entries.
+    pub(crate) fn n_entries(&self) -> usize {
+        self.m0.len() + self.m1.len()
+    }
+
+    /// Whether no entry is listed and none is meant.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.n_entries() == 0 && self.structure != 4
+    }
+
+    /// Whether the indices of `m1` can be meant so.
+    pub(crate) fn admits(&self, modes: ModeIndex, nq: usize) -> bool {
+        self.m1.iter().all(|entry| {
+            let (column, mode) = modes.split(entry.index);
+            column < self.ncol && mode < nq
+        })
+    }
+
+    /// Checks sizes and indices for a body of `nq` modes, `shape` being (nrow, ncol).
+    pub(crate) fn check(
+        &self,
+        lines: &Lines<'_>,
+        shape: (usize, usize),
+        nq: usize,
+        modes: ModeIndex,
+    ) -> Result<(), Diagnostic> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        let name = &self.name;
+        if (self.nrow, self.ncol) != shape {
+            let message = format!(
+                "`{name}` is {} x {}, expected {} x {} for {nq} modes",
+                self.nrow, self.ncol, shape.0, shape.1
+            );
+            return Err(lines.unreadable(self.line, message));
+        }
+        // Some leave it at 0 where nothing depends on q.
+        if self.nq != nq && !(self.nq == 0 && self.m1.is_empty()) {
+            let message = format!("`{name}` has nq = {}, the body {nq} modes", self.nq);
+            return Err(lines.unreadable(self.line, message));
+        }
+        for (order, entries) in [&self.m0, &self.m1].into_iter().enumerate() {
+            let mut places: Vec<([usize; 3], usize)> =
+                entries.iter().map(|entry| (entry.index, entry.line)).collect();
+            for &(index, line) in &places {
+                let (column, mode) = if order == 0 { (index[1], 0) } else { modes.split(index) };
+                if index[0] >= self.nrow || column >= self.ncol || mode >= nq {
+                    let message = format!(
+                        "entry of `{name}` outside of its {} x {} numbers for {nq} modes",
+                        self.nrow, self.ncol
+                    );
+                    return Err(lines.unreadable(line, message));
+                }
+                if order == 0 && self.structure == 1 && index[0] != column {
+                    let message = format!("entry of `{name}` beside the diagonal, its `structure` is 1");
+                    return Err(lines.unreadable(line, message));
+                }
+            }
+            places.sort_unstable();
+            if let Some(pair) = places.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+                let message = format!("entry of `{name}` again, it is in line {} already", pair[0].1);
+                return Err(lines.unreadable(pair[1].1, message));
+            }
+        }
+        Ok(())
+    }
+
+    /// M0.
+    ///
+    /// # Panics
+    /// Here and below when [`Taylor::check`] did not pass.
+    pub(crate) fn constant(&self, (nrow, ncol): (usize, usize)) -> Mat<f64> {
+        if self.structure == 4 && self.m0.is_empty() {
+            return Mat::identity(nrow, ncol);
+        }
+        let mut all = Mat::zeros(nrow, ncol);
+        self.m0.iter().for_each(|entry| all[(entry.index[0], entry.index[1])] = entry.value);
+        self.mirror(&mut all);
+        all
+    }
+
+    /// M1_k of every mode; none where all are zero.
+    pub(crate) fn linear(
+        &self,
+        (nrow, ncol): (usize, usize),
+        nq: usize,
+        modes: ModeIndex,
+    ) -> Option<Vec<Mat<f64>>> {
+        if self.m1.iter().all(|entry| entry.value == 0.0) {
+            return None;
+        }
+        let mut all = vec![Mat::zeros(nrow, ncol); nq];
+        for entry in &self.m1 {
+            let (column, mode) = modes.split(entry.index);
+            all[mode][(entry.index[0], column)] = entry.value;
+        }
+        all.iter_mut().for_each(|one| self.mirror(one));
+        Some(all)
+    }
+
+    /// A symmetric matrix may list one triangle.
+    fn mirror(&self, a: &mut Mat<f64>) {
+        if self.structure != 2 || a.nrows() != a.ncols() {
+            return;
+        }
+        for i in 0..a.nrows() {
+            for j in 0..i {
+                if a[(i, j)] == 0.0 {
+                    a[(i, j)] = a[(j, i)];
+                } else if a[(j, i)] == 0.0 {
+                    a[(j, i)] = a[(i, j)];
+                }
+            }
+        }
+    }
+}
+
+/// What `structure` of an object must be that has none, by the entries that it lists: ccx2sid writes none. Objects that are symmetric by their
+/// meaning may list one triangle.
+fn inferred_structure(name: &str, m0: &[Entry], m1: &[Entry]) -> usize {
+    const SYMMETRIC: [&str; 5] = ["j", "mmi", "me", "ke", "de"];
+    let all = || m0.iter().chain(m1);
+    let beside = |sign: std::cmp::Ordering| all().any(|entry| entry.index[0].cmp(&entry.index[1]) == sign);
+    let one_triangle = beside(std::cmp::Ordering::Less) != beside(std::cmp::Ordering::Greater);
+    if all().next().is_none() {
+        0
+    } else if m1.is_empty() && SYMMETRIC.contains(&name) && one_triangle {
+        2
+    } else {
+        3
+    }
+}
+
+/// `m0( 1, 2)`, `m1(1,2,3)`: order and indices from 0.
+fn place(key: &str) -> Option<(usize, [usize; 3])> {
+    let (name, rest) = key.split_once('(')?;
+    let order = match name.trim_end() {
+        "m0" => 0,
+        "m1" => 1,
+        _ => return None,
+    };
+    let indices = rest.strip_suffix(')')?;
+    let mut index = [1usize; 3];
+    let mut count = 0;
+    for text in indices.split(',') {
+        *index.get_mut(count)? = text.trim().parse().ok().filter(|i| *i >= 1)?;
+        count += 1;
+    }
+    (count == 2 + order).then(|| (order, index.map(|i| i - 1)))
+}

@@ -1,0 +1,6 @@
+//! SID_FEM text: Standard Input Data of a flexible body after Wallrapp, in the dialects that programs read. The reader is made from the
+//! description of the format alone and shares nothing with the writer.
+
+mod checks;
+pub(super) mod read;
+pub(super) mod write;

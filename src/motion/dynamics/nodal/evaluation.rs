@@ -1,0 +1,280 @@
+//! The nodal equations at one state.
+
+use super::equations::NodalEquations;
+use super::massless::Room;
+use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
+use crate::model::Damping;
+use crate::motion::dynamics::{EulerParameters, Orientation};
+use crate::numerics::integration::Failure;
+use crate::numerics::linalg::multiply_vector;
+use nalgebra::{LU, Matrix3, U6, Vector3, Vector6};
+
+/// The deformation is beyond what the conditions can follow.
+const LOST: Failure = Failure::Rates {
+    reason: "the deformation is so large that the reference conditions do not determine the frame",
+};
+
+/// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after [`NodalEvaluation::new`].
+///
+/// [`NodalEvaluation::set`] takes the state and removes all loads; loads are added then; rates and accelerations are those under them.
+#[derive(Debug, Clone)]
+pub struct NodalEvaluation<'e> {
+    pub(super) equations: &'e NodalEquations<'e>,
+    pub(super) origin: Vector3<f64>,
+    /// As in the state, of unit length but for the error of the integration.
+    pub(super) attitude: EulerParameters,
+    /// D.
+    offset: Vector3<f64>,
+    /// Model axes to world axes.
+    pub(super) axes: Matrix3<f64>,
+    /// V, omega, p, h in model axes.
+    pub(super) velocity: Vector3<f64>,
+    pub(super) omega: Vector3<f64>,
+    pub(super) p: Vector3<f64>,
+    pub(super) h: Vector3<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) ud: Vec<f64>,
+    pub(super) vbar: Vec<f64>,
+    pub(super) w: Vec<f64>,
+    /// B'C' and its transpose.
+    conditions: LU<f64, U6, U6>,
+    conditions_transposed: LU<f64, U6, U6>,
+    /// Loads: force, torque about the origin, forces of rows; model axes.
+    pub(super) force: Vector3<f64>,
+    pub(super) torque: Vector3<f64>,
+    pub(super) row_forces: Vec<f64>,
+    w_rate: Vec<f64>,
+    multipliers: Vector6<f64>,
+    first: Vec<f64>,
+    second: Vec<f64>,
+    room: Room,
+}
+
+impl<'e> NodalEvaluation<'e> {
+    /// Memory for evaluations of `equations`, set to rest without deformation.
+    pub fn new(equations: &'e NodalEquations<'e>) -> Self {
+        let zeros = || vec![0.0; equations.n_rows()];
+        let zero = Vector3::zeros();
+        Self {
+            equations,
+            origin: zero,
+            attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+            offset: zero,
+            axes: equations.frame.axes.transpose(),
+            velocity: zero,
+            omega: zero,
+            p: zero,
+            h: zero,
+            u: zeros(),
+            ud: zeros(),
+            vbar: zeros(),
+            w: zeros(),
+            conditions: equations.conditions_rigid.lu(),
+            conditions_transposed: equations.conditions_rigid.transpose().lu(),
+            force: zero,
+            torque: zero,
+            row_forces: zeros(),
+            w_rate: zeros(),
+            multipliers: Vector6::zeros(),
+            first: zeros(),
+            second: zeros(),
+            room: equations.massless.room(),
+        }
+    }
+
+    /// The equations.
+    pub fn equations(&self) -> &'e NodalEquations<'e> {
+        self.equations
+    }
+
+    /// Goes to a state, without loads.
+    ///
+    /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a whole. Then M vbar = w,
+    /// C B (V, omega) = C vbar and u' = vbar - B (V, omega).
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] when the body is deformed so far that C B is singular.
+    ///
+    /// # Panics
+    /// When `state` has not [`NodalEquations::dimension`] entries.
+    pub fn set(&mut self, state: &[f64]) -> Result<(), Failure> {
+        let body = self.equations;
+        let (frame, u, w) = body.parts(state);
+        let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
+        self.offset = vector(OFFSET);
+        self.origin = vector(0) + self.offset;
+        self.attitude = attitude(frame);
+        self.axes = self.attitude.normalised().axes() * body.frame.axes.transpose();
+        self.u.copy_from_slice(u);
+        self.w.copy_from_slice(w);
+        (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
+        self.row_forces.fill(0.0);
+
+        let matrix = body.conditions_at(&self.u);
+        (self.conditions, self.conditions_transposed) = (matrix.lu(), matrix.transpose().lu());
+        let (linear, angular) = (vector(LINEAR), vector(ANGULAR) - self.offset.cross(&vector(LINEAR)));
+        (self.p, self.h) = (self.axes.tr_mul(&linear), self.axes.tr_mul(&angular));
+        let missing = joined(&self.p, &self.h) - body.onto_frame(&self.u, &self.w);
+        let mu = self.conditions.solve(&missing).ok_or(LOST)?;
+        NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
+
+        self.vbar.copy_from_slice(&self.w);
+        body.solve(&mut self.vbar, &mut self.first);
+        let nu = NodalEquations::sums(&body.conditions, &self.vbar);
+        let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
+        (self.velocity, self.omega) = halves(&nu);
+        self.ud.copy_from_slice(&self.vbar);
+        body.add_frame(-1.0, &nu, &self.u, &mut self.ud);
+        if !body.massless.is_empty() {
+            body.massless.project(body.stiffness(), &mut self.ud, &mut self.room);
+            self.vbar.copy_from_slice(&self.ud);
+            body.add_frame(1.0, &nu, &self.u, &mut self.vbar);
+        }
+        Ok(())
+    }
+
+    /// y' (see [`NodalEquations::dimension`]) under the loads.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `rates` has not the length of a state.
+    pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
+        assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
+        self.find_rates()?;
+        let flight = self.axes * self.p / self.equations.rigid_mass[(0, 0)];
+        let offset = self.axes * self.velocity - flight;
+        let linear = self.axes * self.force;
+        let angular = self.axes * self.torque + self.offset.cross(&linear);
+        let turning = self.attitude.rate(&self.equations.frame.axes.tr_mul(&self.omega));
+        let frame = flight.iter().chain(&offset).chain(&turning).chain(&linear).chain(&angular);
+        let nodes = self.ud.iter().chain(&self.w_rate);
+        rates.iter_mut().zip(frame.chain(nodes)).for_each(|(rate, value)| *rate = *value);
+        Ok(())
+    }
+
+    /// w' and lambda.
+    ///
+    /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is known from the momenta.
+    fn find_rates(&mut self) -> Result<(), Failure> {
+        let body = self.equations;
+        self.first.copy_from_slice(&self.row_forces);
+        body.add_turned(-1.0, &self.omega, &self.w, &mut self.first);
+        self.take_internal_forces();
+        let torque = self.torque
+            - self.omega.cross(&self.h)
+            - self.velocity.cross(&self.p)
+            - body.moment(&self.ud, &self.w);
+        let wanted = joined(&(self.force - self.omega.cross(&self.p)), &torque);
+        let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
+        self.multipliers = self.conditions.solve(&missing).ok_or(LOST)?;
+        NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
+        Ok(())
+    }
+
+    /// `w_rate` = T'(f - D u') - K u for the forces f in `first`.
+    fn take_internal_forces(&mut self) {
+        let body = self.equations;
+        self.second.copy_from_slice(&self.u);
+        match body.model.damping() {
+            None => {}
+            Some(Damping::Rayleigh { alpha, beta }) => {
+                body.weigh(&self.ud, &mut self.w_rate);
+                add_scaled(-alpha, &self.w_rate, &mut self.first);
+                add_scaled(*beta, &self.ud, &mut self.second);
+            }
+            Some(Damping::Matrix(damping)) => {
+                multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
+                add_scaled(-1.0, &self.w_rate, &mut self.first);
+            }
+            Some(Damping::Ratio(_) | Damping::Bands(_)) => unreachable!("refused at construction"),
+        }
+        // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the others.
+        body.massless.add_static(&self.first, &mut self.second, &mut self.room);
+        multiply_vector(body.stiffness(), 1, &self.second, &mut self.w_rate);
+        self.w_rate.iter_mut().zip(&self.first).for_each(|(rate, force)| *rate = force - *rate);
+    }
+
+    /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components in these axes.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `udd` has not N entries.
+    pub fn accelerations(&mut self, udd: &mut [f64]) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
+        assert_eq!(udd.len(), self.u.len(), "one entry per row");
+        self.find_rates()?;
+        let body = self.equations;
+        udd.copy_from_slice(&self.w_rate);
+        body.solve(udd, &mut self.first);
+        body.add_turned(-1.0, &self.omega, &self.ud, udd);
+        let nu = NodalEquations::sums(&body.conditions, udd);
+        let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
+        let (linear, angular) = halves(&nu);
+        body.add_frame(-1.0, &nu, &self.u, udd);
+        body.massless.project(body.stiffness(), udd, &mut self.room);
+        let to_frame = body.frame.axes.transpose();
+        Ok((to_frame * linear, to_frame * angular))
+    }
+
+    /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame: what it takes to hold C u = 0.
+    /// Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the moment that linear elastic forces have about the deformed
+    /// body.
+    pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let (force, torque) = halves(&(self.equations.conditions_at(&self.u) * self.multipliers));
+        let to_frame = self.equations.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+
+    /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F and tau in the axes of the
+    /// frame, and f (N) in model axes, with lambda = 0; none on what has no mass.
+    ///
+    /// # Panics
+    /// When a length is not N.
+    pub fn balance(
+        &mut self,
+        linear: &Vector3<f64>,
+        angular: &Vector3<f64>,
+        udd: &[f64],
+        forces: &mut [f64],
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let body = self.equations;
+        assert!(udd.len() == self.u.len() && forces.len() == self.u.len(), "one entry per row");
+        let nu = body.in_model(linear, angular);
+        let change = &mut self.first;
+        change.copy_from_slice(udd);
+        body.add_frame(1.0, &nu, &self.u, change);
+        body.add_turned(1.0, &self.omega, &self.ud, change);
+        body.weigh(change, forces);
+        let (force, torque) = halves(&body.onto_frame(&self.u, forces));
+        let force = force + self.omega.cross(&self.p);
+        let torque = torque
+            + body.moment(&self.ud, &self.w)
+            + self.omega.cross(&self.h)
+            + self.velocity.cross(&self.p);
+        body.add_turned(1.0, &self.omega, &self.w, forces);
+        self.first.copy_from_slice(forces);
+        self.first.iter_mut().for_each(|force| *force = -*force);
+        self.take_internal_forces();
+        forces.iter_mut().zip(&self.w_rate).for_each(|(force, rate)| *force = -rate);
+        let to_frame = body.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+}
+
+/// Both in one.
+fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::from_iterator(linear.iter().chain(angular).copied())
+}
+
+/// The linear and the angular part.
+fn halves(both: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (both.fixed_rows::<3>(0).into_owned(), both.fixed_rows::<3>(3).into_owned())
+}
+
+/// y += factor x.
+fn add_scaled(factor: f64, x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
+}

@@ -1,0 +1,283 @@
+//! A scene as data. Numbers are in the units of the body that it is for.
+
+use super::{History, Requirements};
+use crate::base::provenance::SourceFile;
+use crate::motion::dynamics::Terms;
+use nalgebra::Vector3;
+
+/// What a body is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Name.
+    pub name: String,
+    /// How it is simulated.
+    pub run: Run,
+    /// The state at time zero.
+    pub initial: Initial,
+    /// Uniform gravity, world axes.
+    pub gravity: Option<Vector3<f64>>,
+    /// Forces and torques.
+    pub loads: Vec<Load>,
+    /// Prescribed spin.
+    pub spin: Option<Spin>,
+    /// The interface that carries the body.
+    pub carried: Option<Carried>,
+    /// Places whose paths are recorded.
+    pub watched: Vec<Point>,
+    /// What is demanded of the body.
+    pub requirements: Requirements,
+    /// The file that it was read from.
+    pub source: Option<SourceFile>,
+    /// Whether its vectors are along the axes of a body in its [`Stage`](super::Stage), and its start is that of this body's frame.
+    pub resolved: bool,
+}
+
+impl Scene {
+    /// The same for a body that has only `modes` (from 0, ascending) of the one that it was written for.
+    pub fn of_modes(&self, modes: &[usize]) -> Self {
+        let mut scene = self.clone();
+        let kept =
+            |start: &ModeStart| Some(ModeStart { mode: modes.binary_search(&start.mode).ok()?, ..*start });
+        scene.initial.modes = self.initial.modes.iter().filter_map(kept).collect();
+        scene
+    }
+
+    /// Times at which something is not smooth, ascending.
+    pub fn breaks(&self) -> Vec<f64> {
+        let loads = self.loads.iter().map(|load| &load.history);
+        let mut times: Vec<f64> = loads.chain(self.driving()).flat_map(History::breaks).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+}
+
+impl Scene {
+    /// Axis and angular velocity of a prescribed rotation, of the frame or of the interface that carries the body.
+    pub fn rotation(&self) -> Option<(&Vector3<f64>, &History)> {
+        let carried = self.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+        let spin = self.spin.as_ref().map(|spin| (&spin.axis, &spin.rate));
+        spin.or(carried.map(|spin| (&spin.axis, &spin.rate)))
+    }
+
+    /// Whether the motion of the frame, or of the interface that carries the body, is prescribed.
+    pub fn prescribes(&self) -> bool {
+        self.spin.is_some() || self.carried.is_some()
+    }
+
+    /// The same with the prescribed angular velocity times a factor.
+    pub fn turning_faster(&self, factor: f64) -> Self {
+        let mut scene = self.clone();
+        let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
+        for rate in scene.spin.iter_mut().map(|s| &mut s.rate).chain(carried.map(|s| &mut s.rate)) {
+            *rate = rate.scaled(factor);
+        }
+        scene
+    }
+
+    /// Histories of prescribed motion.
+    pub fn driving(&self) -> impl Iterator<Item = &History> {
+        let translation = self.carried.as_ref().and_then(|carried| carried.translation.as_ref());
+        let rate = self.rotation().map(|(_, rate)| rate);
+        rate.into_iter().chain(translation.map(|translation| translation.drive.history()))
+    }
+}
+
+/// How a scene is simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// From time zero to this; `None` where nothing is to be simulated.
+    pub duration: Option<f64>,
+    /// Instants recorded after the first, evenly spaced.
+    pub outputs: usize,
+    /// Steps that the integration may take; a run that needs more is refused.
+    pub most_steps: u64,
+    /// Integration method.
+    pub scheme: Scheme,
+    /// Terms of the equations of motion.
+    pub terms: Terms,
+}
+
+impl Run {
+    /// Steps that an integration may take unless the scene says otherwise: some minutes to an hour, with the number of modes.
+    pub const MOST_STEPS: u64 = 20_000_000;
+}
+
+/// Integration methods ([`crate::numerics::integration`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scheme {
+    /// Explicit, of order 8, with error control.
+    Adaptive {
+        /// Largest error of a step, relative to the scales of the motion.
+        tolerance: f64,
+    },
+    /// Gauss collocation with steps of one length.
+    Conserving {
+        /// 2, 4 or 6.
+        order: usize,
+        /// Longest step; `None`: a twentieth of the shortest period of the body.
+        step: Option<f64>,
+    },
+}
+
+/// The state at time zero.
+///
+/// A point that has the coordinates x in the model is at `origin` + A x in the world, A being the rotation by `rotation`: world axes start
+/// along those of the model unless that turns them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Initial {
+    /// Where the origin of the model is, world axes.
+    pub origin: Vector3<f64>,
+    /// Velocity of the centre of mass of the undeformed body, world axes.
+    pub velocity: Vector3<f64>,
+    /// Attitude: the model is turned by the length of this vector (radians) about its direction.
+    pub rotation: Vector3<f64>,
+    /// Angular velocity.
+    pub angular_velocity: Vector3<f64>,
+    /// Axes of the angular velocity.
+    pub axes: Axes,
+    /// Modes that are not at rest and undeformed.
+    pub modes: Vec<ModeStart>,
+}
+
+/// A mode at time zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeStart {
+    /// Number of the mode, from 0.
+    pub mode: usize,
+    /// Modal coordinate.
+    pub amplitude: f64,
+    /// Its rate.
+    pub rate: f64,
+}
+
+/// A place of the body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Point {
+    /// A node by its number.
+    Node(i64),
+    /// An interface by its name.
+    Interface(String),
+}
+
+impl std::fmt::Display for Point {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Node(number) => write!(f, "node {number}"),
+            Self::Interface(name) => write!(f, "interface {name}"),
+        }
+    }
+}
+
+/// A force and a torque at a place, each times the history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Load {
+    /// Where it acts.
+    pub at: Point,
+    /// Force.
+    pub force: Vector3<f64>,
+    /// Torque.
+    pub torque: Vector3<f64>,
+    /// Axes of both.
+    pub axes: Axes,
+    /// Factor over time.
+    pub history: History,
+}
+
+/// Axes that a vector is given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Axes {
+    /// Fixed in space.
+    World,
+    /// Those of the model, turning with the body. Of a body that came without a model these are those of its file.
+    #[default]
+    Model,
+    /// Those of the body frame of the flex-body file, turning with the body.
+    Body,
+}
+
+impl Axes {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::World => "world",
+            Self::Model => "model",
+            Self::Body => "body",
+        }
+    }
+}
+
+/// Prescribed angular velocity of the body frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spin {
+    /// Direction, of length one.
+    pub axis: Vector3<f64>,
+    /// Axes of the direction, which turns with the body.
+    pub axes: Axes,
+    /// Angular velocity about it.
+    pub rate: History,
+    /// Whether the centre of mass of the undeformed body is held where it is.
+    pub hold: bool,
+}
+
+/// An interface, or a node with rotations, whose motion is prescribed; the rest of the body hangs from it. Without motion it is held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Carried {
+    /// What is carried.
+    pub by: Point,
+    /// Rotation about an axis.
+    pub spin: Option<CarriedSpin>,
+    /// Motion along a direction.
+    pub translation: Option<Translation>,
+}
+
+/// Rotation of what carries a body, about an axis that is fixed to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CarriedSpin {
+    /// Direction, of length one.
+    pub axis: Vector3<f64>,
+    /// Axes of the direction.
+    pub axes: Axes,
+    /// A point of the axis in model coordinates; `None`: the reference point of what is carried.
+    pub through: Option<Vector3<f64>>,
+    /// Angular velocity.
+    pub rate: History,
+}
+
+/// Motion of what carries a body, axis of rotation and all, along a direction that is fixed in space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Translation {
+    /// Direction, of length one, world axes.
+    pub direction: Vector3<f64>,
+    /// How far, how fast or with what acceleration.
+    pub drive: Drive,
+}
+
+/// A motion along a line, given by one of its derivatives. It starts at zero.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drive {
+    /// The way, of two continuous derivatives.
+    Displacement(History),
+    /// The velocity.
+    Velocity(History),
+    /// The acceleration of a motion that starts at rest.
+    Acceleration(History),
+}
+
+impl Drive {
+    /// What is given.
+    pub fn history(&self) -> &History {
+        match self {
+            Self::Displacement(history) | Self::Velocity(history) | Self::Acceleration(history) => history,
+        }
+    }
+
+    /// Velocity and acceleration at a time.
+    pub fn at(&self, time: f64) -> (f64, f64) {
+        match self {
+            Self::Displacement(way) => (way.at(time).1, way.curvature(time)),
+            Self::Velocity(velocity) => velocity.at(time),
+            Self::Acceleration(acceleration) => (acceleration.integral(time), acceleration.at(time).0),
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! How long the steps of an integration may be, and how many there are, before it begins.
+
+use super::{History, Scene, Scheme};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::body::flex_body::FlexBody;
+use std::f64::consts::TAU;
+
+/// Steps of the conserving method per shortest period, unless said.
+const STEPS_PER_PERIOD: f64 = 20.0;
+
+/// Explicit steps per oscillation of a load or a spin, and steps of a given length: with fewer an oscillation could pass between them.
+const STEPS_PER_OSCILLATION: f64 = 2.0;
+
+/// Longest explicit step that is stable, as the angle that the fastest mode turns in it.
+const STABLE: f64 = 6.0;
+
+/// Frequency of the fastest history, in oscillations per time; zero without any that oscillates.
+fn fastest_history(scene: &Scene) -> f64 {
+    let histories = scene.loads.iter().map(|load| &load.history);
+    let frequency = |history: &History| match history {
+        History::Sine { amplitude, frequency, .. } if *amplitude != 0.0 => frequency.abs(),
+        _ => 0.0,
+    };
+    histories.chain(scene.driving()).map(frequency).fold(0.0, f64::max)
+}
+
+/// Longest explicit step for the histories of a scene that lasts `duration`.
+pub(super) fn longest_step(scene: &Scene, duration: f64) -> f64 {
+    duration.min(1.0 / (STEPS_PER_OSCILLATION * fastest_history(scene)))
+}
+
+/// Steps that an integration takes at the least.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Effort {
+    steps: f64,
+    /// What makes them so many.
+    because: String,
+}
+
+impl Effort {
+    /// The scheme of `scene` with the step that is taken, and what it costs at the least.
+    ///
+    /// # Errors
+    /// FB551 where the step is given and longer than half a period of a load.
+    pub fn plan(body: &FlexBody, scene: &Scene, duration: f64) -> Result<(Scheme, Self)> {
+        let fastest_mode = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt() / TAU;
+        let of_history = fastest_history(scene);
+        let of_load = format!("a load or spin oscillates {of_history:.3e} times per time");
+        let of_mode = format!("the fastest mode oscillates {fastest_mode:.3e} times per time");
+        match scene.run.scheme {
+            Scheme::Adaptive { .. } => {
+                let for_modes = duration * fastest_mode * TAU / STABLE;
+                let for_histories = duration * of_history * STEPS_PER_OSCILLATION;
+                let (steps, because) =
+                    if for_histories > for_modes { (for_histories, of_load) } else { (for_modes, of_mode) };
+                Ok((scene.run.scheme, Self { steps, because }))
+            }
+            Scheme::Conserving { order, step: Some(step) } => {
+                let step = step.min(duration);
+                if step * of_history * STEPS_PER_OSCILLATION > 1.0 {
+                    let message = format!("{of_load}: steps of {step:e} pass over it");
+                    let longest = 1.0 / (STEPS_PER_PERIOD * of_history);
+                    let help = format!("give a `step` of {longest:.3e} or less, or none");
+                    return Err(Diagnostic::new(Code::StepPassesOver, message).with_help(help).into());
+                }
+                let because = format!("steps of {step:e}");
+                Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
+            }
+            Scheme::Conserving { order, step: None } => {
+                let (fastest, because) = match of_history > fastest_mode {
+                    true => (of_history, of_load),
+                    false => (fastest_mode, of_mode),
+                };
+                let step = (1.0 / (STEPS_PER_PERIOD * fastest)).min(duration);
+                Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
+            }
+        }
+    }
+
+    /// Refuses what takes more steps than the scene allows.
+    ///
+    /// # Errors
+    /// FB550.
+    pub fn refuse_too_much(&self, scene: &Scene) -> Result<()> {
+        if self.steps <= scene.run.most_steps as f64 {
+            return Ok(());
+        }
+        let message = format!(
+            "the run of `{}` takes {:.1e} steps at the least, {} are allowed: {}",
+            scene.name, self.steps, scene.run.most_steps, self.because
+        );
+        Err(Diagnostic::new(Code::RunTooLong, message).into())
+    }
+}

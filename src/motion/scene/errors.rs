@@ -1,0 +1,313 @@
+//! How far a motion is from that of a reference: the errors that tolerances of a scene are about.
+
+use super::lively::{LivelyNodes, along_axes, longest};
+use super::peak::Peak;
+use super::{Tolerance, Trace};
+use crate::body::flex_body::FlexBody;
+use crate::motion::dynamics::EulerParameters;
+use faer::MatRef;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Torques, relative to the energy of the motion, that are none: rounding.
+const NO_TORQUE: f64 = 1e-10;
+
+/// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
+pub(crate) const LEAST_REACTION: f64 = 1e-3;
+
+/// Force and torque.
+type Reaction = (Vector3<f64>, Vector3<f64>);
+
+/// Largest errors over the continuous motion. `None`: the reference has nothing of it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct OutputErrors {
+    /// Angle between the frames, radians.
+    pub attitude: f64,
+    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of any of them or to the least
+    /// that counts ([`Resolution`](super::Resolution)). Without watched points: of the nodes that move most in some mode along some axis.
+    pub deflection: Option<f64>,
+    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that counts instead of the
+    /// largest where that is less.
+    pub stress: Option<f64>,
+    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or torque, or to a thousandth of
+    /// w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2.
+    pub reaction: Option<f64>,
+}
+
+impl OutputErrors {
+    /// The largest ratio of error to tolerance.
+    pub fn worst(&self, tolerance: &Tolerance) -> f64 {
+        let ratio = |error: Option<f64>, allowed: f64| error.map_or(0.0, |error| error / allowed);
+        let ratios = [
+            self.attitude / tolerance.attitude,
+            ratio(self.deflection, tolerance.deflection),
+            ratio(self.stress, tolerance.stress),
+            ratio(self.reaction, tolerance.reaction),
+        ];
+        largest(ratios.iter())
+    }
+
+    /// The output whose error is largest beside its tolerance: its name, the error, and the tolerance.
+    pub fn decisive(&self, tolerance: &Tolerance) -> (&'static str, f64, f64) {
+        let all = [
+            ("attitude", Some(self.attitude), tolerance.attitude),
+            ("deflection", self.deflection, tolerance.deflection),
+            ("stress", self.stress, tolerance.stress),
+            ("reaction", self.reaction, tolerance.reaction),
+        ];
+        let there = all.into_iter().filter_map(|(name, error, allowed)| Some((name, error?, allowed)));
+        // NaN is the largest of all.
+        let ratio = |(_, error, allowed): &(&str, f64, f64)| error / allowed;
+        there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
+    }
+
+    /// Whether every error is within its tolerance.
+    pub fn within(&self, tolerance: &Tolerance) -> bool {
+        self.worst(tolerance) <= 1.0
+    }
+}
+
+/// The errors along the motion, as [`OutputErrors`] has the largest of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorHistory {
+    /// Where the motion was looked at.
+    pub time: Vec<f64>,
+    /// Of the attitude.
+    pub attitude: Vec<f64>,
+    /// Of deflections.
+    pub deflection: Option<Vec<f64>>,
+    /// Of the elastic energy.
+    pub stress: Option<Vec<f64>>,
+    /// Of force and torque.
+    pub reaction: Option<Vec<f64>>,
+}
+
+impl ErrorHistory {
+    /// The largest errors, also between the places where the motion was looked at.
+    pub fn largest(&self) -> OutputErrors {
+        let of = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
+        OutputErrors {
+            attitude: of(&self.attitude),
+            deflection: self.deflection.as_deref().map(of),
+            stress: self.stress.as_deref().map(of),
+            reaction: self.reaction.as_deref().map(of),
+        }
+    }
+
+    /// The largest error in the second half of the run relative to that in the first half, of the output where this is most; about 1
+    /// for errors that stay bounded, 2 and more for a phase that runs away. `None` without an error in the first half.
+    pub fn growth(&self) -> Option<f64> {
+        let of = |history: &Vec<f64>| {
+            let (before, after) = self.halves(history);
+            (before > 0.0).then_some(after / before)
+        };
+        let others = [&self.deflection, &self.stress, &self.reaction];
+        let all = others.into_iter().flatten().chain([&self.attitude]);
+        all.filter_map(of).reduce(f64::max)
+    }
+
+    /// The largest of `values` along the motion in the first half of the run, and in the second.
+    pub fn halves(&self, values: &[f64]) -> (f64, f64) {
+        let end = self.time.last().copied().unwrap_or(0.0);
+        let (first, second) = values.split_at(self.time.partition_point(|&time| time <= 0.5 * end));
+        (largest(first.iter()), largest(second.iter()))
+    }
+}
+
+/// The largest of values that are not negative; not a number where one of them is not.
+fn largest<'v>(values: impl Iterator<Item = &'v f64>) -> f64 {
+    values.fold(0.0, |most, &value| if value > most || value.is_nan() { value } else { most })
+}
+
+/// How far apart the deformations of two motions are, along the motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Apart {
+    /// Elastic energy of the difference.
+    pub energy: Vec<f64>,
+    /// Largest difference of the deflections of any node that is looked at.
+    pub deflection: Vec<f64>,
+    /// Largest of their deflections in the reference.
+    pub largest_deflection: f64,
+}
+
+impl ErrorHistory {
+    /// The errors of `candidate`, whose deformation is `apart` from that of `reference`. What the nodes have to say counts where no points
+    /// are watched.
+    ///
+    /// # Panics
+    /// When the motions were not looked at in the same places.
+    pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
+        assert!(reference.time == candidate.time, "motions that were looked at in the same places");
+        let (mass, radius) = reference.size;
+        let largest_of = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let peak_of = |values: &mut dyn Iterator<Item = f64>| Peak::of(&reference.time, values).value;
+        let (motion, spin) = (reference.extremes.internal, reference.extremes.spin);
+        let relative = |values: Vec<f64>, scale: f64, none: f64| {
+            (scale > none).then(|| values.into_iter().map(|value| value / scale).collect::<Vec<_>>())
+        };
+
+        let attitudes = reference.attitude.iter().zip(&candidate.attitude);
+        let attitude = attitudes.map(|(a, b)| angle(a, b)).collect();
+        let (deflection, scale) = if reference.deflections.is_empty() {
+            (apart.deflection.clone(), apart.largest_deflection)
+        } else {
+            let pairs = || reference.deflections.iter().zip(&candidate.deflections);
+            let at = |i: usize| largest_of(&mut pairs().map(|(a, b)| (a[i] - b[i]).norm()));
+            let paths = reference.deflections.iter();
+            let largest = paths.map(|path| peak_of(&mut path.iter().map(|d| d.norm())));
+            ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, f64::max))
+        };
+        let energy = peak_of(&mut reference.elastic.iter().map(|energy| energy.max(0.0).sqrt()));
+        let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
+        let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
+            let of = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
+                let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
+                let largest = peak_of(&mut a.iter().map(|a| part(a).norm()));
+                // Forces that are rounding are no forces, however small the least that counts.
+                let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
+                (largest > NO_TORQUE * motion / lever)
+                    .then(|| relative(differences, largest.max(least), 0.0))
+                    .flatten()
+            };
+            let force = of(|both| both.0, radius);
+            let torque = of(|both| both.1, 1.0);
+            match (force, torque) {
+                (Some(force), Some(torque)) => {
+                    Some(force.into_iter().zip(torque).map(|(a, b)| a.max(b)).collect())
+                }
+                (force, torque) => force.or(torque),
+            }
+        });
+        Self {
+            time: reference.time.clone(),
+            attitude,
+            deflection: relative(deflection, scale.max(reference.resolution.deflection), 0.0),
+            stress: relative(stress, energy.max(reference.resolution.root_energy), 0.0),
+            reaction,
+        }
+    }
+}
+
+/// The angle between two attitudes.
+fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
+    let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a.0, b.0);
+    let (a, b) = (Vector3::new(a1, a2, a3), Vector3::new(b1, b2, b3));
+    let scalar = a0 * b0 + a.dot(&b);
+    let vector = b * a0 - a * b0 - a.cross(&b);
+    2.0 * vector.norm().atan2(scalar.abs())
+}
+
+/// The motion of a body that others are measured against.
+#[derive(Debug, Clone)]
+pub struct Measure<'r> {
+    body: &'r FlexBody,
+    trace: &'r Trace,
+    /// Nodes that are looked at where no points are watched.
+    nodes: Vec<usize>,
+    rows: LivelyNodes,
+    largest_deflection: f64,
+}
+
+impl<'r> Measure<'r> {
+    /// Measures against `trace`, a motion of `body`.
+    ///
+    /// # Panics
+    /// When the motion has another number of modes.
+    pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
+        assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
+        let nodes = if trace.deflections.is_empty() { along_axes(body) } else { Vec::new() };
+        let rows = LivelyNodes::new(body, &nodes);
+        let largest_deflection = Peak::of(&trace.time, trace.q.iter().map(|q| rows.longest(q))).value;
+        Self { body, trace, nodes, rows, largest_deflection }
+    }
+
+    /// The body.
+    pub fn body(&self) -> &'r FlexBody {
+        self.body
+    }
+
+    /// Its motion.
+    pub fn trace(&self) -> &'r Trace {
+        self.trace
+    }
+
+    /// Errors of the motion of a body that has the modes `kept` (from 0) of the reference, in this order.
+    ///
+    /// # Panics
+    /// When the reference has no such modes, or the motions were not looked at in the same places.
+    pub fn of_subset(&self, candidate: &Trace, kept: &[usize]) -> ErrorHistory {
+        let energy = &self.body.invariants().modal_stiffness;
+        let apart = self.apart(candidate, |reference, own| {
+            let mut difference: Vec<f64> = reference.iter().map(|q| -q).collect();
+            kept.iter().zip(own).for_each(|(&mode, q)| difference[mode] += q);
+            let energy = 0.5 * quadratic(energy.as_ref(), &difference);
+            (energy, self.rows.longest(&difference))
+        });
+        ErrorHistory::new(self.trace, candidate, &apart)
+    }
+
+    /// Errors of the motion of a body with other modes of the same model.
+    ///
+    /// # Panics
+    /// When the motions were not looked at in the same places.
+    pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
+        let (energy, rows) =
+            (&self.body.invariants().modal_stiffness, LivelyNodes::new(modes.body, &self.nodes));
+        let apart = self.apart(candidate, |reference, own| {
+            let q = DVector::from_column_slice(own);
+            let difference = &modes.map * &q - DVector::from_column_slice(reference);
+            let outside = (&modes.outside * &q).dot(&q).max(0.0);
+            let displacements = rows.displacements(own).zip(self.rows.displacements(reference));
+            let deflection = longest(displacements.map(|(own, reference)| own - reference));
+            (0.5 * (quadratic(energy.as_ref(), difference.as_slice()) + outside), deflection)
+        });
+        ErrorHistory::new(self.trace, candidate, &apart)
+    }
+
+    fn apart(&self, candidate: &Trace, of: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
+        let (energy, deflection) = self.trace.q.iter().zip(&candidate.q).map(|(a, b)| of(a, b)).unzip();
+        Apart { energy, deflection, largest_deflection: self.largest_deflection }
+    }
+}
+
+/// Modes of a candidate, seen from those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K Psi_r
+///
+/// ```text
+/// V(Psi_c q_c - Psi_r q_r) = d'L_r d / 2 + q_c'(L_c - G L_r^-1 G') q_c / 2,    d = L_r^-1 G' q_c - q_r
+/// ```
+///
+/// a part within the reference, and one outside of it, without the cancellation of the sum of squares.
+#[derive(Debug, Clone)]
+pub struct OtherModes<'c> {
+    body: &'c FlexBody,
+    /// L_r^-1 G' (nr x nc).
+    map: DMatrix<f64>,
+    /// L_c - G L_r^-1 G' (nc x nc).
+    outside: DMatrix<f64>,
+}
+
+impl<'c> OtherModes<'c> {
+    /// The modes of `candidate` seen from those of `reference`, with `shared` = G (nc x nr); `None` where the bodies are not of one model, or
+    /// the stiffness of the reference is not positive definite.
+    pub fn new(candidate: &'c FlexBody, reference: &FlexBody, shared: MatRef<'_, f64>) -> Option<Self> {
+        let (nc, nr) = (candidate.n_modes(), reference.n_modes());
+        let same = candidate.n_nodes() == reference.n_nodes() && candidate.frame() == reference.frame();
+        if !same || (shared.nrows(), shared.ncols()) != (nc, nr) {
+            return None;
+        }
+        let of = |body: &FlexBody| {
+            let k = &body.invariants().modal_stiffness;
+            DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+        };
+        let transposed = DMatrix::from_fn(nr, nc, |i, j| shared[(j, i)]);
+        let map = of(reference).cholesky()?.solve(&transposed);
+        let outside = of(candidate) - transposed.tr_mul(&map);
+        Some(Self { body: candidate, map, outside })
+    }
+}
+
+/// x'A x of a matrix that is not negative.
+fn quadratic(a: MatRef<'_, f64>, x: &[f64]) -> f64 {
+    let column =
+        |(j, xj): (usize, &f64)| xj * x.iter().enumerate().map(|(i, xi)| a[(i, j)] * xi).sum::<f64>();
+    x.iter().enumerate().map(column).sum::<f64>().max(0.0)
+}

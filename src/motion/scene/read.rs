@@ -1,0 +1,510 @@
+//! Reads `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
+
+use super::contradictions::contradictions;
+use super::read_carried::carried;
+use super::read_requirements::{self, requirements};
+use super::{Axes, History, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin};
+use crate::base::diagnostic::Code;
+use crate::base::error::Result;
+use crate::base::provenance::SourceFile;
+use crate::input::{Table, Value, Walk, integer, read_toml, real};
+use crate::motion::dynamics::Terms;
+use nalgebra::Vector3;
+use std::ops::Range;
+use std::path::Path;
+use toml::de::DeValue;
+
+const TOP: &[&str] = &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch"];
+const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
+const INITIAL: &[&str] = &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode"];
+const MODE: &[&str] = &["number", "amplitude", "rate"];
+const LOAD: &[&str] = &["node", "interface", "force", "torque", "axes", "history"];
+const SPIN: &[&str] = &["axis", "axes", "rate", "hold"];
+const WATCH: &[&str] = &["node", "interface"];
+const HISTORIES: [(&str, &[&str]); 3] = [
+    ("a table of points", &["times", "values"]),
+    ("a sine", &["amplitude", "frequency", "phase"]),
+    ("a ramp", &["from", "to", "start", "duration"]),
+];
+
+/// All axes that a vector can be along.
+pub(super) const EVERY: [Axes; 3] = [Axes::Model, Axes::Body, Axes::World];
+
+/// Instants recorded unless said.
+const OUTPUTS: i64 = 500;
+
+/// More than anybody plots, and less than memory holds.
+const MOST_OUTPUTS: i64 = 1_000_000;
+
+/// Tolerance of the adaptive method unless said: trajectories of some ten turns to 1e-7.
+const TOLERANCE: f64 = 1e-9;
+
+/// Tolerances that rounding leaves a meaning.
+const TOLERANCES: Range<f64> = 1e-14..0.1;
+
+/// Reads a scene.
+///
+/// # Errors
+/// FB101, FB106 when it cannot be read; FB211 for syntax, unknown, missing or mistyped keys and values that cannot be. All of them,
+/// in the order of lines.
+pub fn read_scene(path: impl AsRef<Path>) -> Result<Scene> {
+    let path = path.as_ref();
+    let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    read_toml(path, "scene", Code::SceneSyntax, |walk, top| scene(walk, top, name))
+}
+
+/// `None` only with something in `found`, as everything here.
+fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
+    let required = read_requirements::TABLES.map(|(name, _)| name);
+    walk.known_keys(top, "the scene", &[TOP, &required].concat());
+    let name = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
+    let run = match walk.table(top, "run") {
+        Some((table, span)) => run(walk, table, span),
+        None => run(walk, &Table::new(), 0..0),
+    };
+    let initial = match walk.table(top, "initial") {
+        Some((table, _)) => initial(walk, table),
+        None => Some(Initial::default()),
+    };
+    let gravity = top.get("gravity").map(|value| vector(walk, "gravity", value));
+    let loads = list(walk, top, "load", load);
+    let spin = walk.table(top, "spin").map(|(table, span)| spin(walk, table, span));
+    let carried = walk.table(top, "carried").map(|(table, span)| carried(walk, table, span));
+    let watched = list(walk, top, "watch", |walk, table, span| {
+        walk.known_keys(table, "[[watch]]", WATCH);
+        place(walk, table, span)
+    });
+    let requirements = requirements(walk, top);
+    contradictions(walk, top);
+    Some(Scene {
+        name: name?,
+        run: run?,
+        initial: initial?,
+        gravity: transposed(gravity)?,
+        loads: loads?,
+        spin: transposed(spin)?,
+        carried: transposed(carried)?,
+        watched: watched?,
+        requirements: requirements?,
+        source: Some(SourceFile::new("scene", walk.path, walk.fingerprint())),
+        resolved: false,
+    })
+}
+
+/// What is not there is no mistake; what is there and wrong is.
+pub(super) fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
+    match value {
+        Some(read) => read.map(Some),
+        None => Some(None),
+    }
+}
+
+fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
+    walk.known_keys(table, "[run]", RUN);
+    let duration = match table.contains_key("duration") {
+        true => positive(walk, table, "duration", &span).map(Some),
+        false => Some(None),
+    };
+    let mut count = |key: &str, default: i64, most: i64| match table.get(key) {
+        None => Some(default),
+        Some(value) => {
+            let count = integer(value).filter(|count| (1..=most).contains(count));
+            if count.is_none() {
+                walk.wrong(value.span(), format!("`{key}` is not a number from 1 to {most}"));
+            }
+            count
+        }
+    };
+    let outputs = count("outputs", OUTPUTS, MOST_OUTPUTS);
+    let most_steps = count("most_steps", Run::MOST_STEPS as i64, i64::MAX);
+    let terms = match table.get("terms") {
+        None => Some(Terms::ALL),
+        Some(value) => terms(walk, value),
+    };
+    let scheme = scheme(walk, table, &span);
+    let outputs = usize::try_from(outputs?).ok()?;
+    let most_steps = most_steps? as u64;
+    Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms: terms? })
+}
+
+fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+    let method =
+        if table.contains_key("method") { walk.string(table, "method")? } else { "adaptive".to_owned() };
+    let mut refuse = |keys: &[&str]| {
+        for key in keys.iter().filter_map(|key| table.get(*key)) {
+            walk.wrong(key.span(), format!("method `{method}` has no such setting"));
+        }
+    };
+    match method.as_str() {
+        "adaptive" => {
+            refuse(&["order", "step"]);
+            let tolerance = match table.contains_key("tolerance") {
+                true => positive(walk, table, "tolerance", span)?,
+                false => TOLERANCE,
+            };
+            if !TOLERANCES.contains(&tolerance) {
+                let message = format!(
+                    "`tolerance` is {tolerance}, expected {} to {}",
+                    TOLERANCES.start, TOLERANCES.end
+                );
+                walk.wrong(place_of(table, "tolerance", span), message);
+                return None;
+            }
+            Some(Scheme::Adaptive { tolerance })
+        }
+        "conserving" => {
+            refuse(&["tolerance"]);
+            let order = match table.get("order") {
+                None => 4,
+                Some(value) => match integer(value) {
+                    Some(order @ (2 | 4 | 6)) => order as usize,
+                    _ => {
+                        walk.mistyped("order", value, "2, 4 or 6");
+                        return None;
+                    }
+                },
+            };
+            let step = match table.contains_key("step") {
+                true => Some(positive(walk, table, "step", span)?),
+                false => None,
+            };
+            Some(Scheme::Conserving { order, step })
+        }
+        other => {
+            let message = format!("`method` is `{other}`, expected `adaptive` or `conserving`");
+            walk.wrong(place_of(table, "method", span), message);
+            None
+        }
+    }
+}
+
+fn terms(walk: &mut Walk<'_>, value: &Value) -> Option<Terms> {
+    let DeValue::Array(names) = value.get_ref() else {
+        walk.mistyped("terms", value, "a list of \"W1\", \"W2\", \"W3\"");
+        return None;
+    };
+    let mut terms = Terms { geometric_stiffness: true, ..Terms::NONE };
+    for name in names.iter() {
+        match name.get_ref() {
+            DeValue::String(text) if text == "W1" => terms.w1 = true,
+            DeValue::String(text) if text == "W2" => terms.w2 = true,
+            DeValue::String(text) if text == "W3" => terms.w3 = true,
+            _ => {
+                walk.mistyped("terms", name, "\"W1\", \"W2\" or \"W3\"");
+                return None;
+            }
+        }
+    }
+    Some(terms)
+}
+
+fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
+    walk.known_keys(table, "[initial]", INITIAL);
+    let mut or_zero = |key: &str| match table.get(key) {
+        Some(value) => vector(walk, key, value),
+        None => Some(Vector3::zeros()),
+    };
+    let [origin, velocity, rotation, angular_velocity] =
+        ["origin", "velocity", "rotation", "angular_velocity"].map(&mut or_zero);
+    let axes = axes(walk, table, &EVERY, Axes::Model);
+    let modes = list(walk, table, "mode", |walk, table, span| {
+        walk.known_keys(table, "[[initial.mode]]", MODE);
+        let number = mode_number(walk, table, &span, "[[initial.mode]]");
+        let mut or_zero = |key: &str| {
+            if table.contains_key(key) { finite(walk, table, key, &span) } else { Some(0.0) }
+        };
+        let (amplitude, rate) = (or_zero("amplitude"), or_zero("rate"));
+        Some(ModeStart { mode: number?, amplitude: amplitude?, rate: rate? })
+    });
+    Some(Initial {
+        origin: origin?,
+        velocity: velocity?,
+        rotation: rotation?,
+        angular_velocity: angular_velocity?,
+        axes: axes?,
+        modes: modes?,
+    })
+}
+
+/// The number of a mode, from 0.
+pub(super) fn mode_number(
+    walk: &mut Walk<'_>,
+    table: &Table,
+    span: &Range<usize>,
+    place: &str,
+) -> Option<usize> {
+    let Some(value) = table.get("number") else {
+        walk.wrong(span.clone(), format!("key `number` is missing in {place}"));
+        return None;
+    };
+    let number = integer(value).and_then(|number| usize::try_from(number).ok()).filter(|&n| n > 0);
+    if number.is_none() {
+        walk.mistyped("number", value, "the number of a mode, from 1");
+    }
+    Some(number? - 1)
+}
+
+/// One of the axes `known` under the key `axes`.
+pub(super) fn axes(walk: &mut Walk<'_>, table: &Table, known: &[Axes], default: Axes) -> Option<Axes> {
+    let Some(value) = table.get("axes") else { return Some(default) };
+    let given = match value.get_ref() {
+        DeValue::String(text) => known.iter().copied().find(|axes| axes.name() == text.as_ref()),
+        _ => None,
+    };
+    if given.is_none() {
+        let names: Vec<String> = known.iter().map(|axes| format!("\"{}\"", axes.name())).collect();
+        walk.mistyped("axes", value, &names.join(" or "));
+    }
+    given
+}
+
+fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> {
+    walk.known_keys(table, "[[load]]", LOAD);
+    let at = place(walk, table, span.clone());
+    let force = table.get("force").map(|value| vector(walk, "force", value));
+    let torque = table.get("torque").map(|value| vector(walk, "torque", value));
+    if force.is_none() && torque.is_none() {
+        walk.wrong(span, "load has neither `force` nor `torque`".to_owned());
+    }
+    let axes = axes(walk, table, &EVERY, Axes::World);
+    let history = match table.get("history") {
+        Some(value) => history(walk, "history", value),
+        None => Some(History::Constant(1.0)),
+    };
+    Some(Load {
+        at: at?,
+        force: force.unwrap_or(Some(Vector3::zeros()))?,
+        torque: torque.unwrap_or(Some(Vector3::zeros()))?,
+        axes: axes?,
+        history: history?,
+    })
+}
+
+fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Spin> {
+    walk.known_keys(table, "[spin]", SPIN);
+    let axis = match table.contains_key("axis") {
+        true => direction(walk, table, "axis"),
+        false => Some(Vector3::z()),
+    };
+    let axes = axes(walk, table, &EVERY, Axes::Model);
+    let rate = match table.get("rate") {
+        Some(value) => history(walk, "rate", value),
+        None => {
+            walk.wrong(span, "key `rate` is missing in [spin]".to_owned());
+            None
+        }
+    };
+    let hold = match table.get("hold").map(|value| (value, value.get_ref())) {
+        None => Some(false),
+        Some((_, DeValue::Boolean(hold))) => Some(*hold),
+        Some((value, _)) => {
+            walk.mistyped("hold", value, "true or false");
+            None
+        }
+    };
+    Some(Spin { axis: axis?, axes: axes?, rate: rate?, hold: hold? })
+}
+
+/// A vector of length one along that of `key`, which must be there.
+pub(super) fn direction(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Vector3<f64>> {
+    let value = table.get(key)?;
+    let unit = vector(walk, key, value)?.try_normalize(0.0);
+    if unit.is_none() {
+        walk.wrong(value.span(), format!("`{key}` has no direction"));
+    }
+    unit
+}
+
+pub(super) fn place(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Point> {
+    match (table.get("node"), table.contains_key("interface")) {
+        (Some(value), false) => {
+            let node = integer(value);
+            if node.is_none() {
+                walk.mistyped("node", value, "a node number");
+            }
+            Some(Point::Node(node?))
+        }
+        (None, true) => Some(Point::Interface(walk.string(table, "interface")?)),
+        (Some(_), true) => {
+            walk.wrong(span, "table has both `node` and `interface`".to_owned());
+            None
+        }
+        (None, false) => {
+            walk.wrong(span, "table has neither `node` nor `interface`".to_owned());
+            None
+        }
+    }
+}
+
+pub(super) fn history(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<History> {
+    const EXPECTED: &str = "a number or a table { times, values }, { amplitude, frequency, phase } or { from, to, start, duration }";
+    let table = match value.get_ref() {
+        DeValue::Table(table) => table,
+        _ => {
+            let number = real(value).filter(|number| number.is_finite());
+            if number.is_none() {
+                walk.mistyped(key, value, EXPECTED);
+            }
+            return number.map(History::Constant);
+        }
+    };
+    let kind = HISTORIES.iter().position(|(_, keys)| keys.iter().any(|key| table.contains_key(*key)));
+    let Some(kind) = kind else {
+        walk.wrong(value.span(), format!("`{key}` is empty, expected {EXPECTED}"));
+        return None;
+    };
+    let (place, keys) = HISTORIES[kind];
+    walk.known_keys(table, place, keys);
+    let span = value.span();
+    let mut or_zero =
+        |key: &str| if table.contains_key(key) { finite(walk, table, key, &span) } else { Some(0.0) };
+    match kind {
+        0 => points(walk, table, span),
+        1 => {
+            let phase = or_zero("phase");
+            let (amplitude, frequency) =
+                (finite(walk, table, "amplitude", &span), positive(walk, table, "frequency", &span));
+            Some(History::Sine { amplitude: amplitude?, frequency: frequency?, phase: phase? })
+        }
+        _ => {
+            let (from, start) = (or_zero("from"), or_zero("start"));
+            let (to, duration) = (finite(walk, table, "to", &span), positive(walk, table, "duration", &span));
+            Some(History::Ramp { from: from?, to: to?, start: start?, duration: duration? })
+        }
+    }
+}
+
+fn points(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<History> {
+    let mut numbers = |key: &str| {
+        let list: Option<Vec<f64>> = table.get(key).and_then(|value| match value.get_ref() {
+            DeValue::Array(list) => list.iter().map(|item| real(item).filter(|v| v.is_finite())).collect(),
+            _ => None,
+        });
+        if list.is_none() {
+            walk.wrong(span.clone(), format!("`{key}` is not a list of numbers"));
+        }
+        list
+    };
+    let (times, values) = (numbers("times"), numbers("values"));
+    let (times, values) = (times?, values?);
+    let problem = if times.len() != values.len() {
+        format!("{} times and {} values", times.len(), values.len())
+    } else if times.is_empty() {
+        "no points".to_owned()
+    } else if times.windows(2).any(|pair| pair[0] >= pair[1]) {
+        "times are not ascending".to_owned()
+    } else {
+        return Some(History::Table { times, values });
+    };
+    walk.wrong(span, problem);
+    None
+}
+
+/// The tables `[[key]]`.
+pub(super) fn list<T>(
+    walk: &mut Walk<'_>,
+    table: &Table,
+    key: &str,
+    mut read: impl FnMut(&mut Walk<'_>, &Table, Range<usize>) -> Option<T>,
+) -> Option<Vec<T>> {
+    let Some(value) = table.get(key) else { return Some(Vec::new()) };
+    let DeValue::Array(items) = value.get_ref() else {
+        walk.mistyped(key, value, &format!("a list of tables: write [[{key}]]"));
+        return None;
+    };
+    let mut all = Some(Vec::new());
+    for item in items.iter() {
+        let read = match item.get_ref() {
+            DeValue::Table(table) => read(walk, table, item.span()),
+            _ => {
+                walk.mistyped(key, item, &format!("a list of tables: write [[{key}]]"));
+                None
+            }
+        };
+        all = all.zip(read).map(|(mut all, one)| {
+            all.push(one);
+            all
+        });
+    }
+    all
+}
+
+/// Three finite numbers.
+pub(super) fn vector(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<Vector3<f64>> {
+    let components: Option<Vec<f64>> = match value.get_ref() {
+        DeValue::Array(list) => list.iter().map(|item| real(item).filter(|v| v.is_finite())).collect(),
+        _ => None,
+    };
+    match components.as_deref() {
+        Some(&[x, y, z]) => Some(Vector3::new(x, y, z)),
+        _ => {
+            walk.wrong(value.span(), format!("`{key}` is not a list of three numbers"));
+            None
+        }
+    }
+}
+
+/// A finite number that must be there.
+pub(super) fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+    let number = walk.number(table, key, span)?;
+    if !number.is_finite() {
+        walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a finite number"));
+        return None;
+    }
+    Some(number)
+}
+
+/// A positive number that must be there.
+pub(super) fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+    let number = finite(walk, table, key, span)?;
+    if number <= 0.0 {
+        walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a positive number"));
+        return None;
+    }
+    Some(number)
+}
+
+/// Where the value of `key` stands; `span` is that of its table.
+pub(super) fn place_of(table: &Table, key: &str, span: &Range<usize>) -> Range<usize> {
+    table.get(key).map_or_else(|| span.clone(), |value| value.span())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::read_carried::{CARRIED, CARRIED_SPIN, TRANSLATION};
+    use super::*;
+
+    /// The schema and the reader name the same keys.
+    #[test]
+    fn schema_lists_the_keys_of_the_reader() {
+        let schema: serde_json::Value =
+            serde_json::from_str(include_str!("../../../schemas/scene.schema.json")).expect("JSON");
+        let lists = [
+            ("/properties/run/properties", RUN),
+            ("/properties/initial/properties", INITIAL),
+            ("/properties/initial/properties/mode/items/properties", MODE),
+            ("/properties/load/items/properties", LOAD),
+            ("/properties/spin/properties", SPIN),
+            ("/properties/carried/properties", CARRIED),
+            ("/properties/carried/properties/spin/properties", CARRIED_SPIN),
+            ("/properties/carried/properties/translation/properties", TRANSLATION),
+            ("/properties/watch/items/properties", WATCH),
+            ("/$defs/history/anyOf/1/properties", HISTORIES[0].1),
+            ("/$defs/history/anyOf/2/properties", HISTORIES[1].1),
+            ("/$defs/history/anyOf/3/properties", HISTORIES[2].1),
+        ];
+        let required = read_requirements::TABLES;
+        let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));
+        let top = [TOP, &read_requirements::TABLES.map(|(name, _)| name)].concat();
+        let lists = lists.into_iter().map(|(pointer, keys)| (pointer.to_owned(), keys));
+        for (pointer, known) in lists.chain(required).chain([("/properties".to_owned(), &top[..])]) {
+            let pointer = &pointer;
+            let object = schema.pointer(pointer).and_then(|v| v.as_object()).expect(pointer);
+            let (mut listed, mut known): (Vec<&str>, Vec<&str>) =
+                (object.keys().map(String::as_str).collect(), known.to_vec());
+            listed.sort_unstable();
+            known.sort_unstable();
+            assert_eq!(listed, known, "{pointer}");
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! The simulation of a scene.
+
+use super::extremes::Survey;
+use super::prepared::{PARTS, Prepared, damped};
+use super::{Extremes, Path, Recording, Scene, Setting, Stage};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::memory::refuse_beyond;
+use crate::body::flex_body::FlexBody;
+use crate::model::LoadKind;
+use crate::motion::dynamics::{Evaluation, Motion};
+use crate::numerics::integration::{Failure, Sight, Work};
+use nalgebra::Vector3;
+
+/// Deflections up to this part of the extent of the body are those of linear elasticity.
+const LINEAR_RANGE: f64 = 0.1;
+
+/// Bytes that a recorded number takes: itself, and as text of a table.
+const BYTES: f64 = 8.0 + 25.0;
+
+/// Numbers of an instant besides modes and watched points.
+const NUMBERS: usize = 44;
+
+/// The motion of `body` in `scene` at the instants that it writes, and what has to be said about it.
+///
+/// * `memory`: bytes that there are for the recording and tables of it; `None` where it is not known.
+/// * `watch`: hears which part of the duration is done.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body; FB550, before any work, when the run takes more steps than it may, and FB601, when the
+/// recording does not fit the memory; FB540 when the integration cannot go on.
+pub fn simulate(
+    body: &FlexBody,
+    scene: &Scene,
+    memory: Option<u64>,
+    mut watch: impl FnMut(f64),
+) -> Result<(Recording, Vec<Diagnostic>)> {
+    let stage = Stage::new(body, scene)?;
+    let body = &*damped(&stage.body, &stage.scene)?;
+    let scene = &*stage.scene;
+    let run = Prepared::new(body, scene)?;
+    refuse_too_much(body, scene, memory)?;
+    let outputs = scene.run.outputs;
+    let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
+    let mut recording = Recording {
+        scene: scene.name.clone(),
+        body: body.source().name.clone(),
+        scheme: run.scheme,
+        time: Vec::with_capacity(time.len()),
+        states: Vec::with_capacity(time.len()),
+        balances: Vec::with_capacity(time.len()),
+        reactions: scene.prescribes().then(Vec::new),
+        setting: Setting::new(body, scene),
+        paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
+        work: Work::default(),
+        extremes: Extremes::default(),
+    };
+    let undeformed = Evaluation::new(&run.equations);
+    let rest: Vec<Vector3<f64>> = run.watched.iter().map(|point| point.place(&undeformed)).collect();
+    let mut survey = Survey::new(body, &run.watched);
+    let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if sight != Sight::Instant {
+            watch(time / run.duration);
+            return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
+        }
+        let now = motion.evaluate(time, state)?;
+        recording.time.push(time);
+        recording.states.push(now.configuration());
+        recording.balances.push(now.balance());
+        if let Some(reactions) = &mut recording.reactions {
+            reactions.push(now.reaction());
+        }
+        for ((path, point), rest) in recording.paths.iter_mut().zip(&run.watched).zip(&rest) {
+            let at = point.place(now.evaluation());
+            path.place.push(now.place().origin + now.place().axes * at);
+            path.deflection.push(at - rest);
+        }
+        Ok::<(), Failure>(())
+    };
+    let finished = run.integrate(&time, PARTS, record)?;
+    recording.work = finished.work;
+    recording.extremes = survey.extremes(finished.size, finished.least_energy);
+    let found = [stage.found, remarks(body, scene, &recording.extremes)].concat();
+    Ok((recording, found))
+}
+
+/// # Errors
+/// FB601 when the recording does not fit the memory.
+fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
+    let numbers = NUMBERS + 2 * body.n_modes() + 6 * scene.watched.len();
+    let instants = scene.run.outputs + 1;
+    let needed = instants as f64 * numbers as f64 * BYTES;
+    refuse_beyond(memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
+}
+
+/// What has to be said about a motion with these extremes.
+pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Vec<Diagnostic> {
+    let (mut found, unit) = (Vec::new(), body.units().time.name());
+    let deflection = extremes.deflection;
+    if deflection.value > LINEAR_RANGE {
+        let message = format!(
+            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}: modes are those of small deformation",
+            100.0 * deflection.value,
+            rounded(deflection.time)
+        );
+        found.push(Diagnostic::new(Code::LinearRangeLeft, message));
+    }
+    let stiffened = scene.run.terms.geometric_stiffness
+        && body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    if scene.run.terms.w2 && !stiffened {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let Some(limit) = body.invariants().softening_rate(axis) else { continue };
+            let largest = extremes.spin_about[axis];
+            if largest > limit {
+                let lost = (0.1 * largest / limit).powi(2) * 100.0;
+                let message = format!(
+                    "spin about {name} reaches {} rad/{unit}: without geometric stiffness it takes {lost:.2} % of the stiffness of some motion",
+                    rounded(largest)
+                );
+                found.push(Diagnostic::new(Code::SpinSoftens, message));
+            }
+        }
+    }
+    found
+}
+
+/// Four digits are enough to find a place.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,223 @@
+//! A scene and its body in one frame: axes of the model, origin at the centre of mass or at what carries the body.
+//!
+//! A flex-body file has its frame where the conversion put it, along principal axes as a rule. What a scene means does not depend on that:
+//! everything is computed in this frame, and vectors of the results are along its axes, which are those of the model.
+
+use super::{Axes, Load, Point, Range, Scene};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::body::flex_body::{Carrier, FlexBody};
+use crate::motion::dynamics::{Orientation, RotationVector};
+use nalgebra::{Matrix3, Vector3};
+use std::borrow::Cow;
+
+/// Centres of mass within this part of the extent of the body from the origin are at the origin.
+const AT_ORIGIN: f64 = 1e-10;
+
+/// How far a prescribed rotation may be above what the scene allows, by rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Coupling of acceleration and modes below this part of its bound is rounding.
+const UNCOUPLED: f64 = 1e-8;
+
+/// A scene for a body in its frame, and what has to be said about the two.
+#[derive(Debug, Clone)]
+pub struct Stage<'a> {
+    /// The body, in the frame of the scene.
+    pub body: Cow<'a, FlexBody>,
+    /// The scene, with all vectors along the axes of this frame or of the world.
+    pub scene: Cow<'a, Scene>,
+    /// Warnings.
+    pub found: Vec<Diagnostic>,
+}
+
+impl<'a> Stage<'a> {
+    /// Brings `body` and `scene` together; a scene that was resolved already, and the body that it was resolved for, stay.
+    ///
+    /// # Errors
+    /// FB212 and FB214 where the body has not what the scene carries it by; FB213 for a prescribed motion beyond what the scene allows.
+    pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
+        if scene.resolved {
+            return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
+        }
+        refuse_beyond_range(scene, &body.frame().axes)?;
+        let (staged, mut found) = match &scene.carried {
+            Some(carried) => {
+                let carrier = carrier(&carried.by);
+                let own = body.carried(&carrier)?;
+                let mut found = Vec::from_iter(own.unresolved(&carrier, body));
+                found.extend(body.softened(&carrier));
+                if body.loses_geometric_stiffness() {
+                    let message = format!(
+                        "geometric stiffness of the body does not act while {carrier} carries it: the stress comes from the reaction there"
+                    );
+                    found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
+                }
+                (Cow::Owned(own), found)
+            }
+            None => (centred(body)?, Vec::new()),
+        };
+        let resolved = resolved(scene, &body.frame().axes, &staged.frame().origin);
+        found.extend(idle(&staged, &resolved));
+        Ok(Self { body: staged, scene: Cow::Owned(resolved), found })
+    }
+}
+
+/// What a point is as a carrier.
+fn carrier(point: &Point) -> Carrier {
+    match point {
+        Point::Node(number) => Carrier::Node(*number),
+        Point::Interface(name) => Carrier::Interface(name.clone()),
+    }
+}
+
+/// The body along the axes of the model, with its origin at the centre of mass.
+fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
+    let invariants = body.invariants();
+    let centre = invariants.first_moment / invariants.mass;
+    let shift = if centre.norm() <= AT_ORIGIN * body.extent() { Vector3::zeros() } else { centre };
+    if shift == Vector3::zeros() && body.frame().axes == Matrix3::identity() {
+        return Ok(Cow::Borrowed(body));
+    }
+    Ok(Cow::Owned(body.in_model_axes(shift)?))
+}
+
+/// The scene with its vectors along the axes of the model; `axes` are those of the body in the model, `origin` is that of its frame.
+fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene {
+    let mut scene = scene.clone();
+    let attitude = RotationVector(scene.initial.rotation).axes();
+    let in_model = |vector: &mut Vector3<f64>, given: &mut Axes| {
+        *vector = match given {
+            Axes::Model => *vector,
+            Axes::Body => axes * *vector,
+            Axes::World => attitude.tr_mul(vector),
+        };
+        *given = Axes::Model;
+    };
+    let initial = &mut scene.initial;
+    initial.origin += attitude * origin;
+    in_model(&mut initial.angular_velocity, &mut initial.axes);
+    if let Some(spin) = &mut scene.spin {
+        in_model(&mut spin.axis, &mut spin.axes);
+    }
+    if let Some(spin) = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut()) {
+        in_model(&mut spin.axis, &mut spin.axes);
+    }
+    for Load { force, torque, axes: given, .. } in &mut scene.loads {
+        if *given == Axes::Body {
+            (*force, *torque, *given) = (axes * *force, axes * *torque, Axes::Model);
+        }
+    }
+    let demands = &mut scene.requirements;
+    if demands.motion.axes == Axes::Body {
+        let ranges = [&mut demands.motion.angular_velocity, &mut demands.motion.angular_acceleration];
+        for range in ranges.into_iter().flatten() {
+            if let Range::Axes(components) = range {
+                *components = axes * *components;
+            }
+        }
+        demands.motion.axes = Axes::Model;
+    }
+    if demands.attachment.axes == Axes::Body {
+        demands.attachment.inertia = axes * demands.attachment.inertia * axes.transpose();
+        demands.attachment.axes = Axes::Model;
+    }
+    scene.resolved = true;
+    scene
+}
+
+/// Refuses a start or a prescribed rotation beyond what [motion] allows.
+fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
+    let motion = &scene.requirements.motion;
+    let along_range = |vector: &Vector3<f64>, given: Axes| {
+        let in_model = match given {
+            Axes::Body => axes * vector,
+            Axes::World => RotationVector(scene.initial.rotation).axes().tr_mul(vector),
+            Axes::Model => *vector,
+        };
+        if motion.axes == Axes::Body { axes.tr_mul(&in_model) } else { in_model }
+    };
+    let beyond = |range: &Option<Range>, vector: Vector3<f64>| match range {
+        None => false,
+        Some(Range::Any(length)) => vector.norm() > length * (1.0 + ROUNDING),
+        Some(Range::Axes(components)) => {
+            let slack = ROUNDING * (vector.norm() + components.norm());
+            (0..3).any(|k| vector[k].abs() > components[k] + slack)
+        }
+    };
+    let given = scene.spin.as_ref().map(|spin| (spin.axis, spin.axes, &spin.rate, "[spin]"));
+    let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+    let carried = carried.map(|spin| (spin.axis, spin.axes, &spin.rate, "[carried.spin]"));
+    let mut found = Vec::new();
+    let mut refuse = |what: &str, key: &str| {
+        let message = format!("{what} is beyond `{key}` of [motion]");
+        found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
+            "[motion] has the largest rotation that the body ever has, that of the scene included",
+        ));
+    };
+    match given.or(carried) {
+        Some((axis, kind, rate, table)) => {
+            let end = scene.run.duration.unwrap_or(f64::INFINITY);
+            let (velocity, acceleration) = rate.largest_until(end);
+            let axis = along_range(&axis, kind);
+            if beyond(&motion.angular_velocity, axis * velocity) {
+                refuse(&format!("the rate {velocity} of {table}"), "angular_velocity");
+            }
+            if beyond(&motion.angular_acceleration, axis * acceleration) {
+                refuse(&format!("the acceleration {acceleration} of {table}"), "angular_acceleration");
+            }
+        }
+        None => {
+            let initial = &scene.initial;
+            let start = along_range(&initial.angular_velocity, initial.axes);
+            if beyond(&motion.angular_velocity, start) {
+                refuse("`angular_velocity` of [initial]", "angular_velocity");
+            }
+        }
+    }
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// Warnings about loads that do nothing.
+fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    let mut tell = |message: String, help: Option<&str>| {
+        let diagnostic = Diagnostic::new(Code::LoadIdle, message);
+        found.push(match help {
+            Some(help) => diagnostic.with_help(help),
+            None => diagnostic,
+        });
+    };
+    let leave = Some("leave it out, or give it its size");
+    let end = scene.run.duration.unwrap_or(f64::INFINITY);
+    for load in &scene.loads {
+        let place = &load.at;
+        if load.force == Vector3::zeros() && load.torque == Vector3::zeros()
+            || load.history.is_zero_until(end)
+        {
+            tell(format!("the load at {place} is zero all the time"), leave);
+        } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
+            let message = format!(
+                "the load at {place} bends nothing: {place} is carried, and the reaction takes the load"
+            );
+            tell(message, Some("load another place of the body, or let nothing carry this one"));
+        }
+    }
+    let Some(gravity) = &scene.gravity else { return found };
+    if *gravity == Vector3::zeros() {
+        tell("`gravity` is zero".to_owned(), leave);
+    } else if scene.spin.as_ref().is_some_and(|spin| spin.hold) && is_uncoupled(body) {
+        let message = "`gravity` bends nothing: [spin] holds the body at its centre of mass and mean axes, that is by all of its mass";
+        tell(message.to_owned(), None);
+    }
+    found
+}
+
+/// Whether accelerations of the frame excite no mode.
+fn is_uncoupled(body: &FlexBody) -> bool {
+    let (invariants, modal) = (body.invariants(), body.invariants().modal_mass());
+    (0..body.n_modes()).all(|j| {
+        let bound = (invariants.mass * modal[(j, j)]).sqrt();
+        (0..3).all(|k| invariants.c1[(k, j)].abs() <= UNCOUPLED * bound)
+    })
+}

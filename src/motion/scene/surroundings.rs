@@ -1,0 +1,193 @@
+//! A scene as forces and prescribed motion of one body.
+
+use super::{Axes, Carried, Load, Point, Scene, Spin};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::body::flex_body::FlexBody;
+use crate::motion::dynamics::{
+    BodyPoint, Evaluation, Orientation, Place, Prescribed, RotationVector, Surroundings,
+};
+use nalgebra::{Matrix3, Vector3};
+
+/// What acts on a body in a scene.
+pub(super) struct SceneForces<'a> {
+    gravity: Option<Vector3<f64>>,
+    loads: Vec<(BodyPoint, &'a Load)>,
+    spin: Option<&'a Spin>,
+    carried: Option<CarriedMotion<'a>>,
+}
+
+/// The prescribed motion of the frame of a body that is carried.
+struct CarriedMotion<'a> {
+    carried: &'a Carried,
+    /// From the axis of rotation to the origin of the frame, its axes.
+    arm: Vector3<f64>,
+    /// Axes of the frame at time zero.
+    start: Matrix3<f64>,
+}
+
+impl<'a> CarriedMotion<'a> {
+    fn new(body: &FlexBody, scene: &'a Scene) -> Option<Self> {
+        let carried = scene.carried.as_ref()?;
+        let through = carried.spin.as_ref().and_then(|spin| spin.through);
+        let arm = through.map_or_else(Vector3::zeros, |through| body.frame().origin - through);
+        Some(Self { carried, arm, start: RotationVector(scene.initial.rotation).axes() })
+    }
+
+    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes of the frame.
+    fn at(&self, time: f64) -> (Prescribed, Prescribed) {
+        let zero = Vector3::zeros();
+        let (omega, alpha, turned) = match &self.carried.spin {
+            Some(spin) => {
+                let (rate, slope) = spin.rate.at(time);
+                let turned = RotationVector(spin.axis * spin.rate.integral(time)).axes();
+                (spin.axis * rate, spin.axis * slope, turned)
+            }
+            None => (zero, zero, Matrix3::identity()),
+        };
+        let (velocity, acceleration) = match &self.carried.translation {
+            Some(translation) => {
+                let (velocity, acceleration) = translation.drive.at(time);
+                let along = (self.start * turned).tr_mul(&translation.direction);
+                (along * velocity, along * acceleration)
+            }
+            None => (zero, zero),
+        };
+        let linear = omega.cross(&self.arm) + velocity;
+        let rate = alpha.cross(&self.arm) + acceleration - omega.cross(&velocity);
+        (
+            Prescribed { linear: Some(linear), angular: Some(omega) },
+            Prescribed { linear: Some(rate), angular: Some(alpha) },
+        )
+    }
+}
+
+impl<'a> SceneForces<'a> {
+    /// Resolves the names of `scene`; and the points that it watches.
+    ///
+    /// # Errors
+    /// FB212 for nodes, interfaces and modes that the body has not, for torques where it has no orientation, and for
+    /// vectors that leave the plane of a plane body. All of them.
+    pub fn new(body: &FlexBody, scene: &'a Scene) -> Result<(Self, Vec<BodyPoint>)> {
+        let mut found = Vec::new();
+        let mut wrong = |message: String| found.push(Diagnostic::new(Code::SceneBody, message));
+        for start in &scene.initial.modes {
+            if start.mode >= body.n_modes() {
+                wrong(format!("mode {} does not exist: the body has {}", start.mode + 1, body.n_modes()));
+            }
+        }
+        if body.dimension() == 2 {
+            leaving_the_plane(scene).into_iter().for_each(|what| {
+                wrong(format!(
+                    "{what} leaves the plane of the body: vectors have z = 0, rotations x = y = 0"
+                ));
+            });
+        }
+        let mut points = |place: &Point| point(body, scene, place).map_err(&mut wrong).ok();
+        let watched = scene.watched.iter().map(&mut points).collect();
+        let loads: Option<Vec<_>> = scene.loads.iter().map(|load| Some((points(&load.at)?, load))).collect();
+        for (point, load) in loads.iter().flatten() {
+            if load.torque != Vector3::zeros() && !point.turns() {
+                wrong(format!("no torque can act at {}: it has no orientation", load.at));
+            }
+        }
+        match (watched, loads) {
+            (Some(watched), Some(loads)) if found.is_empty() => {
+                let (spin, carried) = (scene.spin.as_ref(), CarriedMotion::new(body, scene));
+                Ok((Self { gravity: scene.gravity, loads, spin, carried }, watched))
+            }
+            _ => Err(Error::new(found)),
+        }
+    }
+}
+
+/// Where the loads of a scene act on `body`, and the points that it watches.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body.
+pub(crate) fn points_of(body: &FlexBody, scene: &Scene) -> Result<(Vec<BodyPoint>, Vec<BodyPoint>)> {
+    let (forces, watched) = SceneForces::new(body, scene)?;
+    Ok((forces.loads.into_iter().map(|(point, _)| point).collect(), watched))
+}
+
+fn point(body: &FlexBody, scene: &Scene, place: &Point) -> std::result::Result<BodyPoint, String> {
+    match place {
+        Point::Node(number) => {
+            let at = body.nodes().ids.iter().position(|id| id == number);
+            at.map(|at| BodyPoint::node(body, at)).ok_or_else(|| format!("the body has no node {number}"))
+        }
+        Point::Interface(name) => {
+            let interface = body.interfaces().iter().find(|interface| interface.name == *name);
+            let interface = interface.ok_or_else(|| {
+                let all: Vec<&str> = body.interfaces().iter().map(|i| i.name.as_str()).collect();
+                let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
+                format!("the body has no interface `{name}`: {known}")
+            })?;
+            BodyPoint::interface(body, interface, scene.run.terms)
+                .ok_or_else(|| format!("interface `{name}` has no reference point: name a node of it"))
+        }
+    }
+}
+
+/// Vectors of a scene that a plane body cannot follow.
+fn leaving_the_plane(scene: &Scene) -> Vec<String> {
+    let in_plane = |v: &Vector3<f64>| v.z == 0.0;
+    let about_normal = |v: &Vector3<f64>| v.x == 0.0 && v.y == 0.0;
+    let initial = &scene.initial;
+    let mut checks = vec![
+        // The start of a frame that is turned out of the plane tells nothing of where the model was put.
+        (in_plane(&initial.origin) || !about_normal(&initial.rotation), "`origin`".to_owned()),
+        (in_plane(&initial.velocity), "`velocity`".to_owned()),
+        (about_normal(&initial.rotation), "`rotation`".to_owned()),
+        (about_normal(&initial.angular_velocity), "`angular_velocity`".to_owned()),
+        (scene.gravity.as_ref().is_none_or(in_plane), "`gravity`".to_owned()),
+        (scene.spin.as_ref().is_none_or(|spin| about_normal(&spin.axis)), "`axis` of [spin]".to_owned()),
+    ];
+    let carried = scene.carried.as_ref();
+    if let Some(spin) = carried.and_then(|carried| carried.spin.as_ref()) {
+        checks.push((about_normal(&spin.axis), "`axis` of [carried.spin]".to_owned()));
+        let through = spin.through.as_ref().is_none_or(in_plane);
+        checks.push((through, "`through` of [carried.spin]".to_owned()));
+    }
+    if let Some(translation) = carried.and_then(|carried| carried.translation.as_ref()) {
+        checks.push((in_plane(&translation.direction), "`direction` of [carried.translation]".to_owned()));
+    }
+    for load in &scene.loads {
+        checks.push((in_plane(&load.force), format!("`force` at {}", load.at)));
+        checks.push((about_normal(&load.torque), format!("`torque` at {}", load.at)));
+    }
+    checks.into_iter().filter(|(fits, _)| !fits).map(|(_, what)| what).collect()
+}
+
+impl Surroundings for SceneForces<'_> {
+    fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]) {
+        if let Some(gravity) = &self.gravity {
+            evaluation.add_gravity(&place.axes.tr_mul(gravity), forces);
+        }
+        for (point, load) in &self.loads {
+            let factor = load.history.at(time).0;
+            let in_body = |v: &Vector3<f64>| match load.axes {
+                Axes::World => place.axes.tr_mul(v) * factor,
+                // The frame of the body is that of the scene.
+                Axes::Model | Axes::Body => v * factor,
+            };
+            point.add_force(evaluation, &in_body(&load.force), forces);
+            if load.torque != Vector3::zeros() {
+                point.add_torque(evaluation, &in_body(&load.torque), forces);
+            }
+        }
+    }
+
+    fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
+        if let Some(carried) = &self.carried {
+            return carried.at(time);
+        }
+        let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
+        let (rate, slope) = spin.rate.at(time);
+        let linear = spin.hold.then(Vector3::zeros);
+        (
+            Prescribed { linear, angular: Some(spin.axis * rate) },
+            Prescribed { linear, angular: Some(spin.axis * slope) },
+        )
+    }
+}

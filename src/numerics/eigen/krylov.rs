@@ -1,0 +1,325 @@
+//! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
+
+use super::problem::{Counters, EigenProblem};
+use super::start::Snapshot;
+use crate::numerics::linalg::{Solve, combine, gram, subtract_combination};
+use faer::prelude::IntoConst;
+use faer::{Mat, MatRef};
+
+/// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not see: the rest is
+/// rounding of the product.
+const UNSEEN: f64 = 1e-13;
+
+/// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is rounding.
+const VANISHED: f64 = 1e-13;
+
+/// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
+pub(super) struct Krylov<'a> {
+    problem: &'a EigenProblem<'a>,
+    factor: &'a dyn Solve,
+    /// Grows with the basis inside memory reserved for `capacity` columns: what is not reached is never touched.
+    v: Mat<f64>,
+    capacity: usize,
+    m: usize,
+    t: Mat<f64>,
+    /// Columns of the newest block, not yet multiplied by the operator.
+    fresh: usize,
+    /// M times the newest block.
+    m_fresh: Mat<f64>,
+    /// Coupling B (fresh x previous block): OP V = V T + V_fresh B E'.
+    coupling: Mat<f64>,
+    /// First column of the basis that the operator couples to the newest block.
+    reach: usize,
+    random: u64,
+    mass_diagonal: Vec<f64>,
+}
+
+/// An M-orthonormalised block W and M W.
+struct Block {
+    w: Mat<f64>,
+    mw: Mat<f64>,
+    /// The coefficients that were subtracted: W_given = V h + W b.
+    h: Mat<f64>,
+    b: Mat<f64>,
+}
+
+impl<'a> Krylov<'a> {
+    /// An empty basis for at most `capacity` vectors.
+    pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a dyn Solve, capacity: usize) -> Self {
+        let n = problem.pencil.n();
+        let mut v = Mat::with_capacity(n, capacity);
+        v.resize_with(n, 0, |_, _| 0.0);
+        Self {
+            problem,
+            factor,
+            v,
+            capacity,
+            m: 0,
+            t: Mat::zeros(capacity, capacity),
+            fresh: 0,
+            m_fresh: Mat::zeros(0, 0),
+            coupling: Mat::zeros(0, 0),
+            reach: 0,
+            random: 0,
+            mass_diagonal: problem.pencil.mass_diagonal(),
+        }
+    }
+
+    /// Starts the sequence of random blocks elsewhere.
+    pub(super) fn choose_random(&mut self, seed: u64) {
+        self.random = seed;
+    }
+
+    /// Vectors that the operator has been applied to: the size of T that is valid.
+    pub(super) fn projected(&self) -> usize {
+        self.m - self.fresh
+    }
+
+    /// Room left for new vectors.
+    pub(super) fn room(&self) -> usize {
+        self.capacity - self.m
+    }
+
+    /// Whether the newest block is empty: the basis spans an invariant subspace.
+    pub(super) fn exhausted(&self) -> bool {
+        self.fresh == 0
+    }
+
+    /// T (projected x projected).
+    pub(super) fn t(&self) -> MatRef<'_, f64> {
+        self.t.as_ref().submatrix(0, 0, self.projected(), self.projected())
+    }
+
+    /// Norms |B s_last| of the columns of S (projected x k): the M-norms of the Ritz residuals of the operator.
+    pub(super) fn residual_norms(&self, s: MatRef<'_, f64>) -> Vec<f64> {
+        let last = self.coupling.ncols();
+        let tail = s.subrows(self.projected() - last, last);
+        let r = combine(self.coupling.as_ref(), tail);
+        (0..s.ncols()).map(|j| r.col(j).norm_l2()).collect()
+    }
+
+    /// OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected x k) with
+    /// values theta: one inverse iteration on them that needs no solve, because OP V = V T + V_fresh B E' holds already.
+    /// It damps what is left of higher modes, and removes what a singular M does not see of the basis.
+    pub(super) fn inverse_iterated(&self, s: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
+        let (size, last) = (self.projected(), self.coupling.ncols());
+        let residual = combine(self.coupling.as_ref(), s.subrows(size - last, last));
+        let coefficients = Mat::from_fn(size + residual.nrows(), s.ncols(), |i, j| {
+            if i < size { s[(i, j)] } else { residual[(i - size, j)] / theta[j] }
+        });
+        combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref())
+    }
+
+    /// V S for S (projected x k).
+    pub(super) fn combination(&self, s: MatRef<'_, f64>) -> Mat<f64> {
+        combine(self.v.as_ref().subcols(0, self.projected()), s)
+    }
+
+    /// Appends `x` (any block), orthonormalised; columns dependent on the basis are dropped.
+    pub(super) fn append(&mut self, x: Mat<f64>, counters: &mut Counters) {
+        let block = self.orthonormalise(x, 0, counters);
+        self.reach = 0;
+        self.coupling = Mat::zeros(block.w.ncols(), 0);
+        self.push(block);
+    }
+
+    /// Appends a deterministic random block of `width` columns, filtered by one application of the operator, which
+    /// removes what a singular M does not see.
+    pub(super) fn append_random(&mut self, width: usize, counters: &mut Counters) {
+        let n = self.problem.pencil.n();
+        let seed = self.random;
+        self.random += 1;
+        // Of M-norm about one, by a power of two: what the operator makes of it can be squared in any units.
+        let heaviest = self.mass_diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let unit = (-0.5 * heaviest.log2()).round().exp2();
+        let x = Mat::from_fn(n, width, |i, j| unit * noise(seed, i as u64, j as u64));
+        counters.mass_columns += width as u64;
+        let mut y = self.problem.pencil.apply_mass(x.as_ref());
+        counters.solved_columns += width as u64;
+        self.factor.solve_in_place(y.as_mut());
+        self.append(y, counters);
+    }
+
+    /// One Lanczos step: applies the operator to the newest block and appends what is new.
+    pub(super) fn step(&mut self, counters: &mut Counters) {
+        let old = self.fresh;
+        let at = self.m - old;
+        let mut w = std::mem::replace(&mut self.m_fresh, Mat::zeros(0, 0));
+        counters.solved_columns += old as u64;
+        self.factor.solve_in_place(w.as_mut());
+        let block = self.orthonormalise(w, self.reach, counters);
+        self.reach = at;
+        for j in 0..old {
+            for i in 0..self.m {
+                // The diagonal block of h is symmetric up to rounding; the mean keeps T exactly symmetric.
+                let value = if i >= at {
+                    0.5 * (block.h[(i, j)] + block.h[(at + j, i - at)])
+                } else {
+                    block.h[(i, j)]
+                };
+                self.t[(i, at + j)] = value;
+                self.t[(at + j, i)] = value;
+            }
+        }
+        self.coupling = block.b.clone();
+        self.push(block);
+    }
+
+    /// Thick restart: keeps the Ritz vectors V S (S: projected x k) with values theta, and the newest block.
+    pub(super) fn restart(&mut self, s: MatRef<'_, f64>, theta: &[f64]) {
+        let kept = self.combination(s);
+        let k = kept.ncols();
+        let fresh = self.v.as_ref().subcols(self.projected(), self.fresh).to_owned();
+        self.v.as_mut().subcols_mut(0, k).copy_from(&kept);
+        self.v.as_mut().subcols_mut(k, self.fresh).copy_from(&fresh);
+        self.t.fill(0.0);
+        for (i, &value) in theta.iter().enumerate() {
+            self.t[(i, i)] = value;
+        }
+        self.m = k + self.fresh;
+        self.reach = 0;
+    }
+
+    /// Ritz vectors V S (S: projected x k) with the newest block F behind them, and C of OP V S = V S Theta + F C.
+    pub(super) fn state(&self, s: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
+        let (size, k, last) = (self.projected(), s.ncols(), self.coupling.ncols());
+        let coefficients = Mat::from_fn(self.m, k + self.fresh, |i, j| match (i < size, j < k) {
+            (true, true) => s[(i, j)],
+            (false, false) => f64::from(i - size == j - k),
+            _ => 0.0,
+        });
+        let basis = combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref());
+        (basis, combine(self.coupling.as_ref(), s.subrows(size - last, last)))
+    }
+
+    /// Fills the empty basis with the first `k` Ritz vectors of a snapshot and its newest block.
+    pub(super) fn take_up(&mut self, start: &Snapshot, shift: f64, k: usize, counters: &mut Counters) {
+        let (given, width) = (start.eigenvalues.len(), start.coupling.nrows());
+        self.v.resize_with(self.problem.pencil.n(), k + width, |_, _| 0.0);
+        self.v.as_mut().subcols_mut(0, k).copy_from(start.basis.as_ref().subcols(0, k));
+        let newest = start.basis.as_ref().subcols(given, width);
+        self.v.as_mut().subcols_mut(k, width).copy_from(newest);
+        for (i, lambda) in start.eigenvalues[..k].iter().enumerate() {
+            self.t[(i, i)] = (lambda + shift).recip();
+        }
+        self.coupling = start.coupling.as_ref().subcols(0, if width > 0 { k } else { 0 }).to_owned();
+        self.m = k + width;
+        self.fresh = width;
+        counters.mass_columns += width as u64;
+        self.m_fresh = self.problem.pencil.apply_mass(newest);
+    }
+
+    fn push(&mut self, block: Block) {
+        let width = block.w.ncols();
+        let columns = self.v.ncols().max(self.m + width);
+        self.v.resize_with(self.problem.pencil.n(), columns, |_, _| 0.0);
+        self.v.as_mut().subcols_mut(self.m, width).copy_from(&block.w);
+        self.m += width;
+        self.fresh = width;
+        self.m_fresh = block.mw;
+    }
+
+    /// Two passes of: block Gram-Schmidt against the rigid modes and the basis, then column by column inside the block.
+    /// The first leaves out the columns before `reach`, where the operator leaves nothing but rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the first ends
+    /// orthogonal to rounding; only what is rounding altogether is dropped.
+    fn orthonormalise(&self, mut w: Mat<f64>, reach: usize, counters: &mut Counters) -> Block {
+        let pencil = &self.problem.pencil;
+        let width = w.ncols();
+        let basis = self.v.as_ref().subcols(0, self.m);
+        let mut h = Mat::zeros(self.m, width);
+        let mut b = Mat::<f64>::identity(width, width);
+        let mut mw = Mat::zeros(0, 0);
+        for from in [reach, 0] {
+            let basis = basis.subcols(from, self.m - from);
+            counters.mass_columns += 2 * w.ncols() as u64;
+            mw = pencil.apply_mass(w.as_ref());
+            let norms: Vec<f64> = (0..w.ncols()).map(|j| dot(&w, &mw, j, j).max(0.0).sqrt()).collect();
+            let rigid = gram(self.problem.rigid, mw.as_ref());
+            let part = gram(basis, mw.as_ref());
+            subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
+            subtract_combination(w.as_mut(), basis, part.as_ref());
+            let mut h = h.as_mut().subrows_mut(from, self.m - from);
+            h += combine(part.as_ref(), b.as_ref());
+            mw = pencil.apply_mass(w.as_ref());
+            let unseen = |w: faer::ColRef<'_, f64>| {
+                let rows = w.iter().zip(&self.mass_diagonal);
+                UNSEEN * rows.map(|(w, m)| w * w * m).sum::<f64>()
+            };
+            b = combine(gram_schmidt(&mut w, &mut mw, &norms, &unseen).as_ref(), b.as_ref());
+        }
+        let room = self.room();
+        if w.ncols() > room {
+            w = w.as_ref().subcols(0, room).to_owned();
+            mw = mw.as_ref().subcols(0, room).to_owned();
+            b = b.as_ref().subrows(0, room).to_owned();
+        }
+        Block { w, mw, h, b }
+    }
+}
+
+/// w_i' (M w)_j.
+fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
+    gram(w.as_ref().subcols(i, 1), mw.as_ref().subcols(j, 1))[(0, 0)]
+}
+
+/// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`] of
+/// their norm before are dropped, and those whose square does not exceed `unseen`. Returns T (new x old) with W_old = W_new T.
+fn gram_schmidt(
+    w: &mut Mat<f64>,
+    mw: &mut Mat<f64>,
+    norms: &[f64],
+    unseen: &dyn Fn(faer::ColRef<'_, f64>) -> f64,
+) -> Mat<f64> {
+    let width = w.ncols();
+    let mut t = Mat::zeros(width, width);
+    let mut kept = 0;
+    for j in 0..width {
+        // Twice, as in any Gram-Schmidt that may lose digits.
+        for _ in 0..2 {
+            for i in 0..kept {
+                let along = dot(w, mw, i, j);
+                t[(i, j)] += along;
+                subtract_column(w, j, i, along);
+                subtract_column(mw, j, i, along);
+            }
+        }
+        let square = dot(w, mw, j, j);
+        let norm = square.max(0.0).sqrt();
+        if norm <= VANISHED * norms[j] || square <= unseen(w.col(j)) {
+            continue;
+        }
+        t[(kept, j)] = norm;
+        for block in [&mut *w, &mut *mw] {
+            for row in 0..block.nrows() {
+                block[(row, kept)] = block[(row, j)] / norm;
+            }
+        }
+        kept += 1;
+    }
+    *w = w.as_ref().subcols(0, kept).to_owned();
+    *mw = mw.as_ref().subcols(0, kept).to_owned();
+    t.as_ref().subrows(0, kept).to_owned()
+}
+
+/// Column `target` -= factor * column `source`, for source < target.
+fn subtract_column(block: &mut Mat<f64>, target: usize, source: usize, factor: f64) {
+    let (left, right) = block.as_mut().split_at_col_mut(target);
+    let from = left.into_const().col(source).try_as_col_major().expect("blocks are column-major").as_slice();
+    let to = right.col_mut(0).try_as_col_major_mut().expect("blocks are column-major").as_slice_mut();
+    for (t, s) in to.iter_mut().zip(from) {
+        *t -= factor * s;
+    }
+}
+
+/// Reproducible uniform noise in (-1, 1) by place: a SplitMix64 hash of (seed, row, column).
+fn noise(seed: u64, row: u64, column: u64) -> f64 {
+    let mut z = seed
+        .wrapping_mul(0xA076_1D64_78BD_642F)
+        .wrapping_add(row.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+        .wrapping_add(column.wrapping_mul(0xD1B5_4A32_D192_ED03))
+        .wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}

@@ -1,0 +1,214 @@
+//! Memory and precision, decided before the work: the symbolic analysis knows what a factor needs.
+
+use super::problem::{Accuracy, EigenFailure, EigenProblem, EigenSettings};
+use crate::numerics::linalg::{Analysis, Peaks};
+
+/// Numbers of the factor that the search solves with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// f64.
+    Double,
+    /// f32, with all residuals and projections in f64: half the memory, and half the time where factorisation dominates.
+    Single,
+}
+
+impl Precision {
+    /// Bytes of a number.
+    fn bytes(self) -> u64 {
+        match self {
+            Self::Double => 8,
+            Self::Single => 4,
+        }
+    }
+}
+
+/// What the user says about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FactorChoice {
+    /// Single where double does not fit the memory, or where it is faster; back to double where conditioning defeats it.
+    Auto,
+    /// This one.
+    Always(Precision),
+}
+
+/// What was decided, and what it needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Numbers of the factor.
+    pub precision: Precision,
+    /// Bytes that the solver will hold at the most.
+    pub bytes: u64,
+    /// Bytes of the factor that the search solves with.
+    pub factor_bytes: u64,
+    /// Multiplications and additions of one factorisation.
+    pub flops: f64,
+    /// Whether single precision was tried first, in vain.
+    pub single_failed: bool,
+    /// About how long the search takes on one processor, in seconds, without the factorisation.
+    pub seconds: f64,
+    /// Why completeness cannot be proved: bytes of the count, bytes there are.
+    pub proof_too_large: Option<(u64, u64)>,
+}
+
+/// Operations per second that estimates of time assume: what one processor does of the mixed work of a search.
+const PACE: f64 = 4e9;
+
+/// Columns of the Krylov basis. Measured: five for each wanted mode.
+fn basis_columns(wanted: usize) -> usize {
+    (5 * wanted + 16).min(2 * wanted + 128)
+}
+
+/// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products, corrections, and
+/// the copy of the basis that a checkpoint is written from.
+fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
+    let basis = basis_columns(wanted);
+    let searched = basis + 4 * wanted + 24;
+    let columns = match precision {
+        Precision::Double => searched,
+        // A span of twice its first size, 1.5 for each wanted mode, and the corrections, all with both products; one more
+        // while they are combined.
+        Precision::Single => (searched + 2 * wanted).max(15 * wanted + 128),
+    };
+    let saved = if problem.resume.save.is_some() { basis } else { 0 };
+    8 * (problem.pencil.n() * (columns + saved)) as u64
+}
+
+/// What the dense path holds: both matrices, their transformed product, its eigenvectors and copies in work.
+fn dense_bytes(n: usize, wanted: usize) -> u64 {
+    let (n, wanted) = (n as u64, wanted as u64);
+    8 * (6 * n * n + 3 * n * wanted)
+}
+
+/// What a caller makes of `wanted` modes: a copy of them, and tables with numbers for each pair of modes.
+fn made_of_them(n: usize, wanted: usize) -> u64 {
+    let (n, wanted) = (n as u64, wanted as u64);
+    8 * (80 * wanted * wanted + 3 * n * wanted)
+}
+
+/// About how long a search takes: solutions with the factor, orthogonalisation against the basis, restarts, and the products of
+/// all pairs of modes; on the dense path two decompositions.
+fn seconds(n: usize, wanted: usize, factor: u64, dense: bool) -> f64 {
+    let (rows, modes) = (n as f64, wanted as f64);
+    let search = if dense {
+        30.0 * rows.powi(3)
+    } else {
+        let (basis, columns) = (basis_columns(wanted) as f64, 3.0 * modes + 100.0);
+        columns * (4.0 * factor as f64 + 8.0 * rows * basis) + 6.0 * rows * basis * modes
+    };
+    (search + 20.0 * rows * modes * modes) / PACE
+}
+
+/// What an inertia count of `inertia` numbers needs, with the modes and their products.
+fn count_bytes(problem: &EigenProblem<'_>, inertia: u64, modes: usize) -> u64 {
+    8 * (inertia + (3 * modes * problem.pencil.n()) as u64)
+}
+
+impl Plan {
+    /// Decides for `wanted` modes, which the dense path looks for or an iterative search.
+    ///
+    /// # Errors
+    /// [`EigenFailure::Memory`] when nothing fits; [`EigenFailure::TooLong`] when it would take longer than the settings allow.
+    pub(super) fn new(
+        problem: &EigenProblem<'_>,
+        settings: &EigenSettings,
+        analysis: &Analysis,
+        wanted: usize,
+        dense: bool,
+    ) -> Result<Self, EigenFailure> {
+        let n = problem.pencil.n();
+        let seconds = seconds(n, wanted, analysis.factor_len() as u64, dense);
+        let Peaks { factor, cholesky, inertia } = analysis.peaks(rayon::current_num_threads());
+        let available = settings.memory.unwrap_or(u64::MAX);
+        let search = |precision: Precision| {
+            let size = precision.bytes();
+            let found = if dense {
+                dense_bytes(n, wanted)
+            } else {
+                (size * cholesky).max(size * factor + vectors(problem, wanted, precision))
+            };
+            found.max(made_of_them(n, wanted))
+        };
+        // The factor is given back before the count.
+        let count = count_bytes(problem, inertia, wanted);
+        let certified = settings.accuracy == Accuracy::Certified;
+        let precision = match settings.factor {
+            _ if certified => Precision::Double,
+            FactorChoice::Always(precision) => precision,
+            FactorChoice::Auto if resident(search(Precision::Double)) > available => Precision::Single,
+            FactorChoice::Auto if analysis.flops() > settings.single_pays => Precision::Single,
+            FactorChoice::Auto => Precision::Double,
+        };
+        let needed = if certified {
+            // The bounds factor a matrix of their own, beside the modes.
+            let copy = 12 * problem.pencil.stiffness().as_csc().nnz() as u64;
+            search(precision).max(count) + copy
+        } else {
+            search(precision)
+        };
+        if resident(needed) > available {
+            return Err(EigenFailure::Memory { bytes: resident(needed), available });
+        }
+        if settings.longest.is_some_and(|longest| seconds > longest) {
+            return Err(EigenFailure::TooLong { wanted, seconds, bytes: resident(needed) });
+        }
+        let count = if settings.accuracy == Accuracy::Fast { 0 } else { count };
+        let proof_too_large = (resident(count) > available).then_some((resident(count), available));
+        Ok(Self {
+            precision,
+            bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
+            factor_bytes: precision.bytes() * factor,
+            flops: analysis.flops(),
+            seconds,
+            single_failed: false,
+            proof_too_large,
+        })
+    }
+
+    /// Bytes that an inertia count beside `found` modes needs.
+    pub(super) fn count_bytes(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
+        resident(count_bytes(problem, analysis.peaks(rayon::current_num_threads()).inertia, found))
+    }
+
+    /// The same in double precision, where that fits.
+    pub(super) fn in_double(
+        problem: &EigenProblem<'_>,
+        settings: &EigenSettings,
+        analysis: &Analysis,
+        wanted: usize,
+    ) -> Result<Self, EigenFailure> {
+        let settings = EigenSettings { factor: FactorChoice::Always(Precision::Double), ..*settings };
+        Self::new(problem, &settings, analysis, wanted, false)
+    }
+}
+
+impl std::fmt::Display for Plan {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let precision = if self.precision == Precision::Double { "double" } else { "single" };
+        let (factor, all) = (gigabytes(self.factor_bytes), gigabytes(self.bytes));
+        write!(
+            f,
+            "factor of {factor} in {precision} precision, {:.2e} operations, {all} in all",
+            self.flops
+        )?;
+        match (self.seconds / 60.0).round() {
+            minutes if minutes >= 1.0 => write!(f, "; about {minutes} min for the modes on one processor"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given back and not yet
+/// taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its own, and buffers of the dense
+/// products (measured on models of 4 000 to 20 000 degrees of freedom: 42 to 52 MB on one thread, 50 to 90 MB on two).
+fn resident(bytes: u64) -> u64 {
+    bytes + bytes / 8 + 24_000_000 + 24_000_000 * rayon::current_num_threads() as u64
+}
+
+/// Bytes in GB, or MB where that is less.
+pub(super) fn gigabytes(bytes: u64) -> String {
+    if bytes < 1_000_000_000 {
+        format!("{:.0} MB", bytes as f64 * 1e-6)
+    } else {
+        format!("{:.3} GB", bytes as f64 * 1e-9)
+    }
+}

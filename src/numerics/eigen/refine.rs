@@ -1,0 +1,194 @@
+//! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals.
+
+use super::noise::rounding_residual;
+use super::problem::{Counters, EigenFailure, EigenProblem};
+use crate::numerics::linalg::{Solve, combine, gram, subtract_combination, symmetric_eigen};
+use faer::{ColRef, Mat, MatRef};
+
+/// Refined modes with their products.
+pub(super) struct Refined {
+    pub eigenvalues: Vec<f64>,
+    pub vectors: Mat<f64>,
+    pub residuals: Vec<f64>,
+    pub floors: Vec<f64>,
+}
+
+/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the basis. With
+/// `correct`, one step of iterative refinement follows, which brings the residual of the solve to its rounding floor.
+fn inverse_iteration(
+    problem: &EigenProblem<'_>,
+    factor: &dyn Solve,
+    x: MatRef<'_, f64>,
+    correct: bool,
+    counters: &mut Counters,
+) -> Mat<f64> {
+    let pencil = &problem.pencil;
+    let k = x.ncols() as u64;
+    counters.mass_columns += k;
+    counters.solved_columns += k;
+    let b = pencil.apply_mass(x);
+    let mut y = b.clone();
+    factor.solve_in_place(y.as_mut());
+    if correct {
+        counters.mass_columns += k;
+        counters.stiffness_columns += k;
+        counters.solved_columns += k;
+        let shifted =
+            pencil.apply_stiffness(y.as_ref()) + pencil.apply_mass(y.as_ref()) * faer::Scale(factor.shift());
+        let mut correction = b - shifted;
+        factor.solve_in_place(correction.as_mut());
+        y += correction;
+    }
+    y
+}
+
+/// Squared M-norm, relative to that of the columns, below which a direction of their span is only rounding.
+const DEPENDENT: f64 = 1e-8;
+
+/// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz vectors
+/// in ascending order of lambda. Directions in which X is dependent are left out.
+pub(super) fn rayleigh_ritz(
+    problem: &EigenProblem<'_>,
+    mut x: Mat<f64>,
+    counters: &mut Counters,
+) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+    let pencil = &problem.pencil;
+    let k = x.ncols() as u64;
+    counters.mass_columns += k;
+    let mx = pencil.apply_mass(x.as_ref());
+    let along = gram(problem.rigid, mx.as_ref());
+    subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
+    // Unit M-norms first: inverse iteration scales the columns by theta.
+    counters.mass_columns += k;
+    counters.stiffness_columns += k;
+    let mx = pencil.apply_mass(x.as_ref());
+    let kx = pencil.apply_stiffness(x.as_ref());
+    let gm = gram(x.as_ref(), mx.as_ref());
+    let gk = gram(x.as_ref(), kx.as_ref());
+    let (values, coefficients) = small_ritz(gm, gk)?;
+    Ok((values, combine(x.as_ref(), coefficients.as_ref())))
+}
+
+/// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram matrices
+/// with M and with K. Directions in which the basis is dependent are left out.
+pub(super) fn small_ritz(gm: Mat<f64>, gk: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+    // A column that nothing is left of spans nothing.
+    let scale: Vec<f64> =
+        (0..gm.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
+    if scale.iter().any(|s| !s.is_finite()) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    let scaled = |g: &Mat<f64>| {
+        Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
+    };
+    let (gm, gk) = (scaled(&gm), scaled(&gk));
+    let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let first = eigen.values.partition_point(|&v| v < DEPENDENT);
+    let to_orthonormal = Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
+        eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
+    });
+    let projected = gram(to_orthonormal.as_ref(), combine(gk.as_ref(), to_orthonormal.as_ref()).as_ref());
+    let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let coefficients = combine(to_orthonormal.as_ref(), ritz.vectors.as_ref());
+    let coefficients =
+        Mat::from_fn(coefficients.nrows(), coefficients.ncols(), |i, j| scale[i] * coefficients[(i, j)]);
+    Ok((ritz.values, coefficients))
+}
+
+/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be helped:
+/// rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as well as the node positions
+/// are known.
+pub(super) fn residuals(
+    problem: &EigenProblem<'_>,
+    eigenvalues: &[f64],
+    x: MatRef<'_, f64>,
+    counters: &mut Counters,
+) -> (Vec<f64>, Vec<f64>) {
+    let pencil = &problem.pencil;
+    counters.mass_columns += x.ncols() as u64;
+    counters.stiffness_columns += x.ncols() as u64;
+    let mx = pencil.apply_mass(x);
+    let kx = pencil.apply_stiffness(x);
+    let rounding = rounding_residual(pencil.stiffness(), x);
+    let rigid = pencil.apply_mass(problem.rigid) * gram(problem.rigid, kx.as_ref());
+    let mut residuals = Vec::with_capacity(x.ncols());
+    let mut floors = Vec::with_capacity(x.ncols());
+    for (j, &lambda) in eigenvalues.iter().enumerate() {
+        let scale = residual_scale(kx.col(j), mx.col(j), lambda);
+        residuals.push(relative_residual(kx.col(j), mx.col(j), lambda));
+        floors.push(if scale > 0.0 { (rounding[j] + rigid.col(j).norm_l2()) / scale } else { 0.0 });
+    }
+    (residuals, floors)
+}
+
+/// |K psi| + |lambda| |M psi|.
+pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+    k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
+}
+
+/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros.
+pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+    let scale = residual_scale(k_psi, m_psi, lambda);
+    if scale > 0.0 { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale } else { 0.0 }
+}
+
+impl Refined {
+    /// Rayleigh-Ritz on the span of `x`, and the true K-residuals of the outcome.
+    pub(super) fn new(
+        problem: &EigenProblem<'_>,
+        x: Mat<f64>,
+        counters: &mut Counters,
+    ) -> Result<Self, EigenFailure> {
+        let given = x.ncols();
+        let (eigenvalues, vectors) = rayleigh_ritz(problem, x, counters)?;
+        if vectors.ncols() < given {
+            return Err(EigenFailure::Inaccurate { residual: DEPENDENT });
+        }
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        Ok(Self { eigenvalues, vectors, residuals, floors })
+    }
+
+    /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is higher.
+    fn excess_of(&self, i: usize, tolerance: f64) -> f64 {
+        self.residuals[i] / tolerance.max(self.floors[i])
+    }
+
+    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors.
+    pub(super) fn excess(&self, tolerance: f64) -> f64 {
+        (0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)).fold(0.0, f64::max)
+    }
+}
+
+/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor, by at most three
+/// inverse iterations of those that do not.
+pub(super) fn refine(
+    problem: &EigenProblem<'_>,
+    factor: &dyn Solve,
+    mut best: Refined,
+    tolerance: f64,
+    counters: &mut Counters,
+) -> Result<Refined, EigenFailure> {
+    for round in 0..3 {
+        let least = best.excess(tolerance);
+        if least <= 1.0 {
+            break;
+        }
+        let poor: Vec<usize> =
+            (0..best.residuals.len()).filter(|&i| best.excess_of(i, tolerance) > 1.0).collect();
+        let mut x = best.vectors.clone();
+        let chosen = Mat::from_fn(x.nrows(), poor.len(), |i, j| x[(i, poor[j])]);
+        let improved = inverse_iteration(problem, factor, chosen.as_ref(), round > 0, counters);
+        for (from, &to) in poor.iter().enumerate() {
+            x.as_mut().col_mut(to).copy_from(improved.col(from));
+        }
+        let refined = Refined::new(problem, x, counters)?;
+        let excess = refined.excess(tolerance);
+        if excess < least {
+            best = refined;
+        }
+        if excess > 0.5 * least {
+            break;
+        }
+    }
+    Ok(best)
+}

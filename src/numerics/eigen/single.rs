@@ -1,0 +1,213 @@
+//! Modes with a single-precision factor: Lanczos on the operator that it makes, then corrections against the true K
+//! and M in double precision until the true residuals keep the tolerance (a block Davidson method: Davidson, J. Comput.
+//! Phys. 17 (1975) 87, with the factor as preconditioner).
+//!
+//! The factor T of K + tau M is good to about 1e-7 times its condition, so that Lanczos finds the modes to 1e-2 or
+//! 1e-4. A correction T r of the residual r = K x - lambda M x, with Rayleigh-Ritz on all that is there, gains as many
+//! digits again for one solved column, where refining every solve of Lanczos would cost several.
+
+use super::canonical::cluster_end;
+use super::lanczos::{self, Goal, Search, factorise};
+use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::refine::{Refined, relative_residual, residuals, small_ritz};
+use super::start::{Snapshot, first_shift, fitting_start};
+use crate::base::progress::{Event, Watch};
+use crate::numerics::linalg::{
+    Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination,
+};
+use faer::{Mat, MatRef};
+
+/// Columns per step of Lanczos: as many as the solves take together, since with single precision four cost the same.
+const BLOCK: usize = 8;
+
+/// Ritz residual at which Lanczos hands over: more steps find no modes that the factor's error does not hide.
+const HANDED_OVER: f64 = 1e-4;
+
+/// Residual of the first mode beyond the wanted ones: its eigenvalue, good to the square, bounds the gap of the count.
+const BEYOND: f64 = 1e-3;
+
+/// Corrections before single precision is given up.
+const MAX_ROUNDS: usize = 30;
+
+/// Rounds in a row that gain less than a factor of two before it is given up.
+const PATIENCE: usize = 6;
+
+/// The lowest modes, eigenvalues beyond them, and the shift; or the reason why single precision does not find them.
+pub(super) fn search(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    goal: &Goal,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
+    let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, ..*goal };
+    let start = fitting_start(problem, goal.attempt).filter(|start| start.converged >= goal.wanted);
+    let mut tau = first_shift(problem, start);
+    loop {
+        watch(Event::Phase("factorisation"));
+        let factor: Cholesky<'_, f32> = factorise(problem, analysis, tau, counters)?;
+        watch(Event::Phase("modes"));
+        let (vectors, wanted) = if let Some(start) = start {
+            counters.taken_up = start.eigenvalues.len() as u64;
+            (start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned(), goal.wanted)
+        } else {
+            match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
+                Search::ShiftTooLarge(shift) => {
+                    tau = shift;
+                    continue;
+                }
+                Search::Found { modes, next } => return Ok((modes, next, tau)),
+                Search::Rough { vectors, wanted } => (vectors, wanted),
+            }
+        };
+        let (modes, next) = correct(problem, &factor, vectors, wanted, goal, watch, counters)?;
+        return Ok((modes, next, tau));
+    }
+}
+
+/// Vectors with their products.
+struct Span {
+    x: Mat<f64>,
+    kx: Mat<f64>,
+    mx: Mat<f64>,
+}
+
+impl Span {
+    fn new(problem: &EigenProblem<'_>, x: Mat<f64>, counters: &mut Counters) -> Self {
+        counters.stiffness_columns += x.ncols() as u64;
+        counters.mass_columns += x.ncols() as u64;
+        let (kx, mx) = (problem.pencil.apply_stiffness(x.as_ref()), problem.pencil.apply_mass(x.as_ref()));
+        Self { x, kx, mx }
+    }
+
+    /// Replaces the vectors by combinations of them.
+    fn combine(&mut self, coefficients: MatRef<'_, f64>) {
+        for mine in [&mut self.x, &mut self.kx, &mut self.mx] {
+            *mine = combine(mine.as_ref(), coefficients);
+        }
+    }
+
+    /// Replaces the vectors by combinations of them and of others, `coefficients` first of its own, then of the others.
+    fn combine_with(&mut self, other: &Self, coefficients: MatRef<'_, f64>) {
+        let (own, others) = coefficients.split_at_row(self.x.ncols());
+        for (mine, theirs) in [(&mut self.x, &other.x), (&mut self.kx, &other.kx), (&mut self.mx, &other.mx)]
+        {
+            let mut new = combine(mine.as_ref(), own);
+            add_combination(new.as_mut(), theirs.as_ref(), others);
+            *mine = new;
+        }
+    }
+}
+
+/// Corrects the span of `x` until its lowest `wanted` Ritz pairs keep the tolerance, and the end of their cluster is seen.
+fn correct(
+    problem: &EigenProblem<'_>,
+    factor: &dyn Solve,
+    mut x: Mat<f64>,
+    mut wanted: usize,
+    goal: &Goal,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Refined, Vec<f64>), EigenFailure> {
+    let m_rigid = problem.pencil.apply_mass(problem.rigid);
+    let along = gram(m_rigid.as_ref(), x.as_ref());
+    subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
+    let mut span = Span::new(problem, x, counters);
+    let gram_of = |x: &Mat<f64>, y: &Mat<f64>| gram(x.as_ref(), y.as_ref());
+    let (mut lambda, coefficients) = small_ritz(gram_of(&span.x, &span.mx), gram_of(&span.x, &span.kx))?;
+    span.combine(coefficients.as_ref());
+    // The span keeps earlier corrections until it has twice this size: with them the last modes take half the columns.
+    let base = lambda.len();
+    let (mut least, mut since, mut converged) = (f64::INFINITY, 0, 0);
+    let mut floors = Vec::new();
+    for _ in 0..MAX_ROUNDS {
+        wanted = cluster_end(wanted, lambda.len(), goal.cluster_gap, |i| lambda[i]);
+        let looked = (wanted + 1).min(lambda.len());
+        if floors.len() < looked {
+            let lowest = span.x.as_ref().subcols(0, looked);
+            floors = residuals(problem, &lambda[..looked], lowest, counters).1;
+        }
+        let excess: Vec<f64> = (0..looked)
+            .map(|j| {
+                let allowed = if j < wanted { goal.tolerance.max(floors[j]) } else { BEYOND };
+                relative_residual(span.kx.col(j), span.mx.col(j), lambda[j]) / allowed
+            })
+            .collect();
+        converged = excess[..wanted].iter().filter(|e| **e <= 1.0).count();
+        let poor: Vec<usize> = (0..looked).filter(|&i| excess[i] > 1.0).collect();
+        watch(Event::Fraction(1.0 - poor.len() as f64 / looked as f64));
+        if poor.is_empty() {
+            let next = lambda[wanted..looked].to_vec();
+            problem.resume.save(|| Snapshot {
+                shift: factor.shift(),
+                eigenvalues: lambda.clone(),
+                basis: span.x.clone(),
+                coupling: Mat::zeros(0, lambda.len()),
+                converged: wanted,
+            });
+            return Ok((
+                Refined::new(problem, span.x.as_ref().subcols(0, wanted).to_owned(), counters)?,
+                next,
+            ));
+        }
+        let worst = excess.iter().fold(0.0f64, |m, e| if e.is_nan() { f64::NAN } else { m.max(*e) });
+        if worst < 0.5 * least {
+            (least, since) = (worst, 0);
+        } else {
+            since += 1;
+        }
+        if since > PATIENCE || worst.is_nan() {
+            break;
+        }
+        let new = corrections(problem, factor, &span, &poor, &lambda, m_rigid.as_ref(), counters);
+        // X' M X = I and X' K X = Lambda hold already.
+        let ones = vec![1.0; lambda.len()];
+        let gm = bordered(&ones, &gram_of(&span.x, &new.mx), &gram_of(&new.x, &new.mx));
+        let gk = bordered(&lambda, &gram_of(&span.x, &new.kx), &gram_of(&new.x, &new.kx));
+        let (values, coefficients) = small_ritz(gm, gk)?;
+        let kept = if values.len() <= 2 * base { values.len() } else { base };
+        span.combine_with(&new, coefficients.as_ref().subcols(0, kept));
+        lambda = values[..kept].to_vec();
+    }
+    Err(EigenFailure::NotConverged { converged, wanted })
+}
+
+/// [diag(a), B; B', C].
+fn bordered(a: &[f64], b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
+    let m = a.len();
+    Mat::from_fn(m + c.ncols(), m + c.ncols(), |i, j| match (i < m, j < m) {
+        (true, true) if i == j => a[i],
+        (true, true) => 0.0,
+        (true, false) => b[(i, j - m)],
+        (false, true) => b[(j, i - m)],
+        (false, false) => c[(i - m, j - m)],
+    })
+}
+
+/// T (K x - lambda M x) for some Ritz pairs, M-orthogonal to the span and to the rigid modes.
+fn corrections(
+    problem: &EigenProblem<'_>,
+    factor: &dyn Solve,
+    span: &Span,
+    chosen: &[usize],
+    lambda: &[f64],
+    m_rigid: MatRef<'_, f64>,
+    counters: &mut Counters,
+) -> Span {
+    counters.solved_columns += chosen.len() as u64;
+    let mut d = Mat::zeros(span.x.nrows(), chosen.len());
+    for (mut d, &j) in d.col_iter_mut().zip(chosen) {
+        let r = span.kx.col(j) - span.mx.col(j) * faer::Scale(lambda[j]);
+        // Unit size: residuals near rounding would leave the range of single precision.
+        let size = r.norm_max();
+        d.copy_from(r * faer::Scale(if size > 0.0 { size.recip() } else { 0.0 }));
+    }
+    factor.solve_in_place(d.as_mut());
+    for _ in 0..2 {
+        for (basis, m_basis) in [(problem.rigid, m_rigid), (span.x.as_ref(), span.mx.as_ref())] {
+            let along = gram(m_basis, d.as_ref());
+            subtract_combination(d.as_mut(), basis, along.as_ref());
+        }
+    }
+    Span::new(problem, d, counters)
+}

@@ -1,0 +1,347 @@
+//! The one entry: chooses the method, refines, counts, puts into canonical form.
+
+use super::bounds::enclose;
+use super::canonical::{canonical_basis, cluster_end, clusters};
+use super::completeness::{Completeness, Proof, count_below};
+use super::dense;
+use super::lanczos::{self, BLOCK, Goal, NOISE_FACTOR};
+use super::noise::energy_noise;
+use super::plan::{FactorChoice, Plan, Precision, gigabytes};
+use super::problem::{
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
+    Wanted,
+};
+use super::refine::{Refined, refine, residuals as residuals_of};
+use super::single;
+use super::start::{Snapshot, first_shift, fitting_start};
+use crate::base::progress::{Event, Watch};
+use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
+use faer::Mat;
+
+/// Models up to this size are solved densely: all modes take less than a second.
+const DENSE_ALWAYS: usize = 600;
+
+/// Largest model that is solved densely because most of its modes are wanted (n^2 numbers, three times).
+const DENSE_AT_MOST: usize = 9000;
+
+/// Part of all modes beyond which the dense path does less work than a Krylov basis of twice that size.
+const DENSE_PART: f64 = 0.2;
+
+/// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one: a digit.
+const FAR: f64 = 0.1;
+
+/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
+pub(super) const CLUSTER_GAP: f64 = 1e-9;
+
+/// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
+/// residuals, up to the root of m times the largest.
+const SEARCHED: f64 = 0.4;
+
+/// Computes the wanted flexible modes.
+///
+/// # Errors
+/// [`EigenFailure`] says why no trustworthy modes exist.
+pub fn solve(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    watch: Watch<'_>,
+) -> Result<EigenSolution, EigenFailure> {
+    let mut counters = Counters::default();
+    let pencil = &problem.pencil;
+    watch(Event::Phase("ordering"));
+    let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
+    counters.factor_len = analysis.factor_len() as u64;
+    counters.factor_flops = analysis.flops() as u64;
+    if !is_positive_semidefinite(pencil.mass(), &analysis) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    let rigid = problem.rigid.ncols();
+    let available = pencil.n() - rigid;
+    let wanted = match settings.wanted {
+        Wanted::Lowest(count) => count.min(available),
+        Wanted::Below(lambda) => {
+            watch(Event::Phase("counting modes"));
+            count_below(problem, &analysis, lambda, &mut counters)?.saturating_sub(rigid)
+        }
+    };
+    let dense = match settings.method {
+        Method::Dense => true,
+        Method::Lanczos => false,
+        Method::Auto => {
+            pencil.n() <= DENSE_ALWAYS
+                || (pencil.n() <= DENSE_AT_MOST && wanted as f64 > DENSE_PART * available as f64)
+        }
+    };
+    let plan = Plan::new(problem, settings, &analysis, wanted, dense)?;
+    let tolerance = SEARCHED * settings.accuracy.residual();
+    let mut sparse = Sparse { problem, settings, analysis: &analysis, plan };
+    let (mut search, finite_modes) = if dense {
+        let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
+        (search, Some(finite))
+    } else {
+        watch(Event::Plan(&sparse.plan.to_string()));
+        (sparse.search(wanted, 0, watch, &mut counters)?, None)
+    };
+    let mut completeness = prove(&sparse, &search, watch, &mut counters)?;
+    let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
+    if missed > 0 {
+        // Once more, from other directions and for as many modes as there are.
+        search = sparse.search(wanted + missed, 1, watch, &mut counters)?;
+        completeness = prove(&sparse, &search, watch, &mut counters)?;
+    }
+    let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
+    if found != counted {
+        return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
+    }
+    let bounds = if settings.accuracy == Accuracy::Certified && found > 0 {
+        watch(Event::Phase("bounds"));
+        let (modes, values) = (&search.refined.vectors, &search.refined.eigenvalues[..found]);
+        let modes = modes.as_ref().subcols(0, found);
+        Some(enclose(problem, &analysis, modes, values, completeness.shift, CLUSTER_GAP, &mut counters)?)
+    } else {
+        None
+    };
+    let plan = (!dense).then_some(sparse.plan);
+    finish(
+        problem,
+        search,
+        (completeness, bounds),
+        (wanted, settings.accuracy.residual()),
+        (plan, finite_modes),
+        counters,
+    )
+}
+
+/// Modes as a method found them.
+struct Search {
+    refined: Refined,
+    next: Vec<f64>,
+    tau: f64,
+}
+
+fn search_densely(
+    problem: &EigenProblem<'_>,
+    wanted: usize,
+    tolerance: f64,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Search, usize), EigenFailure> {
+    watch(Event::Phase("dense eigenproblem"));
+    let pencil = &problem.pencil;
+    let finite = dense::finite_eigenvalues(pencil).ok_or(EigenFailure::MassIndefinite)?;
+    let flexible = finite.saturating_sub(problem.rigid.ncols());
+    let mean = dense::shift(problem.first_estimate, dense::highest_estimate(pencil));
+    let mut spectrum = dense::Spectrum::new(problem, mean)?;
+    let end =
+        |spectrum: &dense::Spectrum| cluster_end(wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
+    let mut last = end(&spectrum);
+    // Far above the wanted modes a shift crowds them together, which costs the digits by which they differ. Once it is known
+    // where they are, another is placed between them, if that matrix can be factored.
+    let highest = if last > 0 { spectrum.eigenvalue(last - 1) } else { mean };
+    let among = dense::shift(problem.first_estimate.min(highest), highest);
+    if among < FAR * mean
+        && let Ok(closer) = dense::Spectrum::new(problem, among)
+    {
+        spectrum = closer;
+        last = end(&spectrum);
+    }
+    let tau = spectrum.factor.shift();
+    let found = Refined::new(problem, spectrum.vectors(last), counters)?;
+    let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
+    check_zero_energy(problem, &refined)?;
+    problem.resume.save(|| Snapshot {
+        // That of an iterative search: it may go on from here when other modes are wanted.
+        shift: first_shift(problem, None),
+        eigenvalues: refined.eigenvalues.clone(),
+        basis: refined.vectors.clone(),
+        coupling: Mat::zeros(0, last),
+        converged: last,
+    });
+    let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
+    Ok((Search { refined, next, tau }, flexible))
+}
+
+/// The iterative search and what it goes by.
+struct Sparse<'a> {
+    problem: &'a EigenProblem<'a>,
+    settings: &'a EigenSettings,
+    analysis: &'a Analysis,
+    plan: Plan,
+}
+
+impl Sparse<'_> {
+    /// Searches with the factor of the plan; from single precision back to double where it fails, if that fits.
+    fn search(
+        &mut self,
+        wanted: usize,
+        attempt: u64,
+        watch: Watch<'_>,
+        counters: &mut Counters,
+    ) -> Result<Search, EigenFailure> {
+        let Self { problem, analysis, .. } = *self;
+        let tolerance = SEARCHED * self.settings.accuracy.residual();
+        let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, block: BLOCK, rough: false, attempt };
+        let found = if self.plan.precision == Precision::Single {
+            match single::search(problem, analysis, &goal, watch, counters) {
+                Ok(found) => Some(found),
+                Err(failure) => {
+                    let double = match self.settings.factor {
+                        FactorChoice::Auto => Plan::in_double(problem, self.settings, analysis, wanted).ok(),
+                        FactorChoice::Always(_) => None,
+                    };
+                    let plan = double.ok_or_else(|| EigenFailure::SinglePrecision(Box::new(failure)))?;
+                    self.plan = Plan { single_failed: true, ..plan };
+                    None
+                }
+            }
+        } else {
+            None
+        };
+        let (refined, next, tau) = match found {
+            Some(found) => found,
+            None => search_in_double(problem, analysis, &goal, watch, counters)?,
+        };
+        counters.factor_bytes = self.plan.factor_bytes;
+        check_zero_energy(problem, &refined)?;
+        Ok(Search { refined, next, tau })
+    }
+}
+
+fn search_in_double(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    goal: &Goal,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
+    let mut start = fitting_start(problem, goal.attempt);
+    let mut tau = first_shift(problem, start);
+    loop {
+        watch(Event::Phase("factorisation"));
+        let factor: Cholesky<'_, f64> = lanczos::factorise(problem, analysis, tau, counters)?;
+        watch(Event::Phase("modes"));
+        match lanczos::lowest_modes(problem, &factor, goal, start, watch, counters)? {
+            lanczos::Search::Found { modes, next } => {
+                return Ok((refine(problem, &factor, modes, goal.tolerance, counters)?, next, tau));
+            }
+            lanczos::Search::ShiftTooLarge(shift) => (tau, start) = (shift, None),
+            lanczos::Search::Rough { .. } => unreachable!("not asked for"),
+        }
+    }
+}
+
+/// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
+pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
+    let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
+    let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
+    if let Some(&lambda) = refined.eigenvalues.first()
+        && lambda < -NOISE_FACTOR * noise[0]
+    {
+        let vector = refined.vectors.as_ref().subcols(0, 1).to_owned();
+        return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lambda, vector });
+    }
+    let count = refined.eigenvalues.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count();
+    if count > 0 {
+        return Err(EigenFailure::ZeroEnergy {
+            count,
+            eigenvalues: refined.eigenvalues[..count].to_vec(),
+            vectors: refined.vectors.as_ref().subcols(0, count).to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// The inertia count in the gap above the last mode.
+fn prove(
+    sparse: &Sparse<'_>,
+    search: &Search,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Completeness, EigenFailure> {
+    let Sparse { problem, settings, analysis, plan } = sparse;
+    let found = search.refined.eigenvalues.len();
+    let last = search.refined.eigenvalues.last().copied().unwrap_or(0.0);
+    let shift = match (settings.wanted, search.next.first()) {
+        (Wanted::Below(lambda), _) => lambda,
+        (_, Some(&next)) if found == 0 => 0.5 * next,
+        (_, Some(&next)) => 0.5 * (last + next),
+        // Nothing above: every finite mode was computed.
+        (_, None) => 1.1 * last,
+    };
+    let remark = match plan.proof_too_large {
+        _ if settings.accuracy == Accuracy::Fast => Some("accuracy `fast` leaves the count out".to_owned()),
+        Some((needed, available)) => Some(format!(
+            "the count needs {} of memory, {} are available",
+            gigabytes(needed),
+            gigabytes(available)
+        )),
+        None => None,
+    };
+    if let Some(remark) = remark {
+        let proof = Proof::NotProved;
+        return Ok(Completeness { proof, shift, negative_pivots: None, modes_below: found, remark });
+    }
+    watch(Event::Phase("completeness"));
+    let below = search.refined.eigenvalues.iter().filter(|&&l| l < shift).count();
+    let negative = count_below(problem, analysis, shift, counters)?;
+    Ok(Completeness {
+        proof: Proof::InertiaCount,
+        shift,
+        negative_pivots: Some(negative),
+        modes_below: below,
+        remark: String::new(),
+    })
+}
+
+/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
+pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
+    residual <= tolerance.max(30.0 * floor)
+}
+
+/// Canonical form, the wanted number of modes, residuals of what is handed out.
+fn finish(
+    problem: &EigenProblem<'_>,
+    search: Search,
+    (completeness, mut bounds): (Completeness, Option<EigenvalueBounds>),
+    (wanted, tolerance): (usize, f64),
+    (plan, finite_modes): (Option<Plan>, Option<usize>),
+    mut counters: Counters,
+) -> Result<EigenSolution, EigenFailure> {
+    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = search.refined;
+    let groups = clusters(&eigenvalues, CLUSTER_GAP);
+    canonical_basis(vectors.as_mut(), &groups);
+    if let Some(bounds) = &bounds {
+        bounds.clamp(&mut eigenvalues);
+    }
+    if bounds.is_some() || groups.iter().any(|g| g.len() > 1) {
+        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
+    }
+    let kept = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
+    let converged = (0..eigenvalues.len()).filter(kept).count();
+    if converged < eigenvalues.len() {
+        return Err(EigenFailure::NotConverged { converged, wanted });
+    }
+    let given = wanted.min(eigenvalues.len());
+    let next_eigenvalue = eigenvalues.get(given).copied().or(search.next.first().copied());
+    if given < eigenvalues.len() {
+        vectors = vectors.as_ref().subcols(0, given).to_owned();
+    }
+    if let Some(bounds) = &mut bounds {
+        for column in [&mut bounds.lower, &mut bounds.upper, &mut bounds.shape_error] {
+            column.truncate(given);
+        }
+    }
+    Ok(EigenSolution {
+        plan,
+        bounds,
+        eigenvalues: eigenvalues[..given].to_vec(),
+        vectors,
+        residuals: residuals[..given].to_vec(),
+        rounding_floors: floors[..given].to_vec(),
+        completeness,
+        next_eigenvalue,
+        finite_modes,
+        shift: search.tau,
+        counters,
+    })
+}

@@ -1,0 +1,151 @@
+//! Modes of a given subspace: Rayleigh-Ritz, canonical form, residuals as they are, and the count for those that turn
+//! out to be eigenvectors. Nothing is factored unless that count is made.
+
+use super::bounds::enclose;
+use super::canonical::{canonical_basis, clusters};
+use super::completeness::{Completeness, Proof, count_below};
+use super::plan::{Plan, gigabytes};
+use super::problem::{Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Wanted};
+use super::refine::{Refined, residuals as residuals_of};
+use super::solve::{CLUSTER_GAP, check_zero_energy, keeps};
+use crate::base::progress::{Event, Watch};
+use crate::numerics::linalg::{Analysis, is_positive_semidefinite};
+use faer::Mat;
+
+/// Distance of the count's shift from the last eigenvector, relative to its eigenvalue: the second is tried where the
+/// first counts too many, which may lie beyond the modes that were given.
+const ABOVE: [f64; 2] = [1e-3, 1e-5];
+
+/// The modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors, M-orthogonal to the
+/// rigid modes, ascending.
+///
+/// They are eigenvectors only as far as their residuals say. Where the lowest of them keep the K-residual of the
+/// accuracy, an inertia count says whether modes are missing below the last such; accuracy `fast` leaves it out.
+///
+/// # Errors
+/// [`EigenFailure`]: dependent columns, an indefinite matrix, a mechanism; at [`Accuracy::Certified`] also where a mode is no
+/// eigenvector or one is missing.
+pub fn modes_of_span(
+    problem: &EigenProblem<'_>,
+    basis: Mat<f64>,
+    settings: &EigenSettings,
+    watch: Watch<'_>,
+) -> Result<EigenSolution, EigenFailure> {
+    let mut counters = Counters::default();
+    let refined = Refined::new(problem, basis, &mut counters)?;
+    check_zero_energy(problem, &refined)?;
+    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = refined;
+    let given = match settings.wanted {
+        Wanted::Lowest(count) => count.min(eigenvalues.len()),
+        Wanted::Below(lambda) => eigenvalues.partition_point(|&l| l < lambda),
+    };
+    let next_eigenvalue = eigenvalues.get(given).copied();
+    eigenvalues.truncate(given);
+    vectors = vectors.as_ref().subcols(0, given).to_owned();
+    let groups = clusters(&eigenvalues, CLUSTER_GAP);
+    canonical_basis(vectors.as_mut(), &groups);
+    if groups.iter().any(|group| group.len() > 1) {
+        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
+    }
+    residuals.truncate(given);
+    floors.truncate(given);
+    let tolerance = settings.accuracy.residual();
+    let exact = (0..given).take_while(|&i| keeps(residuals[i], floors[i], tolerance)).count();
+    let mut analysis = None;
+    let completeness = if exact == 0 || settings.accuracy == Accuracy::Fast {
+        let remark = if exact < given {
+            let others = residuals.iter().zip(&floors).filter(|(r, f)| !keeps(**r, **f, tolerance)).count();
+            format!("{others} of {given} modes of the given subspace are no eigenvectors")
+        } else {
+            "accuracy `fast` leaves the count out".to_owned()
+        };
+        let shift = eigenvalues.last().copied().unwrap_or(0.0);
+        Completeness { proof: Proof::NotProved, shift, negative_pivots: None, modes_below: given, remark }
+    } else {
+        watch(Event::Phase("completeness"));
+        let analysis = analysis.insert(Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?);
+        count(problem, analysis, &eigenvalues[..exact], settings, &mut counters)?
+    };
+    let mut bounds = None;
+    if settings.accuracy == Accuracy::Certified && given > 0 {
+        let why = match &analysis {
+            _ if exact < given => "not every mode of the subspace is an eigenvector to a K-residual of 1e-12",
+            _ if completeness.proof == Proof::NotProved => "modes are missing in the subspace",
+            Some(analysis) => {
+                watch(Event::Phase("bounds"));
+                // Refuses what does not fit the memory.
+                Plan::new(problem, settings, analysis, given, false)?;
+                let (modes, high) = (vectors.as_ref(), completeness.shift);
+                bounds =
+                    Some(enclose(problem, analysis, modes, &eigenvalues, high, CLUSTER_GAP, &mut counters)?);
+                ""
+            }
+            None => unreachable!("a count needs the analysis"),
+        };
+        if bounds.is_none() {
+            return Err(EigenFailure::NotCertified { why });
+        }
+    }
+    if let Some(bounds) = &bounds {
+        bounds.clamp(&mut eigenvalues);
+    }
+    Ok(EigenSolution {
+        eigenvalues,
+        vectors,
+        residuals,
+        rounding_floors: floors,
+        completeness,
+        plan: None,
+        bounds,
+        next_eigenvalue,
+        finite_modes: None,
+        shift: 0.0,
+        counters,
+    })
+}
+
+/// Counts the modes below a shift just above the last of `eigenvalues`, all of which belong to eigenvectors.
+fn count(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    eigenvalues: &[f64],
+    settings: &EigenSettings,
+    counters: &mut Counters,
+) -> Result<Completeness, EigenFailure> {
+    let (rigid, found) = (problem.rigid.ncols(), eigenvalues.len());
+    let last = *eigenvalues.last().expect("counted only where there is one");
+    let outcome = |shift: f64, negative_pivots: Option<usize>, remark: String| Completeness {
+        proof: if remark.is_empty() { Proof::InertiaCount } else { Proof::NotProved },
+        shift,
+        negative_pivots,
+        modes_below: found,
+        remark,
+    };
+    let needed = Plan::count_bytes(problem, analysis, found);
+    if let Some(available) = settings.memory.filter(|&available| needed > available) {
+        let (needed, available) = (gigabytes(needed), gigabytes(available));
+        let remark = format!("the count needs {needed} of memory, {available} are available");
+        return Ok(outcome(last, None, remark));
+    }
+    if !is_positive_semidefinite(problem.pencil.mass(), analysis) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    let mut counted = (last, 0);
+    for above in ABOVE {
+        let shift = (1.0 + above) * last;
+        let negative = count_below(problem, analysis, shift, counters)?;
+        if negative == rigid + found {
+            return Ok(outcome(shift, Some(negative), String::new()));
+        }
+        if negative < rigid + found {
+            let counted = negative.saturating_sub(rigid);
+            return Err(EigenFailure::CountDiffers { found, counted, shift });
+        }
+        counted = (shift, negative);
+    }
+    let (shift, negative) = counted;
+    let there = negative - rigid;
+    let remark =
+        format!("the body has {there} flexible modes below lambda = {shift:.6e}, the given subspace {found}");
+    Ok(outcome(shift, Some(negative), remark))
+}

@@ -1,0 +1,179 @@
+//! Static responses of the free body: x = K^+ f on the M-orthogonal complement of given modes, by conjugate gradients
+//! that the factor of K + tau M preconditions.
+
+use super::lanczos::factorise;
+use super::noise::rounding_residual;
+use super::plan::Precision;
+use super::problem::{Counters, EigenFailure, EigenProblem};
+use crate::numerics::linalg::{
+    Analysis, Cholesky, Pencil, Solve, column_products, gram, side_by_side, subtract_combination,
+};
+use faer::{Mat, MatRef};
+
+/// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of six in each.
+const ITERATIONS: usize = 40;
+
+/// Energy norm of the error, relative to that of the start, at which a cycle ends: its floor in f64.
+const REACHED: f64 = 1e-14;
+
+/// Cycles: each begins with the true residual, which the recurrence loses sight of.
+const CYCLES: usize = 3;
+
+/// Residual |f - K x| / |f| above which a response is no result, unless rounding explains it.
+const ACCEPTED: f64 = 1e-9;
+
+/// For each load (column of `loads`, N x m) the part of K^+ f that `modes` do not have: with P = \[R, Psi\] of rigid modes and
+/// eigenvectors (`modes` M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are thereby self-equilibrated (inertia relief).
+///
+/// `first` is the first flexible eigenvalue, the scale of the shift. Without rigid modes and `modes` (a body that is held) x = K^-1 f.
+///
+/// # Errors
+/// Failures of the factorisation; [`EigenFailure::Inaccurate`] with the residual of a response.
+pub fn static_responses(
+    problem: &EigenProblem<'_>,
+    modes: MatRef<'_, f64>,
+    loads: Mat<f64>,
+    first: f64,
+    precision: Precision,
+    counters: &mut Counters,
+) -> Result<Mat<f64>, EigenFailure> {
+    let respond = |responses: &Responses<'_>, counters: &mut Counters| responses.of(loads, counters);
+    with_responses(problem, modes, first, precision, counters, respond)
+}
+
+/// The responses of a body that is held, K^-1 f, and with the same factor those to further loads that these responses tell.
+///
+/// # Errors
+/// As [`static_responses`].
+pub fn static_responses_twice(
+    problem: &EigenProblem<'_>,
+    loads: Mat<f64>,
+    further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
+    first: f64,
+    precision: Precision,
+    counters: &mut Counters,
+) -> Result<[Mat<f64>; 2], EigenFailure> {
+    let none = Mat::zeros(problem.pencil.n(), 0);
+    let respond = |responses: &Responses<'_>, counters: &mut Counters| {
+        let x = responses.of(loads, counters)?;
+        let loads = further(&x);
+        Ok([x, responses.of(loads, counters)?])
+    };
+    with_responses(problem, none.as_ref(), first, precision, counters, respond)
+}
+
+fn with_responses<T>(
+    problem: &EigenProblem<'_>,
+    modes: MatRef<'_, f64>,
+    first: f64,
+    precision: Precision,
+    counters: &mut Counters,
+    respond: impl FnOnce(&Responses<'_>, &mut Counters) -> Result<T, EigenFailure>,
+) -> Result<T, EigenFailure> {
+    let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
+    let known = side_by_side(&[problem.rigid, modes]);
+    // Without known modes K itself is definite, and its factor the solution but for rounding.
+    let tau = if known.ncols() == 0 { 0.0 } else { 0.5 * first };
+    match precision {
+        Precision::Double => {
+            let factor: Cholesky<'_, f64> = factorise(problem, &analysis, tau, counters)?;
+            respond(&Responses::new(&problem.pencil, &known, &factor), counters)
+        }
+        Precision::Single => {
+            let factor: Cholesky<'_, f32> = factorise(problem, &analysis, tau, counters)?;
+            respond(&Responses::new(&problem.pencil, &known, &factor), counters)
+        }
+    }
+}
+
+struct Responses<'a> {
+    pencil: &'a Pencil<'a>,
+    /// P and M P.
+    known: &'a Mat<f64>,
+    products: Mat<f64>,
+    factor: &'a dyn Solve,
+}
+
+impl<'a> Responses<'a> {
+    fn new(pencil: &'a Pencil<'a>, known: &'a Mat<f64>, factor: &'a dyn Solve) -> Self {
+        Self { pencil, known, products: pencil.apply_mass(known.as_ref()), factor }
+    }
+
+    /// X <- (I - P P'M) X.
+    fn deflate(&self, x: &mut Mat<f64>) {
+        let along = gram(self.products.as_ref(), x.as_ref());
+        subtract_combination(x.as_mut(), self.known.as_ref(), along.as_ref());
+    }
+
+    /// F <- (I - M P P') F.
+    fn equilibrate(&self, f: &mut Mat<f64>) {
+        let along = gram(self.known.as_ref(), f.as_ref());
+        subtract_combination(f.as_mut(), self.products.as_ref(), along.as_ref());
+    }
+
+    fn of(&self, mut loads: Mat<f64>, counters: &mut Counters) -> Result<Mat<f64>, EigenFailure> {
+        // Twice: a load may be rigid but for its last digits.
+        self.equilibrate(&mut loads);
+        self.equilibrate(&mut loads);
+        let mut x = Mat::zeros(loads.nrows(), loads.ncols());
+        let mut residual = loads.clone();
+        for _ in 0..CYCLES {
+            x += self.cycle(residual, counters);
+            self.deflate(&mut x);
+            counters.stiffness_columns += x.ncols() as u64;
+            residual = &loads - self.pencil.apply_stiffness(x.as_ref());
+            self.equilibrate(&mut residual);
+        }
+        let rounding = rounding_residual(self.pencil.stiffness(), x.as_ref());
+        for (j, rounding) in rounding.iter().enumerate() {
+            let (left, load) = (residual.col(j).norm_l2(), loads.col(j).norm_l2());
+            if left.is_nan() || left > (ACCEPTED * load).max(30.0 * rounding) {
+                return Err(EigenFailure::Inaccurate { residual: left / load });
+            }
+        }
+        Ok(x)
+    }
+
+    /// Conjugate gradients of all columns side by side from zero.
+    fn cycle(&self, mut residual: Mat<f64>, counters: &mut Counters) -> Mat<f64> {
+        let columns = residual.ncols();
+        let precondition = |r: &Mat<f64>, counters: &mut Counters| {
+            counters.solved_columns += columns as u64;
+            let mut z = r.clone();
+            self.factor.solve_in_place(z.as_mut());
+            self.deflate(&mut z);
+            z
+        };
+        let mut x = Mat::zeros(residual.nrows(), columns);
+        let mut direction = precondition(&residual, counters);
+        let start = column_products(residual.as_ref(), direction.as_ref());
+        let mut energy = start.clone();
+        for _ in 0..ITERATIONS {
+            if energy.iter().zip(&start).all(|(e, s)| *e <= REACHED * REACHED * s) {
+                break;
+            }
+            counters.stiffness_columns += columns as u64;
+            let product = self.pencil.apply_stiffness(direction.as_ref());
+            let curvature = column_products(direction.as_ref(), product.as_ref());
+            // A column that has converged to nothing stands still.
+            let step = ratios(&energy, &curvature);
+            for j in 0..columns {
+                for i in 0..x.nrows() {
+                    x[(i, j)] += step[j] * direction[(i, j)];
+                    residual[(i, j)] -= step[j] * product[(i, j)];
+                }
+            }
+            let z = precondition(&residual, counters);
+            let next = column_products(residual.as_ref(), z.as_ref());
+            let turn = ratios(&next, &energy);
+            direction = Mat::from_fn(z.nrows(), columns, |i, j| z[(i, j)] + turn[j] * direction[(i, j)]);
+            energy = next;
+        }
+        x
+    }
+}
+
+/// a / b, zero where b is not positive.
+fn ratios(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| if *b > 0.0 { a / b } else { 0.0 }).collect()
+}

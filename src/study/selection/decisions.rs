@@ -1,0 +1,88 @@
+//! Decisions in words and numbers, and the trials that they rest on.
+
+use super::search::Choice;
+use super::situation::Input;
+use super::trial::Trial;
+use crate::body::flex_body::{FlexBody, Group, Groups, TermDecision};
+use crate::motion::scene::Scene;
+
+/// The decision about every group, and the trial that it rests on.
+pub(super) fn decisions(
+    body: &FlexBody,
+    scene: &Scene,
+    rotation: &Input,
+    choice: &Choice,
+    trials: &[Trial],
+    short_of: Option<(f64, f64)>,
+) -> Vec<TermDecision> {
+    let held = body.invariants().groups;
+    let of_groups = |kept: Groups| trials.iter().rfind(move |trial| trial.kept == kept);
+    let within = |kept: Groups| trials.iter().find(move |trial| trial.kept == kept && trial.passed());
+    let decide = |group: Group| {
+        let kept = choice.groups.has(group);
+        let undecided = |kept: bool, reason: &str| TermDecision {
+            group,
+            kept,
+            tier: 0,
+            bound: 0.0,
+            limit: 0.0,
+            reason: reason.to_owned(),
+        };
+        if !held.has(group) {
+            let earlier = body.terms().iter().find(|decision| decision.group == group);
+            return earlier.cloned().unwrap_or_else(|| undecided(false, "the body does not hold it"));
+        }
+        let basis = if kept {
+            of_groups(choice.groups.and(Groups::without(group)))
+        } else {
+            within(choice.groups).or(choice.chosen.as_ref())
+        };
+        let mut decided = match basis {
+            Some(trial) => decision(group, kept, trial, scene, rotation),
+            None => undecided(kept, "nothing shows that it may be dropped"),
+        };
+        if let Some((reached, allowed)) = short_of.filter(|_| kept) {
+            decided.reason = format!(
+                "{}; the run turns with {reached:.3e} only where the scene allows {allowed:.3e}, so nothing was measured",
+                decided.reason
+            );
+        }
+        decided
+    };
+    Group::ALL.into_iter().map(decide).collect()
+}
+
+/// The decision that a trial without `group` leads to.
+pub(super) fn decision(
+    group: Group,
+    kept: bool,
+    trial: &Trial,
+    scene: &Scene,
+    rotation: &Input,
+) -> TermDecision {
+    let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite());
+    let decisive = errors.map(|errors| errors.decisive(&scene.requirements.tolerance));
+    let how = match trial.tier {
+        2 => "measured over the run",
+        1 => "bound with the norms of the invariants",
+        _ => "bound from I0 and the frequencies",
+    };
+    let reason = match (&decisive, trial.remark.as_str()) {
+        (Some((output, ..)), _) => format!("error of {output}, {how}; rotation from {}", rotation.source),
+        (None, "") => format!("no finite {how}"),
+        (None, remark) => remark.to_owned(),
+    };
+    let (bound, limit) = decisive.map_or((0.0, 0.0), |(_, error, allowed)| (error, allowed * trial.budget));
+    TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
+}
+
+/// The guideline of \[WP19\] section 8 that a set of groups is nearest to.
+pub(super) fn guideline(groups: Groups) -> &'static str {
+    match (groups.w1, groups.w2, groups.w3) {
+        (false, false, false) => "I: inertia of the undeformed body",
+        (true, false, false) => "II: constant centrifugal load, and W1 in the inertia with it",
+        (_, true, false) | (true, false, true) => "III: inertia of the deformed body",
+        (false, false, true) => "IV: Coriolis forces",
+        (_, true, true) => "III and IV: inertia of the deformed body and Coriolis forces",
+    }
+}

@@ -1,0 +1,218 @@
+//! Decides which terms and modes a body needs in a scene.
+
+use super::basis::BEYOND_BAND;
+use super::cases::{Case, SLACK_OF_RANGE, bounded, scenes, worst};
+use super::decisions::{decision, decisions, guideline};
+use super::participation::{Participation, participations};
+use super::search::{Choice, Search};
+use super::significance::{Significance, significances};
+use super::situation::{Input, Situation};
+use super::trial::{ModeShare, Trial, multiplications};
+use super::warnings::{growth_of, phase_drifts, resonances};
+use crate::base::diagnostic::Diagnostic;
+use crate::base::error::Result;
+use crate::base::progress::{Event, Watch};
+use crate::body::flex_body::{FlexBody, Groups, TermDecision};
+use crate::motion::scene::{Measure, Scene, Stage, damped, points_of};
+
+/// What was decided, and on what grounds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Selection {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the body.
+    pub body: String,
+    /// Numbers that the decision follows from.
+    pub inputs: Vec<Input>,
+    /// Largest errors that are allowed; in the order attitude, deflection, stress, reaction.
+    pub tolerance: [f64; 4],
+    /// Sizes of all terms.
+    pub significances: Vec<Significance>,
+    /// Everything that was tried, in order.
+    pub trials: Vec<Trial>,
+    /// The decision about every group.
+    pub terms: Vec<TermDecision>,
+    /// Groups that are kept.
+    pub groups: Groups,
+    /// Modes that the body has.
+    pub n_modes: usize,
+    /// Modes that are kept (from 0).
+    pub modes: Vec<usize>,
+    /// What every mode of the body does, where a motion was integrated.
+    pub shares: Vec<ModeShare>,
+    /// What the selected modes lack of the static responses to the loads.
+    pub participations: Vec<Participation>,
+    /// Why these modes.
+    pub mode_reason: String,
+    /// The selected model, measured against all that the body holds; none where nothing was integrated.
+    pub chosen: Option<Trial>,
+    /// Multiplications of an evaluation with everything that the body holds.
+    pub multiplications: usize,
+    /// Guideline of \[WP19\] section 8 that the kept groups are nearest to.
+    pub guideline: &'static str,
+    /// The cost that the scene allows, where that decides.
+    pub most_multiplications: Option<usize>,
+    /// What has to be said.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Selection {
+    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured.
+    pub fn holds(&self) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
+            Some(most) => chosen.multiplications <= most,
+            None => chosen.passed(),
+        })
+    }
+}
+
+/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in this scene need not hold. `body` needs
+/// to hold none.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
+pub fn rule_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<Vec<TermDecision>> {
+    if scene.carried.is_some() {
+        return Ok(Vec::new());
+    }
+    let stage = Stage::new(body, scene)?;
+    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
+    let scenes = scenes(body, scene)?;
+    let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
+    let trials = bounded(&cases, false)?;
+    let Some(passed) = trials.iter().find(|trial| trial.passed()) else { return Ok(Vec::new()) };
+    let rotation = &cases[0].situation.spin;
+    Ok(passed.kept.dropped().map(|group| decision(group, false, passed, scene, rotation)).collect())
+}
+
+/// The terms and modes of `body` that `scene` needs.
+///
+/// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 where these leave half of the tolerances, else by
+/// the error of a motion that is integrated (tier 2), if the scene says how long it lasts. Where the scene allows faster rotation than
+/// its run has, everything holds for the run and for the run with the rotation scaled to that. Modes are ranked by what
+/// they do in the motion, and the fewest are kept whose motion, with the kept groups, is within the tolerances.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
+pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<'_>) -> Result<Selection> {
+    let stage = Stage::new(body, scene)?;
+    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
+    let (loads, _) = points_of(body, scene)?;
+    let situation = Situation::new(body, scene, &loads);
+    let scenes = scenes(body, scene)?;
+    let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
+    let held = body.invariants().groups;
+    let eigenvalues = &body.modes().eigenvalue;
+    let significances = significances(&situation, body);
+
+    watch(Event::Phase("bounds"));
+    let mut trials = bounded(&cases, true)?;
+    let by_bounds = trials.iter().find(|trial| trial.passed()).map(|trial| trial.kept);
+    let whole = by_bounds.map_or(held, |kept| kept.and(held));
+    let all: Vec<usize> = (0..body.n_modes()).collect();
+    let mut choice = Choice { groups: whole, modes: all.clone(), shares: Vec::new(), chosen: None };
+    let mut diagnostics = stage.found.clone();
+    let mode_reason;
+    let mut short_of = None;
+    match scene.run.duration {
+        None => {
+            let band = scene.requirements.band;
+            let within = |&j: &usize| {
+                let frequency = eigenvalues[j].sqrt() / std::f64::consts::TAU;
+                // Residual vectors are what makes up for the modes beyond the band.
+                let free = body.modes().provenance.get(j).is_none_or(|from| from == "free mode");
+                band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
+            };
+            let within: Vec<usize> = all.iter().copied().filter(within).collect();
+            if !within.is_empty() {
+                choice.modes = within;
+            }
+            mode_reason = match band {
+                Some(band) => {
+                    format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
+                }
+                None => "the scene has neither a duration nor a band: all".to_owned(),
+            };
+        }
+        Some(_) => {
+            watch(Event::Phase("reference motion"));
+            let mut references = Vec::new();
+            for case in &cases {
+                let (reference, said) = case.bench().motion(whole)?;
+                diagnostics.extend(said);
+                references.push(reference);
+            }
+            let measures = references.iter().map(|reference| Measure::new(body, reference));
+            let tried: Vec<_> = cases.iter().map(Case::bench).zip(measures).collect();
+            let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
+            if situation.spin.value > SLACK_OF_RANGE * largest
+                && scene.requirements.motion.angular_velocity.is_some()
+            {
+                short_of = Some((largest, situation.spin.value));
+            }
+            watch(Event::Phase("trials"));
+            let search = Search { cases: &tried, by_bounds: by_bounds.is_some() };
+            mode_reason = match scene.requirements.multiplications {
+                Some(most) => match search.within_cost(most, &mut choice, &mut trials)? {
+                    true => format!("the most accurate of at most {most} multiplications"),
+                    false => format!("no model takes {most} multiplications or fewer: everything is kept"),
+                },
+                None => {
+                    if short_of.is_none() {
+                        search.terms(&mut choice, &mut trials)?;
+                    }
+                    search.modes(&mut choice, &mut trials)?;
+                    if short_of.is_none() {
+                        search.fewer_terms(&mut choice, &mut trials)?;
+                    }
+                    "the fewest whose motion is within the tolerances".to_owned()
+                }
+            };
+            let mut chosen = Vec::new();
+            let mut growth = None;
+            for (bench, measure) in &tried {
+                let (trial, history) =
+                    bench.measured(measure, &choice.modes, choice.groups, search.budget())?;
+                let own = history.and_then(|history| growth_of(bench, measure, &history));
+                growth = [growth, own].into_iter().flatten().reduce(f64::max);
+                diagnostics.extend(resonances(bench, measure, &choice.modes));
+                chosen.push(trial);
+            }
+            diagnostics.extend(growth.map(phase_drifts));
+            choice.chosen = Some(worst(chosen.into_iter()));
+        }
+    }
+    let terms = decisions(body, scene, &situation.spin, &choice, &trials, short_of);
+    let tolerance = scene.requirements.tolerance;
+    Ok(Selection {
+        scene: scene.name.clone(),
+        body: body.source().name.clone(),
+        inputs: situation.inputs().into_iter().cloned().collect(),
+        tolerance: [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction],
+        significances,
+        multiplications: multiplications(body, held),
+        terms,
+        guideline: guideline(choice.groups),
+        groups: choice.groups,
+        n_modes: all.len(),
+        participations: participations(body, scene, &loads, &choice.modes),
+        modes: choice.modes,
+        shares: choice.shares,
+        mode_reason,
+        chosen: choice.chosen,
+        most_multiplications: scene.requirements.multiplications,
+        trials,
+        diagnostics: once(diagnostics),
+    })
+}
+
+/// Each diagnostic once.
+fn once(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let mut kept: Vec<Diagnostic> = Vec::new();
+    for diagnostic in diagnostics {
+        if !kept.contains(&diagnostic) {
+            kept.push(diagnostic);
+        }
+    }
+    kept
+}

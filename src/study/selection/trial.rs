@@ -1,0 +1,306 @@
+//! Models with fewer terms or modes, tried: by bounds, and by integration.
+
+use super::along::Along;
+use super::bounds::Lacking;
+use super::norms::Norms;
+use super::rows::PointRows;
+use super::situation::Situation;
+use super::variation::Variation;
+use crate::base::diagnostic::Diagnostic;
+use crate::base::error::Result;
+use crate::body::flex_body::{FlexBody, Groups};
+use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
+use crate::motion::scene::{
+    ErrorHistory, History, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin,
+    Trace, ends_a_run, simulate, trace, trace_at,
+};
+use nalgebra::DMatrix;
+use std::f64::consts::TAU;
+
+/// Instants per shortest period that bounds look at a motion, and how many they look at in all.
+const INSTANTS_PER_PERIOD: f64 = 20.0;
+const MOST_INSTANTS: usize = 20_000;
+
+/// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a spin is looked for.
+const LEAST_INSTANTS: usize = 500;
+
+/// A model with fewer terms or modes and the error that it makes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Groups that it has.
+    pub kept: Groups,
+    /// Number of modes that it has.
+    pub modes: usize,
+    /// Multiplications of an evaluation of its equations.
+    pub multiplications: usize,
+    /// 0 and 1: guaranteed bounds; 2: a measured motion.
+    pub tier: u8,
+    /// Its errors, or bounds of them; none where there is no bound or the integration failed.
+    pub errors: Option<OutputErrors>,
+    /// What remains of the tolerances for it: 1, or what other decisions leave.
+    pub budget: f64,
+    /// Largest error over its tolerance.
+    pub worst: f64,
+    /// Why there are no errors; empty where there are.
+    pub remark: String,
+}
+
+impl Trial {
+    /// Whether the errors are within what the tolerances leave.
+    pub fn passed(&self) -> bool {
+        self.worst <= self.budget
+    }
+}
+
+/// A body and a scene that trials are made with, both on their [`Stage`](crate::motion::scene::Stage).
+pub struct Bench<'a> {
+    /// The body, with the damping of the scene.
+    pub body: &'a FlexBody,
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What it means for the body.
+    pub situation: &'a Situation,
+    /// Where its loads act.
+    pub loads: &'a [BodyPoint],
+    /// Watched points.
+    pub watched: &'a [BodyPoint],
+    /// Memory for recordings.
+    pub memory: Option<u64>,
+}
+
+impl Bench<'_> {
+    /// The continuous motion of the body with the groups `kept`.
+    ///
+    /// # Errors
+    /// As [`trace`].
+    pub fn motion(&self, kept: Groups) -> Result<(Trace, Vec<Diagnostic>)> {
+        let mut scene = self.scene.clone();
+        scene.run.terms = Terms::ALL.held(kept);
+        trace(self.body, &scene, self.memory, |_| ())
+    }
+
+    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the loads and the spin. `None` where
+    /// these would be too many.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    pub fn fine_motion(&self, kept: Groups) -> Result<Option<Recording>> {
+        let mut scene = self.scene.clone();
+        let wanted = (self.situation.duration.value * self.fastest() / TAU * INSTANTS_PER_PERIOD).ceil();
+        if wanted.is_nan() || wanted > MOST_INSTANTS as f64 {
+            return Ok(None);
+        }
+        scene.run.outputs = (wanted as usize).max(LEAST_INSTANTS);
+        scene.run.terms = Terms::ALL.held(kept);
+        Ok(Some(simulate(self.body, &scene, self.memory, |_| ())?.0))
+    }
+
+    /// Largest circular frequency of anything in the motion of the body. What a spin does between two of its breaks is one half of a period.
+    fn fastest(&self) -> f64 {
+        let duration = self.situation.duration.value;
+        let modes = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+        let histories = self.scene.loads.iter().map(|load| &load.history);
+        let tones = histories.chain(self.scene.driving()).map(|history| match history {
+            History::Sine { frequency, .. } => TAU * frequency,
+            _ => 0.0,
+        });
+        let mut breaks = self.scene.rotation().map_or(Vec::new(), |(_, rate)| rate.breaks());
+        breaks.retain(|&time| 0.0 < time && time < duration);
+        let ends = [0.0].into_iter().chain(breaks).chain([duration]);
+        let ends: Vec<f64> = ends.collect();
+        let pieces = ends.windows(2).map(|ends| 0.5 * TAU / (ends[1] - ends[0]));
+        tones.chain(pieces).fold(modes, f64::max) + self.situation.spin.value
+    }
+
+    /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure` holds; and how its errors grow.
+    ///
+    /// # Errors
+    /// Those of [`simulate`] other than FB540 and FB550, which the trial notes.
+    pub fn measured(
+        &self,
+        measure: &Measure<'_>,
+        modes: &[usize],
+        kept: Groups,
+        budget: f64,
+    ) -> Result<(Trial, Option<ErrorHistory>)> {
+        let whole = measure.body();
+        let own;
+        let body = if modes.len() == whole.n_modes() {
+            whole
+        } else {
+            own = whole.reduced(modes, whole.invariants().groups, Vec::new())?;
+            &own
+        };
+        let mut scene =
+            if modes.len() == whole.n_modes() { self.scene.clone() } else { self.scene.of_modes(modes) };
+        scene.run.terms = Terms::ALL.held(kept);
+        // The same steps: errors are those of the model.
+        scene.run.scheme = measure.trace().scheme;
+        let history = match trace_at(body, &scene, &measure.trace().time, self.memory) {
+            Ok(trace) => Ok(measure.of_subset(&trace, modes)),
+            Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
+                Err(error.diagnostics()[0].message().to_owned())
+            }
+            Err(error) => return Err(error),
+        };
+        let errors = history.as_ref().ok().map(ErrorHistory::largest);
+        let trial = Trial {
+            kept,
+            modes: modes.len(),
+            multiplications: multiplications(body, kept),
+            tier: 2,
+            errors,
+            budget,
+            worst: errors.map_or(f64::INFINITY, |errors| errors.worst(&self.scene.requirements.tolerance)),
+            remark: history.as_ref().err().cloned().unwrap_or_default(),
+        };
+        Ok((trial, history.ok()))
+    }
+
+    /// The trial by bounds of a model with the groups `kept`. With its motion `run`, the load that the dropped terms are to its error is taken
+    /// along that, at its instants; without, at the largest motion that loads and rotation allow.
+    pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: Groups, budget: f64) -> Trial {
+        let mut trial = Trial {
+            kept,
+            modes: self.body.n_modes(),
+            multiplications: multiplications(self.body, kept),
+            tier: norms.tier,
+            errors: None,
+            budget,
+            worst: f64::INFINITY,
+            remark: String::new(),
+        };
+        match self.bounds(norms, run, kept) {
+            Ok(errors) => {
+                trial.worst = errors.worst(&self.scene.requirements.tolerance);
+                trial.errors = Some(errors);
+            }
+            Err(reason) => trial.remark = reason,
+        }
+        trial
+    }
+
+    fn bounds(
+        &self,
+        norms: &Norms,
+        run: Option<&Recording>,
+        kept: Groups,
+    ) -> std::result::Result<OutputErrors, String> {
+        let driven = self.situation.driven.as_ref().map_err(String::clone)?;
+        let dropped = kept.complement();
+        let softened = || "the spin may take the stiffness of some motion".to_owned();
+        let (own, residual, lacking) = match run {
+            Some(run) => {
+                let along = Along::new(self, run, kept, norms);
+                (along.amplitude, vec![along.load], Lacking { torque: along.torque, stiff: along.stiff })
+            }
+            None => {
+                let own = driven.amplitude(kept, norms).ok_or_else(softened)?;
+                let residual = driven.residual(dropped, norms, &own);
+                (own, residual, driven.lacking(dropped, norms, &own))
+            }
+        };
+        let error = driven.error(norms, &residual).ok_or_else(softened)?;
+        // The levers of the loads deform with the body.
+        let rows = PointRows::new(self.body);
+        let lever = |(load, point): (&Load, &BodyPoint)| {
+            let largest = Variation::of(&load.history, driven.rotation.duration).largest;
+            largest * load.force.norm() * self.reach_of(&rows.of(point))
+        };
+        let levers = self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>() * error.energy;
+        let torque = driven.torque_error(norms, &own, &error, &lacking) + levers;
+
+        // Relative to what is certain of the whole motion, or to the least that counts.
+        let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
+        let relative = |error: f64, of_run: &dyn Fn(&Recording) -> f64, least: f64| {
+            error / (run.map_or(0.0, of_run) - error).max(least)
+        };
+        let paths = |run: &Recording| run.extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max);
+        let energies = |run: &Recording| run.extremes.elastic.sqrt();
+        let torques = |run: &Recording| {
+            run.reactions.iter().flatten().map(|(_, torque)| torque.norm()).fold(0.0, f64::max)
+        };
+        // The inertia whose radius of gyration a recording has: of a plane body that about its normal alone.
+        let inertia = self.body.invariants().inertia();
+        let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
+        let rate = |spin: &Spin| {
+            let even =
+                (0..=LEAST_INSTANTS).map(|i| driven.rotation.duration * (i as f64 / LEAST_INSTANTS as f64));
+            even.map(|time| spin.rate.at(time).0.abs()).fold(0.0, f64::max)
+        };
+        let least_torque = LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2);
+        Ok(OutputErrors {
+            attitude: 0.0,
+            deflection: Some(relative(self.reach() * error.energy, &paths, least.deflection)),
+            stress: Some(relative(error.energy / 2f64.sqrt(), &energies, least.root_energy)),
+            reaction: self.scene.spin.is_some().then(|| relative(torque, &torques, least_torque)),
+        })
+    }
+
+    /// Largest deflection of a watched point, or without any of a node, for |Lambda^(1/2) q| = 1.
+    fn reach(&self) -> f64 {
+        let mut reach = 0.0f64;
+        self.each_watched(|rows| reach = reach.max(self.reach_of(rows)));
+        reach
+    }
+
+    fn reach_of(&self, rows: &DMatrix<f64>) -> f64 {
+        let eigenvalues = &self.body.modes().eigenvalue;
+        PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / eigenvalues[j].sqrt()))
+    }
+
+    /// Hands over Psi of every watched point; of every node where there are none.
+    fn each_watched(&self, mut hear: impl FnMut(&DMatrix<f64>)) {
+        let rows = PointRows::new(self.body);
+        match self.watched {
+            [] => (0..self.body.n_nodes()).for_each(|node| hear(&rows.of_node(node))),
+            points => points.iter().for_each(|point| hear(&rows.of(point))),
+        }
+    }
+
+    /// What every mode does in a motion of the body.
+    pub fn shares(&self, trace: &Trace) -> Vec<ModeShare> {
+        let mut longest = vec![0.0f64; self.body.n_modes()];
+        self.each_watched(|rows| {
+            for (longest, column) in longest.iter_mut().zip(rows.column_iter()) {
+                *longest = longest.max(column.norm());
+            }
+        });
+        let extremes = &trace.extremes;
+        let energy = extremes.elastic.sqrt();
+        let deflection = match extremes.watched.is_empty() {
+            true => extremes.deflection.value * self.body.extent(),
+            false => extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max),
+        };
+        let share = |j: usize| {
+            let amplitude = extremes.amplitudes[j];
+            let moved = longest[j] * amplitude;
+            let root_energy = (0.5 * self.body.modes().eigenvalue[j]).sqrt() * amplitude;
+            ModeShare {
+                amplitude,
+                deflection: moved / deflection.max(trace.resolution.deflection),
+                stress: root_energy / energy.max(trace.resolution.root_energy),
+                kept: true,
+            }
+        };
+        (0..self.body.n_modes()).map(share).collect()
+    }
+}
+
+/// What a mode does in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeShare {
+    /// Largest |q|.
+    pub amplitude: f64,
+    /// Largest deflection of a watched point (without any: of a node) by this mode alone, relative to the largest of all together.
+    pub deflection: f64,
+    /// Root of its largest elastic energy, relative to the largest of all together.
+    pub stress: f64,
+    /// Whether the mode is kept.
+    pub kept: bool,
+}
+
+/// Multiplications of an evaluation of the equations of `body` with `groups`.
+pub fn multiplications(body: &FlexBody, groups: Groups) -> usize {
+    EquationsOfMotion::new(body, Terms::ALL.held(groups)).multiplications()
+}

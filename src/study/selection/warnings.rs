@@ -1,0 +1,80 @@
+//! What may go wrong in a scene although the tolerances hold.
+
+use super::rows::PointRows;
+use super::trial::Bench;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::motion::scene::{Axes, ErrorHistory, History, Measure};
+use std::f64::consts::TAU;
+
+/// Errors of the second half of a run over those of the first from which on they are said to grow.
+const GROWING: f64 = 1.8;
+
+/// Errors below this part of their tolerance do not matter yet, though they grow.
+const MATTERS: f64 = 0.1;
+
+/// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths of its resonance.
+const NEAR: f64 = 0.1;
+
+/// How much more the errors of a model grow from the first half of the run to the second than the motion does, where those of the second
+/// matter: about 1 for errors that stay in step with the motion, more where phases run apart.
+pub(super) fn growth_of(bench: &Bench<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
+    let growth = |(first, second): (f64, f64), allowed: f64| {
+        (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
+    };
+    let energies = measure.trace().elastic.iter().map(|energy| energy.max(0.0).sqrt());
+    let motion = growth(errors.halves(&energies.collect::<Vec<_>>()), 0.0)?;
+    let tolerance = &bench.scene.requirements.tolerance;
+    // The attitude has no amplitude: it grows when it grows.
+    let of_attitude = growth(errors.halves(&errors.attitude), tolerance.attitude);
+    let of_stress = errors.stress.as_ref().and_then(|stress| growth(errors.halves(stress), tolerance.stress));
+    let beyond_motion = of_stress.map(|growth| growth / motion.max(1.0));
+    [of_attitude, beyond_motion].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
+}
+
+/// The warning about it.
+pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
+    let message = format!(
+        "errors of the selected model grow {growth:.1} times more than the motion from the first half of the run to the second"
+    );
+    Diagnostic::new(Code::PhaseDrifts, message)
+}
+
+/// Modes that are dropped and that a load drives near their frequency.
+pub(super) fn resonances(bench: &Bench<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
+    let (body, scene) = (bench.body, bench.scene);
+    let rows = PointRows::new(body);
+    let spin = measure.trace().extremes.spin;
+    let mut found = Vec::new();
+    for (load, point) in scene.loads.iter().zip(bench.loads) {
+        // Seen from the body a force that is fixed in space turns the other way round.
+        let turning = if load.axes == Axes::World { spin } else { 0.0 };
+        let rates: Vec<f64> = match &load.history {
+            History::Sine { frequency, .. } => {
+                [-1.0, 0.0, 1.0].iter().map(|sign| (TAU * frequency + sign * turning).abs()).collect()
+            }
+            _ => vec![turning],
+        };
+        let modal = rows.of(point);
+        for (j, lambda) in body.modes().eigenvalue.iter().enumerate() {
+            let moved = modal.column(j).norm() * load.force.norm();
+            let near = |rate: &&f64| {
+                let width = NEAR.max(3.0 * body.modes().damping_ratio[j]);
+                (*rate / lambda.sqrt() - 1.0).abs() < width
+            };
+            if moved == 0.0 || modes.binary_search(&j).is_ok() {
+                continue;
+            }
+            if let Some(rate) = rates.iter().find(near) {
+                let message = format!(
+                    "mode {} of frequency {:.4e} is dropped, and the load at {} drives it at {:.4e} (oscillations per time)",
+                    j + 1,
+                    lambda.sqrt() / TAU,
+                    load.at,
+                    rate / TAU
+                );
+                found.push(Diagnostic::new(Code::ResonanceDropped, message));
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,299 @@
+//! The study: every candidate simulated, its errors measured, then its times.
+
+use super::candidate::candidates;
+use super::{Candidate, NodalReference, Recommendation, Source, front, timing};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::memory::refuse_beyond;
+use crate::base::progress::{Event, Watch};
+use crate::body::flex_body::FlexBody;
+use crate::formats::flex_body_file;
+use crate::model::FeModel;
+use crate::motion::dynamics::{EquationsOfMotion, Terms};
+use crate::motion::scene::{
+    Measure, OutputErrors, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at,
+};
+use crate::numerics::integration::Work;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What errors are measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReferenceKind {
+    /// The motion of the first source, with everything that it has.
+    Full,
+    /// The unreduced equations of all nodes.
+    Nodal,
+}
+
+impl ReferenceKind {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Nodal => "nodal",
+        }
+    }
+}
+
+/// How a study is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Integrations whose median time counts; of those that take long, fewer.
+    pub repeat: usize,
+    /// Bytes that there are; `None` where it is not known.
+    pub memory: Option<u64>,
+}
+
+/// Times of a candidate. Unit: s.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Times {
+    /// To make the body that it is of, where that is known.
+    pub preprocessing: Option<f64>,
+    /// Of one evaluation of the equations.
+    pub evaluation: f64,
+    /// Of the simulation.
+    pub integration: f64,
+}
+
+/// What was found of a candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Largest errors, with the steps of the reference.
+    pub errors: OutputErrors,
+    /// Largest ratio of error to tolerance.
+    pub worst: f64,
+    /// [`ErrorHistory::growth`](crate::motion::scene::ErrorHistory::growth).
+    pub growth: Option<f64>,
+    /// Multiplications of one evaluation of the equations.
+    pub multiplications: usize,
+    /// Size of its file. Unit: bytes.
+    pub bytes: u64,
+    /// Work of its simulation, with the steps that a scene without a given step takes for it.
+    pub work: Work,
+    /// Times.
+    pub times: Times,
+}
+
+/// Why there is nothing of a candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Failed(pub Diagnostic);
+
+/// A candidate and what was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// What it is.
+    pub candidate: Candidate,
+    /// What it is made of.
+    pub source: String,
+    /// Frequency of its last mode in hertz.
+    pub last_frequency_hz: f64,
+    /// What was measured.
+    pub outcome: std::result::Result<Measured, Failed>,
+}
+
+/// A finished study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trade {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the body's model.
+    pub body: String,
+    /// What errors are measured against.
+    pub reference: ReferenceKind,
+    /// What the tolerances are.
+    pub tolerance: Tolerance,
+    /// Multiplications that the scene allows instead.
+    pub allowed: Option<usize>,
+    /// All candidates; the first is the whole body of the reference.
+    pub rows: Vec<Row>,
+    /// Rows of the Pareto front, ascending in cost.
+    pub front: Vec<usize>,
+    /// The row to take.
+    pub recommended: Recommendation,
+    /// What has to be said about the motion of the reference.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Measures every candidate of `sources` in `scene`. The first source is the reference; others are [`Source::beside`] it.
+///
+/// Errors are those of the model: all candidates are integrated with the method and the step of the reference. They are found on all
+/// threads; the times afterwards, one after the other. Everything but the times is the same at any number of threads.
+///
+/// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
+///
+/// # Errors
+/// Those of [`trace`] and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the
+/// temporary folder.
+pub fn trade(
+    sources: &[Source],
+    scene: &Scene,
+    nodal: Option<&FeModel>,
+    settings: &Settings,
+    watch: Watch<'_>,
+) -> Result<Trade> {
+    let Some(source) = sources.first() else {
+        return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
+    };
+    watch(Event::Phase("reference"));
+    nodal.map(|model| NodalReference::refuse(model, scene)).transpose()?;
+    let stage = Stage::new(source.body(), scene)?;
+    let staged = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
+    let (sources, source) = (&staged[..], &staged[0]);
+    // Groups are what candidates differ in.
+    let mut scene = stage.scene.into_owned();
+    scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
+    let full = |part| watch(Event::Fraction(part));
+    let (motion, said) = trace(source.body(), &scene, settings.memory, full)?;
+    refuse_too_much(sources, &motion, settings.memory)?;
+    let diagnostics = [stage.found, said].concat();
+    let nodal = match nodal {
+        Some(model) => {
+            watch(Event::Phase("nodal reference"));
+            Some(NodalReference::new(model, source.body(), &scene, &motion, settings.memory, watch)?)
+        }
+        None => None,
+    };
+    let measure = Measure::new(source.body(), &motion);
+    let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref() };
+
+    watch(Event::Phase("errors"));
+    let all = candidates(sources, &motion, scene.carried.is_some());
+    let (count, done) = (all.len() as f64, AtomicUsize::new(0));
+    let step = |done: &AtomicUsize| {
+        let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
+        watch(Event::Fraction(finished as f64 / count));
+    };
+    let found = all
+        .into_par_iter()
+        .map(|candidate| {
+            let row = job.measure(candidate);
+            step(&done);
+            row
+        })
+        .collect::<Result<Vec<_>>>()?;
+    watch(Event::Phase("times"));
+    let done = AtomicUsize::new(0);
+    let timed = |mut row: Row| {
+        job.time(&mut row, settings.repeat)?;
+        step(&done);
+        Ok(row)
+    };
+    let rows = found.into_iter().map(timed).collect::<Result<Vec<_>>>()?;
+    let allowed = scene.requirements.multiplications;
+    Ok(Trade {
+        scene: scene.name.clone(),
+        body: source.body().source().name.clone(),
+        reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
+        tolerance: scene.requirements.tolerance,
+        allowed,
+        front: front(&rows),
+        recommended: Recommendation::new(&rows, allowed),
+        rows,
+        diagnostics,
+    })
+}
+
+/// What all candidates have in common.
+struct Job<'j> {
+    sources: &'j [Source],
+    scene: &'j Scene,
+    motion: &'j Trace,
+    measure: &'j Measure<'j>,
+    nodal: Option<&'j NodalReference<'j>>,
+}
+
+impl Job<'_> {
+    /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
+    fn measure(&self, candidate: Candidate) -> Result<Row> {
+        let source = &self.sources[candidate.source];
+        let last = candidate.modes.last().copied().unwrap_or(0);
+        let outcome = match self.measured(source, &candidate) {
+            Ok(measured) => Ok(measured),
+            Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
+                Err(Failed(error.diagnostics()[0].clone()))
+            }
+            Err(error) => return Err(error),
+        };
+        Ok(Row {
+            source: source.name().to_owned(),
+            last_frequency_hz: source.body().frequencies_hz()[last],
+            candidate,
+            outcome,
+        })
+    }
+
+    fn measured(&self, source: &Source, candidate: &Candidate) -> Result<Measured> {
+        let body = candidate.body(source)?;
+        let mut scene = self.own_scene(source, &body, candidate);
+        scene.run.scheme = self.motion.scheme;
+        let motion = trace_at(&body, &scene, &self.motion.time, None)?;
+        let history = match self.nodal {
+            Some(nodal) => nodal.errors(&body, &motion),
+            None => source.errors(self.measure, &body, &candidate.modes, &motion),
+        };
+        let history = history.ok_or_else(|| {
+            let message =
+                format!("the modes of {} cannot be compared with those of the reference", source.name());
+            Error::from(Diagnostic::new(Code::BodyIncomparable, message))
+        })?;
+        let errors = history.largest();
+        Ok(Measured {
+            errors,
+            worst: errors.worst(&scene.requirements.tolerance),
+            growth: history.growth(),
+            multiplications: EquationsOfMotion::new(&body, scene.run.terms).multiplications(),
+            bytes: file_size(&body)?,
+            work: motion.work,
+            times: Times { preprocessing: source.preprocessing(), evaluation: 0.0, integration: 0.0 },
+        })
+    }
+
+    fn time(&self, row: &mut Row, repeat: usize) -> Result<()> {
+        let Ok(measured) = &mut row.outcome else { return Ok(()) };
+        let source = &self.sources[row.candidate.source];
+        let body = row.candidate.body(source)?;
+        let scene = self.own_scene(source, &body, &row.candidate);
+        let timed = timing::integration(&body, &scene, repeat);
+        match (timed, timing::evaluation(&body, scene.run.terms)) {
+            (Ok((integration, work)), Ok(evaluation)) => {
+                measured.work = work;
+                (measured.times.integration, measured.times.evaluation) = (integration, evaluation);
+            }
+            (Err(error), _) => row.outcome = Err(Failed(error.diagnostics()[0].clone())),
+            (_, Err(reason)) => {
+                row.outcome = Err(Failed(Diagnostic::new(Code::SimulationStopped, reason.to_string())));
+            }
+        }
+        Ok(())
+    }
+
+    fn own_scene(&self, source: &Source, body: &FlexBody, candidate: &Candidate) -> Scene {
+        source.scene(self.scene, body, &candidate.modes, &self.motion.start)
+    }
+}
+
+/// Size of the file of `body`, written to the temporary folder and removed.
+fn file_size(body: &FlexBody) -> Result<u64> {
+    let name = format!("flexbody-trade-{}.flex.h5", std::process::id());
+    let slot = flex_body_file::prepare_output(std::env::temp_dir().join(name))?;
+    flex_body_file::fill_slot(body, &slot)?;
+    Ok(std::fs::metadata(slot.temporary()).map_or(0, |meta| meta.len()))
+}
+
+/// Every thread has a body, its equations and its motion, beside that of the reference, which is there.
+fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -> Result<()> {
+    const DOUBLE: f64 = 8.0;
+    /// W1 to W3, their panels and copies, and S: squares of the modes.
+    const SQUARES: f64 = 40.0;
+    let most =
+        |of: &dyn Fn(&FlexBody) -> usize| sources.iter().map(|s| of(s.body())).max().unwrap_or(0) as f64;
+    let (nodes, modes) = (most(&FlexBody::n_nodes), most(&FlexBody::n_modes));
+    let body = nodes * (7.0 + 6.0 * modes) + SQUARES * modes * modes;
+    let motion = reference.bytes(most(&FlexBody::n_modes) as usize);
+    let threads = rayon::current_num_threads() as f64;
+    let needed = threads * (DOUBLE * 2.0 * body + motion);
+    let what = format!("a trade study on {threads} threads");
+    refuse_beyond(memory, needed, &what, "use fewer --threads or modes, or a shorter `duration`")
+}
