@@ -52,7 +52,7 @@ after the body tumbled free for {turns} periods of its first mode at a twentieth
 Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in frequencies, I0 or W1, or from its files in W2 and W3,
 without a warning that says so. What `flexbody` itself leaves of W2 and W3 can be less where two modes differ by less than the digits of K resolve (bricks of 1 : 1e3): their span is
 right, and the motion with it. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. Written by
-`python3 docs/make_stability.py`, which fails if this is not so; `tests/extremes.rs` holds what is said here.
+`python3 docs/make_stability.py`, which fails if this is not so; `tests/numerics/extremes.rs` holds what is said here.
 
 ![digits kept against digits that the files hold](images/stability.svg)
 """

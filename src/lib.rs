@@ -5,7 +5,7 @@
 //! lumped-mass approximation, into the constant invariants I0, W1, W2, W3. Sources of every equation and the
 //! errata of the literature: `docs/theory.md`.
 //!
-//! Rooms and the arrows between them: `ARCHITECTURE.md`; `tests/architecture.rs` holds them.
+//! Rooms and the arrows between them: `ARCHITECTURE.md`; `tests/program/architecture.rs` holds them.
 
 pub mod base;
 pub mod body;

@@ -2,14 +2,18 @@
 //! Every test binary uses its own part of it.
 #![allow(dead_code)]
 
+pub mod cuboid;
 pub mod elements;
 pub mod equations;
+pub mod exported;
+pub mod file_bodies;
 pub mod files;
 pub mod flexible;
 pub mod general;
 pub mod integrate;
 pub mod jointed;
 pub mod mesh;
+pub mod models;
 pub mod motion;
 pub mod nodal;
 pub mod partial;
@@ -18,5 +22,6 @@ pub mod plane;
 pub mod program;
 pub mod random;
 pub mod reference;
+pub mod report_bodies;
 pub mod scenes;
 pub mod unreduced;

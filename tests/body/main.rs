@@ -1,0 +1,17 @@
+//! From a model to a flexible body: bases, invariants, certified digits, damping, geometric stiffness.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod accepted;
+mod body_units;
+mod certified;
+mod craig_bampton;
+mod craig_bampton_rotations;
+mod damping;
+mod geometric_stiffness;
+mod imported_shapes;
+mod invariants;
+mod partial_bodies;
+mod partial_conversion;
+mod residual_vectors;

@@ -1,0 +1,251 @@
+//! Bodies that another program describes, whatever its modes are: taken as bodies, and audited.
+
+use crate::support::elements::{Kind, MassRule, Material};
+use crate::support::flexible::{body_of, fixture};
+use crate::support::mesh::{Mesh, grid};
+use crate::support::random::Random;
+use faer::Mat;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::provenance::SourceFile;
+use flexbody::base::units::UnitSystem;
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::{BodyFrame, Invariants, condense, primary_differences};
+use flexbody::formats::import::{Adopted, Audit, Foreign, ForeignBody, ForeignFrame, adopt, audit};
+use flexbody::model::{FeModel, GeometricStiffness};
+use flexbody::report::{Tolerances, compare};
+use std::path::Path;
+
+/// A block without any symmetry, its model and its body.
+fn block(modes: usize) -> (FeModel, FlexBody) {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Kind::Hex8, &grid([4, 3, 2]), |[x, y, z]| {
+        [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
+    });
+    let assembly = mesh.assemble(&rubber, MassRule::Consistent);
+    let model = FeModel::from_raw(assembly.raw_model()).expect("a body").model;
+    (model, body_of(assembly.raw_model(), modes, BodyFrame::Principal))
+}
+
+/// A file that describes `body` by other modes.
+fn foreign(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Foreign {
+    let frame = |i: usize| ForeignFrame {
+        label: body.nodes().ids[i].to_string(),
+        interface: None,
+        position: body.nodes().positions[i],
+        translation: shape.as_ref().subrows(3 * i, 3).to_owned(),
+        rotation: None,
+    };
+    Foreign {
+        format: "test",
+        dialect: String::new(),
+        notes: Vec::new(),
+        checks: Vec::new(),
+        unsound: Vec::new(),
+        body: ForeignBody {
+            name: "block".to_owned(),
+            units: None,
+            inertia: invariants.numbered(),
+            modal_stiffness: invariants.modal_stiffness.clone(),
+            modal_damping: body.modes().modal_damping.clone(),
+            geometric_stiffness: body.geometric_stiffness().to_vec(),
+            frames: (0..body.n_nodes()).map(frame).collect(),
+            lacks: Vec::new(),
+        },
+    }
+}
+
+fn adopted(foreign: &Foreign) -> Result<Adopted, flexbody::base::error::Error> {
+    let source = SourceFile::new("body", Path::new("block.file"), "0".repeat(64));
+    adopt(foreign, source, UnitSystem::default())
+}
+
+fn random(random: &mut Random, rows: usize, columns: usize) -> Mat<f64> {
+    Mat::from_fn(rows, columns, |_, _| random.signed())
+}
+
+/// The rigid motions of the nodes (3n x 6).
+fn rigid(body: &FlexBody) -> Mat<f64> {
+    flexbody::model::rigid_fields(&body.nodes().positions, 3, [0.0; 3], 1.0)
+}
+
+fn worst_difference(a: &Invariants, b: &Invariants) -> f64 {
+    primary_differences(a, b).into_iter().map(|(_, difference)| difference).fold(0.0, f64::max)
+}
+
+#[test]
+fn free_surface_modes_are_taken_to_the_last_bit() {
+    for name in ["bracket_hex20", "frame_beams", "shell_folded", "turbine_blade"] {
+        let body = fixture(name, 6, BodyFrame::Principal);
+        let Adopted { body: taken, diagnostics } =
+            adopted(&foreign(&body, &body.modes().shape, body.invariants())).expect("a body");
+        assert!(diagnostics.is_empty(), "{name}: {diagnostics:?}");
+        assert_eq!(taken.modes().shape, body.modes().shape, "{name}");
+        assert_eq!(taken.invariants().modal_stiffness, body.invariants().modal_stiffness, "{name}");
+        let (own, told) = (taken.invariants(), body.invariants());
+        // What a file does not tell of a general mass is W0 beyond C1.
+        let mut without_w0 = told.clone();
+        if let Some(general) = &mut without_w0.general {
+            let solid = Invariants { general: None, ..told.clone() };
+            general.w0 = solid.w0();
+        }
+        assert_eq!(own.general.is_some(), told.general.is_some(), "{name}");
+        assert!(
+            worst_difference(&without_w0, own) < 1e-13,
+            "{name}: {:?}",
+            primary_differences(&without_w0, own)
+        );
+    }
+}
+
+#[test]
+fn modes_of_any_frame_and_basis_give_the_same_body() {
+    let (model, body) = block(7);
+    let mut numbers = Random(5);
+    let (nf, mass) = (body.n_modes(), model.scalar_mass().expect("a solid"));
+    // Every mode with a rigid motion as large as itself, and all mixed with each other.
+    let mix = random(&mut numbers, nf, nf) + Mat::<f64>::identity(nf, nf);
+    let own = &body.modes().shape;
+    let size = own.norm_max();
+    let shape = own * &mix + rigid(&body) * (random(&mut numbers, 6, nf) * faer::Scale(size));
+    let stiffness = mix.transpose() * &body.invariants().modal_stiffness * &mix;
+    let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
+    let mut told = foreign(&body, &shape, &invariants);
+    // A damping that is not diagonal, and what it is in the modes of the body.
+    let damping = Mat::from_fn(nf, nf, |i, j| 0.01 * (1 + i.min(j)) as f64);
+    told.body.modal_damping = Some(mix.transpose() * &damping * &mix);
+    let load = flexbody::model::UnitLoad { kind: flexbody::model::LoadKind::Spin, component: 1 };
+    told.body.geometric_stiffness =
+        vec![GeometricStiffness { load, matrix: mix.transpose() * &damping * &mix }];
+
+    let Adopted { body: taken, diagnostics } = adopted(&told).expect("a body");
+    assert_eq!(diagnostics.iter().map(|d| d.code()).collect::<Vec<_>>(), [Code::ForeignChanged]);
+    let failed: Vec<_> = taken.identities(BodyFrame::Model).into_iter().filter(|c| !c.passed).collect();
+    assert!(failed.is_empty(), "{failed:?}");
+    let mut in_frame = body.clone().into_parts();
+    in_frame.frame = *taken.frame();
+    in_frame.units = taken.units().clone();
+    let in_frame = FlexBody::new(in_frame).expect("a body");
+    let strict = Tolerances { frequency: 1e-11, invariants: 1e-9, ..Tolerances::default() };
+    let comparison = compare(&in_frame, &taken, &strict).expect("comparable");
+    assert!(comparison.same_nodes() && comparison.passed(), "{}", comparison.text());
+    // Signs of the modes apart.
+    let sign = |j: usize| {
+        let products = (0..3 * body.n_nodes()).map(|row| own[(row, j)] * taken.modes().shape[(row, j)]);
+        products.sum::<f64>().signum()
+    };
+    for found in [taken.modes().modal_damping.as_ref().expect("told"), &taken.geometric_stiffness()[0].matrix]
+    {
+        let apart = (0..nf * nf)
+            .map(|at| (at / nf, at % nf))
+            .map(|(i, j)| (found[(i, j)] * sign(i) * sign(j) - damping[(i, j)]).abs())
+            .fold(0.0, f64::max);
+        assert!(apart < 1e-9 * damping.norm_max(), "{apart:e}");
+    }
+}
+
+#[test]
+fn a_rigid_motion_among_the_modes_is_left_out() {
+    let (model, body) = block(4);
+    let mass = model.scalar_mass().expect("a solid");
+    let rigid = rigid(&body);
+    let own = &body.modes().shape;
+    let shape = Mat::from_fn(own.nrows(), 5, |row, j| match j {
+        0 => own[(row, 0)],
+        1 => rigid[(row, 4)],
+        _ => own[(row, j - 1)],
+    });
+    let lambda = &body.modes().eigenvalue;
+    let stiffness = Mat::from_fn(5, 5, |i, j| match (i, i == j) {
+        (1, _) | (_, false) => 0.0,
+        (0, _) => lambda[0],
+        _ => lambda[i - 1],
+    });
+    let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
+    let Adopted { body: taken, diagnostics } = adopted(&foreign(&body, &shape, &invariants)).expect("a body");
+    assert!(diagnostics[0].message().ends_with("rigid motions left out: 2"), "{}", diagnostics[0]);
+    assert_eq!(taken.n_modes(), 4);
+    assert!(worst_difference(body.invariants(), taken.invariants()) < 1e-10);
+}
+
+#[test]
+fn what_is_no_body_is_refused_in_words() {
+    let (_, body) = block(3);
+    let good = foreign(&body, &body.modes().shape, body.invariants());
+    let refused = |change: &dyn Fn(&mut ForeignBody), code: Code, words: &str| {
+        let mut bad = good.clone();
+        change(&mut bad.body);
+        let error = adopted(&bad).expect_err(words);
+        let first = &error.diagnostics()[0];
+        assert!(first.code() == code && first.message().contains(words), "{words}: {first}");
+    };
+    refused(&|b| b.frames.clear(), Code::ForeignIncomplete, "no node");
+    refused(&|b| b.inertia.i1 = -1.0, Code::ForeignIncomplete, "m > 0");
+    refused(&|b| b.inertia.i7[(0, 0)] = f64::NAN, Code::ForeignIncomplete, "no NaN");
+    refused(&|b| b.modal_stiffness[(0, 0)] *= -1.0, Code::ForeignIncomplete, "not positive definite beside");
+    refused(&|b| b.inertia.i3[(0, 1)] = 1e3, Code::ForeignIncomplete, "mode 2 and rigid motion together");
+    // Masses on the axis x.
+    let line = |b: &mut ForeignBody| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into());
+    refused(&line, Code::ForeignIncomplete, "all masses lie on a line");
+    refused(
+        &|b| {
+            b.inertia.i6 = Mat::from_fn(3, 3, |_, _| 1.0);
+            b.inertia.i9 = None;
+        },
+        Code::ForeignIncomplete,
+        "depend on each other",
+    );
+}
+
+#[test]
+fn groups_that_a_file_lacks_are_dropped_and_named() {
+    let (_, body) = block(3);
+    let mut without = foreign(&body, &body.modes().shape, body.invariants());
+    without.body.inertia.i9 = None;
+    without.body.lacks = vec!["inertia that is quadratic in the modes".to_owned()];
+    let Adopted { body: taken, diagnostics } = adopted(&without).expect("a body");
+    assert_eq!(diagnostics[0].code(), Code::ForeignDropped);
+    let (w1, w2, w3) = (taken.invariants().w1(), taken.invariants().w2(), taken.invariants().w3());
+    assert!(w1.is_some() && w2.is_none() && w3.is_some());
+    assert_eq!(taken.terms().len(), 1);
+}
+
+fn codes(found: &Audit) -> Vec<Code> {
+    found.findings().iter().map(|finding| finding.code()).collect()
+}
+
+#[test]
+fn an_audit_passes_a_body_and_names_what_is_wrong_with_another() {
+    let (_, body) = block(4);
+    let good = foreign(&body, &body.modes().shape, body.invariants());
+    let found = audit(&good, 1e-9);
+    assert!(found.passed() && found.checks.len() > 12, "{:?}", found.findings());
+    assert!(found.notes.iter().any(|note| note.contains("free-surface")));
+    let of = |change: &dyn Fn(&mut ForeignBody)| {
+        let mut bad = good.clone();
+        change(&mut bad.body);
+        audit(&bad, 1e-9)
+    };
+    // Lengths of nodes in millimetres, inertia in metres.
+    let millimetres = of(&|b| b.frames.iter_mut().for_each(|f| f.position = f.position.map(|x| 1000.0 * x)));
+    assert_eq!(codes(&millimetres), [Code::AuditUnits]);
+    assert!(millimetres.findings()[0].message().contains("1e-3"), "{}", millimetres.findings()[0]);
+    // An inertia that no body has.
+    assert!(codes(&of(&|b| b.inertia.i7[(0, 0)] *= 9.0)).contains(&Code::AuditImplausible));
+    assert_eq!(codes(&of(&|b| b.inertia.i1 = f64::NAN)), [Code::AuditImplausible]);
+    // What has no mass has one finding, not one for each number that is divided by it.
+    for mass in [0.0, -3.0] {
+        let found = of(&|b| b.inertia.i1 = mass);
+        assert_eq!(codes(&found), [Code::AuditImplausible], "{:?}", found.findings());
+        assert!(found.findings()[0].message().contains("mass is not positive"));
+    }
+    // No body is made of masses on a line (see above), and the audit says so.
+    let line = of(&|b| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into()));
+    assert!(line.findings().iter().any(|f| f.message().contains("all masses lie on a line")), "{line:?}");
+    // A coupling a thousand times too large: modes would carry negative energy.
+    assert!(codes(&of(&|b| b.inertia.i3[(0, 0)] = 1e3)).contains(&Code::AuditIdentity));
+    assert!(codes(&of(&|b| b.modal_stiffness = Mat::zeros(4, 4))).contains(&Code::AuditImplausible));
+    assert!(codes(&of(&|b| b.modal_stiffness[(0, 1)] += 1.0)).contains(&Code::AuditIdentity));
+    // What the tolerance allows passes.
+    let slightly = |by: f64| of(&|b| b.modal_stiffness[(0, 1)] += by * b.modal_stiffness.norm_max());
+    assert!(slightly(1e-10).passed() && !slightly(1e-8).passed());
+}

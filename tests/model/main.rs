@@ -1,0 +1,15 @@
+//! Files that are read and the model that they make: readers, manifest, checks, plausibility.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod general_models;
+mod input_fuzz;
+mod input_hdf5;
+mod input_readers;
+mod input_tables;
+mod interface_names;
+mod manifest_settings;
+mod plane;
+mod plausibility;
+mod split;

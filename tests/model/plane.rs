@@ -1,0 +1,281 @@
+//! Plane bodies: two displacements per node, three rigid motions (theory section 4).
+
+use crate::support::plane::{DENSITY, HEIGHT, LENGTH, YOUNGS, rectangle};
+use crate::support::random::Random;
+use faer::Mat;
+use faer::linalg::solvers::Solve;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{Conversion, ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::body::verification::verify;
+use flexbody::input::{ModelFiles, read_model};
+use flexbody::model::{FeModel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad, check};
+use flexbody::numerics::eigen::{Accuracy, Wanted};
+use flexbody::numerics::linalg::CscMatrix;
+use nalgebra::{Matrix2, Vector2};
+use std::path::{Path, PathBuf};
+
+fn model(raw: RawModel) -> FeModel {
+    check(raw).expect("a sound body").model
+}
+
+fn settings(modes: usize, frame: BodyFrame) -> ConvertSettings {
+    let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
+    ConvertSettings { modes, frame, ..ConvertSettings::default() }
+}
+
+fn converted(model: &FeModel, modes: usize, frame: BodyFrame) -> Conversion {
+    convert(model, &settings(modes, frame), SILENT).expect("a sound body")
+}
+
+fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found}, expected {expected}");
+}
+
+#[test]
+fn rigid_properties_of_a_turned_rectangle_are_exact() {
+    let (angle, origin) = (0.3, [5.0, -2.0]);
+    let body = converted(&model(rectangle(6, 3, angle, origin)), 5, BodyFrame::Principal).body;
+    assert_eq!(body.dimension(), 2);
+    assert_eq!(body.certificate().rigid_modes, 3);
+    assert_eq!(
+        body.certificate().negative_pivots,
+        Some(3 + body.certificate().proved_modes.expect("proved"))
+    );
+    let (mass, inertia) = (DENSITY * LENGTH * HEIGHT, body.invariants().inertia());
+    close(body.invariants().mass, mass, 1e-13, "m");
+    close(inertia[(2, 2)], mass * (LENGTH.powi(2) + HEIGHT.powi(2)) / 12.0, 1e-12, "J0");
+    close(inertia[(0, 0)], mass * HEIGHT.powi(2) / 12.0, 1e-12, "axis along the length");
+    let centre = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos())
+        * Vector2::new(0.5 * LENGTH, 0.5 * HEIGHT)
+        + Vector2::from(origin);
+    close(body.frame().origin.x, centre.x, 1e-13, "centre x");
+    close(body.frame().origin.y, centre.y, 1e-13, "centre y");
+    close(body.frame().axes[(0, 0)], angle.cos(), 1e-12, "first axis");
+    assert_eq!(body.frame().axes.column(2).as_slice(), [0.0, 0.0, 1.0]);
+}
+
+/// The kinetic energy of every nodal motion equals that of the condensed terms: the mass matrix of theory section 4,
+/// J0 = I0_zz, b = W1_zz / 2, C2 and W3 their z rows.
+#[test]
+fn kinetic_energy_equals_that_of_the_nodes() {
+    for frame in BodyFrame::ALL {
+        let model = model(rectangle(5, 2, 0.7, [1.0, 2.0]));
+        let body = converted(&model, 12, frame).body;
+        let invariants = body.invariants();
+        let nf = invariants.n_modes();
+        let (derived, i0) = (invariants.derived(), invariants.inertia());
+        let (w1, w3) = (derived.w1.expect("held"), derived.w3.expect("held"));
+        let shape = &body.modes().shape;
+        let x = &body.nodes().positions;
+        let mut random = Random(11);
+        for _ in 0..20 {
+            let v = Vector2::from(random.vector::<2>());
+            let spin = random.signed();
+            let q: Vec<f64> = (0..nf).map(|_| 3.0 * random.signed()).collect();
+            let qd: Vec<f64> = (0..nf).map(|_| 3.0 * random.signed()).collect();
+            let field = |coordinates: &[f64], row: usize| -> f64 {
+                coordinates.iter().enumerate().map(|(j, c)| c * shape[(row, j)]).sum()
+            };
+            // v + theta' x r + u', all in body axes.
+            let velocity: Vec<[f64; 2]> = (0..x.len())
+                .map(|i| {
+                    let r = [x[i][0] + field(&q, 3 * i), x[i][1] + field(&q, 3 * i + 1)];
+                    [v.x - spin * r[1] + field(&qd, 3 * i), v.y + spin * r[0] + field(&qd, 3 * i + 1)]
+                })
+                .collect();
+            let mut nodal = 0.0;
+            for i in 0..x.len() {
+                let (columns, values) = model.scalar_mass().expect("a solid").row(i);
+                for (&j, m) in columns.iter().zip(values) {
+                    let other = velocity[j as usize];
+                    nodal += 0.5 * m * (velocity[i][0] * other[0] + velocity[i][1] * other[1]);
+                }
+            }
+            let modal = |f: &dyn Fn(usize) -> f64, c: &[f64]| -> f64 { (0..nf).map(|j| f(j) * c[j]).sum() };
+            let s = [0, 1].map(|k| invariants.first_moment[k] + modal(&|j| invariants.c1[(k, j)], &q));
+            let squared =
+                |a: &[f64], b: &[f64]| -> f64 { modal(&|i| modal(&|j| derived.modal_mass[(i, j)], b), a) };
+            let inertia = i0[(2, 2)] + modal(&|j| w1[(2, 2 * nf + j)], &q) + squared(&q, &q);
+            let coupling = modal(&|j| derived.c2[(2, j)] + modal(&|i| w3[(2 * nf + i, j)], &q), &qd);
+            let drift = [0, 1].map(|k| modal(&|j| invariants.c1[(k, j)], &qd));
+            let reduced = 0.5 * invariants.mass * v.norm_squared()
+                + 0.5 * inertia * spin * spin
+                + 0.5 * squared(&qd, &qd)
+                + spin * (v.y * s[0] - v.x * s[1])
+                + v.x * drift[0]
+                + v.y * drift[1]
+                + spin * coupling;
+            close(reduced, nodal, 1e-13, frame.name());
+        }
+    }
+}
+
+#[test]
+fn identities_and_recomputation_hold() {
+    let model = model(rectangle(7, 3, 1.1, [0.0, 0.0]));
+    for accuracy in [Accuracy::Standard, Accuracy::Certified] {
+        let mut settings = settings(9, BodyFrame::Principal);
+        settings.modes.accuracy = accuracy;
+        let body = convert(&model, &settings, SILENT).expect("a sound body").body;
+        let checks = body.identities(BodyFrame::Principal);
+        let recomputed = verify(&body, &model).expect("the same nodes");
+        for check in checks.iter().chain(&recomputed) {
+            assert!(check.passed, "{accuracy:?}, {}: {:e} > {:e}", check.name, check.value, check.limit);
+        }
+        assert_eq!(body.lumped().len(), 2);
+    }
+}
+
+/// Bending of a slender bar: Euler and Bernoulli's first frequency, to the shear and rotary inertia that they leave out.
+#[test]
+fn first_bending_frequency_is_that_of_a_beam() {
+    let body = converted(&model(rectangle(160, 12, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
+    let (area, second) = (HEIGHT, HEIGHT.powi(3) / 12.0);
+    let slenderness = 4.730_040_744_862_704f64;
+    let omega = slenderness.powi(2) * (YOUNGS * second / (DENSITY * area * LENGTH.powi(4))).sqrt();
+    // Shear and rotary inertia, which the beam leaves out, lower it by some 15 % at this slenderness.
+    let found = body.modes().eigenvalue[0].sqrt();
+    assert!(found < omega && found > 0.75 * omega, "{found}, beam {omega}");
+    // Halving the elements changes the frequency by the square of their size.
+    let coarse = converted(&model(rectangle(40, 3, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
+    let middle = converted(&model(rectangle(80, 6, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;
+    let value = |body: &FlexBody| body.modes().eigenvalue[0].sqrt();
+    let order = ((value(&coarse) - value(&middle)) / (value(&middle) - found)).log2();
+    assert!((1.8..2.2).contains(&order), "order {order}");
+}
+
+#[test]
+fn all_modes_of_a_small_plate_are_found() {
+    let raw = rectangle(3, 2, 0.2, [0.0, 0.0]);
+    let n = 2 * raw.nodes.len();
+    let dense = |a: &CscMatrix| Mat::from_fn(n, n, |i, j| a.get(i, j));
+    let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
+    let body = converted(&model(raw), 1000, BodyFrame::Principal).body;
+    assert_eq!(body.n_modes(), n - 3);
+    // The rigid eigenvalues are zero, so the flexible ones alone make the trace of M^-1 K.
+    let trace = m.partial_piv_lu().solve(&k).diagonal().column_vector().iter().sum::<f64>();
+    close(body.modes().eigenvalue.iter().sum(), trace, 1e-11, "trace");
+}
+
+#[test]
+fn what_leaves_the_plane_is_refused() {
+    let mut raw = rectangle(2, 2, 0.0, [0.0, 0.0]);
+    let mut labels = Vec::new();
+    for &node in &raw.nodes.ids {
+        labels.extend([1, 3].map(|direction| flexbody::model::DofLabel { node, direction }));
+    }
+    raw.dofs = Some(labels);
+    let error = check(raw).expect_err("direction 3");
+    assert!(error.has(Code::DirectionOutOfPlane), "{error}");
+    let mut raw = rectangle(2, 2, 0.0, [0.0, 0.0]);
+    raw.nodes.positions[3][2] = 1.0;
+    assert!(check(raw).expect_err("z").has(Code::DirectionOutOfPlane));
+    let raw = RawModel { dimension: 3, ..rectangle(2, 2, 0.0, [0.0, 0.0]) };
+    assert!(check(raw).expect_err("two rows per node").has(Code::DofCount));
+}
+
+#[test]
+fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
+    let raw = rectangle(4, 2, 0.7, [1.0, 2.0]);
+    let n = 2 * raw.nodes.len() as u32;
+    let string = [(1, 1, 2.0), (1, n - 1, -2.0), (n - 1, 1, -2.0), (n - 1, n - 1, 2.0)];
+    let matrix = CscMatrix::from_triplets(n as usize, n as usize, &string);
+    let given = |kind, component| GeometricStiffness {
+        load: UnitLoad { kind, component },
+        matrix: RawMatrix { matrix: matrix.clone(), ..raw.stiffness.clone() },
+    };
+    let with = |geometric_stiffness| RawModel { geometric_stiffness, ..raw.clone() };
+    let sound = model(with(vec![given(LoadKind::Spin, 2), given(LoadKind::Acceleration, 0)]));
+    let body = converted(&sound, 6, BodyFrame::Principal).body;
+    let (axes, shape) = (body.frame().axes, &body.modes().shape);
+    let last = 3 * (raw.nodes.len() - 1);
+    let stroke =
+        |j: usize| -> f64 { (0..3).map(|l| axes[(1, l)] * (shape[(l, j)] - shape[(last + l, j)])).sum() };
+    // Acceleration along the model's x is axes' x of it along the body's.
+    let expected = [("spin_zz", 1.0), ("acceleration_x", axes[(0, 0)]), ("acceleration_y", axes[(0, 1)])];
+    assert_eq!(body.geometric_stiffness().len(), expected.len());
+    let largest = (0..6).fold(0.0f64, |m, j| m.max(stroke(j).powi(2)));
+    for (one, (label, part)) in body.geometric_stiffness().iter().zip(expected) {
+        assert_eq!(one.load.label(), label);
+        for p in 0..6 {
+            for q in 0..6 {
+                let product = 2.0 * part * stroke(p) * stroke(q);
+                assert!((one.matrix[(p, q)] - product).abs() <= 1e-13 * largest, "{label} {p} {q}");
+            }
+        }
+    }
+    for check in verify(&body, &sound).expect("the same nodes") {
+        assert!(check.passed, "{}: {:e} > {:e}", check.name, check.value, check.limit);
+    }
+    for (kind, component) in
+        [(LoadKind::Spin, 0), (LoadKind::Acceleration, 2), (LoadKind::AngularAcceleration, 1)]
+    {
+        let error = check(with(vec![given(kind, component)])).expect_err("out of the plane");
+        assert!(error.to_string().contains("a body of dimension 2 has"), "{error}");
+    }
+}
+
+/// A plate with two holes that scikit-fem meshed and assembled, where it lies beside the project.
+#[test]
+fn plane_stress_plate_agrees_with_its_reference() {
+    let shared = std::env::var_os("FLEXBODY_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let folder = shared.join("models/i_plane_stress");
+    let Ok(text) = std::fs::read_to_string(folder.join("ref.json")) else { return };
+    let reference: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let files = ModelFiles::from_arguments(
+        folder.join("K.mtx.gz"),
+        folder.join("M.mtx.gz"),
+        folder.join("nodes.csv"),
+        Some(folder.join("dofs.csv")),
+        Some("mm,t,s"),
+    )
+    .expect("files");
+    let raw = read_model(&ModelFiles { dimension: 2, ..files }).expect("readable");
+    let body = converted(&model(raw), 20, BodyFrame::Com).body;
+    let rigid = &reference["consistent"];
+    close(body.invariants().mass, rigid["mass"].as_f64().expect("mass"), 1e-13, "m");
+    close(body.invariants().inertia()[(2, 2)], rigid["inertia_com"][2][2].as_f64().expect("J0"), 1e-12, "J0");
+    for k in 0..2 {
+        close(body.frame().origin[k], rigid["com"][k].as_f64().expect("com"), 1e-13, "centre");
+    }
+    let lambda = reference["modes"]["lambda_"].as_array().expect("eigenvalues");
+    for (found, expected) in body.modes().eigenvalue.iter().zip(lambda) {
+        close(*found, expected.as_f64().expect("a number"), 1e-10, "lambda");
+    }
+    // An inertia count of another program, and the row sums of the mass matrix.
+    let sylvester = &reference["modes"]["sylvester"];
+    let (shift, count) = (&sylvester["lam"], &sylvester["count"]);
+    let below = body.modes().eigenvalue.iter().filter(|l| **l < shift.as_f64().expect("a shift")).count();
+    assert_eq!(Some(3 + below as u64), count.as_u64());
+    let row_sum = body.lumped().iter().find(|lumped| lumped.scheme == "row-sum").expect("by default");
+    let inertia = reference["rowsum_lumped"]["inertia_com"][2][2].as_f64().expect("J0");
+    close(row_sum.invariants.inertia()[(2, 2)], inertia, 1e-12, "J0 of row sums");
+    assert_eq!(Some(row_sum.negative_masses as u64), reference["rowsum_negative_rows"].as_u64());
+}
+
+/// Shapes stay in the plane and are M-orthonormal there.
+#[test]
+fn shapes_are_orthonormal_in_the_plane() {
+    let model = model(rectangle(6, 2, 0.4, [3.0, 1.0]));
+    let body = converted(&model, 8, BodyFrame::Principal).body;
+    let shape = &body.modes().shape;
+    let mut gram = Mat::<f64>::zeros(8, 8);
+    for i in 0..model.nodes().len() {
+        let (columns, values) = model.scalar_mass().expect("a solid").row(i);
+        for (&j, m) in columns.iter().zip(values) {
+            for p in 0..8 {
+                for q in 0..8 {
+                    for k in 0..3 {
+                        gram[(p, q)] += m * shape[(3 * i + k, p)] * shape[(3 * j as usize + k, q)];
+                    }
+                }
+            }
+        }
+    }
+    assert!((&gram - Mat::<f64>::identity(8, 8)).norm_max() < 1e-12);
+}

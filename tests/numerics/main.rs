@@ -1,0 +1,10 @@
+//! Numerical mathematics: eigen-solver, factorisation, integration, and the work that they take.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod extremes;
+mod integration;
+mod memory;
+mod single_precision;
+mod work_counters;

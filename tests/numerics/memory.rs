@@ -1,0 +1,169 @@
+//! Memory as the program tells it before the work, and what it does when there is too little.
+
+use crate::support::elements::{Kind, MassRule, Material};
+use crate::support::files::{Triangle, write_model};
+use crate::support::mesh::{Assembly, Mesh};
+use crate::support::program::members;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::error::ExitCode;
+use flexbody::base::progress::{Event, SILENT};
+use flexbody::body::basis::{ModeSettings, free_surface};
+use flexbody::body::convert::{Conversion, ConvertSettings, convert as convert_model};
+use flexbody::formats::flex_body_file;
+use flexbody::model::check;
+use flexbody::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
+use flexbody::report::{Facts, Format, RunData, render};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::Mutex;
+
+fn block(cells: [i32; 3], size: [f64; 3]) -> Assembly {
+    Mesh::block(Kind::Hex8, cells, size).assemble(&Material::STEEL, MassRule::Consistent)
+}
+
+/// A folder with a cube of 20 577 degrees of freedom, whose factor weighs more than its modes.
+fn cube() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_model(folder.path(), &block([18; 3], [1.0; 3]).raw_model(), Triangle::Lower);
+    folder
+}
+
+/// Runs `flexbody convert model.toml -o b.h5` on one thread, where memory does not depend on who gets the processor.
+fn convert(folder: &Path, options: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_flexbody"))
+        .args(["convert", "model.toml", "-o", "b.h5", "--threads", "1"])
+        .args(options.split_whitespace())
+        .current_dir(folder)
+        .output()
+        .expect("the program")
+}
+
+/// The report of a run that succeeds.
+fn report(folder: &Path, options: &str) -> Value {
+    let output = convert(folder, &format!("{options} --json"));
+    assert!(output.status.success(), "{options}: {output:?}");
+    serde_json::from_slice::<Value>(&output.stdout).expect("JSON")["results"].take()
+}
+
+fn estimate(report: &Value) -> f64 {
+    report["run"]["memory_estimate_bytes"].as_f64().expect("an estimate")
+}
+
+#[cfg(target_os = "linux")] // elsewhere the peak is not told
+#[test]
+fn the_peak_is_within_15_percent_of_the_estimate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let raw = block([60, 9, 9], [1.0, 0.2, 0.2]).raw_model(); // 18 300 degrees of freedom
+    write_model(folder.path(), &raw, Triangle::Lower);
+    for options in ["", "--factor f32", "--checkpoint search.h5"] {
+        let report = report(folder.path(), options);
+        let peak = report["run"]["peak_memory_bytes"].as_f64().expect("a peak");
+        let ratio = peak / estimate(&report);
+        assert!((0.85..1.15).contains(&ratio), "`{options}`: peak {peak}, {ratio} of the estimate");
+    }
+}
+
+#[test]
+fn where_nothing_fits_the_numbers_are_told_before_any_work() {
+    let folder = cube();
+    let before = members(folder.path());
+    let output = convert(folder.path(), "--memory-limit 60M");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(ExitCode::Resources as i32), "{said}");
+    assert!(said.contains("error[FB601]: the factor and the vectors need 0."), "{said}");
+    assert!(said.contains(" GB on top of the matrices, 0.") && said.contains(" GB are left"), "{said}");
+    assert_eq!(members(folder.path()), before);
+
+    let model = check(block([9; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
+    let phases = Mutex::new(Vec::new());
+    let watch = |event: Event<'_>| {
+        if let Event::Phase(name) = event {
+            phases.lock().expect("one thread").push(name.to_owned());
+        }
+    };
+    let settings =
+        ModeSettings { memory: Some(1_000_000), method: Method::Lanczos, ..ModeSettings::default() };
+    let error = free_surface(&model, &settings, &watch).expect_err("too little memory");
+    assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
+    assert_eq!(*phases.lock().expect("one thread"), ["ordering"], "nothing was factored");
+}
+
+/// In the library, where nothing but the plan decides: what reading leaves behind differs from run to run of the program.
+#[test]
+fn a_factor_that_does_not_fit_is_taken_in_single_precision() {
+    let model = check(block([15; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
+    let run = |factor, memory| {
+        let modes = ModeSettings {
+            wanted: Wanted::Lowest(4),
+            accuracy: Accuracy::Fast,
+            method: Method::Lanczos,
+            factor,
+            memory,
+            ..ModeSettings::default()
+        };
+        let settings = ConvertSettings { modes, ..ConvertSettings::default() };
+        convert_model(&model, &settings, SILENT).expect("a body")
+    };
+    let plan = |found: &Conversion| found.plan.expect("a sparse factor");
+    let (double, single) =
+        (run(FactorChoice::Auto, None), run(FactorChoice::Always(Precision::Single), None));
+    let limit = (plan(&double).bytes + plan(&single).bytes) / 2;
+    assert!(plan(&single).bytes < limit && limit < plan(&double).bytes, "room for one of them");
+    let limited = run(FactorChoice::Auto, Some(limit));
+    let told =
+        |found: &Conversion| found.diagnostics.iter().filter(|d| d.code() == Code::FactorPrecision).count();
+    assert_eq!((told(&limited), told(&double)), (1, 0), "{:?}", limited.diagnostics);
+    assert_eq!((plan(&limited).precision, plan(&double).precision), (Precision::Single, Precision::Double));
+    assert_eq!(2 * plan(&limited).factor_bytes, plan(&double).factor_bytes);
+    for (a, b) in limited.body.modes().eigenvalue.iter().zip(&double.body.modes().eigenvalue) {
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
+    let model = check(block([15; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+    let run = |accuracy, memory| {
+        let modes = ModeSettings {
+            wanted: Wanted::Lowest(4),
+            accuracy,
+            method: Method::Lanczos,
+            factor: FactorChoice::Always(Precision::Single),
+            memory,
+            ..ModeSettings::default()
+        };
+        let settings = ConvertSettings { modes, ..ConvertSettings::default() };
+        threads.install(|| convert_model(&model, &settings, SILENT)).expect("a body")
+    };
+    let bytes = |found: &Conversion| found.plan.expect("a sparse factor").bytes;
+    let (search, all) = (run(Accuracy::Fast, None), run(Accuracy::Standard, None));
+    assert!(all.body.certificate().proved_modes.is_some());
+    let limit = (bytes(&search) + bytes(&all)) / 2;
+    assert!(bytes(&search) < limit && limit < bytes(&all), "room for the search only");
+    let found = run(Accuracy::Standard, Some(limit));
+    assert_eq!(bytes(&found), bytes(&search));
+    // The modes keep their promise all the same.
+    assert_eq!(found.body.modes().eigenvalue, all.body.modes().eigenvalue);
+    let why = "the count needs ";
+    let warning =
+        found.diagnostics.iter().find(|d| d.code() == Code::CompletenessUnproved).expect("a warning");
+    assert!(warning.message().contains(why) && warning.help().contains("--memory-limit"), "{warning}");
+    let folder = tempfile::tempdir().expect("a folder");
+    flex_body_file::write(&found.body, folder.path().join("b.h5")).expect("a file");
+    let body = flex_body_file::read(folder.path().join("b.h5")).expect("a body");
+    assert_eq!(body.certificate().proved_modes, None);
+    assert!(body.certificate().remark.starts_with(why), "{}", body.certificate().remark);
+    let run = RunData { diagnostics: found.diagnostics, ..RunData::default() };
+    for format in [Format::Text, Format::Json, Format::Html] {
+        assert!(render(&Facts::new(&body, &run), format).contains(why), "{format:?}");
+    }
+    let inspect = Command::new(env!("CARGO_BIN_EXE_flexbody"))
+        .args(["inspect", "b.h5"])
+        .current_dir(folder.path())
+        .output()
+        .expect("the program");
+    let text = String::from_utf8_lossy(&inspect.stdout).into_owned();
+    assert!(text.contains("NOT PROVED") && text.contains(why), "{text}");
+}

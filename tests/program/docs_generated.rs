@@ -1,0 +1,90 @@
+//! Generated documents are what the code generates. `FLEXBODY_BLESS=1 cargo test --test program docs_generated` writes them.
+//! Written ones lead to files and codes that exist.
+
+use flexbody::base::diagnostic;
+use flexbody::base::diagnostic::{Code, Severity};
+use flexbody::formats::flex_body_file;
+use std::path::{Path, PathBuf};
+
+#[track_caller]
+fn assert_generated(path: &str, generated: &str) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    if std::env::var_os("FLEXBODY_BLESS").is_some_and(|v| v == "1") {
+        std::fs::write(&file, generated).unwrap();
+    }
+    let committed = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(
+        committed == generated,
+        "{path} is out of date: FLEXBODY_BLESS=1 cargo test --test program docs_generated writes it"
+    );
+}
+
+#[test]
+fn format_description() {
+    assert_generated("docs/format.md", &flex_body_file::format_markdown());
+}
+
+#[test]
+fn format_schema() {
+    assert_generated("schemas/flexbody-file.schema.json", &flex_body_file::format_schema());
+}
+
+#[test]
+fn diagnostic_codes() {
+    assert_generated("docs/codes.md", &diagnostic::codes_markdown());
+}
+
+/// README, ARCHITECTURE, CHANGELOG and all of `docs/`, `fixtures/` and `benches/` with their text.
+fn documents() -> Vec<(PathBuf, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = Vec::new();
+    for folder in ["", "docs", "docs/formats", "fixtures", "benches/peers"] {
+        for entry in std::fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|e| e == "md") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                found.push((path, text));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn links_between_documents_lead_to_files() {
+    let mut links = 0;
+    for (path, text) in documents() {
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next()) {
+            if !target.is_empty() && !target.contains(':') {
+                let file = path.parent().unwrap().join(target);
+                assert!(file.exists(), "{} links to {target}, which does not exist", path.display());
+                links += 1;
+            }
+        }
+    }
+    assert!(links >= 10, "{links} links");
+}
+
+#[test]
+fn codes_named_in_documents_exist() {
+    for (path, text) in documents() {
+        for (at, _) in text.match_indices("FB") {
+            let Some(id) = text.get(at..at + 5) else { continue };
+            if id[2..].bytes().all(|b| b.is_ascii_digit()) {
+                assert!(Code::ALL.iter().any(|c| c.id() == id), "{} names {id}", path.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn codes_are_unique_and_their_exit_codes_fit_their_severity() {
+    let mut ids: Vec<_> = Code::ALL.iter().map(|c| c.id()).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), Code::ALL.len());
+    for code in Code::ALL {
+        let fails = code.exit_code() != flexbody::base::error::ExitCode::Done;
+        assert_eq!(fails, code.severity() == Severity::Error, "{}", code.id());
+    }
+}

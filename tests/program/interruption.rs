@@ -1,0 +1,148 @@
+//! An interrupted program ends at once, says so, and leaves nothing but what was there before.
+#![cfg(unix)]
+
+use crate::support::elements::{Kind, MassRule, Material};
+use crate::support::files::{Triangle, write_model};
+use crate::support::mesh::Mesh;
+use crate::support::program::members;
+use flexbody::base::error::ExitCode;
+use std::io::Read;
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Waits until both outputs have been reserved: the handler stands since before that.
+fn wait_for_temporary_files(folder: &Path, child: &mut Child) {
+    let began = Instant::now();
+    while members(folder).iter().filter(|name| name.starts_with(".flexbody-")).count() < 2 {
+        assert!(child.try_wait().expect("a child").is_none(), "the program ended before it was interrupted");
+        assert!(began.elapsed() < Duration::from_secs(60), "no temporary file appeared");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn a_signal_during_convert_leaves_the_folder_as_it_was() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (model, out) = (folder.path().join("model"), folder.path().join("out"));
+    std::fs::create_dir(&model).expect("a folder");
+    std::fs::create_dir(&out).expect("a folder");
+    let raw = Mesh::block(Kind::Hex8, [18; 3], [1.0; 3])
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
+    let manifest = write_model(&model, &raw, Triangle::Lower);
+    let body = out.join("body.flex.h5");
+    std::fs::write(&body, "what was there before").expect("a file");
+    for signal in ["INT", "TERM"] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_flexbody"))
+            .arg("convert")
+            .arg(&manifest)
+            .arg("--output")
+            .arg(&body)
+            .arg("--report")
+            .arg(out.join("report.html"))
+            .args(["--modes", "100"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        wait_for_temporary_files(&out, &mut child);
+        let sent = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).status();
+        assert!(sent.expect("kill").success());
+        let status = child.wait().expect("a child");
+        let mut said = String::new();
+        child.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
+        assert_eq!(status.code(), Some(ExitCode::Interrupted as i32), "SIG{signal}: {said}");
+        assert_eq!(said, "interrupted: no unfinished file is left\n");
+        let mut printed = String::new();
+        child.stdout.take().expect("piped").read_to_string(&mut printed).expect("text");
+        assert_eq!(printed, "");
+        assert_eq!(members(&out), ["body.flex.h5"]);
+        assert_eq!(std::fs::read_to_string(&body).expect("text"), "what was there before");
+    }
+}
+
+#[test]
+fn an_interrupted_convert_goes_on_from_its_checkpoint() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (model, out) = (folder.path().join("model"), folder.path().join("out"));
+    std::fs::create_dir(&model).expect("a folder");
+    std::fs::create_dir(&out).expect("a folder");
+    let raw = Mesh::block(Kind::Hex8, [16; 3], [1.0, 0.9, 0.8])
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
+    let manifest = write_model(&model, &raw, Triangle::Lower);
+    let convert = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
+        command.arg("convert").arg(&manifest).args(["--modes", "120", "--json"]).current_dir(&out);
+        command.args(["--output", "body.flex.h5", "--checkpoint", "search.h5"]);
+        command
+    };
+    let mut child = convert().stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
+    let began = Instant::now();
+    while !out.join("search.h5").exists() {
+        assert!(child.try_wait().expect("a child").is_none(), "the program ended without a checkpoint");
+        assert!(began.elapsed() < Duration::from_secs(120), "no checkpoint appeared");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let sent = Command::new("kill").arg("-INT").arg(child.id().to_string()).status();
+    assert!(sent.expect("kill").success());
+    assert_eq!(child.wait().expect("a child").code(), Some(ExitCode::Interrupted as i32));
+    assert_eq!(members(&out), ["search.h5"]);
+    let output = convert().output().expect("the program");
+    assert!(output.status.success(), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("FB711"), "{output:?}");
+    assert_eq!(members(&out), ["body.flex.h5", "search.h5"]);
+}
+
+/// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of these names.
+fn small_convert(out: &Path) -> Command {
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/cube_hex8/model.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
+    command.arg("convert").arg(model).args(["--output", "new.flex.h5", "--report", "new.json"]);
+    command.current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// Kills runs at times spread over their length; `FLEXBODY_KILLS` is the number of times for each signal.
+#[test]
+fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else() {
+    let kills: u32 = std::env::var("FLEXBODY_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(6);
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path();
+    let (body, report) = (out.join("new.flex.h5"), out.join("new.json"));
+    let began = Instant::now();
+    assert!(small_convert(out).status().expect("the program").success());
+    let whole = began.elapsed();
+    let is_old = |path: &Path| std::fs::read(path).expect("an output") == b"old";
+    for signal in ["KILL", "INT", "TERM"] {
+        for kill in 0..kills {
+            std::fs::write(&body, "old").expect("a file");
+            std::fs::write(&report, "old").expect("a file");
+            let mut child = small_convert(out).spawn().expect("the program");
+            // Most of what is delicate happens at the end.
+            let part = 1.0 - 0.7 * (f64::from(kill) / f64::from(kills)).powi(2);
+            std::thread::sleep(whole.mul_f64(part));
+            // It may have ended by itself.
+            let _ = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).output();
+            let status = child.wait().expect("a child");
+            if !is_old(&body) {
+                flexbody::formats::flex_body_file::read(&body).expect("a whole body");
+            }
+            if !is_old(&report) {
+                let text = std::fs::read_to_string(&report).expect("text");
+                serde_json::from_str::<serde_json::Value>(&text).expect("a whole report");
+            }
+            if signal != "KILL" {
+                // Before the handler stands the system ends the program, which has made nothing yet.
+                let handled = matches!(status.code(), Some(0 | 130));
+                assert!(handled || (status.signal().is_some() && is_old(&body)), "SIG{signal}: {status:?}");
+                assert_eq!(is_old(&body), is_old(&report), "SIG{signal}: one of two outputs");
+                assert_eq!(members(out), ["new.flex.h5", "new.json"], "SIG{signal}");
+            }
+        }
+        assert!(small_convert(out).status().expect("the program").success());
+        assert_eq!(members(out), ["new.flex.h5", "new.json"], "after SIG{signal} and another run");
+    }
+}

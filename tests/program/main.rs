@@ -1,0 +1,16 @@
+//! The program as people and scripts meet it: command line, messages, reports, limits; documents and the structure of the sources.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod architecture;
+mod bad_input;
+mod checkpoint;
+mod command_line;
+mod docs_generated;
+mod interruption;
+mod json_output;
+mod licences;
+mod limits;
+mod report;
+mod report_comparison;

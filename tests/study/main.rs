@@ -1,0 +1,11 @@
+//! What a scene needs of a body, and what accuracy costs.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod output_errors;
+mod select_command;
+mod selection_bounds;
+mod selection_verdicts;
+mod tailoring;
+mod trade;

@@ -1,0 +1,102 @@
+//! `select` and `convert --scene` as a user runs them.
+
+use crate::support::program::{fixtures, flexbody};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// A bracket that is spun up and shaken, in the folder `place`: `whole.flex.h5` and `scene.toml`.
+fn prepare(place: &Path, more: &str) -> String {
+    let manifest = fixtures().join("models/bracket_hex20/model.toml");
+    let manifest = manifest.to_str().expect("a path").to_owned();
+    let words = ["convert", &manifest, "--modes", "8", "-o", "whole.flex.h5", "--lumped", "none", "--quiet"];
+    assert!(flexbody(place, &words).status.success());
+    let text = format!(
+        "[run]\nduration = 0.004\noutputs = 200\n[spin]\naxis = [0, 0, 1]\nrate = {{ to = 400, duration = 0.003 }}\n\
+         [[load]]\ninterface = \"bolt_wall\"\nforce = [0, 20, 0]\naxes = \"body\"\n\
+         history = {{ amplitude = 1, frequency = 300 }}\n[[watch]]\ninterface = \"bolt_base\"\n{more}"
+    );
+    fs::write(place.join("scene.toml"), text).expect("written");
+    manifest
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).expect("JSON")
+}
+
+#[test]
+fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let manifest = prepare(place, "[damping]\nratio = 0.02\n");
+    let words = [
+        "select",
+        "whole.flex.h5",
+        "--scene",
+        "scene.toml",
+        "--json",
+        "--report",
+        "s.html",
+        "--report",
+        "s.txt",
+    ];
+    let run = flexbody(place, &words);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let told = json(&run.stdout)["results"].take();
+    let schema = json(include_bytes!("../../schemas/selection-report.schema.json"));
+    let schema = jsonschema::validator_for(&schema).expect("a schema");
+    let wrong: Vec<String> = schema.iter_errors(&told).map(|error| error.to_string()).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    let page = fs::read_to_string(place.join("s.html")).expect("a page");
+    assert!(page.contains("Sizes of the terms") && !page.contains("NaN"), "{page}");
+    assert!(fs::read_to_string(place.join("s.txt")).expect("a text").starts_with("Selection"));
+    let chosen = &told["chosen"];
+    assert!(chosen["worst"].as_f64().expect("a number") <= 1.0, "{chosen}");
+
+    // The same from the matrices, with the modes and residual vectors that the scene asks for.
+    let words = ["convert", &manifest, "--scene", "scene.toml", "-o", "small.flex.h5", "--quiet"];
+    assert!(flexbody(place, &words).status.success());
+    assert!(flexbody(place, &["check", "small.flex.h5"]).status.success());
+    let small = flexbody::formats::flex_body_file::read(place.join("small.flex.h5")).expect("a body");
+    assert!(small.source().files.iter().any(|file| file.role == "scene" && file.name == "scene.toml"));
+    assert_eq!(small.terms().len(), 3);
+    let again = flexbody(place, &["select", &manifest, "--scene", "scene.toml", "--json"]);
+    let again = json(&again.stdout)["results"].take();
+    assert_eq!(again["modes"]["kept"].as_array().expect("a list").len(), small.n_modes());
+    for term in again["terms"].as_array().expect("terms") {
+        let group = term["group"].as_str().expect("a name");
+        let of_file = small.terms().iter().find(|decision| decision.group.name() == group);
+        assert_eq!(term["kept"], of_file.expect("a decision").kept, "{group}");
+    }
+}
+
+#[test]
+fn a_cost_that_nothing_meets_is_a_check_that_fails() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    prepare(place, "[cost]\nmultiplications = 5\n");
+    let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml"]);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&run.stdout).contains("no model takes 5 multiplications"));
+    prepare(place, "[cost]\nmultiplications = 900\n");
+    let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml", "--json"]);
+    assert!(run.status.success());
+    assert!(json(&run.stdout)["results"]["chosen"]["multiplications"].as_u64().expect("a number") <= 900);
+}
+
+#[test]
+fn contradictions_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let manifest = prepare(place, "");
+    for (words, said) in [
+        (&["select", "whole.flex.h5", "--scene", "scene.toml", "--modes", "3"][..], "--modes is for a model"),
+        (&["select", "whole.flex.h5", "--scene", "scene.toml", "--report", "scene.toml"], "scene.toml"),
+        (&["convert", &manifest, "--scene", "none.toml", "-o", "x.flex.h5"], "does not exist"),
+    ] {
+        let run = flexbody(place, words);
+        assert_eq!(run.status.code(), Some(2), "{words:?}");
+        assert!(String::from_utf8_lossy(&run.stderr).contains(said), "{words:?}");
+    }
+    assert!(!place.join("x.flex.h5").exists());
+}

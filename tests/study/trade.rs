@@ -1,0 +1,347 @@
+//! What accuracy costs: who must win does, errors are those of an independent comparison, and nothing but times depends on threads.
+
+use crate::support::elements::{Kind as Element, MassRule, Material};
+use crate::support::flexible::{fixture, soft_block};
+use crate::support::mesh::{Mesh, grid};
+use crate::support::program::{fixtures, flexbody};
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::flex_body::{FlexBody, Groups, Storage};
+use flexbody::body::invariants::BodyFrame;
+use flexbody::model::FeModel;
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{Axes, Initial, ModeStart, Run, Scene, Scheme, simulate};
+use flexbody::study::trade::{
+    Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
+};
+use nalgebra::Vector3;
+use serde_json::Value;
+use std::fs;
+
+const QUICK: Settings = Settings { repeat: 1, memory: None };
+
+/// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns` turns.
+fn tumble(spin: f64, turns: f64) -> Scene {
+    let axis = Vector3::new(0.2, 1.0, 0.1).normalize();
+    Scene {
+        name: "tumble".to_owned(),
+        run: Run {
+            duration: Some(turns * std::f64::consts::TAU / spin),
+            outputs: 60,
+            most_steps: Run::MOST_STEPS,
+            scheme: Scheme::Adaptive { tolerance: 1e-10 },
+            terms: Terms::ALL,
+        },
+        initial: Initial { angular_velocity: axis * spin, axes: Axes::Body, ..Initial::default() },
+        gravity: None,
+        loads: Vec::new(),
+        spin: None,
+        carried: None,
+        watched: Vec::new(),
+        requirements: Default::default(),
+        source: None,
+        resolved: false,
+    }
+}
+
+fn study(body: FlexBody, scene: &Scene) -> Trade {
+    trade(&[Source::new("body", body, None).expect("a body")], scene, None, &QUICK, SILENT).expect("a study")
+}
+
+fn first_rate(body: &FlexBody) -> f64 {
+    body.modes().eigenvalue[0].sqrt()
+}
+
+fn recommended(trade: &Trade) -> &Row {
+    &trade.rows[trade.recommended.row().expect("a recommendation")]
+}
+
+#[test]
+fn a_body_that_stays_rigid_needs_one_mode_and_no_group() {
+    let body = soft_block(6);
+    let scene = tumble(1e-6 * first_rate(&body), 0.5);
+    let mut scene = scene;
+    // Steps that no vibration shortens: six million periods are not followed.
+    scene.run.scheme =
+        Scheme::Conserving { order: 4, step: scene.run.duration.map(|duration| duration / 60.0) };
+    let found = study(body, &scene);
+    let row = recommended(&found);
+    assert_eq!(row.candidate.groups, Groups::NONE, "{row:?}");
+    assert_eq!(row.candidate.modes, [0]);
+    assert!(matches!(found.recommended, Recommendation::Cheapest(_)));
+}
+
+#[test]
+fn a_soft_body_that_tumbles_fast_needs_every_group() {
+    let body = soft_block(6);
+    let mut scene = tumble(0.25 * first_rate(&body), 2.0);
+    scene.initial.modes = vec![ModeStart { mode: 1, amplitude: 0.05, rate: 0.0 }];
+    let found = study(body, &scene);
+    assert_eq!(recommended(&found).candidate.groups, Groups::ALL);
+    for row in &found.rows {
+        if row.candidate.groups != Groups::ALL {
+            let worst = row.outcome.as_ref().map_or(f64::INFINITY, |measured| measured.worst);
+            assert!(worst > 1.0, "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn the_reference_is_no_distance_from_itself_and_everything_else_is_some() {
+    let body = soft_block(5);
+    let found = study(body.clone(), &tumble(0.1 * first_rate(&body), 1.0));
+    assert_eq!(found.reference, ReferenceKind::Full);
+    let worst = |row: &Row| row.outcome.as_ref().expect("a motion").worst;
+    assert_eq!(worst(&found.rows[0]), 0.0);
+    assert!(found.rows[1..].iter().all(|row| worst(row) > 0.0));
+    // All eight sets of groups, lumped masses and single precision with all modes.
+    let whole = found.rows.iter().filter(|row| row.candidate.modes.len() == 5);
+    let of_kind = |kind: Kind| whole.clone().filter(|row| row.candidate.kind() == kind).count();
+    assert_eq!([Kind::Modes, Kind::Groups, Kind::Lumped, Kind::Single].map(of_kind), [1, 7, 2, 1]);
+    let single =
+        found.rows.iter().find(|row| row.candidate.storage == Storage::F32).expect("single precision");
+    assert!((1e-9..1e-2).contains(&worst(single)), "{}", worst(single));
+    // Rows of the front get better as they get dearer.
+    let cost = |row: usize| found.rows[row].outcome.as_ref().expect("a motion").multiplications;
+    for pair in found.front.windows(2) {
+        assert!(cost(pair[0]) < cost(pair[1]) && worst(&found.rows[pair[0]]) > worst(&found.rows[pair[1]]));
+    }
+}
+
+#[test]
+fn a_lumped_mass_has_the_error_of_two_simulations() {
+    let body = soft_block(5);
+    let scene = tumble(0.1 * first_rate(&body), 1.0);
+    let found = study(body.clone(), &scene);
+    let lumped =
+        body.lumped().iter().find(|lumped| lumped.scheme == "diagonal-scaling").expect("a scheme").clone();
+    let mut parts = body.clone().into_parts();
+    parts.invariants = lumped.invariants;
+    let other = FlexBody::new(parts).expect("a body");
+    // So many instants that a peak between them is no larger by much.
+    let mut often = scene.clone();
+    often.run.outputs = 6000;
+    let [a, b] = [&body, &other].map(|body| simulate(body, &often, None, |_| ()).expect("a motion").0);
+    let energy = |q: &mut dyn Iterator<Item = f64>| -> f64 {
+        q.zip(&body.modes().eigenvalue).map(|(q, lambda)| 0.5 * lambda * q * q).sum()
+    };
+    let apart =
+        a.states.iter().zip(&b.states).map(|(a, b)| energy(&mut a.q.iter().zip(&b.q).map(|(a, b)| a - b)));
+    let largest = a.states.iter().map(|a| energy(&mut a.q.iter().copied())).fold(0.0, f64::max);
+    let stress = (apart.fold(0.0, f64::max) / largest).sqrt();
+    let dots = a.states.iter().zip(&b.states).map(|(a, b)| {
+        let dot: f64 = a.attitude.0.iter().zip(&b.attitude.0).map(|(a, b)| a * b).sum();
+        2.0 * dot.abs().min(1.0).acos()
+    });
+    let attitude = dots.fold(0.0, f64::max);
+    let row = found.rows.iter().find(|row| row.candidate.lumped.as_deref() == Some("diagonal-scaling"));
+    let errors = row.expect("a row").outcome.as_ref().expect("a motion").errors;
+    assert!(stress > 0.01, "a coarse mesh: {stress}");
+    assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 2e-3, "{errors:?} {stress}");
+    assert!((errors.attitude / attitude - 1.0).abs() < 2e-3, "{errors:?} {attitude}");
+}
+
+#[test]
+fn a_body_of_beams_has_candidates_of_lumped_mass_too() {
+    let body = fixture("frame_beams", 4, BodyFrame::Model);
+    let found = study(body.clone(), &tumble(0.05 * first_rate(&body), 0.2));
+    let lumped = found.rows.iter().filter(|row| row.candidate.kind() == Kind::Lumped);
+    let worst: Vec<f64> = lumped.map(|row| row.outcome.as_ref().expect("a motion").worst).collect();
+    assert_eq!(worst.len(), body.lumped().len());
+    assert!(!worst.is_empty() && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
+}
+
+#[test]
+fn errors_are_the_same_bits_at_one_and_two_threads() {
+    let body = soft_block(6);
+    let scene = tumble(0.1 * first_rate(&body), 1.0);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let mut found = pool.install(|| study(body.clone(), &scene));
+        for row in &mut found.rows {
+            let measured = row.outcome.as_mut().expect("a motion");
+            assert!(measured.times.evaluation > 0.0 && measured.times.integration > 0.0);
+            (measured.times.evaluation, measured.times.integration) = (0.0, 0.0);
+        }
+        found
+    };
+    assert_eq!(on(1), on(2));
+}
+
+#[test]
+fn a_cost_is_kept_by_the_most_accurate() {
+    let body = soft_block(6);
+    let mut scene = tumble(0.1 * first_rate(&body), 1.0);
+    let costs = |trade: &Trade| -> Vec<(usize, f64)> {
+        let measured = trade.rows.iter().map(|row| row.outcome.as_ref().expect("a motion"));
+        measured.map(|measured| (measured.multiplications, measured.worst)).collect()
+    };
+    let dearest = costs(&study(body.clone(), &scene)).into_iter().map(|point| point.0).max().expect("rows");
+    let allowed = dearest / 2;
+    scene.requirements.multiplications = Some(allowed);
+    let found = study(body.clone(), &scene);
+    let Recommendation::MostAccurate(row) = found.recommended else { panic!("{:?}", found.recommended) };
+    let all = costs(&found);
+    assert!(all[row].0 <= allowed);
+    assert!(all.iter().filter(|point| point.0 <= allowed).all(|point| point.1 >= all[row].1));
+    scene.requirements.multiplications = Some(1);
+    assert_eq!(study(body, &scene).recommended, Recommendation::None);
+}
+
+#[test]
+fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
+    let mut parts = soft_block(4).into_parts();
+    // The mass of the modes is negative: no motion follows from it.
+    let s = &mut parts.lumped[0].invariants.s;
+    s.iter_mut().flatten().for_each(|s| *s = -&*s);
+    let body = FlexBody::new(parts).expect("a body");
+    let scheme = body.lumped()[0].scheme.clone();
+    let found = study(body.clone(), &tumble(0.1 * first_rate(&body), 0.2));
+    let failed: Vec<&Row> = found.rows.iter().filter(|row| row.outcome.is_err()).collect();
+    assert_eq!(failed.len(), 1);
+    assert_eq!(failed[0].candidate.lumped.as_ref(), Some(&scheme));
+    assert_eq!(failed[0].outcome.as_ref().err().map(|failed| failed.0.code()), Some(Code::SimulationStopped));
+    assert!(found.recommended.row().is_some());
+}
+
+/// A rubber-like block of few nodes, as a model.
+fn model() -> FeModel {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Element::Hex8, &grid([4, 2, 1]), |[x, y, z]| {
+        [0.3 * x + 0.03 * y, 0.3 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
+    });
+    FeModel::from_raw(mesh.assemble(&rubber, MassRule::Consistent).raw_model()).expect("a body").model
+}
+
+#[test]
+fn conversions_are_measured_against_the_motion_of_all_nodes() {
+    let model = model();
+    let (sources, _) = conversions(&model, 4, None, None, SILENT).expect("bodies");
+    assert!(sources.iter().all(|source| source.preprocessing().is_some_and(|seconds| seconds > 0.0)));
+    let rate = first_rate(sources[0].body());
+    let mut scene = tumble(0.15 * rate, 0.5);
+    scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
+    let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
+    assert_eq!(found.reference, ReferenceKind::Nodal);
+    let stress = |row: &Row| row.outcome.as_ref().expect("a motion").errors.stress.expect("a deformed body");
+    // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not, and lacking W1 nothing is.
+    let of = |source: &str, groups: Groups| {
+        let row = found.rows.iter().find(|row| {
+            row.source == source && row.candidate.groups == groups && row.candidate.kind() != Kind::Lumped
+        });
+        stress(row.expect("a row"))
+    };
+    let (whole, one) = (of(sources[0].name(), Groups::ALL), of("1 free mode", Groups::ALL));
+    assert!(whole > 0.0 && whole < 0.1 && one > 0.9, "{whole} {one}");
+    assert!(of(sources[0].name(), Groups::NONE) > 0.5);
+    // Residual vectors have what modes lack of the response to spin.
+    let (with, without) =
+        (of("4 free modes, residual vectors", Groups::ALL), of("4 free modes", Groups::ALL));
+    assert!(whole < with && with < without && without < one, "{whole} {with} {without} {one}");
+    // The same against the largest body: apart by no more than that is from the truth.
+    let reduced = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
+    for (a, b) in found.rows.iter().zip(&reduced.rows) {
+        assert_eq!(a.candidate, b.candidate);
+        assert!((stress(a) - stress(b)).abs() <= 1.1 * whole, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn what_nodal_equations_do_not_have_is_refused() {
+    let model = model();
+    let (sources, _) = conversions(&model, 2, None, None, SILENT).expect("bodies");
+    let rate = first_rate(sources[0].body());
+    let mut scene = tumble(0.1 * rate, 0.1);
+    scene.requirements.damping = Some(0.01);
+    let refused = |scene: &Scene| {
+        let error = trade(&sources, scene, Some(&model), &QUICK, SILENT).expect_err("refused");
+        assert_eq!(error.diagnostics()[0].code(), Code::Usage);
+        error.diagnostics()[0].message().to_owned()
+    };
+    assert!(refused(&scene).contains("damping ratios"));
+    scene.requirements.damping = None;
+    scene.run.duration = Some(1e12 / rate);
+    // Long before the motion of the bodies is computed.
+    scene.run.scheme = Scheme::Conserving { order: 2, step: Some(1e11 / rate) };
+    assert!(refused(&scene).contains("multiplications"));
+}
+
+#[test]
+fn a_front_has_nothing_that_another_beats() {
+    let body = soft_block(3);
+    let mut rows = study(body.clone(), &tumble(0.1 * first_rate(&body), 0.2)).rows;
+    rows.truncate(5);
+    for (row, (cost, worst)) in rows.iter_mut().zip([(10, 1.0), (20, 2.0), (5, 3.0), (10, 0.5), (30, 0.5)]) {
+        let measured = row.outcome.as_mut().expect("a motion");
+        (measured.multiplications, measured.worst) = (cost, worst);
+    }
+    assert_eq!(front(&rows), [2, 3]);
+    rows[3].outcome.as_mut().expect("a motion").worst = f64::NAN;
+    assert_eq!(front(&rows), [2, 0, 4]);
+}
+
+#[test]
+fn the_program_writes_what_its_schema_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let manifest = fixtures().join("models/cube_hex8/model.toml");
+    let manifest = manifest.to_str().expect("a path");
+    let made = flexbody(place, &["convert", manifest, "--modes", "4", "-o", "body.flex.h5", "--quiet"]);
+    assert!(made.status.success());
+    let body = flexbody::formats::flex_body_file::read(place.join("body.flex.h5")).expect("a body");
+    let period = std::f64::consts::TAU / first_rate(&body);
+    let scene = |more: &str| {
+        let text = format!(
+            "[run]\nduration = {}\noutputs = 20\n[initial]\nangular_velocity = [{}, {}, 0]\n{more}",
+            4.0 * period,
+            0.02 / period,
+            0.4 / period
+        );
+        fs::write(place.join("scene.toml"), text).expect("written");
+    };
+    scene("");
+    let words = ["trade", "body.flex.h5", "--scene", "scene.toml", "--repeat", "1"];
+    let with = |more: &[&str]| flexbody(place, &[&words[..], more].concat());
+    let files = ["t.html", "t.json", "t.txt"];
+    let mut more = vec!["--csv", "t.csv", "--threads", "2", "--json"];
+    files.iter().for_each(|file| more.extend(["--report", file]));
+    let run = with(&more);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let facts: Value = serde_json::from_slice::<Value>(&run.stdout).expect("JSON")["results"].take();
+    let schema: Value =
+        serde_json::from_str(include_str!("../../schemas/trade-report.schema.json")).expect("a schema");
+    let schema = jsonschema::validator_for(&schema).expect("a schema");
+    let wrong: Vec<String> = schema.iter_errors(&facts).map(|error| error.to_string()).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    let rows = facts["rows"].as_array().expect("rows");
+    let table = fs::read_to_string(place.join("t.csv")).expect("a table");
+    assert_eq!(table.lines().count(), rows.len() + 1);
+    let columns = table.lines().next().expect("a head").split(',').count();
+    assert!(table.lines().all(|line| line.split(',').count() == columns), "{table}");
+    let page = fs::read_to_string(place.join("t.html")).expect("a page");
+    assert!(page.contains("<svg") && page.contains("recommended") && !page.contains("NaN"));
+    let text = fs::read_to_string(place.join("t.txt")).expect("a text");
+    assert!(text.contains("Verdict") && text.lines().any(|line| line.starts_with('>')), "{text}");
+    let left: Vec<_> = fs::read_dir(place).expect("a folder").collect();
+    assert_eq!(left.len(), 2 + 4, "{left:?}");
+
+    // Nothing is that cheap: a tolerance that failed.
+    scene("[cost]\nmultiplications = 1\n");
+    let run = with(&[]);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&run.stdout).contains("no candidate is as cheap as allowed"));
+    for (more, said) in [
+        (&["--reference", "nodal"][..], "give the manifest"),
+        (&["--modes", "3"], "give the manifest"),
+        (&["--csv", "scene.toml"], "is an input"),
+        (&["--report", "t.pdf"], "no known extension"),
+    ] {
+        let run = with(more);
+        assert_eq!(run.status.code(), Some(2), "{more:?}");
+        assert!(String::from_utf8_lossy(&run.stderr).contains(said), "{more:?}");
+    }
+    // No output replaces a matrix of the model.
+    let matrix = fixtures().join("models/cube_hex8/K.mtx.gz");
+    let words = ["trade", manifest, "--scene", "scene.toml", "--csv", matrix.to_str().expect("a path")];
+    assert_eq!(flexbody(place, &words).status.code(), Some(2));
+}
