@@ -15,7 +15,7 @@ use crate::base::units::UnitSystem;
 use crate::body::basis::{
     BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
 };
-use crate::body::convert::{Conversion, ConvertSettings, Lumping, convert_for};
+use crate::body::convert::{Conversion, ConvertSettings, Lumping, convert_resuming};
 use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;
 use crate::formats::flex_body_file;
@@ -156,7 +156,7 @@ impl Job<'_> {
                     .map_err(|error| error.in_file(path))
                     .map(|(conversion, selection)| (conversion, Some(selection)))
             }
-            _ => convert_for(model, &settings, None, resume, &watch).map(|conversion| (conversion, None)),
+            _ => convert_resuming(model, &settings, resume, &watch).map(|conversion| (conversion, None)),
         }?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());

@@ -82,7 +82,7 @@ fn converted(
         ..ConvertSettings::default()
     };
     let tailoring = Tailoring { settings, by_band: arguments.modes.is_none() };
-    let conversion = tailoring.convert(&model, scene, None, Resume::default(), watch)?;
+    let conversion = tailoring.convert(&model, scene, Resume::default(), watch)?;
     diagnostics.extend(conversion.diagnostics);
     Ok((conversion.body, diagnostics))
 }

@@ -3,7 +3,7 @@
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;
 use crate::base::progress::Watch;
-use crate::body::convert::{Conversion, ConvertSettings, Decide, convert_for};
+use crate::body::convert::{Conversion, ConvertSettings, ModalModel};
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
 use crate::motion::scene::Scene;
@@ -20,29 +20,45 @@ pub struct Tailoring {
 }
 
 impl Tailoring {
-    /// A body with everything that `scene` may need, less what `decide` rules out.
+    /// A body with everything that `scene` may need.
     ///
     /// # Errors
-    /// As [`convert_for`].
+    /// As [`convert`](crate::body::convert::convert).
     pub fn convert(
         &self,
         model: &FeModel,
         scene: &Scene,
-        decide: Option<Decide<'_>>,
         resume: Resume<'_>,
         watch: Watch<'_>,
     ) -> Result<Conversion> {
-        let Some(highest) = largest_eigenvalue(scene).filter(|_| self.by_band) else {
-            return convert_for(model, &self.settings, decide, resume, watch);
-        };
+        let of_band = self.settings_of_band(scene);
+        let modal = self.find_modes(of_band.as_ref(), model, resume, watch)?;
+        let condensed = modal.condense();
+        modal.finish(condensed, watch)
+    }
+
+    /// The settings with the modes that the band of `scene` wants.
+    fn settings_of_band(&self, scene: &Scene) -> Option<ConvertSettings> {
+        let highest = largest_eigenvalue(scene).filter(|_| self.by_band)?;
         let mut settings = self.settings.clone();
         settings.modes.wanted = Wanted::Below(highest);
-        match convert_for(model, &settings, decide, resume, watch) {
-            // A body that is stiff in the band.
-            Err(error) if error.diagnostics().iter().any(|d| d.code() == Code::NoModes) => {
-                convert_for(model, &self.settings, decide, Resume::default(), watch)
+        Some(settings)
+    }
+
+    /// The modes that the band of a scene wants; those of the settings without a band, and for a body that is stiff in it.
+    fn find_modes<'m>(
+        &'m self,
+        of_band: Option<&'m ConvertSettings>,
+        model: &'m FeModel,
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<ModalModel<'m>> {
+        let Some(of_band) = of_band else { return ModalModel::find(model, &self.settings, resume, watch) };
+        match ModalModel::find(model, of_band, resume, watch) {
+            Err(error) if error.has(Code::NoModes) => {
+                ModalModel::find(model, &self.settings, Resume::default(), watch)
             }
-            other => other,
+            found => found,
         }
     }
 }
@@ -60,8 +76,13 @@ pub fn convert_for_scene(
     watch: Watch<'_>,
 ) -> Result<(Conversion, Selection)> {
     let memory = tailoring.settings.modes.memory;
-    let decide = |early: &FlexBody| rule_out(early, scene, memory);
-    let mut conversion = tailoring.convert(model, scene, Some(&decide), resume, watch)?;
+    let of_band = tailoring.settings_of_band(scene);
+    let modal = tailoring.find_modes(of_band.as_ref(), model, resume, watch)?;
+    // Rigid motion alone is multiplied by M before the scene has said which groups it may need.
+    let linear = modal.condense_linear();
+    let terms = rule_out(&modal.body(&linear)?, scene, memory)?;
+    let condensed = modal.condense_kept(linear, terms);
+    let mut conversion = modal.finish(condensed, watch)?;
     let selection = select(&conversion.body, scene, memory, watch)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
     let mut parts = reduced.into_parts();

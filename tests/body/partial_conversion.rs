@@ -2,11 +2,10 @@
 
 use crate::support::partial::{combinations, decisions};
 use crate::support::plane::rectangle;
-use flexbody::base::diagnostic::{Code, Diagnostic};
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
-use flexbody::body::convert::{Conversion, ConvertSettings, convert, convert_for};
-use flexbody::body::flex_body::{FlexBody, Groups, TermDecision};
+use flexbody::body::convert::{Conversion, ConvertSettings, ModalModel, convert};
+use flexbody::body::flex_body::{Groups, TermDecision};
 use flexbody::body::invariants::{BodyFrame, primary_differences};
 use flexbody::body::verification::verify;
 use flexbody::input::{read_manifest, read_model};
@@ -28,8 +27,9 @@ fn fixture(name: &str) -> FeModel {
 }
 
 fn decided(model: &FeModel, settings: &ConvertSettings, terms: &[TermDecision]) -> Conversion {
-    let decide = |_: &FlexBody| Ok(terms.to_vec());
-    convert_for(model, settings, Some(&decide), Resume::default(), SILENT).expect("converts")
+    let modal = ModalModel::find(model, settings, Resume::default(), SILENT).expect("modes");
+    let condensed = modal.condense_kept(modal.condense_linear(), terms.to_vec());
+    modal.finish(condensed, SILENT).expect("converts")
 }
 
 /// Models with the columns of rigid motion, and those of all that is condensed.
@@ -95,34 +95,26 @@ fn a_decision_is_made_on_what_the_body_will_have() {
     for (model, ..) in models() {
         let body = convert(&model, &settings(), SILENT).expect("converts").body;
         let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} is not {b}");
-        let decide = |early: &FlexBody| {
-            assert_eq!(early.groups(), Groups { w1: true, ..Groups::NONE });
-            near(early.invariants().mass, body.invariants().mass);
-            near(early.invariants().inertia()[(2, 2)], body.invariants().inertia()[(2, 2)]);
-            assert_eq!((early.frame(), early.nodes()), (body.frame(), body.nodes()));
-            assert_eq!(
-                (early.modes().eigenvalue.as_slice(), &early.modes().shape),
-                (body.modes().eigenvalue.as_slice(), &body.modes().shape)
-            );
-            assert_eq!(early.interfaces(), body.interfaces());
-            for (found, expected) in early.modes().damping_ratio.iter().zip(&body.modes().damping_ratio) {
-                near(*found, *expected);
-            }
-            Ok(Vec::new())
-        };
-        let found =
-            convert_for(&model, &settings(), Some(&decide), Resume::default(), SILENT).expect("converts");
+        let settings = settings();
+        let modal = ModalModel::find(&model, &settings, Resume::default(), SILENT).expect("modes");
+        let linear = modal.condense_linear();
+        let early = modal.body(&linear).expect("a body");
+        assert_eq!(early.groups(), Groups { w1: true, ..Groups::NONE });
+        near(early.invariants().mass, body.invariants().mass);
+        near(early.invariants().inertia()[(2, 2)], body.invariants().inertia()[(2, 2)]);
+        assert_eq!((early.frame(), early.nodes()), (body.frame(), body.nodes()));
+        assert_eq!(
+            (early.modes().eigenvalue.as_slice(), &early.modes().shape),
+            (body.modes().eigenvalue.as_slice(), &body.modes().shape)
+        );
+        assert_eq!(early.interfaces(), body.interfaces());
+        for (found, expected) in early.modes().damping_ratio.iter().zip(&body.modes().damping_ratio) {
+            near(*found, *expected);
+        }
+        let condensed = modal.condense_kept(linear, Vec::new());
+        let found = modal.finish(condensed, SILENT).expect("converts");
         assert_eq!(found.body, body, "nothing was decided");
     }
-}
-
-#[test]
-fn a_decision_that_fails_ends_the_conversion() {
-    let (model, ..) = &models()[2];
-    let decide = |_: &FlexBody| Err(Diagnostic::new(Code::Usage, "no such scene").into());
-    let error =
-        convert_for(model, &settings(), Some(&decide), Resume::default(), SILENT).expect_err("refused");
-    assert_eq!(error.diagnostics()[0].message(), "no such scene");
 }
 
 #[test]

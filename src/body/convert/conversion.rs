@@ -1,0 +1,194 @@
+//! The last stage of a conversion: the body, what lumped masses would have given, and what the user should know.
+
+use super::certificate::certificate;
+use super::geometric_stiffness::softening_warning;
+use super::remarks::{free_frequencies, poor_fit};
+use super::{
+    Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping,
+    modal_geometric_stiffness,
+};
+use crate::base::diagnostic::Diagnostic;
+use crate::base::error::Result;
+use crate::base::progress::{Event, Watch};
+use crate::body::basis;
+use crate::body::flex_body::{
+    FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, Source, Storage, Truncation,
+};
+use crate::body::invariants::{Invariants, MassProperties};
+use crate::model::FeModel;
+use crate::numerics::eigen::{Counters, Plan, Resume};
+
+/// A finished conversion.
+#[derive(Debug, Clone)]
+pub struct Conversion {
+    /// The product.
+    pub body: FlexBody,
+    /// Mass properties in model axes.
+    pub mass_properties: MassProperties,
+    /// Fully lumped pipelines, where asked for.
+    pub lumped_modes: Vec<LumpedPipeline>,
+    /// Work of the eigen-solver.
+    pub counters: Counters,
+    /// Columns that the condensation multiplied by M, for the consistent mass.
+    pub condensed_columns: u64,
+    /// Memory and precision as decided before the work; none on the dense path.
+    pub plan: Option<Plan>,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Converts a checked model.
+///
+/// # Errors
+/// Those of [`ModalModel::find`], and of a damping that feeds energy to the modes.
+pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
+    convert_resuming(model, settings, Resume::default(), watch)
+}
+
+/// As [`convert`], with a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+///
+/// # Errors
+/// As [`convert`].
+pub fn convert_resuming(
+    model: &FeModel,
+    settings: &ConvertSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<Conversion> {
+    let modal = ModalModel::find(model, settings, resume, watch)?;
+    let condensed = modal.condense();
+    modal.finish(condensed, watch)
+}
+
+impl ModalModel<'_> {
+    /// The body with what is condensed so far, without comparators: what a scene decides on.
+    ///
+    /// # Errors
+    /// Of a damping that feeds energy to the modes.
+    pub fn body(&self, condensed: &Condensation) -> Result<FlexBody> {
+        FlexBody::new(self.parts(condensed, Vec::new())?.0)
+    }
+
+    /// The conversion with what was condensed.
+    ///
+    /// # Errors
+    /// Of a damping that feeds energy to the modes, and of a comparator.
+    pub fn finish(self, condensed: Condensation, watch: Watch<'_>) -> Result<Conversion> {
+        let exact = &condensed.invariants;
+        watch(Event::Phase("lumped comparison"));
+        let lumped = self.schemes.iter().map(|masses| lumped::comparator(&self, masses, exact)).collect();
+        let pipelines = if self.settings.lumped_modes { self.schemes.as_slice() } else { &[] };
+        let lumped_modes = pipelines
+            .iter()
+            .map(|masses| lumped::pipeline(&self, masses, exact, watch))
+            .collect::<Result<_>>()?;
+        let (parts, overdamped) = self.parts(&condensed, lumped)?;
+        let body = FlexBody::new(parts)?;
+        let diagnostics = self.remarks(exact, overdamped, &body);
+        let solution = self.found.solution;
+        Ok(Conversion {
+            body,
+            mass_properties: self.mass_properties,
+            lumped_modes,
+            counters: solution.counters,
+            condensed_columns: condensed.columns,
+            plan: solution.plan,
+            diagnostics,
+        })
+    }
+
+    /// Everything that a body is made of, and a warning about modes that are damped beyond the critical damping.
+    fn parts(
+        &self,
+        condensed: &Condensation,
+        lumped: Vec<LumpedBody>,
+    ) -> Result<(Parts, Option<Diagnostic>)> {
+        let (modes, overdamped) = self.damped_modes(&condensed.invariants)?;
+        let axes = &self.place.frame.axes;
+        let parts = Parts {
+            source: self.source(),
+            dimension: self.model.dimension(),
+            units: self.model.units().clone(),
+            frame: self.place.frame,
+            interfaces: self.interfaces.clone(),
+            coordinates: self.coordinates(),
+            nodes: self.nodes.clone(),
+            modes,
+            invariants: condensed.invariants.clone(),
+            geometric_stiffness: modal_geometric_stiffness(self.model, self.modes.vectors.as_ref(), axes)?,
+            lumped,
+            certificate: certificate(self.model, &self.found, condensed.guarantee.clone()),
+            terms: condensed.terms.clone(),
+            storage: Storage::default(),
+        };
+        Ok((parts, overdamped))
+    }
+
+    /// Where the body comes from.
+    fn source(&self) -> Source {
+        let (model, settings) = (self.model, self.settings);
+        Source {
+            name: model.name().to_owned(),
+            files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
+            number: model.number(),
+            n_dofs: model.stiffness().n(),
+            mass_structure: match model.scalar_mass() {
+                None => MassStructure::General,
+                Some(_) if model.has_diagonal_mass() => MassStructure::Diagonal,
+                Some(_) => MassStructure::RotationInvariant,
+            },
+            settings: settings.described(model),
+        }
+    }
+
+    /// The modes with the damping that the model states.
+    fn damped_modes(&self, invariants: &Invariants) -> Result<(Modes, Option<Diagnostic>)> {
+        let solution = &self.found.solution;
+        let eigenvalues = &solution.eigenvalues;
+        let damping = modal_damping(self.model, self.modes.vectors.as_ref(), eigenvalues, invariants)?;
+        let (damping_ratio, modal_damping, overdamped) = match damping {
+            Some(damping) => (damping.ratio, Some(damping.matrix), damping.warning),
+            None => (vec![0.0; eigenvalues.len()], None, None),
+        };
+        let truncation = self.found.truncation.iter().cloned();
+        let modes = Modes {
+            damping_ratio,
+            modal_damping,
+            eigenvalue: eigenvalues.clone(),
+            residual: solution.residuals.clone(),
+            provenance: self.found.provenance.clone(),
+            truncation: truncation
+                .map(|basis::Truncation { load, before, after }| Truncation { load, before, after })
+                .collect(),
+            shape: self.modes.of_nodes().to_owned(),
+            rotation: self.modes.rotations.clone(),
+            internal: self.modes.internal.clone(),
+        };
+        Ok((modes, overdamped))
+    }
+
+    /// Motions of the interfaces as coordinates, in body axes, for bases that have them.
+    fn coordinates(&self) -> Option<InterfaceCoordinates> {
+        let own = self.found.coordinates.as_ref()?;
+        let axes = &self.place.frame.axes;
+        let turned = own.in_axes(axes, self.model.dimension(), &self.modes.signs);
+        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
+        Some(InterfaceCoordinates { names, stiffness, mass, of_modes })
+    }
+
+    /// Warnings and notes about the finished body.
+    fn remarks(
+        &self,
+        invariants: &Invariants,
+        overdamped: Option<Diagnostic>,
+        body: &FlexBody,
+    ) -> Vec<Diagnostic> {
+        let softening = softening_warning(self.model, &self.settings.basis, invariants);
+        let poor_fits = self
+            .interfaces
+            .iter()
+            .filter_map(|interface| poor_fit(interface, &self.nodes, &self.modes, self.model.dimension()));
+        let found = self.found.diagnostics.iter().cloned();
+        found.chain(overdamped).chain(softening).chain(poor_fits).chain(free_frequencies(body)).collect()
+    }
+}

@@ -1,0 +1,147 @@
+//! What lumped masses would have given: invariants on the same modes, and the pipeline with modes of their own.
+
+use super::modal_model::reduced;
+use super::{BodyModes, Lumping, ModalModel};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::progress::Watch;
+use crate::body::basis::{ModeSettings, free_surface_of};
+use crate::body::flex_body::{Groups, LumpedBody};
+use crate::body::invariants::{
+    Invariants, LumpedMasses, align, condense_lumped, condense_lumped_linear, error_norms,
+};
+use crate::model::FeModel;
+use crate::numerics::eigen::{Accuracy, EigenSolution, Wanted};
+use crate::numerics::linalg::gram;
+use faer::{Mat, MatRef};
+use std::collections::HashMap;
+
+/// The fully lumped pipeline of one scheme: modes from the lumped mass as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LumpedPipeline {
+    /// Scheme.
+    pub scheme: String,
+    /// Its eigenvalues, ascending; empty when it has no real modes.
+    pub eigenvalues: Vec<f64>,
+    /// Smallest singular value of Psi' M Psi_l: the cosine of the largest angle between the two modal subspaces.
+    pub subspace_cosine: f64,
+    /// Error norms of its invariants after the subspaces were aligned.
+    pub comparison: Vec<(String, f64)>,
+    /// Why there is no result; empty when there is one.
+    pub remark: String,
+}
+
+impl Lumping {
+    /// The masses of the nodes of `model`.
+    ///
+    /// # Errors
+    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes.
+    pub(super) fn masses(&self, model: &FeModel) -> Result<LumpedMasses> {
+        match self {
+            Lumping::RowSum => Ok(LumpedMasses::row_sum(&model.nodal_mass())),
+            Lumping::DiagonalScaling => LumpedMasses::diagonal_scaling(&model.nodal_mass()),
+            Lumping::User(table) => {
+                let ids = &model.nodes().ids;
+                let by_node: HashMap<i64, f64> = table.iter().copied().collect();
+                let refuse = |message: String| Diagnostic::new(Code::LumpedMassTable, message).into();
+                if by_node.len() < table.len() {
+                    return Err(refuse(format!(
+                        "{} nodes are given more than once",
+                        table.len() - by_node.len()
+                    )));
+                }
+                let missing: Vec<i64> = ids.iter().filter(|id| !by_node.contains_key(id)).copied().collect();
+                if let Some(first) = missing.first() {
+                    return Err(refuse(format!("{} nodes have no mass, node {first} first", missing.len())));
+                }
+                LumpedMasses::user(ids.iter().map(|id| by_node[id]).collect(), ids.len())
+            }
+        }
+    }
+}
+
+/// Invariants of `masses` on the same modes, and what they are off by.
+pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &Invariants) -> LumpedBody {
+    let shapes = modal.modes.of_nodes();
+    let own = lumped_invariants(modal, masses, shapes, exact.modal_stiffness.clone(), exact.groups);
+    LumpedBody {
+        scheme: masses.scheme().name().to_owned(),
+        comparison: error_norms(exact, &own),
+        invariants: own,
+        negative_masses: masses.negative(),
+    }
+}
+
+/// What lumped masses make of the groups that the body holds. Of a plane body with a general mass nothing but the rotation about z is
+/// known, and lumped masses are compared in this alone.
+fn lumped_invariants(
+    modal: &ModalModel<'_>,
+    masses: &LumpedMasses,
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+    groups: Groups,
+) -> Invariants {
+    let only_about_z = modal.model.dimension() == 2 && modal.model.scalar_mass().is_none();
+    let condense = if groups.w2 || groups.w3 { condense_lumped } else { condense_lumped_linear };
+    let own = condense(masses, &modal.place.positions, shapes, modal_stiffness);
+    if only_about_z { own.about_z() } else { own }.with_groups(groups)
+}
+
+/// Modes and invariants from the lumped mass, aligned with the exact subspace before they are compared.
+pub(super) fn pipeline(
+    modal: &ModalModel<'_>,
+    masses: &LumpedMasses,
+    exact: &Invariants,
+    watch: Watch<'_>,
+) -> Result<LumpedPipeline> {
+    let scheme = masses.scheme().name().to_owned();
+    let eigenvectors = match own_modes(modal, masses, watch) {
+        Ok(found) => found,
+        Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
+    };
+    let modes = BodyModes::new(modal.model, &modal.place, &eigenvectors.vectors);
+    let mass_times_modes = modal.model.pencil().apply_mass(modes.vectors.as_ref());
+    let cross = gram(modal.modes.vectors.as_ref(), mass_times_modes.as_ref());
+    let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..modal.n_modes())));
+    let stiffness = reduced(modal.model.stiffness(), modes.vectors.as_ref());
+    let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups);
+    Ok(LumpedPipeline {
+        scheme,
+        eigenvalues: eigenvectors.eigenvalues,
+        subspace_cosine: alignment.agreement,
+        comparison: error_norms(exact, &own.with_basis(alignment.basis.as_ref())),
+        remark: String::new(),
+    })
+}
+
+/// As many modes of the lumped mass as the body has; else why there are none.
+fn own_modes(
+    modal: &ModalModel<'_>,
+    masses: &LumpedMasses,
+    watch: Watch<'_>,
+) -> std::result::Result<EigenSolution, String> {
+    if masses.negative() > 0 {
+        return Err(format!("{} nodal masses are negative: no real modes", masses.negative()));
+    }
+    // A comparison needs no guarantees.
+    let accuracy = match modal.settings.modes.accuracy {
+        Accuracy::Certified => Accuracy::Standard,
+        other => other,
+    };
+    let wanted = Wanted::Lowest(modal.n_modes());
+    let settings = ModeSettings { wanted, accuracy, ..modal.settings.modes };
+    let found = free_surface_of(modal.model, masses.masses(), &settings, watch)
+        .map_err(|error| error.diagnostics()[0].message().to_owned())?
+        .solution;
+    if found.eigenvalues.len() < modal.n_modes() {
+        return Err(format!("the lumped mass has {} modes only", found.eigenvalues.len()));
+    }
+    Ok(found)
+}
+
+impl LumpedPipeline {
+    fn without_result(scheme: String, remark: String) -> Self {
+        let (eigenvalues, comparison) = (Vec::new(), Vec::new());
+        Self { scheme, eigenvalues, subspace_cosine: f64::NAN, comparison, remark }
+    }
+}

@@ -1,0 +1,125 @@
+//! A model with its modes, in the frame of its body: the first stage of a conversion.
+
+use super::{BodyModes, ConvertSettings, Place, rigid_mass};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::progress::{Event, Watch};
+use crate::body::basis::{BasisChoice, ModalBasis, Task};
+use crate::body::flex_body::Interface;
+use crate::body::invariants::{
+    BodyFrame, Frame, LumpedMasses, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
+};
+use crate::model::{FeModel, Nodes, Reference};
+use crate::numerics::eigen::{Accuracy, Resume};
+use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
+use faer::{Mat, MatRef};
+use std::collections::HashMap;
+
+/// A checked model and its modes in body axes; of the mass nothing is condensed yet.
+pub struct ModalModel<'m> {
+    pub(super) model: &'m FeModel,
+    pub(super) settings: &'m ConvertSettings,
+    /// The comparators that are wanted.
+    pub(super) schemes: Vec<LumpedMasses>,
+    /// The modes in model axes, with what is known of each.
+    pub(super) found: ModalBasis,
+    pub(super) mass_properties: MassProperties,
+    pub(super) place: Place,
+    pub(super) modes: BodyModes,
+    /// Psi' K Psi.
+    pub(super) modal_stiffness: Mat<f64>,
+    pub(super) nodes: Nodes,
+    pub(super) interfaces: Vec<Interface>,
+}
+
+impl<'m> ModalModel<'m> {
+    /// Finds the modes and chooses the frame.
+    ///
+    /// * `resume`: a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+    ///
+    /// # Errors
+    /// Those of [`free_surface`](crate::body::basis::free_surface) and [`choose_frame`];
+    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes (found before any work).
+    pub fn find(
+        model: &'m FeModel,
+        settings: &'m ConvertSettings,
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<Self> {
+        refuse_uncertifiable(model, settings.modes.accuracy)?;
+        let schemes =
+            settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
+        let task = Task { model, settings: &settings.modes, resume, watch };
+        let found = settings.basis.basis().modes(&task)?;
+        watch(Event::Phase("invariants"));
+        let (frame, mass_properties) = body_frame(model, settings.frame)?;
+        let place = Place::new(model, frame);
+        let modes = BodyModes::new(model, &place, &found.solution.vectors);
+        let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
+        let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
+        let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+        let interfaces = interfaces(model, &frame, coupled);
+        Ok(Self {
+            model,
+            settings,
+            schemes,
+            found,
+            mass_properties,
+            place,
+            modes,
+            modal_stiffness,
+            nodes,
+            interfaces,
+        })
+    }
+
+    /// Number of modes.
+    pub(super) fn n_modes(&self) -> usize {
+        self.modes.vectors.ncols()
+    }
+}
+
+/// Rows that are no displacements have no place in the double-double condensation.
+fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
+    let plain = model.scalar_mass().is_some() && model.rows().len() == model.rows().displacements();
+    if accuracy == Accuracy::Certified && !plain {
+        let message = "accuracy certified covers displacements whose mass commutes with rotations";
+        return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+    }
+    Ok(())
+}
+
+/// The body frame that is wanted, and the mass properties in model axes.
+fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperties)> {
+    let positions = &model.nodes().positions;
+    match (model.scalar_mass(), model.dimension()) {
+        (Some(mass), 2) => choose_plane_frame(mass, positions, wanted),
+        (Some(mass), _) => choose_frame(mass, positions, wanted),
+        (None, d) => choose_general_frame(|about| rigid_mass(model, &about), positions, d, wanted),
+    }
+}
+
+/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.
+fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
+    let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+    let in_body = |reference: &Reference| match reference {
+        Reference::Point(x) => Some(frame.to_body(&[*x])[0]),
+        _ => None,
+    };
+    let sets = model.interfaces().iter();
+    sets.map(|set| Interface {
+        name: set.name.clone(),
+        nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
+        coupling: if coupled { Some(set.coupling()) } else { set.coupling },
+        reference: in_body(&set.reference),
+    })
+    .collect()
+}
+
+/// Psi' A Psi, where the matrix A and the modes are in model axes.
+pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
+    let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
+    multiply(a, 1, vectors, product.as_mut());
+    let k = gram(vectors, product.as_ref());
+    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+}

@@ -1,0 +1,64 @@
+//! What the user is told about a finished body.
+
+use super::BodyModes;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::body::flex_body::{FlexBody, Interface};
+use crate::model::{Coupling, Nodes};
+use faer::Mat;
+
+/// Part by which a frequency may be too high before the user is told.
+const TOO_HIGH: f64 = 0.01;
+
+/// A note about the frequencies of the free body that a Craig-Bampton body does not hold.
+pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
+    let fixed = body.certificate().fixed_interface.as_ref()?;
+    let (theta, hertz) = (&body.modes().eigenvalue, body.frequencies_hz());
+    let holding = fixed.holding(theta, TOO_HIGH);
+    let first = *theta.get(holding)?;
+    let kept = if body.has_rigid_interfaces() { " with the same rigid interfaces" } else { "" };
+    let holds = match holding {
+        0 => format!("none is within 1 % of that of the free body{kept}"),
+        count => format!(
+            "the lowest {count} (up to {:.6} Hz) are within 1 % of those of the free body{kept}",
+            hertz[count - 1]
+        ),
+    };
+    let percent = |part: f64| format!("{:.2} %", 100.0 * part);
+    let most = fixed.largest_excess(holding, first).map(|most| format!(", {} at most", percent(most)));
+    let message = format!(
+        "of the {} frequencies of the Craig-Bampton body {holds}; that of mode {}, {:.6} Hz, is too high by {}{}",
+        theta.len(),
+        holding + 1,
+        hertz[holding],
+        percent(fixed.excess(holding, first)),
+        most.unwrap_or_default(),
+    );
+    Some(Diagnostic::new(Code::FreeFrequencies, message))
+}
+
+/// Part of the motion of an interface that is rounding.
+const RIGID_FIT: f64 = 1e-8;
+
+/// A warning about an interface that was declared rigid, but is not in these modes.
+pub(super) fn poor_fit(
+    interface: &Interface,
+    nodes: &Nodes,
+    modes: &BodyModes,
+    dimension: usize,
+) -> Option<Diagnostic> {
+    if interface.coupling != Some(Coupling::Rigid) {
+        return None;
+    }
+    let rotations = modes.rotations.as_ref().map(Mat::as_ref);
+    let rows = interface.rows(nodes, modes.of_nodes(), rotations, dimension)?;
+    let (mode, part) = rows.deformation();
+    (part > RIGID_FIT).then(|| {
+        let message = format!(
+            "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
+            interface.name,
+            100.0 * part,
+            mode + 1
+        );
+        Diagnostic::new(Code::InterfaceFit, message)
+    })
+}

@@ -1,0 +1,93 @@
+//! What is asked of a conversion.
+
+use crate::body::basis::{BasisChoice, Loads, ModeSettings};
+use crate::body::invariants::{BodyFrame, LumpedScheme};
+use crate::model::{Damping, FeModel};
+use crate::numerics::eigen::Wanted;
+
+/// A lumped comparator that is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Lumping {
+    /// Row sums of Ms.
+    RowSum,
+    /// Diagonal of Ms scaled to the total mass.
+    DiagonalScaling,
+    /// Nodal masses by node number, as a multibody package would import them.
+    User(Vec<(i64, f64)>),
+}
+
+impl Lumping {
+    fn scheme(&self) -> LumpedScheme {
+        match self {
+            Self::RowSum => LumpedScheme::RowSum,
+            Self::DiagonalScaling => LumpedScheme::DiagonalScaling,
+            Self::User(_) => LumpedScheme::User,
+        }
+    }
+}
+
+/// Settings of a conversion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvertSettings {
+    /// Which modes and how good.
+    pub modes: ModeSettings,
+    /// Which basis.
+    pub basis: BasisChoice,
+    /// Body frame.
+    pub frame: BodyFrame,
+    /// Comparators.
+    pub lumped: Vec<Lumping>,
+    /// Also compute the modes of each lumped mass.
+    pub lumped_modes: bool,
+}
+
+impl Default for ConvertSettings {
+    /// 20 modes, principal frame, and the two comparators that need nothing but the matrices.
+    fn default() -> Self {
+        Self {
+            modes: ModeSettings::default(),
+            basis: BasisChoice::default(),
+            frame: BodyFrame::default(),
+            lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
+            lumped_modes: false,
+        }
+    }
+}
+
+impl ConvertSettings {
+    /// The settings that can change the result, for the file.
+    pub(super) fn described(&self, model: &FeModel) -> serde_json::Value {
+        let (modes, below) = match self.modes.wanted {
+            Wanted::Lowest(count) => ((count < usize::MAX).then_some(count), None),
+            Wanted::Below(lambda) => (None, Some(lambda)),
+        };
+        let schemes: Vec<&str> = self.lumped.iter().map(|lumping| lumping.scheme().name()).collect();
+        let loads: Vec<&str> = self.basis.residual_vectors().iter().map(Loads::name).collect();
+        let mut described = serde_json::json!({
+            "accuracy": self.modes.accuracy.name(),
+            "basis": self.basis.basis().name(),
+            "frame": self.frame.name(),
+            "lumped": schemes,
+            "max_eigenvalue": below,
+            "modes": modes,
+            "residual_vectors": loads,
+        });
+        if let Some(damping) = model.damping() {
+            described["damping"] = serde_json::json!({ damping.name(): damping_numbers(damping) });
+        }
+        described
+    }
+}
+
+/// The numbers that a damping is stated by; null for a matrix.
+fn damping_numbers<D>(damping: &Damping<D>) -> serde_json::Value {
+    match damping {
+        Damping::Ratio(ratio) => serde_json::json!(ratio),
+        Damping::Bands(bands) => {
+            let end = |hertz: f64| hertz.is_finite().then_some(hertz);
+            bands.iter().map(|b| serde_json::json!({ "to_hz": end(b.to_hz), "ratio": b.ratio })).collect()
+        }
+        Damping::Rayleigh { alpha, beta } => serde_json::json!({ "alpha": alpha, "beta": beta }),
+        Damping::Matrix(_) => serde_json::Value::Null,
+    }
+}
