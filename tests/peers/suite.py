@@ -5,8 +5,8 @@
 
 installs Exudyn, welib, h5py and scipy by pip into target/peers, Octave and an ARM compiler by apt-get (as root; else it says the command), runs every
 peer with target/release/flexbody and writes the table of docs/export.md and that of docs/formats/embedded.md. Some minutes. Without options it runs what is
-installed and prints. Programs that are in no package archive are found by environment variables: PYMBS, FEMBEAM (folders of their sources). Exits with 1
-when a number is worse than its limit; what is not found is said and fails nothing.
+installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
+FEMBEAM (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
 
 `--small` takes those peers that need seconds (CI runs it); `--all` also runs craig_bampton.py and mechanisms.py, which write files of their own.
 """
@@ -54,6 +54,7 @@ TABLES = {}
 # Name, module and function, whether it needs seconds only.
 PEERS = [
     ("Exudyn", "exudyn_bodies.rows", False),
+    ("MBDyn", "mbdyn.rows", False),
     ("Octave", "octave.simscape", True),
     ("FEMBeam in Octave", "octave.fembeam", True),
     ("pymbs", "pymbs_sid.rows", True),
