@@ -225,7 +225,7 @@ codes! {
 /// `docs/codes.md`: the table of codes and the exit codes.
 pub fn codes_markdown() -> String {
     let mut out = String::from(
-        "<!-- Generated from the table in src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
+        "<!-- Generated from the table in src/base/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
          # Diagnostics and exit codes\n\n\
          | exit code | meaning |\n|---|---|\n\
          | 0 | the work was done |\n\

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
 const INTRODUCTION: &str = "\
-<!-- Generated from the table in src/store/schema.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->
+<!-- Generated from the table in src/formats/flex_body_file/schema.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->
 
 # The flex-body file
 
