@@ -5,15 +5,162 @@
 //! lumped-mass approximation, into the constant invariants I0, W1, W2, W3. Sources of every equation and the
 //! errata of the literature: `docs/theory.md`.
 //!
-//! Rooms and the arrows between them: `ARCHITECTURE.md`; `tests/program/architecture.rs` holds them.
+//! # Five tasks
+//!
+//! **Convert the model of a manifest, look at the body, write it and read it back.**
+//!
+//! ```
+//! use flexbody::{ConvertOptions, FlexBody, Model};
+//! # fn main() -> flexbody::Result<()> {
+//! let model = Model::read("fixtures/models/cube_hex8/model.toml")?;
+//! let body = model.convert(&ConvertOptions::default().modes(8))?.body;
+//! println!("{} kg, first mode at {} Hz", body.mass(), body.frequencies_hz()[0]);
+//! let w2 = body.w2().expect("all groups are there without a scene");
+//! assert_eq!((w2.rows(), w2.columns()), (24, 24));
+//! # let folder = tempfile::tempdir().expect("a folder");
+//! # let path = folder.path().join("cube.flex.h5");
+//! body.write(&path)?;
+//! assert_eq!(FlexBody::read(&path)?, body);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! **Make a model of matrices in memory**, here a bar of two masses per axis, from `sprs` or from slices of compressed columns
+//! ([`SparseMatrix::from_csc`]). `examples/from_memory.rs` goes on from here.
+//!
+//! ```
+//! use flexbody::{Model, SparseMatrix};
+//! # fn main() -> flexbody::Result<()> {
+//! # let (k, m, nodes) = flexbody_doctest::truss();
+//! let model = Model::builder("truss", SparseMatrix::from_sprs(&k), SparseMatrix::from_sprs(&m))
+//!     .nodes((1..=nodes.len() as i64).collect(), nodes)
+//!     .units("m", "kg", "s")?
+//!     .damping_ratio(0.02)
+//!     .build()?;
+//! assert_eq!(model.n_dofs(), 3 * model.node_ids().len());
+//! # Ok(())
+//! # }
+//! # mod flexbody_doctest { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/truss/mod.rs")); }
+//! ```
+//!
+//! **Keep what a scene needs**, and see why.
+//!
+//! ```
+//! use flexbody::{ConvertOptions, Model, Scene};
+//! # fn main() -> flexbody::Result<()> {
+//! let model = Model::read("fixtures/models/bracket_hex20/model.toml")?;
+//! let scene = Scene::read("fixtures/scenes/tumbling.toml")?;
+//! let (conversion, selection) = model.convert_for(&scene, &ConvertOptions::default().modes(6))?;
+//! for (group, kept, why) in selection.groups() {
+//!     println!("{group}: {} {why}", if kept { "kept," } else { "dropped," });
+//! }
+//! assert_eq!(conversion.body.n_modes(), selection.modes().len());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! **Simulate.**
+//!
+//! ```
+//! use flexbody::{ConvertOptions, Model, Scene};
+//! # fn main() -> flexbody::Result<()> {
+//! let body = Model::read("fixtures/models/bracket_hex20/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body;
+//! let motion = body.simulate(&Scene::read("fixtures/scenes/tumbling.toml")?)?;
+//! println!("a node is deflected by {} at most", motion.largest_deflection());
+//! # assert!(motion.largest_deflection() > 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! **Hand the body to another program.** Errors carry codes (`docs/codes.md`), with what to do.
+//!
+//! ```
+//! use flexbody::{ConvertOptions, Model};
+//! # fn main() -> flexbody::Result<()> {
+//! # let folder = tempfile::tempdir().expect("a folder");
+//! # let path = folder.path().join("cube.sid");
+//! let body = Model::read("fixtures/models/cube_hex8/model.toml")?.convert(&ConvertOptions::default())?.body;
+//! for loss in body.export("sid", &path)? {
+//!     println!("{loss}");
+//! }
+//! let unknown = body.export("msc", &path).expect_err("no such format");
+//! println!("{}: {}", unknown.diagnostics()[0].code(), unknown.diagnostics()[0].message());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Rooms of the sources and the arrows between them: `ARCHITECTURE.md`; `tests/program/architecture.rs` holds them.
 
+// What only tests look into is unused without them.
+#![cfg_attr(not(feature = "internals"), allow(dead_code, unused_imports))]
+
+mod api;
+
+// The rooms behind the front door. They are no part of the interface: tests and benches of this package see them by the feature
+// `internals`, which promises nothing.
+#[cfg(not(feature = "internals"))]
+mod base;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod base;
+#[cfg(not(feature = "internals"))]
+mod body;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod body;
+#[cfg(all(feature = "cli", not(feature = "internals")))]
+mod cli;
+#[cfg(all(feature = "cli", feature = "internals"))]
+#[doc(hidden)]
 pub mod cli;
+#[cfg(not(feature = "internals"))]
+mod formats;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod formats;
+#[cfg(not(feature = "internals"))]
+mod input;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod input;
+#[cfg(not(feature = "internals"))]
+mod model;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod model;
+#[cfg(not(feature = "internals"))]
+mod motion;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod motion;
+#[cfg(not(feature = "internals"))]
+mod numerics;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod numerics;
+#[cfg(not(feature = "internals"))]
+mod report;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod report;
+#[cfg(not(feature = "internals"))]
+mod study;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod study;
+
+pub use api::{
+    Accuracy, Basis, Conversion, ConvertOptions, FlexBody, Frame, Identity, Matrix, Model, ModelBuilder,
+    Motion, Scene, Selection, SparseMatrix,
+};
+pub use base::diagnostic::{Code, Diagnostic, Severity};
+pub use base::error::{Error, ExitCode, Result};
+
+/// What `src/main.rs` runs. No part of the interface.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod program {
+    pub use crate::base::memory::goes_without;
+    pub use crate::base::output::{abandon_unfinished, abandon_unfinished_soon};
+    pub use crate::cli::{Arguments, parse, run, tell_bug};
+}

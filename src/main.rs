@@ -2,9 +2,8 @@
 
 mod process;
 
-use flexbody::base::diagnostic::{Code, Diagnostic};
-use flexbody::base::error::ExitCode;
-use flexbody::cli::{Arguments, parse, run, tell_bug};
+use flexbody::program::{Arguments, abandon_unfinished, parse, run, tell_bug};
+use flexbody::{Code, Diagnostic, ExitCode};
 use std::io::{IsTerminal, Write};
 
 #[global_allocator]
@@ -58,7 +57,7 @@ fn keep_freed_memory() {
 
 /// Ctrl-C, or SIGTERM: ends the process at once, whatever it is doing.
 fn interrupted() {
-    flexbody::base::output::abandon_unfinished();
+    abandon_unfinished();
     let mut stderr = std::io::stderr();
     // A progress bar may stand on the line.
     let line_end = if stderr.is_terminal() { "\n" } else { "" };

@@ -1,9 +1,8 @@
 //! What the program asks of its process: limits that give errors instead of signals, and an end without memory.
 #![allow(unsafe_code)] // an allocator, and calls of the C library that set and end a process
 
-use flexbody::base::error::ExitCode;
-use flexbody::base::memory::goes_without;
-use flexbody::base::output::abandon_unfinished_soon;
+use flexbody::ExitCode;
+use flexbody::program::{abandon_unfinished_soon, goes_without};
 use mimalloc::MiMalloc;
 use std::alloc::{GlobalAlloc, Layout};
 use std::cell::Cell;

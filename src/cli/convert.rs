@@ -2,7 +2,6 @@
 
 use super::adopt;
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
-use super::checkpoint::resume;
 use super::output::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
@@ -26,8 +25,8 @@ use crate::model::{CheckedModel, FeModel};
 use crate::motion::scene::{Scene, read_scene};
 use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
-use crate::study::selection::WantedResponses;
-use crate::study::tailoring::{Tailoring, convert_for_scene};
+use crate::study::checkpoint::resume;
+use crate::study::tailoring::{Tailoring, convert_for_scene, loads_for, read_loads};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -241,17 +240,8 @@ fn residual_vectors(
     scene: Option<&Scene>,
 ) -> Vec<LoadSource> {
     let free = arguments.basis == BasisName::Free && arguments.accuracy != AccuracyName::Certified;
-    match scene.filter(|_| free && files.residual_vectors.is_empty() && !arguments.lumped_modes) {
-        Some(scene) => responses_to(scene),
-        None => files.residual_vectors.clone(),
-    }
-}
-
-/// The loads of a scene.
-pub(super) fn responses_to(scene: &Scene) -> Vec<LoadSource> {
-    let WantedResponses { centrifugal, interfaces } = WantedResponses::of(scene);
-    let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
-    loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
+    let scene = scene.filter(|_| free && !arguments.lumped_modes);
+    loads_for(scene, &files.residual_vectors)
 }
 
 /// Loads of residual vectors as named on the command line.
@@ -334,19 +324,6 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
             })
         }
     }
-}
-
-/// Loads of residual vectors, with the files read that they need.
-pub(super) fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
-    let read = |set: &LoadSource| match set {
-        LoadSource::Centrifugal => Ok(Loads::Centrifugal),
-        LoadSource::Interfaces => Ok(Loads::Interfaces),
-        LoadSource::File(location) => {
-            let raw = read_shapes(location, model.stiffness().n(), "loads")?;
-            UserLoads::new(model, raw).map(Loads::User)
-        }
-    };
-    loads.iter().map(read).collect()
 }
 
 /// A lumping scheme as named on the command line.

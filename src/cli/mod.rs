@@ -4,7 +4,6 @@ mod adopt;
 mod arguments;
 mod audit;
 mod check;
-mod checkpoint;
 mod compare;
 mod convert;
 mod export;

@@ -1,12 +1,12 @@
 //! Where outputs go: each is reserved before the work, and appears after it.
 
 use super::arguments::ConvertArguments;
-use super::checkpoint::CheckpointFile;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::{OutputSlot, followed};
 use crate::formats::flex_body_file;
 use crate::report::Format;
+use crate::study::checkpoint::CheckpointFile;
 use std::path::{Path, PathBuf};
 
 /// Output files of one body.

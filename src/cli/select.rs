@@ -1,7 +1,6 @@
 //! `flexbody select`.
 
 use super::arguments::SelectArguments;
-use super::convert::{read_loads, responses_to};
 use super::output::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -20,7 +19,7 @@ use crate::motion::scene::{Scene, read_scene};
 use crate::numerics::eigen::{Resume, Wanted};
 use crate::report::{Format, RunData, SelectionFacts};
 use crate::study::selection::select;
-use crate::study::tailoring::Tailoring;
+use crate::study::tailoring::{Tailoring, loads_for, read_loads};
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -65,10 +64,7 @@ fn converted(
     let files = read_manifest(&arguments.body)?;
     refuse_replacing(files.paths().into_iter(), arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
-    let loads = match files.residual_vectors.is_empty() {
-        true => responses_to(scene),
-        false => files.residual_vectors.clone(),
-    };
+    let loads = loads_for(Some(scene), &files.residual_vectors);
     let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
     let settings = ConvertSettings {
         modes: ModeSettings {

@@ -5,16 +5,19 @@ mod adams;
 mod chrono;
 mod embedded;
 pub mod export;
+#[cfg(feature = "hdf5")]
 mod exudyn;
 pub mod flex_body_file;
 pub mod import;
 mod json;
 mod mbdyn;
+#[cfg(feature = "hdf5")]
 mod mbsim;
 mod npz;
 mod openradioss;
 mod registry;
 mod sid;
+#[cfg(feature = "hdf5")]
 mod simscape;
 
 pub use embedded::embedded_markdown;

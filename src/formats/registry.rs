@@ -2,7 +2,9 @@
 
 use super::export::{ExportFormat, ExportOptions, Exported, Points};
 use super::import::ForeignFormat;
-use super::{adams, chrono, embedded, exudyn, json, mbdyn, mbsim, npz, openradioss, sid, simscape};
+use super::{adams, chrono, embedded, json, mbdyn, npz, openradioss, sid};
+#[cfg(feature = "hdf5")]
+use super::{exudyn, mbsim, simscape};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
@@ -10,12 +12,15 @@ use crate::input::InputFile;
 
 /// Every format, in the order of the documentation.
 pub const FORMATS: &[&dyn ExportFormat] = &[
+    #[cfg(feature = "hdf5")]
     &exudyn::write::Exudyn,
     &sid::write::Sid,
     &mbdyn::write::Mbdyn,
+    #[cfg(feature = "hdf5")]
     &mbsim::write::Mbsim,
     &openradioss::OpenRadioss,
     &chrono::Chrono,
+    #[cfg(feature = "hdf5")]
     &simscape::Simscape,
     &adams::AdamsInvariants,
     &npz::Npz,
@@ -91,8 +96,14 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
 }
 
 /// Every format, in the order in which files are recognised.
-pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] =
-    &[&sid::read::SidFile, &mbdyn::read::Mbdyn, &mbsim::read::Mbsim, &exudyn::read::Exudyn];
+pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] = &[
+    &sid::read::SidFile,
+    &mbdyn::read::Mbdyn,
+    #[cfg(feature = "hdf5")]
+    &mbsim::read::Mbsim,
+    #[cfg(feature = "hdf5")]
+    &exudyn::read::Exudyn,
+];
 
 /// The format of that name.
 ///

@@ -5,6 +5,7 @@ mod assemble;
 mod bytes;
 mod compression;
 mod digits;
+#[cfg(feature = "hdf5")]
 mod hdf5;
 mod manifest;
 mod matrix_market;

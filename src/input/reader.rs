@@ -83,7 +83,11 @@ pub trait Reader: Sync {
 }
 
 /// Every matrix format that is understood.
-pub const READERS: &[&dyn Reader] = &[&super::matrix_market::MatrixMarket, &super::hdf5::Hdf5];
+pub const READERS: &[&dyn Reader] = &[
+    &super::matrix_market::MatrixMarket,
+    #[cfg(feature = "hdf5")]
+    &super::hdf5::Hdf5,
+];
 
 /// Number of bytes that [`Reader::recognises`] is shown. HDF5 files may begin with a user block of this size.
 pub const HEAD: usize = 2048 + 8;

@@ -24,6 +24,7 @@ mod selection;
 mod simulation;
 mod term_facts;
 mod text;
+#[cfg(feature = "hdf5")]
 mod trade;
 
 pub use audit::{audit_json, audit_text};
@@ -36,4 +37,5 @@ pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
 pub use term_facts::dropped_text;
+#[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};

@@ -3,12 +3,14 @@
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;
 use crate::base::progress::Watch;
+use crate::body::basis::{Loads, UserLoads};
 use crate::body::convert::{Conversion, ConvertSettings, ModalModel};
 use crate::body::flex_body::FlexBody;
+use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
 use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Resume, Wanted};
-use crate::study::selection::{Selection, largest_eigenvalue, rule_out, select};
+use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
 
 /// How a body is made for a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +63,31 @@ impl Tailoring {
             found => found,
         }
     }
+}
+
+/// Loads whose static responses join the modes where nobody names others: those `stated` with the model; without, those of the scene, of
+/// which free modes alone know nothing.
+pub fn loads_for(scene: Option<&Scene>, stated: &[LoadSource]) -> Vec<LoadSource> {
+    let Some(scene) = scene.filter(|_| stated.is_empty()) else { return stated.to_vec() };
+    let WantedResponses { centrifugal, interfaces } = WantedResponses::of(scene);
+    let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
+    loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
+}
+
+/// Loads of residual vectors, with the files read that they need.
+///
+/// # Errors
+/// Those of [`read_shapes`] and [`UserLoads::new`].
+pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
+    let read = |set: &LoadSource| match set {
+        LoadSource::Centrifugal => Ok(Loads::Centrifugal),
+        LoadSource::Interfaces => Ok(Loads::Interfaces),
+        LoadSource::File(location) => {
+            let raw = read_shapes(location, model.stiffness().n(), "loads")?;
+            UserLoads::new(model, raw).map(Loads::User)
+        }
+    };
+    loads.iter().map(read).collect()
 }
 
 /// Converts `model` to a body with the terms and modes that `scene` needs: what bounds of tier 0 rule out is never computed, the rest is

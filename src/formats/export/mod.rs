@@ -3,6 +3,7 @@
 pub(crate) mod arrays;
 mod format;
 pub(crate) mod frames;
+#[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_contents;
 pub(crate) mod inertia;
 pub(crate) mod interface_matrices;

@@ -1,7 +1,7 @@
 //! What a flex-body file holds of a body, as plain data: for formats that carry the same entries in another container.
 
 use super::names;
-use super::scan::place;
+use super::names::place;
 use super::schema::TABLE;
 use super::value::Value;
 use crate::body::flex_body::FlexBody;

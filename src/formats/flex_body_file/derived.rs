@@ -2,7 +2,8 @@
 
 use super::extents::index;
 use super::item::{DERIVED_TOLERANCE, Group, Origin, Per, SHORT_TOLERANCE};
-use super::scan::{Scan, key, place};
+use super::names::place;
+use super::scan::{Scan, key};
 use super::schema::TABLE;
 use super::value::{Value, View};
 use crate::base::diagnostic::Code;

@@ -1,17 +1,13 @@
 //! The digest of all content of a flex-body file, as `docs/format.md` describes it: a SHA-256 of every group and dataset, listed by path, and
 //! one of this list.
 
+use super::schema::{LIST, WHOLE};
 use crate::base::hdf5_file::{Record, Stored, attribute_names, attribute_record, dataset_record};
 use crate::base::provenance::{Fingerprint, sha256_hex};
 use hdf5::{IndexType, IterationOrder, LinkType, LocationType};
 use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
-
-/// Root attribute with the list: a line `SHA-256  path` for each group and dataset, by path.
-pub(super) const LIST: &str = "digests";
-/// Root attribute with the SHA-256 of the list.
-pub(super) const WHOLE: &str = "sha256";
 
 /// Deeper groups are not part of any format version.
 const DEEPEST: usize = 8;

@@ -1,5 +1,15 @@
 //! Names that are data, as HDF5 link names: `/` separates groups there, `.` is a group itself.
 
+use super::item::Group;
+
+/// Path of a group instance: the template's placeholder replaced by a link name.
+pub(super) fn place(group: &Group, link: Option<&str>) -> String {
+    match link {
+        Some(link) => format!("{}/{link}", group.parent()),
+        None => group.path.to_owned(),
+    }
+}
+
 /// Percent-encodes what a link name cannot hold: `/`, `%`, control characters, and a leading dot.
 pub(super) fn encode(name: &str) -> String {
     let mut out = String::with_capacity(name.len());

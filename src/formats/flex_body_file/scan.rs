@@ -1,12 +1,14 @@
 //! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing that
 //! the file declares before it is checked against the rest.
 
-use super::digest::{self, LIST, Numbers, WHOLE, digests_of, of_numbers};
+use super::digest::{self, Numbers, digests_of, of_numbers};
 use super::extents::{Sizes, dataset, index};
 use super::item::{Group, Item, Kind, Origin, Per};
 use super::names;
+use super::names::place;
 use super::schema::terms::{DROPPED, KEPT};
 use super::schema::{DIGESTS_SINCE, TABLE};
+use super::schema::{LIST, WHOLE};
 use super::value::Value;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::hdf5_file::{self as hdf5_file, Array, Stored};
@@ -49,14 +51,6 @@ pub(super) fn key(place: &str, item: &Item) -> String {
         "/"
     };
     format!("{place}{separator}{}", item.name)
-}
-
-/// Path of a group instance: the template's placeholder replaced by a link name.
-pub(super) fn place(group: &Group, link: Option<&str>) -> String {
-    match link {
-        Some(link) => format!("{}/{link}", group.parent()),
-        None => group.path.to_owned(),
-    }
 }
 
 impl Scan {

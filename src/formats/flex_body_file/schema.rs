@@ -1,6 +1,5 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
 
-use super::digest::{LIST, WHOLE};
 use super::item::Extent::{Fixed, InternalRows, Modes, Nodes, ThreeModes};
 use super::item::Kind::{Floats, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
@@ -18,6 +17,11 @@ mod certificate;
 mod geometric_stiffness;
 mod interfaces;
 pub(super) mod terms;
+
+/// Root attribute with the list: a line `SHA-256  path` for each group and dataset, by path.
+pub(super) const LIST: &str = "digests";
+/// Root attribute with the SHA-256 of the list.
+pub(super) const WHOLE: &str = "sha256";
 
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;

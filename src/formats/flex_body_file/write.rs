@@ -1,10 +1,12 @@
 //! Writes a body as the table says.
 
-use super::digest::{LIST, Number, Numbers, WHOLE, digests_of, of_numbers, sealed};
+use super::digest::{Number, Numbers, digests_of, of_numbers, sealed};
 use super::item::{Extent, Item, Kind, Per};
 use super::names;
-use super::scan::{key, place};
+use super::names::place;
+use super::scan::key;
 use super::schema::TABLE;
+use super::schema::{LIST, WHOLE};
 use super::value::{Value, View};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;

@@ -7,6 +7,7 @@ pub(crate) mod check;
 pub(crate) mod digits;
 mod format;
 mod free_surface;
+#[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_arrays;
 pub(crate) mod redundant;
 

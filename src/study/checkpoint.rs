@@ -10,21 +10,21 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// The file of a run, and what it held before.
-pub(super) struct CheckpointFile {
+pub(crate) struct CheckpointFile {
     path: PathBuf,
     found: Option<Checkpoint>,
 }
 
 impl CheckpointFile {
     /// Reads the file if there is one, and makes sure before the work that it can be written.
-    pub(super) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         drop(flex_body_file::prepare_output(path)?);
         let found = if path.exists() { Some(flex_body_file::read_checkpoint(path)?) } else { None };
         Ok(Self { path: path.to_path_buf(), found })
     }
 
     /// Refuses a checkpoint of another model than the one that was read from `files`.
-    pub(super) fn for_model(self, files: &ModelFiles, model: &FeModel) -> Result<ModelCheckpoint> {
+    pub(crate) fn for_model(self, files: &ModelFiles, model: &FeModel) -> Result<ModelCheckpoint> {
         let own = identity(files, model);
         if let Some(found) = &self.found
             && found.model != own
@@ -47,7 +47,7 @@ impl CheckpointFile {
 }
 
 /// The checkpoint of the model in work.
-pub(super) struct ModelCheckpoint {
+pub(crate) struct ModelCheckpoint {
     path: PathBuf,
     model: String,
     start: Option<Snapshot>,
@@ -56,12 +56,12 @@ pub(super) struct ModelCheckpoint {
 
 impl ModelCheckpoint {
     /// Where the search starts.
-    pub(super) fn start(&self) -> Option<&Snapshot> {
+    pub(crate) fn start(&self) -> Option<&Snapshot> {
         self.start.as_ref()
     }
 
     /// Replaces the file. A run that took long is not ended by a checkpoint that cannot be written.
-    pub(super) fn save(&self, snapshot: &Snapshot) {
+    pub(crate) fn save(&self, snapshot: &Snapshot) {
         let written = flex_body_file::prepare_output(&self.path)
             .and_then(|slot| flex_body_file::write_checkpoint(snapshot, &self.model, slot));
         let failure = written.err().map(|error| {
@@ -72,7 +72,7 @@ impl ModelCheckpoint {
     }
 
     /// What there is to say about it after the work, which took so many vectors from it.
-    pub(super) fn diagnostics(self, taken_up: u64) -> Vec<Diagnostic> {
+    pub(crate) fn diagnostics(self, taken_up: u64) -> Vec<Diagnostic> {
         let taken_up = self.start.filter(|_| taken_up > 0).map(|start| {
             let message = format!("the search started from a checkpoint with {} modes", start.converged);
             Diagnostic::new(Code::CheckpointTakenUp, message).in_file(&self.path)
@@ -100,7 +100,7 @@ fn identity(files: &ModelFiles, model: &FeModel) -> String {
 }
 
 /// The start and the keeper of a search, for a run with or without a checkpoint.
-pub(super) fn resume<'a>(
+pub(crate) fn resume<'a>(
     checkpoint: Option<&'a ModelCheckpoint>,
     save: &'a (dyn Fn(&Snapshot) + Sync),
 ) -> Resume<'a> {

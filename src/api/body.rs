@@ -1,0 +1,205 @@
+//! A flexible body.
+
+use super::matrix::shown;
+use super::{Matrix, Motion, Scene, Selection};
+use crate::base::diagnostic::Diagnostic;
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::base::progress::SILENT;
+use crate::body::flex_body;
+use crate::body::verification::own_identities;
+use crate::formats::export::{ExportOptions, Exported};
+use crate::formats::{export, find_format};
+use crate::motion::scene::simulate;
+use crate::study::selection::select;
+use nalgebra::{Matrix3, Vector3};
+use std::path::Path;
+
+/// A flexible body: modes and the constant invariants that the equations of motion of its floating frame are made of (theory section 2).
+/// Vectors are along the axes of the body frame, about its origin, in the units of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexBody(pub(super) flex_body::FlexBody);
+
+/// Something that must hold of the numbers of a body (theory section 10).
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Identity {
+    /// Name.
+    pub name: &'static str,
+    /// By how much it is missed, relative.
+    pub value: f64,
+    /// By how much it may be missed.
+    pub limit: f64,
+    /// Whether it holds.
+    pub holds: bool,
+}
+
+impl FlexBody {
+    /// Reads a flex-body file.
+    ///
+    /// # Errors
+    /// FB701 to FB713: no such file, another format, damaged, changed, or of a newer version.
+    #[cfg(feature = "hdf5")]
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        crate::formats::flex_body_file::read(path).map(Self)
+    }
+
+    /// Writes a flex-body file: it appears whole or not at all.
+    ///
+    /// # Errors
+    /// FB104 and FB602 when it cannot be written.
+    #[cfg(feature = "hdf5")]
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        crate::formats::flex_body_file::write(&self.0, path)
+    }
+
+    /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the file, and others that belong
+    /// beside it. What the format cannot hold comes back as warnings.
+    ///
+    /// # Errors
+    /// FB801 for a format that is not known; FB720 when no file of this format can be made of the body; FB104 and FB602 when it cannot be
+    /// written.
+    pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
+        let path = path.as_ref();
+        let (exported, lost) = export(&self.0, find_format(format)?, &ExportOptions::default(), true)?;
+        let mut slots = vec![OutputSlot::prepare(path)?];
+        slots[0].fill(&exported.file)?;
+        for (ending, bytes) in &exported.beside {
+            let slot = OutputSlot::prepare(Exported::place_beside(path, ending))?;
+            slot.fill(bytes)?;
+            slots.push(slot);
+        }
+        OutputSlot::commit_all(slots)?;
+        Ok(lost)
+    }
+
+    /// Number of modes nf.
+    pub fn n_modes(&self) -> usize {
+        self.0.n_modes()
+    }
+
+    /// Node numbers (n).
+    pub fn node_ids(&self) -> &[i64] {
+        &self.0.nodes().ids
+    }
+
+    /// Positions of the nodes (n x 3), body frame. Unit: length.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.0.nodes().positions
+    }
+
+    /// Origin of the body frame in model coordinates, and its axes as columns.
+    pub fn frame(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        (self.0.frame().origin, self.0.frame().axes)
+    }
+
+    /// Frequencies of the modes, ascending. Unit: Hz.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        self.0.frequencies_hz()
+    }
+
+    /// Eigenvalues of the modes, omega^2 (nf). Unit: 1/time^2.
+    pub fn eigenvalues(&self) -> &[f64] {
+        &self.0.modes().eigenvalue
+    }
+
+    /// Damping ratios of the modes (nf).
+    pub fn damping_ratios(&self) -> &[f64] {
+        &self.0.modes().damping_ratio
+    }
+
+    /// Psi (3n x nf): displacements of the nodes, three rows each. Unit: 1/sqrt(mass).
+    pub fn shapes(&self) -> Matrix {
+        shown(self.0.modes().shape.as_ref())
+    }
+
+    /// How many of the lowest modes are proved to be all that there are; `None` without a proof.
+    pub fn proved_complete(&self) -> Option<usize> {
+        self.0.certificate().proved_modes
+    }
+
+    /// m. Unit: mass.
+    pub fn mass(&self) -> f64 {
+        self.0.invariants().mass
+    }
+
+    /// First moment c = sum m x. Unit: mass length.
+    pub fn first_moment(&self) -> Vector3<f64> {
+        self.0.invariants().first_moment
+    }
+
+    /// I0 (3 x 3). Unit: mass length^2.
+    pub fn inertia(&self) -> Matrix3<f64> {
+        self.0.invariants().inertia()
+    }
+
+    /// W1 (3 x 3nf): inertia linear in the modal coordinates; `None` when the body was made for a scene that does not need it.
+    pub fn w1(&self) -> Option<Matrix> {
+        self.0.invariants().w1().map(|w1| shown(w1.as_ref()))
+    }
+
+    /// W2 (3nf x 3nf): inertia quadratic in the modal coordinates; `None` as for [`FlexBody::w1`].
+    pub fn w2(&self) -> Option<Matrix> {
+        self.0.invariants().w2().map(|w2| shown(w2.as_ref()))
+    }
+
+    /// W3 (3nf x nf): coupling of rotation and modes through the modal coordinates; `None` as for [`FlexBody::w1`].
+    pub fn w3(&self) -> Option<Matrix> {
+        self.0.invariants().w3().map(|w3| shown(w3.as_ref()))
+    }
+
+    /// C1 (3 x nf): coupling of translation and modes; zero for free modes.
+    pub fn c1(&self) -> Matrix {
+        shown(self.0.invariants().c1.as_ref())
+    }
+
+    /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes.
+    pub fn c2(&self) -> Matrix {
+        shown(self.0.invariants().c2().as_ref())
+    }
+
+    /// m_ff (nf x nf) = Psi' M Psi.
+    pub fn modal_mass(&self) -> Matrix {
+        shown(self.0.invariants().modal_mass().as_ref())
+    }
+
+    /// K_ff (nf x nf) = Psi' K Psi.
+    pub fn modal_stiffness(&self) -> Matrix {
+        shown(self.0.invariants().modal_stiffness.as_ref())
+    }
+
+    /// What lumped masses would have given: scheme, and how far each invariant is off, relative.
+    pub fn lumped_errors(&self) -> Vec<(&str, &[(String, f64)])> {
+        self.0.lumped().iter().map(|lumped| (lumped.scheme.as_str(), lumped.comparison.as_slice())).collect()
+    }
+
+    /// Everything that must hold of the numbers of the body, checked anew.
+    pub fn identities(&self) -> Vec<Identity> {
+        let checks = own_identities(&self.0).into_iter();
+        checks
+            .map(|check| Identity {
+                name: check.name,
+                value: check.value,
+                limit: check.limit,
+                holds: check.passed,
+            })
+            .collect()
+    }
+
+    /// Decides which terms and modes the body needs in a scene.
+    ///
+    /// # Errors
+    /// FB212 where the scene does not fit the body; FB540 when its motion cannot be integrated.
+    pub fn select(&self, scene: &Scene) -> Result<Selection> {
+        select(&self.0, &scene.0, None, SILENT).map(Selection)
+    }
+
+    /// Simulates the body in a scene.
+    ///
+    /// # Errors
+    /// FB212 where the scene does not fit the body; FB540 when the integration cannot go on; FB550 when it takes more steps than it may.
+    pub fn simulate(&self, scene: &Scene) -> Result<Motion> {
+        let (recording, diagnostics) = simulate(&self.0, &scene.0, None, |_| ())?;
+        Ok(Motion { recording, diagnostics })
+    }
+}

@@ -1,0 +1,178 @@
+//! From a model to a body.
+
+use super::{FlexBody, Model, Scene, Selection};
+use crate::base::diagnostic::Diagnostic;
+use crate::base::error::Result;
+use crate::base::progress::SILENT;
+use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
+use crate::body::convert::{ConvertSettings, Lumping, convert};
+use crate::body::invariants::BodyFrame;
+use crate::body::verification::accept;
+use crate::numerics::eigen::{self, Resume, Wanted};
+use crate::study::tailoring::{Tailoring, convert_for_scene, loads_for, read_loads};
+
+/// Which shapes the body has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Basis {
+    /// Free-surface modes, and the residual vectors that the model or the scene asks for.
+    #[default]
+    Free,
+    /// Modes with the interfaces held, and the static responses to motions of these (Craig and Bampton).
+    CraigBampton,
+    /// Free modes, and the static responses to loads at the interfaces (Craig and Chang).
+    CraigChang,
+}
+
+/// How sure the modes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Accuracy {
+    /// Residuals of 1e-6; that no mode is missing is not proved.
+    Fast,
+    /// Residuals of 1e-9, and an inertia count that proves that no mode is missing.
+    #[default]
+    Standard,
+    /// Guaranteed bounds of eigenvalues and invariants.
+    Certified,
+}
+
+/// Where the body frame is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Frame {
+    /// At the centre of mass, along the principal axes of inertia.
+    #[default]
+    Principal,
+    /// At the centre of mass, along the axes of the model.
+    CentreOfMass,
+    /// That of the model.
+    Model,
+}
+
+/// What is asked of a conversion. The default: 20 free-surface modes, proved complete, in the principal frame.
+#[derive(Debug, Clone, Default)]
+pub struct ConvertOptions {
+    modes: Option<usize>,
+    highest: Option<f64>,
+    basis: Basis,
+    accuracy: Accuracy,
+    frame: Frame,
+    without_comparators: bool,
+}
+
+impl ConvertOptions {
+    /// The lowest modes, so many.
+    pub fn modes(mut self, count: usize) -> Self {
+        self.modes = Some(count);
+        self
+    }
+
+    /// All modes below a frequency. Unit: Hz.
+    pub fn below_hz(mut self, frequency: f64) -> Self {
+        self.highest = Some(frequency);
+        self
+    }
+
+    /// Which shapes.
+    pub fn basis(mut self, basis: Basis) -> Self {
+        self.basis = basis;
+        self
+    }
+
+    /// How sure.
+    pub fn accuracy(mut self, accuracy: Accuracy) -> Self {
+        self.accuracy = accuracy;
+        self
+    }
+
+    /// Which body frame.
+    pub fn frame(mut self, frame: Frame) -> Self {
+        self.frame = frame;
+        self
+    }
+
+    /// Does not compute what lumped masses would have given.
+    pub fn without_comparators(mut self) -> Self {
+        self.without_comparators = true;
+        self
+    }
+
+    fn settings(&self, model: &Model, scene: Option<&Scene>) -> Result<ConvertSettings> {
+        let loads = match (self.basis, self.accuracy) {
+            (Basis::Free, Accuracy::Fast | Accuracy::Standard) => {
+                loads_for(scene.map(|scene| &scene.0), &model.residual_vectors)
+            }
+            _ => model.residual_vectors.clone(),
+        };
+        let residual_vectors = || read_loads(&loads, &model.checked);
+        let mut settings = ConvertSettings {
+            basis: match self.basis {
+                Basis::Free => BasisChoice::Free(FreeSurface { residual_vectors: residual_vectors()? }),
+                Basis::CraigBampton => BasisChoice::CraigBampton(CraigBampton),
+                Basis::CraigChang => {
+                    BasisChoice::CraigChang(CraigChang { residual_vectors: residual_vectors()? })
+                }
+            },
+            frame: match self.frame {
+                Frame::Principal => BodyFrame::Principal,
+                Frame::CentreOfMass => BodyFrame::Com,
+                Frame::Model => BodyFrame::Model,
+            },
+            ..ConvertSettings::default()
+        };
+        settings.modes.accuracy = match self.accuracy {
+            Accuracy::Fast => eigen::Accuracy::Fast,
+            Accuracy::Standard => eigen::Accuracy::Standard,
+            Accuracy::Certified => eigen::Accuracy::Certified,
+        };
+        if let Some(count) = self.modes {
+            settings.modes.wanted = Wanted::Lowest(count);
+        }
+        if let Some(frequency) = self.highest {
+            settings.modes.wanted = Wanted::Below(model.checked.units().eigenvalue_of(frequency));
+        }
+        if self.without_comparators {
+            settings.lumped = Vec::<Lumping>::new();
+        }
+        Ok(settings)
+    }
+}
+
+/// A body, and what there is to say about it.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Conversion {
+    /// The body.
+    pub body: FlexBody,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Model {
+    /// Computes modes and invariants: the body passes every check that `flexbody check` makes.
+    ///
+    /// # Errors
+    /// FB501 to FB549 where the modes cannot be trusted (not converged, not complete, a mechanism), FB714 where an identity does not hold.
+    pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
+        let settings = options.settings(self, None)?;
+        let conversion = convert(&self.checked, &settings, SILENT)?;
+        accept(&conversion.body)?;
+        Ok(Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics })
+    }
+
+    /// The same with the terms and modes alone that `scene` needs, and the decision about each.
+    ///
+    /// # Errors
+    /// As [`Model::convert`]; FB212 where the scene does not fit the body.
+    pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
+        let settings = options.settings(self, Some(scene))?;
+        let by_band = options.modes.is_none() && options.highest.is_none() && options.basis == Basis::Free;
+        let tailoring = Tailoring { settings, by_band };
+        let (conversion, selection) =
+            convert_for_scene(&self.checked, &tailoring, &scene.0, Resume::default(), SILENT)?;
+        accept(&conversion.body)?;
+        let converted = Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics };
+        Ok((converted, Selection(selection)))
+    }
+}

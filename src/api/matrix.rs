@@ -1,0 +1,51 @@
+//! Dense arrays as the library shows them.
+
+use faer::MatRef;
+
+/// A dense matrix, stored column by column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    rows: usize,
+    columns: usize,
+    values: Vec<f64>,
+}
+
+impl Matrix {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// All entries, column by column.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The entries of a column.
+    ///
+    /// # Panics
+    /// When there is no such column.
+    pub fn column(&self, j: usize) -> &[f64] {
+        &self.values[j * self.rows..(j + 1) * self.rows]
+    }
+}
+
+impl std::ops::Index<(usize, usize)> for Matrix {
+    type Output = f64;
+
+    fn index(&self, (i, j): (usize, usize)) -> &f64 {
+        &self.column(j)[i]
+    }
+}
+
+/// Not an implementation of `From`: its signature would show a type of the engine.
+pub(super) fn shown(matrix: MatRef<'_, f64>) -> Matrix {
+    let mut values = Vec::with_capacity(matrix.nrows() * matrix.ncols());
+    matrix.col_iter().for_each(|column| values.extend(column.iter().copied()));
+    Matrix { rows: matrix.nrows(), columns: matrix.ncols(), values }
+}
