@@ -1,5 +1,6 @@
 //! Damaged files: whatever is changed in a valid file, reading it ends in a model or in a report, never in a panic.
 
+use crate::support::cases::Case;
 use flexbody::base::diagnostic::Severity;
 use flexbody::input::{ModelFiles, read_manifest, read_model};
 use proptest::prelude::*;
@@ -98,11 +99,15 @@ fn read(role: &str, name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
 
 /// Damages a fixture and reads it.
 fn survives(role: &str, file: &Path, damages: &[Damage]) -> Result<(), TestCaseError> {
-    let mut bytes = std::fs::read(file).unwrap();
+    survives_as(role, file.file_name().unwrap().to_str().unwrap(), std::fs::read(file).unwrap(), damages)
+}
+
+/// Damages the bytes of a file and reads it under the name `name`.
+fn survives_as(role: &str, name: &str, mut bytes: Vec<u8>, damages: &[Damage]) -> Result<(), TestCaseError> {
     for damage in damages {
         apply(&mut bytes, damage);
     }
-    read(role, file.file_name().unwrap().to_str().unwrap(), &bytes)
+    read(role, name, &bytes)
 }
 
 fn damages() -> impl Strategy<Value = Vec<Damage>> {
@@ -146,7 +151,8 @@ proptest! {
         case in prop::sample::select(vec!["FB201/interfaces", "FB201/mistyped", "FB202/units", "FB205/interface_list"]),
         damages in damages(),
     ) {
-        survives("manifest", &fixture(&format!("codes/{case}/model.toml")), &damages)?;
+        let manifest = Case::read(&fixture("codes").join(case)).files().remove("model.toml").unwrap();
+        survives_as("manifest", "model.toml", manifest, &damages)?;
     }
 }
 

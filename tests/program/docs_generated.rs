@@ -38,7 +38,7 @@ fn diagnostic_codes() {
 fn documents() -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = Vec::new();
-    for folder in ["", "docs", "docs/formats", "fixtures", "benches/peers"] {
+    for folder in ["", "docs", "docs/formats", "fixtures", "fixtures/codes", "benches/peers"] {
         for entry in std::fs::read_dir(root.join(folder)).unwrap() {
             let path = entry.unwrap().path();
             if path.extension().is_some_and(|e| e == "md") {
