@@ -11,9 +11,7 @@ use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::base::units::UnitSystem;
-use crate::body::basis::{
-    BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, ModeSettings, UserLoads,
-};
+use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, ModeSettings};
 use crate::body::convert::{Conversion, ConvertSettings, Lumping, convert_resuming};
 use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;

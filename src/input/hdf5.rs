@@ -1,7 +1,7 @@
 //! Sparse matrices in HDF5 files: opening, and finding the group that holds the matrix.
 
 use super::compression::Compression;
-use super::reader::{MatrixRole, MatrixSource, Reader};
+use super::reader::{MatrixRole, MatrixSource, Reader, is_hdf5};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::model::RawMatrix;
@@ -33,10 +33,7 @@ impl Reader for Hdf5 {
     }
 
     fn recognises(&self, head: &[u8]) -> bool {
-        // The signature stands at 0 or, after a user block (MATLAB writes one), at 512, 1024, 2048, ...
-        [0, 512, 1024, 2048]
-            .iter()
-            .any(|&at| head.get(at..).is_some_and(|h| h.starts_with(b"\x89HDF\r\n\x1a\n")))
+        is_hdf5(head)
     }
 
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {

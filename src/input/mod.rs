@@ -7,6 +7,9 @@ mod compression;
 mod digits;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(not(feature = "hdf5"))]
+#[path = "without_hdf5.rs"]
+mod hdf5;
 mod manifest;
 mod matrix_market;
 mod model_files;

@@ -2,12 +2,11 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-#[cfg(feature = "hdf5")]
-use super::hdf5::{self, Hdf5};
+use super::hdf5::Hdf5;
 use super::matrix_market::MatrixMarket;
 use super::model_files::MatrixLocation;
 use super::reader::{HEAD, Reader};
-use super::{matrix_market, npy};
+use super::{hdf5, matrix_market, npy};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
@@ -47,7 +46,6 @@ fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, V
     let compression = Compression::of(file.bytes());
     let head = compression.head(file.bytes(), HEAD);
     let packed = compression != Compression::None;
-    #[cfg(feature = "hdf5")]
     if !packed && Hdf5.recognises(&head) {
         return hdf5::read_array(file, dataset);
     }
