@@ -153,6 +153,14 @@ pub use api::{
     Accuracy, Basis, Conversion, ConvertOptions, FlexBody, Frame, Identity, Matrix, Model, ModelBuilder,
     Motion, Scene, Selection, SparseMatrix,
 };
+/// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity forces, accelerations, momenta,
+/// energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`] makes them.
+pub mod dynamics {
+    pub use crate::motion::dynamics::{
+        EquationsOfMotion, Evaluation, NotPositiveDefinite, Prescribed, Terms,
+    };
+}
+
 pub use base::diagnostic::{Code, Diagnostic, Severity};
 pub use base::error::{Error, ExitCode, Result};
 

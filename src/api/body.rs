@@ -10,6 +10,7 @@ use crate::body::flex_body;
 use crate::body::verification::own_identities;
 use crate::formats::export::{ExportOptions, Exported};
 use crate::formats::{export, find_format};
+use crate::motion::dynamics::{EquationsOfMotion, Terms};
 use crate::motion::scene::simulate;
 use crate::study::selection::select;
 use nalgebra::{Matrix3, Vector3};
@@ -192,6 +193,11 @@ impl FlexBody {
     /// FB212 where the scene does not fit the body; FB540 when its motion cannot be integrated.
     pub fn select(&self, scene: &Scene) -> Result<Selection> {
         select(&self.0, &scene.0, None, SILENT).map(Selection)
+    }
+
+    /// The equations of motion of the body, with all terms that it holds.
+    pub fn equations_of_motion(&self) -> EquationsOfMotion {
+        EquationsOfMotion::new(&self.0, Terms::ALL)
     }
 
     /// Simulates the body in a scene.

@@ -459,6 +459,26 @@ fn functions(tokens: &TokenStream) -> Vec<(String, usize)> {
 }
 
 #[test]
+fn every_exception_to_the_ban_of_unsafe_code_is_named() {
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md"))
+        .expect("a page");
+    let paragraph = page.split("\n\n").find(|part| part.starts_with("**Unsafe code**")).expect("a paragraph");
+    let named: BTreeSet<&str> = paragraph.split('`').skip(1).step_by(2).collect();
+    let is_unsafe = |file: &PathBuf| {
+        let source = std::fs::read_to_string(file).expect("source file");
+        all_paths(&tokens(&source)).iter().any(|written| written.path == ["unsafe"])
+    };
+    let root = source_root();
+    let files = rust_files(&root);
+    let found: Vec<&PathBuf> = files.iter().filter(|file| is_unsafe(file)).collect();
+    let found: BTreeSet<&str> = found
+        .iter()
+        .map(|file| file.strip_prefix(&root).expect("below src").to_str().expect("our own names"))
+        .collect();
+    assert_eq!(named, found);
+}
+
+#[test]
 fn files_stay_short() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let long: Vec<String> = ["src", "tests", "benches", "examples"]
