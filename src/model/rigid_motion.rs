@@ -1,8 +1,8 @@
 //! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly where it does not.
 
-use super::checks::Assembled;
-use super::layout::name_some;
+use super::assembled::Assembled;
 use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
+use super::wording::name_some;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::{Pencil, gram};
 use faer::Mat;
