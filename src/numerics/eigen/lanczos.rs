@@ -5,11 +5,15 @@
 //! eigenvalues complete up to what the later inertia count proves.
 
 use super::canonical::cluster_end;
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::krylov::Krylov;
 use super::noise::energy_noise;
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::problem::EigenProblem;
 use super::refine::Refined;
-use super::start::{Snapshot, snapshot};
+use super::resume::Snapshot;
+use super::start::snapshot;
+use super::zero_energy::NOISE_FACTOR;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Real, Solve, SymmetricEigen, symmetric_eigen};
 use faer::Mat;
@@ -24,9 +28,6 @@ const MAX_RESTARTS: u64 = 100;
 
 /// Basis vectors beyond two for each wanted mode: restarts are then rare.
 const SPARE: usize = 128;
-
-/// Energy this many standard deviations above the noise of the entries of K is real.
-pub(super) const NOISE_FACTOR: f64 = 30.0;
 
 /// A search is saved when at least so many more modes have converged, or a quarter of those wanted.
 const SAVED_AFTER: usize = 5;

@@ -1,7 +1,9 @@
 //! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals.
 
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::noise::rounding_residual;
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::problem::EigenProblem;
 use crate::numerics::linalg::{Solve, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{ColRef, Mat, MatRef};
 

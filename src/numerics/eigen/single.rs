@@ -7,10 +7,13 @@
 //! digits again for one solved column, where refining every solve of Lanczos would cost several.
 
 use super::canonical::cluster_end;
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::lanczos::{self, Goal, Search, factorise};
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::problem::EigenProblem;
 use super::refine::{Refined, relative_residual, residuals, small_ritz};
-use super::start::{Snapshot, first_shift, fitting_start};
+use super::resume::Snapshot;
+use super::start::{first_shift, fitting_start};
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{
     Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination,

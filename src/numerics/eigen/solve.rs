@@ -1,19 +1,21 @@
 //! The one entry: chooses the method, refines, counts, puts into canonical form.
 
 use super::bounds::enclose;
-use super::canonical::{canonical_basis, cluster_end, clusters};
+use super::canonical::{CLUSTER_GAP, canonical_basis, cluster_end, clusters};
 use super::completeness::{Completeness, Proof, count_below};
+use super::counters::Counters;
 use super::dense;
-use super::lanczos::{self, BLOCK, Goal, NOISE_FACTOR};
-use super::noise::energy_noise;
-use super::plan::{FactorChoice, Plan, Precision, gigabytes};
-use super::problem::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
-    Wanted,
-};
+use super::failure::EigenFailure;
+use super::lanczos::{self, BLOCK, Goal};
+use super::plan::{Plan, gigabytes};
+use super::problem::EigenProblem;
 use super::refine::{Refined, refine, residuals as residuals_of};
+use super::resume::Snapshot;
+use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted, keeps};
 use super::single;
-use super::start::{Snapshot, first_shift, fitting_start};
+use super::solution::{EigenSolution, EigenvalueBounds};
+use super::start::{first_shift, fitting_start};
+use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 use faer::Mat;
@@ -29,9 +31,6 @@ const DENSE_PART: f64 = 0.2;
 
 /// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one: a digit.
 const FAR: f64 = 0.1;
-
-/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
-pub(super) const CLUSTER_GAP: f64 = 1e-9;
 
 /// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
 /// residuals, up to the root of m times the largest.
@@ -230,27 +229,6 @@ fn search_in_double(
     }
 }
 
-/// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
-pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
-    let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
-    let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
-    if let Some(&lambda) = refined.eigenvalues.first()
-        && lambda < -NOISE_FACTOR * noise[0]
-    {
-        let vector = refined.vectors.as_ref().subcols(0, 1).to_owned();
-        return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lambda, vector });
-    }
-    let count = refined.eigenvalues.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count();
-    if count > 0 {
-        return Err(EigenFailure::ZeroEnergy {
-            count,
-            eigenvalues: refined.eigenvalues[..count].to_vec(),
-            vectors: refined.vectors.as_ref().subcols(0, count).to_owned(),
-        });
-    }
-    Ok(())
-}
-
 /// The inertia count in the gap above the last mode.
 fn prove(
     sparse: &Sparse<'_>,
@@ -291,11 +269,6 @@ fn prove(
         modes_below: below,
         remark: String::new(),
     })
-}
-
-/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
-pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
-    residual <= tolerance.max(30.0 * floor)
 }
 
 /// Canonical form, the wanted number of modes, residuals of what is handed out.

@@ -2,12 +2,16 @@
 //! out to be eigenvectors. Nothing is factored unless that count is made.
 
 use super::bounds::enclose;
-use super::canonical::{canonical_basis, clusters};
+use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
 use super::completeness::{Completeness, Proof, count_below};
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::plan::{Plan, gigabytes};
-use super::problem::{Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Wanted};
+use super::problem::EigenProblem;
 use super::refine::{Refined, residuals as residuals_of};
-use super::solve::{CLUSTER_GAP, check_zero_energy, keeps};
+use super::settings::{Accuracy, EigenSettings, Wanted, keeps};
+use super::solution::EigenSolution;
+use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, is_positive_semidefinite};
 use faer::Mat;
