@@ -17,7 +17,7 @@ use super::wording::name_some;
 use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawModel};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Result, stop_on_error};
-use crate::numerics::linalg::SymmetricMatrix;
+use crate::numerics::linalg::{SymmetricMatrix, largest};
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -191,9 +191,9 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let (centre, length) = centre_and_length(&body.nodes.positions);
     let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
     let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
-    let damped = residuals.iter().filter(|r| **r > LIMIT).count();
+    let damped = residuals.iter().filter(|r| r.is_nan() || **r > LIMIT).count();
     if damped > 0 {
-        let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
+        let worst = largest(residuals.iter().copied());
         let message = format!(
             "D R is not zero for {damped} of {} rows: |D R| reaches {worst:.1e} of the row sum of |D|; only the damping of the modes is kept",
             residuals.len()

@@ -16,13 +16,6 @@ impl Parts {
     pub fn interface_identities(&self) -> Vec<IdentityCheck> {
         let Some(coordinates) = &self.coordinates else { return Vec::new() };
         let InterfaceCoordinates { stiffness, mass, of_modes, .. } = coordinates;
-        let check = |name, formula, value: f64, limit| IdentityCheck {
-            name,
-            formula,
-            value,
-            limit,
-            passed: value <= limit,
-        };
         let twice = |a: &Mat<f64>, b: &Mat<f64>| gram(b.as_ref(), combine(a.as_ref(), b.as_ref()).as_ref());
         let (energy, inertia) = (twice(stiffness, of_modes), twice(mass, of_modes));
         let root: Vec<f64> = self.modes.eigenvalue.iter().map(|l| l.sqrt()).collect();
@@ -36,14 +29,14 @@ impl Parts {
         };
         let identity = |i: usize, j: usize| f64::from(i == j);
         let mut checks = vec![
-            check(
+            IdentityCheck::new(
                 "interface_stiffness",
                 "B' K B = diag(lambda)",
                 worst(&|i, j| energy[(i, j)] / (root[i] * root[j]) - identity(i, j), nf, nf),
                 // What K makes of rigid motion is in the shapes, but not in the modes.
                 ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
             ),
-            check(
+            IdentityCheck::new(
                 "interface_mass",
                 "B' M B = I",
                 worst(&|i, j| inertia[(i, j)] - identity(i, j), nf, nf),
@@ -53,7 +46,7 @@ impl Parts {
         if let Some(rigid) = self.rigid_coordinates() {
             let (expected, own) = (self.rigid_mass(), twice(mass, &rigid));
             let r = rigid.ncols();
-            checks.push(check(
+            checks.push(IdentityCheck::new(
                 "interface_rigid_mass",
                 "R' M R = [m, -c~; c~, I0]",
                 worst(
@@ -64,7 +57,7 @@ impl Parts {
                 ENERGY,
             ));
             let (energy, first) = (twice(stiffness, &rigid), root.first().map_or(1.0, |root| root * root));
-            checks.push(check(
+            checks.push(IdentityCheck::new(
                 "interface_rigid_motion",
                 "R' K R = 0 beside lambda_1 R' M R",
                 worst(&|i, j| energy[(i, j)] / (first * (expected[(i, i)] * expected[(j, j)]).sqrt()), r, r),

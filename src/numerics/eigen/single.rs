@@ -16,7 +16,7 @@ use super::resume::Snapshot;
 use super::start::{first_shift, fitting_start};
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{
-    Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination,
+    Analysis, Cholesky, Solve, add_combination, combine, gram, largest, subtract_combination,
 };
 use faer::{Mat, MatRef};
 
@@ -153,7 +153,7 @@ fn correct(
                 next,
             ));
         }
-        let worst = excess.iter().fold(0.0f64, |m, e| if e.is_nan() { f64::NAN } else { m.max(*e) });
+        let worst = largest(excess.iter().copied());
         if worst < 0.5 * least {
             (least, since) = (worst, 0);
         } else {

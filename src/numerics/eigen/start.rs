@@ -3,7 +3,7 @@
 use super::krylov::Krylov;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
-use crate::numerics::linalg::gram;
+use crate::numerics::linalg::{gram, largest, largest_entry};
 use faer::MatRef;
 
 /// Largest entry of V' M V - I and R' M V of a basis that is orthonormal to rounding.
@@ -43,7 +43,7 @@ fn fits(problem: &EigenProblem<'_>, snapshot: &Snapshot) -> bool {
         let x = basis.as_ref().subcols(from, width);
         let mx = pencil.apply_mass(x);
         let orthonormal = off_identity(gram(basis.as_ref(), mx.as_ref()).as_ref(), from) <= ORTHONORMAL
-            && gram(problem.rigid, mx.as_ref()).norm_max() <= ORTHONORMAL;
+            && largest_entry(gram(problem.rigid, mx.as_ref()).as_ref()) <= ORTHONORMAL;
         let modes = converged.saturating_sub(from).min(width);
         let energy = gram(x, pencil.apply_stiffness(x).as_ref());
         orthonormal
@@ -57,19 +57,10 @@ fn fits(problem: &EigenProblem<'_>, snapshot: &Snapshot) -> bool {
 /// Columns of a start that are checked at a time.
 const CHECKED: usize = 16;
 
-/// Largest difference of `block` from the columns `from..` of the identity; infinite when one is no number.
+/// Largest difference of `block` from the columns `from..` of the identity; NaN when one is no number.
 fn off_identity(block: MatRef<'_, f64>, from: usize) -> f64 {
-    let mut largest = 0.0f64;
-    for j in 0..block.ncols() {
-        for i in 0..block.nrows() {
-            let off = (block[(i, j)] - f64::from(i == from + j)).abs();
-            if off.is_nan() {
-                return f64::INFINITY;
-            }
-            largest = largest.max(off);
-        }
-    }
-    largest
+    let off = |i: usize, j: usize| (block[(i, j)] - f64::from(i == from + j)).abs();
+    largest((0..block.ncols()).flat_map(|j| (0..block.nrows()).map(move |i| off(i, j))))
 }
 
 /// A snapshot of a search with the Ritz vectors S (projected x k), theta descending.
