@@ -74,37 +74,15 @@ pub(super) fn finish(
     stop_on_error(&mut found)?;
     let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, &mut found);
     stop_on_error(&mut found)?;
-    let digits = body.raw.mass.digits;
-    let form = match mass_form(&body.mass, &body.rows, block_tolerance(digits)) {
-        Ok(form) => Some(form),
-        Err(diagnostic) => {
-            found.push(diagnostic.in_file(&body.raw.mass.path));
-            None
-        }
-    };
+    let form = form_of_mass(&body, &mut found);
     check_connections(&body, &mut found);
-    if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
-        found.push(diagnostic.in_file(&body.raw.stiffness.path));
-        stop_on_error(&mut found)?;
-    }
-    let label = |row: usize| body.rows.label(&body.nodes, row);
-    if let Some(diagnostic) = misplaced(&body.rows) {
-        found.push(diagnostic.in_file(&body.raw.nodes_path));
-    }
-    if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
-        found.push(diagnostic.in_file(&body.raw.stiffness.path));
-    }
-    let written = body.raw.stiffness.digits;
-    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
-    let rigid_residual = check_rigid_motion(&body, limits, &mut found);
-    check_rigid_damping(&body, &mut found);
-    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
+    let rigid_residual = check_rigid_motions(&mut body, &mut found)?;
     stop_on_error(&mut found)?;
     let mut form = form.expect("a missing mass comes with an error");
     // Vectors that rigid motion moves have no x of their own in the formulas for Ms.
     form.commutes &= body.rows.are_still();
     if !form.commutes {
-        check_inertia(&body, rounding(digits, 3).max(1e-9), &mut found);
+        check_inertia(&body, rounding(body.raw.mass.digits, 3).max(1e-9), &mut found);
         stop_on_error(&mut found)?;
     }
     let diagonal_mass = is_diagonal(&body.mass);
@@ -117,6 +95,36 @@ pub(super) fn finish(
     stop_on_error(&mut found)?;
     let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found, plausibility })
+}
+
+/// What kind of mass it is; `None` with a diagnostic when it is that of no body.
+fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassForm> {
+    let form = mass_form(&body.mass, &body.rows, block_tolerance(body.raw.mass.digits));
+    form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
+}
+
+/// How every row moves with the rigid body, and whether K and the other matrices leave it free. Returns the residual of K.
+///
+/// # Errors
+/// Rows without a place whose motion K does not tell, with all that was found before.
+fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Result<f64> {
+    if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        stop_on_error(found)?;
+    }
+    let label = |row: usize| body.rows.label(&body.nodes, row);
+    if let Some(diagnostic) = misplaced(&body.rows) {
+        found.push(diagnostic.in_file(&body.raw.nodes_path));
+    }
+    if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+    }
+    let written = body.raw.stiffness.digits;
+    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
+    let rigid_residual = check_rigid_motion(body, limits, found);
+    check_rigid_damping(body, found);
+    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
+    Ok(rigid_residual)
 }
 
 /// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted here.
