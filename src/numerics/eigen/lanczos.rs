@@ -15,9 +15,7 @@ use super::resume::Snapshot;
 use super::start::snapshot;
 use super::zero_energy::NOISE_FACTOR;
 use crate::base::progress::{Event, Watch};
-use crate::numerics::linalg::{
-    Analysis, Cholesky, Real, Solve, SymmetricEigen, largest, largest_entry, symmetric_eigen,
-};
+use crate::numerics::linalg::{Solve, SymmetricEigen, symmetric_eigen};
 use faer::Mat;
 
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
@@ -59,32 +57,6 @@ pub(super) enum Search {
     },
     /// Early: with this shift it would be shorter and more accurate.
     ShiftTooLarge(f64),
-}
-
-/// Cholesky factor with a probe of its accuracy.
-pub(super) fn factorise<'a, T: Real>(
-    problem: &EigenProblem<'_>,
-    analysis: &'a Analysis,
-    tau: f64,
-    counters: &mut Counters,
-) -> Result<Cholesky<'a, T>, EigenFailure> {
-    counters.factorizations += 1;
-    let pencil = &problem.pencil;
-    let factor =
-        Cholesky::new(analysis, pencil, tau).ok_or(EigenFailure::NotPositiveDefinite { shift: tau })?;
-    let b = Mat::from_fn(pencil.n(), 1, |i, _| if i % 3 == i % 2 { 1.0 } else { -0.5 });
-    let mut x = b.clone();
-    factor.solve_in_place(x.as_mut());
-    let residual = &b - pencil.apply_stiffness(x.as_ref()) - pencil.apply_mass(x.as_ref()) * faer::Scale(tau);
-    // The backward error: what matters of a factor, however ill-conditioned the matrix.
-    let row_sum = |i: usize| pencil.stiffness().row(i).1.iter().map(|v| v.abs()).sum::<f64>();
-    let scale = b.norm_max() + largest((0..pencil.n()).map(row_sum)) * x.norm_max();
-    let relative = largest_entry(residual.as_ref()) / scale;
-    // Backward stable factors leave about the unit roundoff here; a wrong one leaves O(1).
-    if relative.is_nan() || relative > T::ROUNDOFF.sqrt() {
-        return Err(EigenFailure::Inaccurate { residual: relative });
-    }
-    Ok(factor)
 }
 
 /// Block steps after which the shift is judged: the lowest Ritz value is then near the first eigenvalue.

@@ -6,6 +6,7 @@ mod canonical;
 mod completeness;
 mod counters;
 mod dense;
+mod factorise;
 mod failure;
 mod krylov;
 mod lanczos;

@@ -5,6 +5,7 @@ use super::canonical::{CLUSTER_GAP, canonical_basis, cluster_end, clusters};
 use super::completeness::{Completeness, Proof, count_below};
 use super::counters::Counters;
 use super::dense;
+use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
 use super::lanczos::{self, BLOCK, Goal};
 use super::plan::{Plan, gigabytes};
@@ -46,60 +47,21 @@ pub fn solve(
     watch: Watch<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
     let mut counters = Counters::default();
-    let pencil = &problem.pencil;
-    watch(Event::Phase("ordering"));
-    let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
-    counters.factor_len = analysis.factor_len() as u64;
-    counters.factor_flops = analysis.flops() as u64;
-    if !is_positive_semidefinite(pencil.mass(), &analysis) {
-        return Err(EigenFailure::MassIndefinite);
-    }
-    let rigid = problem.rigid.ncols();
-    let available = pencil.n() - rigid;
-    let wanted = match settings.wanted {
-        Wanted::Lowest(count) => count.min(available),
-        Wanted::Below(lambda) => {
-            watch(Event::Phase("counting modes"));
-            count_below(problem, &analysis, lambda, &mut counters)?.saturating_sub(rigid)
-        }
-    };
-    let dense = match settings.method {
-        Method::Dense => true,
-        Method::Lanczos => false,
-        Method::Auto => {
-            pencil.n() <= DENSE_ALWAYS
-                || (pencil.n() <= DENSE_AT_MOST && wanted as f64 > DENSE_PART * available as f64)
-        }
-    };
+    let analysis = analyse(problem, watch, &mut counters)?;
+    let wanted = count_wanted(problem, settings, &analysis, watch, &mut counters)?;
+    let dense = is_dense(problem, settings, wanted);
     let plan = Plan::new(problem, settings, &analysis, wanted, dense)?;
     let tolerance = SEARCHED * settings.accuracy.residual();
     let mut sparse = Sparse { problem, settings, analysis: &analysis, plan };
-    let (mut search, finite_modes) = if dense {
+    let (search, finite_modes) = if dense {
         let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
         (search, Some(finite))
     } else {
         watch(Event::Plan(&sparse.plan.to_string()));
         (sparse.search(wanted, 0, watch, &mut counters)?, None)
     };
-    let mut completeness = prove(&sparse, &search, watch, &mut counters)?;
-    let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
-    if missed > 0 {
-        // Once more, from other directions and for as many modes as there are.
-        search = sparse.search(wanted + missed, 1, watch, &mut counters)?;
-        completeness = prove(&sparse, &search, watch, &mut counters)?;
-    }
-    let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
-    if found != counted {
-        return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
-    }
-    let bounds = if settings.accuracy == Accuracy::Certified && found > 0 {
-        watch(Event::Phase("bounds"));
-        let (modes, values) = (&search.refined.vectors, &search.refined.eigenvalues[..found]);
-        let modes = modes.as_ref().subcols(0, found);
-        Some(enclose(problem, &analysis, modes, values, completeness.shift, CLUSTER_GAP, &mut counters)?)
-    } else {
-        None
-    };
+    let (search, completeness) = complete(&mut sparse, search, wanted, watch, &mut counters)?;
+    let bounds = bounds(&sparse, &search, &completeness, watch, &mut counters)?;
     let plan = (!dense).then_some(sparse.plan);
     finish(
         problem,
@@ -109,6 +71,98 @@ pub fn solve(
         (plan, finite_modes),
         counters,
     )
+}
+
+/// The order of elimination, and whether M is a mass at all.
+fn analyse(
+    problem: &EigenProblem<'_>,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Analysis, EigenFailure> {
+    watch(Event::Phase("ordering"));
+    let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
+    counters.factor_len = analysis.factor_len() as u64;
+    counters.factor_flops = analysis.flops() as u64;
+    if !is_positive_semidefinite(problem.pencil.mass(), &analysis) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    Ok(analysis)
+}
+
+/// How many modes are wanted, of those that there may be.
+fn count_wanted(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    analysis: &Analysis,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<usize, EigenFailure> {
+    match settings.wanted {
+        Wanted::Lowest(count) => Ok(count.min(flexible_rows(problem))),
+        Wanted::Below(lambda) => {
+            watch(Event::Phase("counting modes"));
+            Ok(count_below(problem, analysis, lambda, counters)?.saturating_sub(problem.rigid.ncols()))
+        }
+    }
+}
+
+/// As many modes as there are beside rigid motion, at the most.
+fn flexible_rows(problem: &EigenProblem<'_>) -> usize {
+    problem.pencil.n() - problem.rigid.ncols()
+}
+
+/// Whether the dense path finds so many modes with less work, or was asked for.
+fn is_dense(problem: &EigenProblem<'_>, settings: &EigenSettings, wanted: usize) -> bool {
+    let n = problem.pencil.n();
+    let most = || wanted as f64 > DENSE_PART * flexible_rows(problem) as f64;
+    match settings.method {
+        Method::Dense => true,
+        Method::Lanczos => false,
+        Method::Auto => n <= DENSE_ALWAYS || (n <= DENSE_AT_MOST && most()),
+    }
+}
+
+/// The proof that no mode is missing; where one is, it is searched for once more, from other directions and for as many modes as
+/// there are.
+fn complete(
+    sparse: &mut Sparse<'_>,
+    mut search: Search,
+    wanted: usize,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Search, Completeness), EigenFailure> {
+    let rigid = sparse.problem.rigid.ncols();
+    let mut completeness = prove(sparse, &search, watch, counters)?;
+    let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
+    if missed > 0 {
+        search = sparse.search(wanted + missed, 1, watch, counters)?;
+        completeness = prove(sparse, &search, watch, counters)?;
+    }
+    let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
+    if found != counted {
+        return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
+    }
+    Ok((search, completeness))
+}
+
+/// Guaranteed bounds of the eigenvalues that were counted, where they are asked for.
+fn bounds(
+    sparse: &Sparse<'_>,
+    search: &Search,
+    completeness: &Completeness,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Option<EigenvalueBounds>, EigenFailure> {
+    let Sparse { problem, settings, analysis, .. } = sparse;
+    let found = completeness.modes_below;
+    if settings.accuracy != Accuracy::Certified || found == 0 {
+        return Ok(None);
+    }
+    watch(Event::Phase("bounds"));
+    let Refined { vectors, eigenvalues, .. } = &search.refined;
+    let modes = vectors.as_ref().subcols(0, found);
+    enclose(problem, analysis, modes, &eigenvalues[..found], completeness.shift, CLUSTER_GAP, counters)
+        .map(Some)
 }
 
 /// Modes as a method found them.
@@ -213,20 +267,18 @@ fn search_in_double(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    let mut start = fitting_start(problem, goal.attempt);
-    let mut tau = first_shift(problem, start);
-    loop {
-        watch(Event::Phase("factorisation"));
-        let factor: Cholesky<'_, f64> = lanczos::factorise(problem, analysis, tau, counters)?;
-        watch(Event::Phase("modes"));
-        match lanczos::lowest_modes(problem, &factor, goal, start, watch, counters)? {
+    let start = fitting_start(problem, goal.attempt);
+    let search = |factor: &Cholesky<'_, f64>, start: Option<&Snapshot>, counters: &mut Counters| {
+        match lanczos::lowest_modes(problem, factor, goal, start, watch, counters)? {
             lanczos::Search::Found { modes, next } => {
-                return Ok((refine(problem, &factor, modes, goal.tolerance, counters)?, next, tau));
+                Ok(Attempt::Done((refine(problem, factor, modes, goal.tolerance, counters)?, next)))
             }
-            lanczos::Search::ShiftTooLarge(shift) => (tau, start) = (shift, None),
+            lanczos::Search::ShiftTooLarge(shift) => Ok(Attempt::ShiftTooLarge(shift)),
             lanczos::Search::Rough { .. } => unreachable!("not asked for"),
         }
-    }
+    };
+    let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
+    Ok((modes, next, tau))
 }
 
 /// The inertia count in the gap above the last mode.

@@ -2,8 +2,8 @@
 //! that the factor of K + tau M preconditions.
 
 use super::counters::Counters;
+use super::factorise::factorise;
 use super::failure::EigenFailure;
-use super::lanczos::factorise;
 use super::noise::rounding_residual;
 use super::problem::EigenProblem;
 use super::settings::Precision;
