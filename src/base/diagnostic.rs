@@ -1,7 +1,7 @@
 //! The one table of diagnostics: every message the tool can give has a code, a severity, an exit code, a
 //! title and a default help here. `docs/codes.md` is generated from it; `fixtures/codes/` triggers each.
 
-use crate::base::error::ExitCode;
+use crate::base::exit_code::ExitCode;
 use std::path::{Path, PathBuf};
 
 /// How much a diagnostic weighs.

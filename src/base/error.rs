@@ -2,25 +2,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 
-/// Process exit codes, the contract with scripts and CI pipelines (`docs/codes.md`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(u8)]
-pub enum ExitCode {
-    /// The work was done.
-    Done = 0,
-    /// A check failed or a tolerance was exceeded; the inputs themselves were readable.
-    CheckFailed = 1,
-    /// Bad input or usage.
-    BadInput = 2,
-    /// No trustworthy numerical result: not converged, mechanism, indefinite mass.
-    Untrustworthy = 3,
-    /// Not enough memory or disk.
-    Resources = 4,
-    /// A bug of ours.
-    Bug = 70,
-    /// Interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left.
-    Interrupted = 130,
-}
+pub use crate::base::exit_code::ExitCode;
 
 /// A failed operation: every diagnostic collected until it had to stop.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,3 +85,14 @@ impl std::fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+/// Ends a stage of checks: an error of all that was found, when an error is among it.
+///
+/// # Errors
+/// All diagnostics, taken out of `found`.
+pub(crate) fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
+    if found.iter().any(|d| d.severity() == Severity::Error) {
+        return Err(Error::new(std::mem::take(found)));
+    }
+    Ok(())
+}

@@ -3,6 +3,7 @@
 
 pub mod diagnostic;
 pub mod error;
+mod exit_code;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_file;
 pub mod memory;

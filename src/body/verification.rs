@@ -3,13 +3,13 @@
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness, rigid_mass};
-use crate::body::flex_body::{FlexBody, Storage};
+use crate::body::flex_body::{FlexBody, Guarantee, Storage};
 use crate::body::invariants::{
     BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
 };
 use crate::model::{Damping, FeModel, GeometricStiffness, UnitLoad};
 use crate::numerics::eigen::{relative_residual, residual_scale, rounding_residual};
-use crate::numerics::linalg::{SymmetricMatrix, gram};
+use crate::numerics::linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
 use faer::Mat;
 
 /// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
@@ -56,6 +56,18 @@ pub fn accept(body: &FlexBody) -> Result<()> {
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) when the nodes differ.
 pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
+    let against = Recomputed::new(body, model)?;
+    let mut checks = vec![against.positions()];
+    checks.extend(against.invariants());
+    checks.extend(against.modes());
+    checks.extend(against.damping()?);
+    checks.extend(against.geometric_stiffness()?);
+    checks.extend(against.guarantee());
+    Ok(checks)
+}
+
+/// Refuses a model with another dimension or other nodes.
+fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
     if body.dimension() != model.dimension() {
         let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
         return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
@@ -68,133 +80,200 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
         );
         return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
     }
-    let check = |name, formula, value: f64, limit: f64| IdentityCheck {
-        name,
-        formula,
-        value,
-        limit,
-        passed: value <= limit,
-    };
-    let frame = body.frame();
-    let place = Place::new(model, *frame);
-    let Some(modes) = BodyModes::of_body(model, body) else {
-        let message = "the rows of the body's modes are not those of the model";
-        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
-    };
-    let positions = &place.positions;
-    let size = positions.iter().flatten().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
-    let moved = positions
-        .iter()
-        .flatten()
-        .zip(body.nodes().positions.iter().flatten())
-        .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-    let in_model = &modes.vectors;
-    let pencil = model.pencil();
-    let kx = pencil.apply_stiffness(in_model.as_ref());
-    let mx = pencil.apply_mass(in_model.as_ref());
-    let modal_stiffness = gram(in_model.as_ref(), kx.as_ref());
-    let own = modes.condensed(model, &place, modal_stiffness);
-    let differences = primary_differences(body.invariants(), &own);
-    let worst_of = |kept: &dyn Fn(&str) -> bool| {
-        let kept = differences.iter().filter(|(name, _)| kept(name));
+    Ok(())
+}
+
+/// A body beside what the matrices of its model say of the same modes.
+struct Recomputed<'a> {
+    body: &'a FlexBody,
+    model: &'a FeModel,
+    place: Place,
+    modes: BodyModes,
+    /// K and M times the modes.
+    kx: Mat<f64>,
+    mx: Mat<f64>,
+    /// The invariants, condensed anew.
+    own: Invariants,
+    /// How far the stored ones are from these, by name.
+    differences: Vec<(String, f64)>,
+}
+
+impl<'a> Recomputed<'a> {
+    fn new(body: &'a FlexBody, model: &'a FeModel) -> Result<Self> {
+        check_comparable(body, model)?;
+        let place = Place::new(model, *body.frame());
+        let Some(modes) = BodyModes::of_body(model, body) else {
+            let message = "the rows of the body's modes are not those of the model";
+            return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+        };
+        let pencil = model.pencil();
+        let kx = pencil.apply_stiffness(modes.vectors.as_ref());
+        let mx = pencil.apply_mass(modes.vectors.as_ref());
+        let modal_stiffness = gram(modes.vectors.as_ref(), kx.as_ref());
+        let own = modes.condensed(model, &place, modal_stiffness);
+        let differences = primary_differences(body.invariants(), &own);
+        Ok(Self { body, model, place, modes, kx, mx, own, differences })
+    }
+
+    /// The positions of the nodes in the body frame.
+    fn positions(&self) -> IdentityCheck {
+        let own = self.place.positions.iter().flatten();
+        let size = own.clone().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        let stored = self.body.nodes().positions.iter().flatten();
+        let moved = largest(own.zip(stored).map(|(a, b)| (a - b).abs()));
+        IdentityCheck::new("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12)
+    }
+
+    /// The largest difference of those invariants whose names are `kept`.
+    fn difference_of(&self, kept: impl Fn(&str) -> bool) -> f64 {
+        let kept = self.differences.iter().filter(|(name, _)| kept(name));
         kept.fold(0.0f64, |m, (_, d)| if d.is_nan() { f64::INFINITY } else { m.max(*d) })
-    };
-    // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that is more.
-    let inertia = body.invariants().inertia().diagonal();
-    let storage = body.storage();
-    let recomputed =
-        RECOMPUTED + storage.rounding() + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
-    // K is huge beside its lowest eigenvalues: what its products round away is no error of the body.
-    let rounding: Vec<f64> = rounding_residual(model.stiffness(), in_model.as_ref())
-        .into_iter()
-        .map(|rounding| storage.roundings() * rounding)
-        .collect();
-    let (mut residual, mut stored, mut long, mut loose) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-    for (j, &lambda) in body.modes().eigenvalue.iter().enumerate() {
-        let size = residual_scale(kx.col(j), mx.col(j), lambda);
-        residual = residual.max(relative_residual(kx.col(j), mx.col(j), lambda));
-        stored = stored.max(body.modes().residual[j]).max(ROUNDING * rounding[j] / size);
-        // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
-        long = long.max(in_model.col(j).norm_l2() / lambda.sqrt());
-        loose = loose.max(rounding[j] / lambda.sqrt());
     }
-    let orthonormality =
-        gram(in_model.as_ref(), mx.as_ref()) - Mat::<f64>::identity(in_model.ncols(), in_model.ncols());
-    let mut checks = vec![
-        check("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12),
-        check(
-            "invariants_recomputed",
-            "m, c, J, C1, Ibar, S from the matrices",
-            // Where m_ff = I was taken for granted, `orthonormal_recomputed` is about it.
-            worst_of(&|name| name != STIFFNESS && (body.groups().w2 || name != "modal_mass")),
-            recomputed,
-        ),
-        check(
-            "rigid_inertia_recomputed",
-            "R' M R = [m, -c~; c~, I0]",
-            rigid_inertia_error(body, &rigid_mass(model, frame)),
-            recomputed,
-        ),
-        check(
-            "stiffness_recomputed",
-            "K_ff = Psi' K Psi",
-            worst_of(&|name| name == STIFFNESS),
-            RECOMPUTED + storage.rounding() + long * loose,
-        ),
-        check(
-            "residual_recomputed",
-            "|K psi - lambda M psi| / (|K psi| + |lambda M psi|)",
-            residual,
-            2.0 * stored,
-        ),
-        check(
-            "orthonormal_recomputed",
-            "Psi' M Psi = I",
-            orthonormality.norm_max(),
-            1e-9 + storage.rounding(),
-        ),
-    ];
-    checks.extend(damping_check(body, model, in_model, &own)?.map(|found| {
-        check(
-            "damping_recomputed",
-            "D_ff = Psi' D Psi, zeta = D_jj / (2 omega_j)",
-            found.largest,
-            found.allowed,
-        )
-    }));
-    checks.extend(geometric_check(body, model, in_model)?.map(|found| {
-        check(
-            "geometric_stiffness_recomputed",
-            "Psi' K_geo Psi for every unit load",
-            found.largest,
-            found.allowed,
-        )
-    }));
-    if let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, model.scalar_mass()) {
-        let (stored, shapes) = (&body.nodes().positions, modes.displacements.as_ref());
-        let own = condense_certified(mass, stored, shapes, model.stiffness(), &frame.axes);
-        let excess =
-            primary_differences(body.invariants(), &own.invariants).iter().fold(0.0f64, |m, (name, d)| {
-                let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| *known == name);
-                let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
-                if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * scale) }
-            });
-        // Stored modes are rounded: their quotients follow the eigenvalues to what any other check of modes allows.
-        let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
-        let modal_mass = own.invariants.modal_mass();
-        let outside = bounds.enumerate().fold(0.0f64, |m, (j, (lower, upper))| {
-            let quotient = own.invariants.modal_stiffness[(j, j)] / modal_mass[(j, j)];
-            m.max((lower - quotient) / lower).max((quotient - upper) / upper)
-        });
-        checks.push(check("digits_recomputed", "invariants to their guaranteed digits", excess, 1.0));
-        checks.push(check(
-            "bounds_recomputed",
-            "psi' K psi / psi' M psi between the bounds of lambda",
-            outside,
-            1e-9 + body.certificate().rigid_noise,
-        ));
+
+    /// What the body has of its mass, by two paths.
+    fn invariants(&self) -> [IdentityCheck; 2] {
+        let body = self.body;
+        // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that is more.
+        let inertia = body.invariants().inertia().diagonal();
+        let recomputed = RECOMPUTED
+            + body.storage().rounding()
+            + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
+        // Where m_ff = I was taken for granted, `orthonormal_recomputed` is about it.
+        let is_of_mass = |name: &str| name != STIFFNESS && (body.groups().w2 || name != "modal_mass");
+        [
+            IdentityCheck::new(
+                "invariants_recomputed",
+                "m, c, J, C1, Ibar, S from the matrices",
+                self.difference_of(is_of_mass),
+                recomputed,
+            ),
+            IdentityCheck::new(
+                "rigid_inertia_recomputed",
+                "R' M R = [m, -c~; c~, I0]",
+                rigid_inertia_error(body, &rigid_mass(self.model, body.frame())),
+                recomputed,
+            ),
+        ]
     }
-    Ok(checks)
+
+    /// K_ff, the residuals and the orthonormality of the modes.
+    fn modes(&self) -> [IdentityCheck; 3] {
+        let (storage, modes) = (self.body.storage(), &self.modes.vectors);
+        let ModeErrors { residual, allowed_residual, stiffness } = self.mode_errors();
+        let orthonormality =
+            gram(modes.as_ref(), self.mx.as_ref()) - Mat::<f64>::identity(modes.ncols(), modes.ncols());
+        [
+            IdentityCheck::new(
+                "stiffness_recomputed",
+                "K_ff = Psi' K Psi",
+                self.difference_of(|name| name == STIFFNESS),
+                RECOMPUTED + storage.rounding() + stiffness,
+            ),
+            IdentityCheck::new(
+                "residual_recomputed",
+                "|K psi - lambda M psi| / (|K psi| + |lambda M psi|)",
+                residual,
+                2.0 * allowed_residual,
+            ),
+            IdentityCheck::new(
+                "orthonormal_recomputed",
+                "Psi' M Psi = I",
+                largest_entry(orthonormality.as_ref()),
+                1e-9 + storage.rounding(),
+            ),
+        ]
+    }
+
+    /// Residuals, and what rounding of products with K explains: K is huge beside its lowest eigenvalues, and what its products
+    /// round away is no error of the body.
+    fn mode_errors(&self) -> ModeErrors {
+        let (modes, storage) = (self.body.modes(), self.body.storage());
+        let rounding: Vec<f64> = rounding_residual(self.model.stiffness(), self.modes.vectors.as_ref())
+            .into_iter()
+            .map(|rounding| storage.roundings() * rounding)
+            .collect();
+        let (mut residual, mut stored, mut long, mut loose) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+        for (j, &lambda) in modes.eigenvalue.iter().enumerate() {
+            let (k_psi, m_psi) = (self.kx.col(j), self.mx.col(j));
+            let size = residual_scale(k_psi, m_psi, lambda);
+            residual = larger(residual, relative_residual(k_psi, m_psi, lambda));
+            stored = stored.max(modes.residual[j]).max(ROUNDING * rounding[j] / size);
+            // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
+            long = long.max(self.modes.vectors.col(j).norm_l2() / lambda.sqrt());
+            loose = loose.max(rounding[j] / lambda.sqrt());
+        }
+        ModeErrors { residual, allowed_residual: stored, stiffness: long * loose }
+    }
+
+    fn damping(&self) -> Result<Option<IdentityCheck>> {
+        let found = damping_check(self.body, self.model, &self.modes.vectors, &self.own)?;
+        Ok(found.map(|found| {
+            let formula = "D_ff = Psi' D Psi, zeta = D_jj / (2 omega_j)";
+            IdentityCheck::new("damping_recomputed", formula, found.largest, found.allowed)
+        }))
+    }
+
+    fn geometric_stiffness(&self) -> Result<Option<IdentityCheck>> {
+        let found = geometric_check(self.body, self.model, &self.modes.vectors)?;
+        Ok(found.map(|found| {
+            let formula = "Psi' K_geo Psi for every unit load";
+            IdentityCheck::new("geometric_stiffness_recomputed", formula, found.largest, found.allowed)
+        }))
+    }
+
+    /// What accuracy `certified` guarantees, where it does.
+    fn guarantee(&self) -> Vec<IdentityCheck> {
+        let body = self.body;
+        let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, self.model.scalar_mass()) else {
+            return Vec::new();
+        };
+        let (stored, shapes) = (&body.nodes().positions, self.modes.displacements.as_ref());
+        let own = condense_certified(mass, stored, shapes, self.model.stiffness(), &body.frame().axes);
+        vec![
+            IdentityCheck::new(
+                "digits_recomputed",
+                "invariants to their guaranteed digits",
+                excess_of_digits(body, guarantee, &own.invariants),
+                1.0,
+            ),
+            IdentityCheck::new(
+                "bounds_recomputed",
+                "psi' K psi / psi' M psi between the bounds of lambda",
+                outside_of_bounds(guarantee, &own.invariants),
+                1e-9 + body.certificate().rigid_noise,
+            ),
+        ]
+    }
+}
+
+/// Errors of modes that were computed anew, and what is allowed.
+struct ModeErrors {
+    /// Largest K-residual.
+    residual: f64,
+    /// The largest that was stored, or that rounding explains.
+    allowed_residual: f64,
+    /// What rounding explains in K_ff, relative to sqrt(lambda_p lambda_q).
+    stiffness: f64,
+}
+
+/// Largest difference of the invariants in units of what their guaranteed digits allow.
+fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) -> f64 {
+    primary_differences(body.invariants(), own).iter().fold(0.0f64, |m, (name, d)| {
+        let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| *known == name);
+        let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
+        if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * scale) }
+    })
+}
+
+/// How far the Rayleigh quotient of a mode lies outside of the bounds of its eigenvalue at the most, relative. Stored modes are
+/// rounded: their quotients follow the eigenvalues to what any other check of modes allows.
+fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
+    let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
+    let modal_mass = own.modal_mass();
+    largest(bounds.enumerate().map(|(j, (lower, upper))| {
+        let quotient = own.modal_stiffness[(j, j)] / modal_mass[(j, j)];
+        larger((lower - quotient) / lower, (quotient - upper) / upper)
+    }))
 }
 
 /// How far stored and recomputed matrices are from each other, relative to the largest entry, and what rounding allows.
@@ -207,14 +286,16 @@ struct Difference {
 impl Difference {
     /// Of entries up to `size`, recomputed with a rounding of `rounding`.
     fn new(largest: f64, size: f64, rounding: f64) -> Self {
-        let relative = |value: f64| if value > 0.0 { value / size } else { 0.0 };
+        let relative = |value: f64| if value == 0.0 { 0.0 } else { value / size };
+        let rounding = if rounding > 0.0 { rounding } else { 0.0 };
         // Twice the size is what two matrices of nothing but rounding differ by at the most.
         Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
     }
 
-    /// The one that comes closer to what is allowed, or goes further beyond it.
+    /// The one that comes closer to what is allowed, or goes further beyond it; one that is no number is worst.
     fn worse(self, other: Self) -> Self {
-        if other.largest * self.allowed > self.largest * other.allowed { other } else { self }
+        let is_worse = other.largest.is_nan() || other.largest * self.allowed > self.largest * other.allowed;
+        if is_worse { other } else { self }
     }
 }
 
@@ -249,8 +330,8 @@ fn damping_check(
     let stored = modes.modal_damping.clone().unwrap_or_else(none);
     let of_ratio =
         |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
-    let largest =
-        modes.eigenvalue.iter().enumerate().map(of_ratio).fold((&stored - &matrix).norm_max(), f64::max);
+    let of_matrix = largest_entry((&stored - &matrix).as_ref());
+    let largest = modes.eigenvalue.iter().enumerate().map(of_ratio).fold(of_matrix, larger);
     let rounding = match model.damping() {
         Some(Damping::Matrix(d)) => rounding_of(d, shapes, body.storage()),
         Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes, body.storage()),
@@ -264,18 +345,18 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
     let nf = shapes.ncols();
     let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes)?;
     let stored = body.geometric_stiffness();
-    let of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
+    let matrix_of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
         let one = list.iter().find(|one| one.load == *load);
         one.map_or_else(|| Mat::zeros(nf, nf), |one| one.matrix.clone())
     };
     let loads = stored.iter().chain(&found).map(|one| &one.load);
     let difference = |load: &UnitLoad| {
-        let (stored, own) = (of(stored, load), of(&found, load));
+        let (stored, own) = (matrix_of(stored, load), matrix_of(&found, load));
         // Every component of the kind may contribute.
         let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
         let rounding = given.map(|one| rounding_of(&one.matrix, shapes, body.storage())).sum();
         let size = stored.norm_max().max(own.norm_max());
-        Difference::new((&stored - &own).norm_max(), size, rounding)
+        Difference::new(largest_entry((&stored - &own).as_ref()), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))
 }

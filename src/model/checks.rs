@@ -1,27 +1,23 @@
 //! What must hold before any work is done on a model: each failure named with its facts.
 
+use super::assemble::assemble;
+use super::assembled::Assembled;
+use super::connections::check_connections;
 use super::density::{Densities, check_density};
 use super::exchanged::check_exchanged_matrices;
-use super::geometric_stiffness::{check_loads, missing_components};
-use super::interface::resolve_references;
-use super::layout::{Layout, layout, name_some};
+use super::load_checks::missing_components;
 use super::local_mass::{LocalMass, SoundSpeed, check_exchanged, check_speed};
-use super::magnitude::check_magnitudes;
 use super::mass_structure::{MassForm, mass_form};
 use super::node_pairs::check_mass_pairs;
 use super::placeless::{check_massless, misplaced, recover};
-use super::rigid::{centre_and_length, extents, rigid_count, rigid_residuals};
+use super::rigid::{centre_and_length, extents, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
-use super::{BodyNumber, Damping, DofLabel, FeModel, GeometricStiffness, Nodes, RawMatrix, RawModel, Rows};
-use crate::base::diagnostic::{Code, Diagnostic, Severity};
-use crate::base::error::{Error, Result};
-use crate::numerics::linalg::SymmetricMatrix;
-use rayon::prelude::*;
-use std::collections::HashSet;
-use std::path::Path;
-
-/// Name of geometric stiffness in messages.
-const GEOMETRIC: &str = "geometric stiffness";
+use super::tolerance::{block_tolerance, rounding};
+use super::wording::name_some;
+use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawModel};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Result, stop_on_error};
+use crate::numerics::linalg::{SymmetricMatrix, largest};
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -49,6 +45,16 @@ pub struct Plausibility {
     pub densities: Option<Densities>,
 }
 
+impl FeModel {
+    /// Checks a model as a reader delivered it, and brings it into the internal order.
+    ///
+    /// # Errors
+    /// See [`check`].
+    pub fn from_raw(raw: RawModel) -> Result<CheckedModel> {
+        check(raw)
+    }
+}
+
 /// Checks `raw` and brings it into the internal order.
 ///
 /// # Errors
@@ -56,129 +62,6 @@ pub struct Plausibility {
 pub fn check(raw: RawModel) -> Result<CheckedModel> {
     let (assembled, found) = assemble(raw)?;
     finish(assembled, None, found)
-}
-
-/// A model in the internal order whose matrices are sound by themselves.
-pub(super) struct Assembled {
-    /// What was read, without matrices, nodes and labels.
-    pub raw: RawModel,
-    /// Nodes with degrees of freedom.
-    pub nodes: Nodes,
-    /// What the rows are; how those without a place move is not known yet.
-    pub rows: Rows,
-    /// K.
-    pub stiffness: SymmetricMatrix,
-    /// M.
-    pub mass: SymmetricMatrix,
-    /// Internal row of each matrix row; none when they are the same, or when this is one of several bodies.
-    pub row_to_internal: Option<Vec<u32>>,
-    /// Damping, a matrix in the same order.
-    pub damping: Option<Damping<SymmetricMatrix>>,
-    /// Geometric stiffness, in the same order.
-    pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
-}
-
-/// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes so far.
-pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)> {
-    let mut found = std::mem::take(&mut raw.diagnostics);
-    check_matrix(&raw.stiffness, "stiffness", &mut found);
-    check_matrix(&raw.mass, "mass", &mut found);
-    let (nk, nm) = (raw.stiffness.matrix.n_cols(), raw.mass.matrix.n_cols());
-    if nk != nm {
-        let message = format!("stiffness matrix has {nk} rows, mass matrix {nm}");
-        found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&raw.mass.path));
-    }
-    if !(2..=3).contains(&raw.dimension) {
-        let message = format!("`dimension` is {}, expected 2 or 3", raw.dimension);
-        found.push(Diagnostic::new(Code::ManifestSyntax, message));
-    }
-    if let Some(problem) = raw.damping.as_ref().and_then(Damping::problem) {
-        found.push(Diagnostic::new(Code::ManifestSyntax, problem));
-    }
-    let damping = raw.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
-    let geometric = raw.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC));
-    for (other, name) in damping.into_iter().chain(geometric) {
-        check_matrix(other, name, &mut found);
-        let rows = other.matrix.n_cols();
-        if rows != nk {
-            let message = format!("stiffness matrix has {nk} rows, {name} matrix {rows}");
-            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&other.path));
-        }
-    }
-    stop_on_error(&mut found)?;
-
-    let dimension = usize::from(raw.dimension);
-    let layout = layout(&raw, &mut found);
-    stop_on_error(&mut found)?;
-    let layout = layout.expect("a missing layout comes with an error");
-    let rows = &layout.rows;
-    let nodes = Nodes {
-        ids: layout.used.iter().map(|&i| raw.nodes.ids[i]).collect(),
-        positions: layout.used.iter().map(|&i| raw.nodes.positions[i]).collect(),
-    };
-    if nodes.positions.iter().flatten().any(|x| !x.is_finite()) {
-        let message = "a node coordinate is not a finite number";
-        found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
-    }
-    if let Some(i) = nodes.positions.iter().position(|x| dimension == 2 && x[2] != 0.0) {
-        let message = format!("node {} of a plane model has z = {}", nodes.ids[i], nodes.positions[i][2]);
-        found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
-    }
-    check_names(&raw, &mut found);
-    resolve_references(&mut raw, &nodes, &mut found);
-    let known: HashSet<i64> = nodes.ids.iter().copied().collect();
-    for set in &raw.interfaces {
-        let unknown: Vec<i64> = set.nodes.iter().filter(|id| !known.contains(id)).copied().collect();
-        if !unknown.is_empty() {
-            let message = format!(
-                "interface `{}` names {} unknown nodes: {}",
-                set.name,
-                unknown.len(),
-                name_some(&unknown)
-            );
-            found.push(Diagnostic::new(Code::InterfaceNode, message));
-        }
-    }
-    check_loads(&raw.geometric_stiffness, &raw.interfaces, dimension, &mut found);
-    if nk <= rigid_count(dimension) {
-        let message = format!("model has {nk} degrees of freedom");
-        found.push(Diagnostic::new(Code::ModelTooSmall, message));
-    }
-    stop_on_error(&mut found)?;
-
-    let label = |row: usize| rows.label(&nodes, row);
-    let stiffness = symmetric(&mut raw.stiffness, &layout, "stiffness", label, &mut found);
-    let mass = symmetric(&mut raw.mass, &layout, "mass", label, &mut found);
-    let damping = raw.damping.take().and_then(|damping| {
-        // Without the matrix there is an error among the diagnostics.
-        let mut ordered = |mut matrix: RawMatrix| {
-            let symmetric = symmetric(&mut matrix, &layout, "damping", label, &mut found)?;
-            check_diagonal(&symmetric, "damping", &matrix.path, label, &mut found);
-            Some(symmetric)
-        };
-        damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
-    });
-    let geometric_stiffness = std::mem::take(&mut raw.geometric_stiffness)
-        .into_iter()
-        .filter_map(|GeometricStiffness { load, mut matrix }| {
-            let matrix = symmetric(&mut matrix, &layout, GEOMETRIC, label, &mut found)?;
-            Some(GeometricStiffness { load, matrix })
-        })
-        .collect();
-    stop_on_error(&mut found)?;
-    let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
-        unreachable!("an asymmetric matrix is an error")
-    };
-    check_diagonals(&stiffness, &mass, label, &raw, &mut found);
-    found.extend(check_magnitudes(&stiffness, &mass, &nodes, &raw));
-    stop_on_error(&mut found)?;
-    (raw.nodes, raw.dofs) = (Nodes::default(), None);
-    let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
-    let rows = layout.rows;
-    Ok((
-        Assembled { raw, nodes, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness },
-        found,
-    ))
 }
 
 /// The checks of a body: its mass, its connections, its rigid motion.
@@ -191,37 +74,15 @@ pub(super) fn finish(
     stop_on_error(&mut found)?;
     let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, &mut found);
     stop_on_error(&mut found)?;
-    let digits = body.raw.mass.digits;
-    let form = match mass_form(&body.mass, &body.rows, block_tolerance(digits)) {
-        Ok(form) => Some(form),
-        Err(diagnostic) => {
-            found.push(diagnostic.in_file(&body.raw.mass.path));
-            None
-        }
-    };
+    let form = form_of_mass(&body, &mut found);
     check_connections(&body, &mut found);
-    if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
-        found.push(diagnostic.in_file(&body.raw.stiffness.path));
-        stop_on_error(&mut found)?;
-    }
-    let label = |row: usize| body.rows.label(&body.nodes, row);
-    if let Some(diagnostic) = misplaced(&body.rows) {
-        found.push(diagnostic.in_file(&body.raw.nodes_path));
-    }
-    if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
-        found.push(diagnostic.in_file(&body.raw.stiffness.path));
-    }
-    let written = body.raw.stiffness.digits;
-    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
-    let rigid_residual = check_rigid_motion(&body, limits, &mut found);
-    check_rigid_damping(&body, &mut found);
-    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
+    let rigid_residual = check_rigid_motions(&mut body, &mut found)?;
     stop_on_error(&mut found)?;
     let mut form = form.expect("a missing mass comes with an error");
     // Vectors that rigid motion moves have no x of their own in the formulas for Ms.
     form.commutes &= body.rows.are_still();
     if !form.commutes {
-        check_inertia(&body, rounding(digits, 3).max(1e-9), &mut found);
+        check_inertia(&body, rounding(body.raw.mass.digits, 3).max(1e-9), &mut found);
         stop_on_error(&mut found)?;
     }
     let diagonal_mass = is_diagonal(&body.mass);
@@ -234,6 +95,36 @@ pub(super) fn finish(
     stop_on_error(&mut found)?;
     let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     Ok(CheckedModel { model, diagnostics: found, plausibility })
+}
+
+/// What kind of mass it is; `None` with a diagnostic when it is that of no body.
+fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassForm> {
+    let form = mass_form(&body.mass, &body.rows, block_tolerance(body.raw.mass.digits));
+    form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
+}
+
+/// How every row moves with the rigid body, and whether K and the other matrices leave it free. Returns the residual of K.
+///
+/// # Errors
+/// Rows without a place whose motion K does not tell, with all that was found before.
+fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Result<f64> {
+    if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        stop_on_error(found)?;
+    }
+    let label = |row: usize| body.rows.label(&body.nodes, row);
+    if let Some(diagnostic) = misplaced(&body.rows) {
+        found.push(diagnostic.in_file(&body.raw.nodes_path));
+    }
+    if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+    }
+    let written = body.raw.stiffness.digits;
+    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
+    let rigid_residual = check_rigid_motion(body, limits, found);
+    check_rigid_damping(body, found);
+    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
+    Ok(rigid_residual)
 }
 
 /// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted here.
@@ -300,196 +191,6 @@ fn note_structure(body: &Assembled, form: &MassForm, diagonal_mass: bool, found:
     }
 }
 
-fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
-    if found.iter().any(|d| d.severity() == Severity::Error) {
-        return Err(Error::new(std::mem::take(found)));
-    }
-    Ok(())
-}
-
-/// Names that no file could hold, before the long run rather than after it.
-fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
-    let mut seen = HashSet::new();
-    for set in &raw.interfaces {
-        let name = &set.name;
-        let wrong = match name.as_str() {
-            "" => Some("an interface has no name".to_owned()),
-            _ if !seen.insert(name) => Some(format!("interface `{name}` is given twice")),
-            _ if name.len() > 200 || name.chars().any(char::is_control) => Some(format!(
-                "interface name `{}` is longer than 200 bytes or has control characters in it",
-                name.escape_debug()
-            )),
-            _ if set.nodes.is_empty() => Some(format!("interface `{name}` has no nodes")),
-            _ => None,
-        };
-        found.extend(wrong.map(|message| Diagnostic::new(Code::ManifestSyntax, message)));
-    }
-    if raw.name.contains('\0') {
-        found.push(Diagnostic::new(Code::ManifestSyntax, "the model name has a NUL character in it"));
-    }
-}
-
-/// Relative size below which a difference is rounding of values with `digits` significant digits.
-fn rounding(digits: u8, margin: i32) -> f64 {
-    10f64.powi(margin - i32::from(digits)).clamp(1e-12, 1e-4)
-}
-
-fn block_tolerance(digits: u8) -> f64 {
-    rounding(digits, 3).max(1e-10)
-}
-
-fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
-    let matrix = &raw.matrix;
-    if matrix.n_rows() != matrix.n_cols() {
-        let message = format!("{name} matrix has {} rows and {} columns", matrix.n_rows(), matrix.n_cols());
-        found.push(Diagnostic::new(Code::MatrixNotSquare, message).in_file(&raw.path));
-    } else if matrix.nnz() == 0 {
-        let message = format!("{name} matrix has no nonzero entries");
-        found.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
-    }
-    let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
-    if !matrix.values().par_chunks(1 << 16).all(finite) {
-        let at = matrix.values().iter().position(|v| !v.is_finite()).expect("just found");
-        let column = matrix.col_ptr().partition_point(|&p| p <= at);
-        let message = format!(
-            "{name} matrix has {} in row {}, column {column}",
-            matrix.values()[at],
-            matrix.row_idx()[at] + 1
-        );
-        found.push(Diagnostic::new(Code::MatrixNotFinite, message).in_file(&raw.path));
-    }
-}
-
-/// The matrix in internal order, symmetric, taken out of `raw`; `None` with a diagnostic when it is not symmetric to
-/// rounding.
-fn symmetric(
-    raw: &mut RawMatrix,
-    layout: &Layout,
-    name: &str,
-    label: impl Fn(usize) -> DofLabel,
-    found: &mut Vec<Diagnostic>,
-) -> Option<SymmetricMatrix> {
-    let matrix = std::mem::take(&mut raw.matrix);
-    let ordered = if layout.is_identity() { matrix } else { matrix.permuted(&layout.row_to_internal) };
-    let ordered = match SymmetricMatrix::try_from(ordered) {
-        Ok(symmetric) => return Some(symmetric),
-        Err(ordered) => ordered,
-    };
-    let n = ordered.n_cols();
-    let size: Vec<f64> = (0..n).map(|i| ordered.get(i, i).abs().sqrt()).collect();
-    let (mut worst, mut at) = (0.0f64, (0, 0));
-    let mut one_sided = 0usize;
-    for j in 0..n {
-        let (rows, values) = ordered.column(j);
-        for (&i, &v) in rows.iter().zip(values) {
-            let i = i as usize;
-            let other = ordered.get(j, i);
-            one_sided += usize::from(other == 0.0);
-            // Beyond the diagonal, as only indefinite matrices go, an entry is compared with itself.
-            let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
-            let difference = (v - other).abs() / scale;
-            if difference > worst {
-                (worst, at) = (difference, (i, j));
-            }
-        }
-    }
-    if worst > rounding(raw.digits, 2) {
-        let (i, j) = at;
-        let message = format!(
-            "{name} matrix is not symmetric: {} at ({}, {}), {} at the mirrored place",
-            ordered.get(i, j),
-            label(i),
-            label(j),
-            ordered.get(j, i)
-        );
-        let mut diagnostic = Diagnostic::new(Code::MatrixAsymmetric, message).in_file(&raw.path);
-        if one_sided * 2 >= ordered.nnz().saturating_sub(n) * 2 && one_sided > 0 {
-            diagnostic = diagnostic.with_help("only one triangle is stored: declare the matrix symmetric");
-        }
-        found.push(diagnostic);
-        return None;
-    }
-    Some(SymmetricMatrix::symmetrised(&ordered))
-}
-
-fn check_diagonals(
-    stiffness: &SymmetricMatrix,
-    mass: &SymmetricMatrix,
-    label: impl Fn(usize) -> DofLabel,
-    raw: &RawModel,
-    found: &mut Vec<Diagnostic>,
-) {
-    check_diagonal(stiffness, "stiffness", &raw.stiffness.path, &label, found);
-    check_diagonal(mass, "mass", &raw.mass.path, &label, found);
-    let empty = |m: &SymmetricMatrix, i: usize| m.row(i).0.is_empty();
-    let both: Vec<DofLabel> =
-        (0..stiffness.n()).filter(|&i| empty(stiffness, i) && empty(mass, i)).map(&label).collect();
-    if !both.is_empty() {
-        let message = format!("{} rows are empty in both matrices: {}", both.len(), name_some(&both));
-        found.push(Diagnostic::new(Code::PencilSingular, message).in_file(&raw.stiffness.path));
-    }
-}
-
-fn check_diagonal(
-    matrix: &SymmetricMatrix,
-    name: &str,
-    path: &Path,
-    label: impl Fn(usize) -> DofLabel,
-    found: &mut Vec<Diagnostic>,
-) {
-    let negative: Vec<DofLabel> =
-        matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
-    if !negative.is_empty() {
-        let message = format!(
-            "{} diagonal entries of the {name} matrix are negative: {}",
-            negative.len(),
-            name_some(&negative)
-        );
-        found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
-    }
-}
-
-/// K and M together make one body, and K alone holds it together.
-fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
-    let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
-    let component = rows.components(&[stiffness]);
-    if component.iter().all(|&c| c == 0) {
-        return;
-    }
-    let bodies = groups(&rows.components(&[stiffness, mass]), rows, nodes);
-    if bodies.len() > 1 {
-        let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
-        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
-        return;
-    }
-    // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
-    let parts = groups(&component, rows, nodes);
-    let message = format!(
-        "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
-        parts.len(),
-        in_words(&parts)
-    );
-    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
-}
-
-/// Node numbers of every component, in the order of their first nodes.
-pub(super) fn groups(component: &[usize], rows: &Rows, nodes: &Nodes) -> Vec<Vec<i64>> {
-    let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
-    for (vertex, &c) in component.iter().enumerate() {
-        groups[c].push(rows.number(nodes, vertex));
-    }
-    groups
-}
-
-/// `8 nodes (1, 2, 3, 4, 5 and 3 more), 1 node (9)`.
-pub(super) fn in_words(groups: &[Vec<i64>]) -> String {
-    let group = |nodes: &Vec<i64>| {
-        let plural = if nodes.len() == 1 { "" } else { "s" };
-        format!("{} node{plural} ({})", nodes.len(), name_some(nodes))
-    };
-    name_some(&groups.iter().map(group).collect::<Vec<_>>())
-}
-
 /// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     /// As much as node tables written with few digits leave.
@@ -498,9 +199,9 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let (centre, length) = centre_and_length(&body.nodes.positions);
     let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
     let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
-    let damped = residuals.iter().filter(|r| **r > LIMIT).count();
+    let damped = residuals.iter().filter(|r| r.is_nan() || **r > LIMIT).count();
     if damped > 0 {
-        let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
+        let worst = largest(residuals.iter().copied());
         let message = format!(
             "D R is not zero for {damped} of {} rows: |D R| reaches {worst:.1e} of the row sum of |D|; only the damping of the modes is kept",
             residuals.len()

@@ -6,7 +6,7 @@
 //! everything else have no such sets, or are left out by what marks them. Curved elements count with their corners, which changes their
 //! volume by some percent.
 
-use super::checks::Assembled;
+use super::assembled::Assembled;
 use super::local_mass::LocalMass;
 use super::node_pairs::neighbours;
 use crate::base::diagnostic::{Code, Diagnostic};

@@ -1,6 +1,6 @@
 //! Stiffness and mass given in each other's place.
 
-use super::checks::Assembled;
+use super::assembled::Assembled;
 use super::rows::Rows;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::SymmetricMatrix;

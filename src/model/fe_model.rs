@@ -1,13 +1,9 @@
 //! The checked model: every used node has d displacements (d: the dimension), row d i + k is direction k of node i; other
 //! rows follow as [`Rows`] has them.
 
-use super::checks::Assembled;
+use super::assembled::Assembled;
 use super::mass_structure::MassForm;
-use super::{
-    BodyNumber, CheckedModel, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, check,
-    check_bodies,
-};
-use crate::base::error::Result;
+use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::{Pencil, SymmetricMatrix};
@@ -42,22 +38,6 @@ pub struct FeModel {
 }
 
 impl FeModel {
-    /// Checks a model as a reader delivered it, and brings it into the internal order.
-    ///
-    /// # Errors
-    /// See [`check`].
-    pub fn from_raw(raw: RawModel) -> Result<CheckedModel> {
-        check(raw)
-    }
-
-    /// The same for matrices that hold several bodies: each becomes a model of its own.
-    ///
-    /// # Errors
-    /// See [`check_bodies`].
-    pub fn bodies_from_raw(raw: RawModel) -> Result<Vec<CheckedModel>> {
-        check_bodies(raw)
-    }
-
     pub(super) fn new(
         body: Assembled,
         form: MassForm,

@@ -2,9 +2,11 @@
 //! dimensions.
 
 use super::rows::{Recovered, Rows};
-use super::{DofLabel, RawModel};
+use super::wording::name_some;
+use super::{DofLabel, Nodes, RawModel};
 use crate::base::diagnostic::{Code, Diagnostic};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// Where each matrix row goes.
@@ -22,69 +24,76 @@ impl Layout {
     pub fn is_identity(&self) -> bool {
         self.row_to_internal.iter().enumerate().all(|(row, &to)| row == to as usize)
     }
+
+    /// The used nodes of the node table.
+    pub fn used_nodes(&self, table: &Nodes) -> Nodes {
+        Nodes {
+            ids: self.used.iter().map(|&i| table.ids[i]).collect(),
+            positions: self.used.iter().map(|&i| table.positions[i]).collect(),
+        }
+    }
 }
 
 /// No row.
 const NONE: u32 = u32::MAX;
 
-/// At most this many items are named in a message.
-const NAMED: usize = 5;
-
-/// `a, b, c and 7 more`.
-pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
-    let named: Vec<String> = items.iter().take(NAMED).map(T::to_string).collect();
-    match items.len().saturating_sub(NAMED) {
-        0 => named.join(", "),
-        more => format!("{} and {more} more", named.join(", ")),
-    }
-}
-
 /// Assigns the rows to nodes and directions; all that is wrong is collected into `found`.
 pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layout> {
-    let n = raw.stiffness.matrix.n_cols();
-    let dimension = usize::from(raw.dimension);
-    let implied: Vec<DofLabel>;
-    let labels = match &raw.dofs {
-        Some(labels) => {
-            if labels.len() != n {
-                let message = format!(
-                    "{} degrees of freedom are labelled, but the matrices have {n} rows",
-                    labels.len()
-                );
-                found.push(Diagnostic::new(Code::DofCount, message).in_file(&raw.dofs_path));
-                return None;
-            }
-            labels
-        }
-        None => {
-            if dimension * raw.nodes.len() != n {
-                let message = format!(
-                    "{} nodes have {} displacements, but the matrices have {n} rows",
-                    raw.nodes.len(),
-                    dimension * raw.nodes.len()
-                );
-                let per_node = n.checked_div(raw.nodes.len()).unwrap_or(0);
-                let help = if per_node * raw.nodes.len() == n && per_node > dimension {
-                    format!(
-                        "give a dofs table that labels the {per_node} rows of each node: 1, 2, 3 for displacements, 4, 5, 6 for rotations"
-                    )
-                } else {
-                    "give a dofs table that says which node and direction each matrix row is".to_owned()
-                };
-                let diagnostic = Diagnostic::new(Code::DofCount, message).in_file(&raw.nodes_path);
-                found.push(diagnostic.with_help(help));
-                return None;
-            }
-            implied = raw
-                .nodes
-                .ids
-                .iter()
-                .flat_map(|&node| (1..=raw.dimension).map(move |direction| DofLabel { node, direction }))
-                .collect();
-            &implied
-        }
-    };
+    let labels = labels(raw, found)?;
     let before = found.len();
+    let index = index_of_nodes(raw, found);
+    check_plane(raw, &labels, found);
+    if found.len() > before {
+        return None;
+    }
+    let rows = RowsOfNodes::new(raw, &labels, &index, found);
+    let occupied = Occupied::new(raw, &rows.placed, found);
+    if found.len() > before {
+        return None;
+    }
+    occupied.note_unused(raw, found);
+    let placeless = sort_without_place(raw, &rows.without_place, occupied.used.is_empty(), found)?;
+    Some(in_order(raw, &rows.placed, occupied.used, placeless))
+}
+
+/// The label of each row, implied where none are given; `None` with a diagnostic when there are not as many as rows.
+fn labels<'r>(raw: &'r RawModel, found: &mut Vec<Diagnostic>) -> Option<Cow<'r, [DofLabel]>> {
+    let n = raw.stiffness.matrix.n_cols();
+    let Some(labels) = &raw.dofs else { return implied_labels(raw, n, found).map(Cow::Owned) };
+    if labels.len() != n {
+        let message =
+            format!("{} degrees of freedom are labelled, but the matrices have {n} rows", labels.len());
+        found.push(Diagnostic::new(Code::DofCount, message).in_file(&raw.dofs_path));
+        return None;
+    }
+    Some(Cow::Borrowed(labels))
+}
+
+/// The displacements of each node in turn.
+fn implied_labels(raw: &RawModel, n: usize, found: &mut Vec<Diagnostic>) -> Option<Vec<DofLabel>> {
+    let (nodes, dimension) = (raw.nodes.len(), usize::from(raw.dimension));
+    if dimension * nodes == n {
+        let displacements =
+            |&node: &i64| (1..=raw.dimension).map(move |direction| DofLabel { node, direction });
+        return Some(raw.nodes.ids.iter().flat_map(displacements).collect());
+    }
+    let message =
+        format!("{nodes} nodes have {} displacements, but the matrices have {n} rows", dimension * nodes);
+    let per_node = n.checked_div(nodes).unwrap_or(0);
+    let help = if per_node * nodes == n && per_node > dimension {
+        format!(
+            "give a dofs table that labels the {per_node} rows of each node: 1, 2, 3 for displacements, 4, 5, 6 for rotations"
+        )
+    } else {
+        "give a dofs table that says which node and direction each matrix row is".to_owned()
+    };
+    let diagnostic = Diagnostic::new(Code::DofCount, message).in_file(&raw.nodes_path);
+    found.push(diagnostic.with_help(help));
+    None
+}
+
+/// Index of each node in the node table, by its number; a complaint about each that is given twice.
+fn index_of_nodes(raw: &RawModel, found: &mut Vec<Diagnostic>) -> HashMap<i64, usize> {
     let mut index = HashMap::with_capacity(raw.nodes.len());
     for (i, &id) in raw.nodes.ids.iter().enumerate() {
         if index.insert(id, i).is_some() {
@@ -92,8 +101,13 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
             found.push(Diagnostic::new(Code::NodeDuplicate, message).in_file(&raw.nodes_path));
         }
     }
-    let outside = |l: &&DofLabel| dimension == 2 && (3..=5).contains(&l.direction);
-    let outside: Vec<DofLabel> = labels.iter().filter(outside).copied().collect();
+    index
+}
+
+/// Complains about the directions of a plane model that lead out of its plane.
+fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>) {
+    let leads_out = |label: &&DofLabel| raw.dimension == 2 && (3..=5).contains(&label.direction);
+    let outside: Vec<DofLabel> = labels.iter().filter(leads_out).copied().collect();
     if !outside.is_empty() {
         let message = format!(
             "{} degrees of freedom of a plane model lead out of the plane: {}",
@@ -102,84 +116,123 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
         );
         found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.dofs_path));
     }
-    // Looked up once: the labels are several times as many as the nodes.
-    let places: Vec<Option<usize>> = labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
-    if found.len() > before {
-        return None;
-    }
-    let mut row_of = vec![[NONE; 6]; raw.nodes.len()];
-    let mut without_place: Vec<(i64, [u32; 6])> = Vec::new();
-    let mut twice = Vec::new();
-    let mut later = HashMap::new();
-    for (row, (label, place)) in labels.iter().zip(places).enumerate() {
-        let rows = match place {
-            Some(place) => &mut row_of[place],
-            None => {
-                let at = *later.entry(label.node).or_insert_with(|| {
-                    without_place.push((label.node, [NONE; 6]));
-                    without_place.len() - 1
-                });
-                &mut without_place[at].1
+}
+
+/// The matrix row of each direction of each node; [`NONE`] where it has none.
+struct RowsOfNodes {
+    /// Of the nodes of the node table, in its order.
+    placed: Vec<[u32; 6]>,
+    /// Of nodes that the table does not have, by number, in the order in which the labels first name them.
+    without_place: Vec<(i64, [u32; 6])>,
+}
+
+impl RowsOfNodes {
+    /// From the labels; a complaint about directions that are given twice.
+    fn new(
+        raw: &RawModel,
+        labels: &[DofLabel],
+        index: &HashMap<i64, usize>,
+        found: &mut Vec<Diagnostic>,
+    ) -> Self {
+        // Looked up once and in parallel: the labels are several times as many as the nodes.
+        let places: Vec<Option<usize>> =
+            labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
+        let mut all = Self { placed: vec![[NONE; 6]; raw.nodes.len()], without_place: Vec::new() };
+        let mut twice = Vec::new();
+        let mut later = HashMap::new();
+        for (row, (label, place)) in labels.iter().zip(places).enumerate() {
+            let rows = match place {
+                Some(place) => &mut all.placed[place],
+                None => {
+                    let without_place = &mut all.without_place;
+                    let at = *later.entry(label.node).or_insert_with(|| {
+                        without_place.push((label.node, [NONE; 6]));
+                        without_place.len() - 1
+                    });
+                    &mut without_place[at].1
+                }
+            };
+            let slot = &mut rows[usize::from(label.direction) - 1];
+            if *slot == NONE {
+                *slot = row as u32;
+            } else {
+                twice.push(format!("{label} in rows {} and {row}", *slot));
             }
-        };
-        let slot = &mut rows[usize::from(label.direction) - 1];
-        if *slot == NONE {
-            *slot = row as u32;
-        } else {
-            twice.push(format!("{label} in rows {} and {row}", *slot));
+        }
+        if !twice.is_empty() {
+            let message = format!("{} labels are given twice: {}", twice.len(), name_some(&twice));
+            found.push(Diagnostic::new(Code::DofDuplicate, message).in_file(&raw.dofs_path));
+        }
+        all
+    }
+}
+
+/// Which nodes of the node table have rows.
+struct Occupied {
+    /// Indices of the nodes that have all displacements, ascending.
+    used: Vec<usize>,
+    /// Numbers of the nodes that have no row at all.
+    unused: Vec<i64>,
+}
+
+impl Occupied {
+    /// Sorts the nodes; a complaint about those that have some displacements only.
+    fn new(raw: &RawModel, placed: &[[u32; 6]], found: &mut Vec<Diagnostic>) -> Self {
+        let dimension = usize::from(raw.dimension);
+        let mut sorted = Self { used: Vec::new(), unused: Vec::new() };
+        let mut incomplete = Vec::new();
+        for (i, (rows, &node)) in placed.iter().zip(&raw.nodes.ids).enumerate() {
+            let missing = |k: &usize| rows[*k] == NONE;
+            match (0..dimension).filter(missing).count() {
+                0 => sorted.used.push(i),
+                _ if rows.iter().all(|&row| row == NONE) => sorted.unused.push(node),
+                _ => {
+                    let missing = (0..dimension).filter(missing);
+                    incomplete.extend(missing.map(|k| DofLabel { node, direction: k as u8 + 1 }));
+                }
+            }
+        }
+        if !incomplete.is_empty() {
+            let message =
+                format!("{} displacements are missing: {}", incomplete.len(), name_some(&incomplete));
+            let mut diagnostic = Diagnostic::new(Code::DofIncomplete, message).in_file(&raw.dofs_path);
+            if sorted.used.is_empty() && incomplete.iter().all(|label| label.direction == 3) {
+                diagnostic = diagnostic.with_help("for a plane model, set `dimension = 2` (--dimension 2)");
+            }
+            found.push(diagnostic);
+        }
+        sorted
+    }
+
+    /// A note about nodes that are left out.
+    fn note_unused(&self, raw: &RawModel, found: &mut Vec<Diagnostic>) {
+        let unused = &self.unused;
+        if !unused.is_empty() {
+            let message = format!(
+                "{} nodes have no degree of freedom and are left out: {}",
+                unused.len(),
+                name_some(unused)
+            );
+            found.push(Diagnostic::new(Code::NodesUnused, message).in_file(&raw.nodes_path));
         }
     }
-    if !twice.is_empty() {
-        let message = format!("{} labels are given twice: {}", twice.len(), name_some(&twice));
-        found.push(Diagnostic::new(Code::DofDuplicate, message).in_file(&raw.dofs_path));
-    }
-    let mut incomplete = Vec::new();
-    let mut used = Vec::new();
-    let mut unused = Vec::new();
-    for (i, rows) in row_of.iter().enumerate() {
-        let missing = |k: &usize| rows[*k] == NONE;
-        match (0..dimension).filter(missing).count() {
-            0 => used.push(i),
-            _ if rows.iter().all(|&row| row == NONE) => unused.push(raw.nodes.ids[i]),
-            _ => incomplete.extend(
-                (0..dimension)
-                    .filter(missing)
-                    .map(|k| DofLabel { node: raw.nodes.ids[i], direction: k as u8 + 1 }),
-            ),
-        }
-    }
-    if !incomplete.is_empty() {
-        let message = format!("{} displacements are missing: {}", incomplete.len(), name_some(&incomplete));
-        let mut diagnostic = Diagnostic::new(Code::DofIncomplete, message).in_file(&raw.dofs_path);
-        if used.is_empty() && incomplete.iter().all(|label| label.direction == 3) {
-            diagnostic = diagnostic.with_help("for a plane model, set `dimension = 2` (--dimension 2)");
-        }
-        found.push(diagnostic);
-    }
-    if found.len() > before {
-        return None;
-    }
-    if !unused.is_empty() {
-        let message = format!(
-            "{} nodes have no degree of freedom and are left out: {}",
-            unused.len(),
-            name_some(&unused)
-        );
-        found.push(Diagnostic::new(Code::NodesUnused, message).in_file(&raw.nodes_path));
-    }
-    let placeless = sort_without_place(raw, &without_place, used.is_empty(), found)?;
+}
+
+/// The internal order: displacements of the used nodes, vectors without a place, rotations, massless rows.
+fn in_order(raw: &RawModel, placed: &[[u32; 6]], used: Vec<usize>, placeless: WithoutPlace) -> Layout {
+    let dimension = usize::from(raw.dimension);
     let mut order: Vec<u32> =
-        used.iter().flat_map(|&node| row_of[node][..dimension].iter().copied()).collect();
+        used.iter().flat_map(|&node| placed[node][..dimension].iter().copied()).collect();
     order.extend(placeless.vectors.iter().flat_map(|(_, rows)| &rows[..dimension]));
     let mut rotations = Vec::new();
     for (internal, &node) in used.iter().enumerate() {
-        for (axis, &row) in row_of[node][3..].iter().enumerate().filter(|(_, row)| **row != NONE) {
+        for (axis, &row) in placed[node][3..].iter().enumerate().filter(|(_, row)| **row != NONE) {
             rotations.push((internal as u32, axis as u8));
             order.push(row);
         }
     }
     order.extend(placeless.others.iter().map(|(_, row)| row));
-    let mut row_to_internal = vec![0u32; n];
+    let mut row_to_internal = vec![0u32; raw.stiffness.matrix.n_cols()];
     for (internal, row) in order.into_iter().enumerate() {
         row_to_internal[row as usize] = internal as u32;
     }
@@ -191,7 +244,7 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
         others: placeless.others.into_iter().map(|(label, _)| label).collect(),
         recovered: Recovered::none(),
     };
-    Some(Layout { row_to_internal, used, rows })
+    Layout { row_to_internal, used, rows }
 }
 
 /// Rows of nodes that the node table does not have.

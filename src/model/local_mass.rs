@@ -5,8 +5,9 @@
 //! E A L of a bar: bending does not count, so that beams and shells count with what they are stretched by. Divided by d times the mass it
 //! is the square of a speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
 
-use super::checks::Assembled;
+use super::assembled::Assembled;
 use super::node_pairs::neighbours;
+use super::wording::name_some;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
@@ -156,7 +157,7 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
     let named: Vec<String> = pairs.iter().map(|&[i, j]| format!("{} and {}", number(i), number(j))).collect();
     let message = format!(
         "masses of nodes of the same elements fit their stiffness only when exchanged: {}",
-        super::layout::name_some(&named)
+        name_some(&named)
     );
     found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.raw.mass.path));
     pairs.len()

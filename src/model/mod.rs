@@ -1,6 +1,10 @@
 //! The finite element model of one free body: nodes, degrees of freedom, K, M. Knows no file format.
 
+mod assemble;
+mod assembled;
+mod body_number;
 mod checks;
+mod connections;
 mod damping;
 mod density;
 mod exchanged;
@@ -8,18 +12,24 @@ mod fe_model;
 mod geometric_stiffness;
 mod interface;
 mod layout;
+mod load_checks;
 mod local_mass;
 mod magnitude;
 mod mass_structure;
+mod matrix_checks;
 mod node_pairs;
 mod nodes;
 mod placeless;
 mod raw;
+mod references;
 mod rigid;
 mod rigid_motion;
 mod rows;
 mod several;
+mod tolerance;
+mod wording;
 
+pub use body_number::BodyNumber;
 pub use checks::{CheckedModel, Plausibility, check};
 pub use damping::{Damping, DampingBand};
 pub use density::Densities;
@@ -31,4 +41,4 @@ pub use nodes::{DofLabel, Nodes};
 pub use raw::{RawMatrix, RawModel, RawShapes};
 pub use rigid::{centre_and_length, extents, rigid_count, rigid_fields};
 pub use rows::Rows;
-pub use several::{BodyNumber, check_bodies};
+pub use several::check_bodies;

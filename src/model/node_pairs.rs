@@ -1,8 +1,8 @@
 //! Which pairs of nodes each matrix couples: an element that gives two nodes common mass ties them by its stiffness too.
 
-use super::checks::Assembled;
-use super::layout::name_some;
+use super::assembled::Assembled;
 use super::rows::Rows;
+use super::wording::name_some;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! Rows without a place and rows without mass: how the first move with the body, and whether the second follow the others.
 
-use super::layout::name_some;
 use super::rigid::{centre_and_length, rigid_count};
 use super::rows::{Recovered, Rows};
+use super::wording::name_some;
 use super::{DofLabel, Nodes};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};

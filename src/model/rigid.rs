@@ -1,6 +1,6 @@
 //! Rigid displacement fields of the nodes, and how far K is from annihilating them.
 
-use crate::numerics::linalg::SymmetricMatrix;
+use crate::numerics::linalg::{SymmetricMatrix, largest};
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -95,7 +95,7 @@ pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f
                     *sum += v * field;
                 }
             }
-            let worst = sums.iter().fold(0.0f64, |m, s| m.max(s.abs()));
+            let worst = largest(sums.map(f64::abs));
             if scale > 0.0 { worst / scale } else { 0.0 }
         })
         .collect()

@@ -1,10 +1,10 @@
 //! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly where it does not.
 
-use super::checks::Assembled;
-use super::layout::name_some;
+use super::assembled::Assembled;
 use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
+use super::wording::name_some;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::numerics::linalg::{Pencil, gram};
+use crate::numerics::linalg::{Pencil, gram, largest};
 use faer::Mat;
 
 /// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second limit: node tables written
@@ -19,9 +19,10 @@ pub(super) fn check_rigid_motion(
     let (centre, length) = centre_and_length(&nodes.positions);
     let fields = rows.rigid_fields(&nodes.positions, centre, length);
     let residuals = rigid_residuals(stiffness, &fields, &rows.field_sizes(length));
-    let worst = residuals.iter().fold(0.0f64, |m, &r| m.max(r));
-    if worst > limit {
-        let mut strained: Vec<usize> = (0..residuals.len()).filter(|&i| residuals[i] > limit).collect();
+    let worst = largest(residuals.iter().copied());
+    if worst.is_nan() || worst > limit {
+        let mut strained: Vec<usize> =
+            (0..residuals.len()).filter(|&i| residuals[i].is_nan() || residuals[i] > limit).collect();
         strained.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]).then(a.cmp(&b)));
         let named: Vec<String> =
             strained.iter().map(|&i| format!("{} ({:.1e})", rows.label(nodes, i), residuals[i])).collect();

@@ -1,7 +1,11 @@
 //! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
 
-use super::checks::{Assembled, CheckedModel, assemble, finish, groups, in_words};
-use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
+use super::assemble::assemble;
+use super::assembled::Assembled;
+use super::checks::{CheckedModel, finish};
+use super::connections::groups;
+use super::wording::{in_words, name_some};
+use super::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::numerics::linalg::SymmetricMatrix;
@@ -9,19 +13,13 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
 
-/// Which of several bodies in the same matrices a model is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BodyNumber {
-    /// From 1, in the order of the first node of each body in the node table.
-    pub number: usize,
-    /// How many bodies there are.
-    pub of: usize,
-}
-
-impl std::fmt::Display for BodyNumber {
-    /// `body 1 of 2`.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "body {} of {}", self.number, self.of)
+impl FeModel {
+    /// The same as [`from_raw`](FeModel::from_raw) for matrices that hold several bodies: each becomes a model of its own.
+    ///
+    /// # Errors
+    /// See [`check_bodies`].
+    pub fn bodies_from_raw(raw: RawModel) -> Result<Vec<CheckedModel>> {
+        check_bodies(raw)
     }
 }
 
@@ -61,82 +59,119 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 
 /// The bodies, in the order of their first nodes.
 fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
-    let Assembled { raw, nodes, rows, stiffness, mass, damping, geometric_stiffness, .. } = whole;
-    let component = rows.components(&[&stiffness, &mass]);
-    let bodies = groups(&component, &rows, &nodes);
+    let component = whole.rows.components(&[&whole.stiffness, &whole.mass]);
+    let members = whole.rows.separated(&component);
     let mut found = Vec::new();
-    let members = rows.separated(&component);
-    let rigid = rigid_count(rows.dimension);
-    let few = bodies.iter().zip(&members).filter(|(_, (own, _))| own.len() <= rigid);
+    found.extend(too_small(&whole, &component, &members));
+    let interfaces = distribute(&whole.raw.interfaces, &component, &whole.nodes, &mut found);
+    check_couplings(&whole, &component, &mut found);
+    check_loads_of_others(&whole, &component, &interfaces, &mut found);
+    if found.iter().any(|d| d.severity() == Severity::Error) {
+        return Err(found);
+    }
+    let nodes = nodes_of_bodies(&whole.nodes, &component, members.len());
+    let parts = members.into_iter().zip(nodes.into_iter().zip(interfaces));
+    let mut bodies = Vec::with_capacity(parts.len());
+    for (i, ((kept, rows), (nodes, interfaces))) in parts.enumerate() {
+        bodies.push(part(&whole, i + 1, &kept, rows, nodes, interfaces));
+    }
+    Ok(bodies)
+}
+
+/// A complaint about bodies with no more rows than rigid motions.
+fn too_small(whole: &Assembled, component: &[usize], members: &[(Vec<usize>, Rows)]) -> Option<Diagnostic> {
+    let bodies = groups(component, &whole.rows, &whole.nodes);
+    let rigid = rigid_count(whole.rows.dimension);
+    let few = bodies.iter().zip(members).filter(|(_, (own, _))| own.len() <= rigid);
     let small: Vec<Vec<i64>> = few.map(|(numbers, _)| numbers.clone()).collect();
-    if !small.is_empty() {
+    (!small.is_empty()).then(|| {
         let message = format!(
             "{} of {} bodies have no flexible degree of freedom: {}",
             small.len(),
             bodies.len(),
             in_words(&small)
         );
-        found.push(
-            Diagnostic::new(Code::ModelTooSmall, message)
-                .in_file(&raw.stiffness.path)
-                .with_help("connect these nodes, or remove them from the matrices"),
-        );
-    }
-    let interfaces = distribute(&raw.interfaces, &component, &nodes, &mut found);
-    let damping_matrix = damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
+        Diagnostic::new(Code::ModelTooSmall, message)
+            .in_file(&whole.raw.stiffness.path)
+            .with_help("connect these nodes, or remove them from the matrices")
+    })
+}
+
+/// Complains about damping and geometric stiffness that couple bodies.
+fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagnostic>) {
+    let damping = whole.damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
     let geometric =
-        geometric_stiffness.iter().map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
-    for (matrix, name) in damping_matrix.into_iter().chain(geometric) {
-        found.extend(coupling(matrix, &name, &component, &rows, &nodes));
+        whole.geometric_stiffness.iter().map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
+    for (matrix, name) in damping.into_iter().chain(geometric) {
+        found.extend(coupling(matrix, &name, component, &whole.rows, &whole.nodes));
     }
-    let of = |row: usize| component[rows.vertex(row)];
-    for GeometricStiffness { load, matrix } in &geometric_stiffness {
+}
+
+/// Complains about geometric stiffness of a load at an interface that stiffens another body than the one of the interface.
+fn check_loads_of_others(
+    whole: &Assembled,
+    component: &[usize],
+    interfaces: &[Vec<NodeSet>],
+    found: &mut Vec<Diagnostic>,
+) {
+    let Assembled { nodes, rows, geometric_stiffness, .. } = whole;
+    let body_of = |row: usize| component[rows.vertex(row)];
+    for GeometricStiffness { load, matrix } in geometric_stiffness {
         let at = load.kind.interface();
         let own = interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
-        let elsewhere = |b| (0..matrix.n()).find(|&row| of(row) != b && !matrix.row(row).0.is_empty());
+        let elsewhere = |b| (0..matrix.n()).find(|&row| body_of(row) != b && !matrix.row(row).0.is_empty());
         if let Some((body, row)) = own.and_then(|b| Some((b + 1, elsewhere(b)?))) {
-            let (node, other) = (rows.label(&nodes, row).node, of(row) + 1);
+            let (node, other) = (rows.label(nodes, row).node, body_of(row) + 1);
             let message = format!(
                 "geometric stiffness for {load} has entries at node {node} of body {other}, the interface belongs to body {body}"
             );
             found.push(Diagnostic::new(Code::BodiesCoupled, message));
         }
     }
-    if found.iter().any(|d| d.severity() == Severity::Error) {
-        return Err(found);
-    }
-    let mut own = vec![Nodes::default(); bodies.len()];
+}
+
+/// The nodes of each body, in the order of the node table.
+fn nodes_of_bodies(nodes: &Nodes, component: &[usize], bodies: usize) -> Vec<Nodes> {
+    let mut own = vec![Nodes::default(); bodies];
     for (node, &body) in component.iter().enumerate().take(nodes.len()) {
         own[body].ids.push(nodes.ids[node]);
         own[body].positions.push(nodes.positions[node]);
     }
-    let mut all = Vec::with_capacity(bodies.len());
-    for (i, ((kept, rows), (nodes, interfaces))) in
-        members.into_iter().zip(own.into_iter().zip(interfaces)).enumerate()
-    {
-        let damping = damping.as_ref().map(|damping| {
-            let principal = |matrix: &SymmetricMatrix| Ok::<_, Infallible>(matrix.principal(&kept));
-            let Ok(own) = damping.borrowed().try_map(principal);
-            own
-        });
-        // What a load does to the other bodies is nothing: no rows of it are theirs.
-        let geometric_stiffness = geometric_stiffness
-            .iter()
-            .map(|one| GeometricStiffness { load: one.load.clone(), matrix: one.matrix.principal(&kept) })
-            .filter(|one| one.matrix.as_csc().nnz() > 0)
-            .collect();
-        all.push(Assembled {
-            raw: RawModel { name: format!("{}-{}", raw.name, i + 1), interfaces, ..raw.clone() },
-            nodes,
-            rows,
-            stiffness: stiffness.principal(&kept),
-            mass: mass.principal(&kept),
-            row_to_internal: None,
-            damping,
-            geometric_stiffness,
-        });
+    own
+}
+
+/// The body with this number, made of the rows `kept`.
+fn part(
+    whole: &Assembled,
+    number: usize,
+    kept: &[usize],
+    rows: Rows,
+    nodes: Nodes,
+    interfaces: Vec<NodeSet>,
+) -> Assembled {
+    let damping = whole.damping.as_ref().map(|damping| {
+        let principal = |matrix: &SymmetricMatrix| Ok::<_, Infallible>(matrix.principal(kept));
+        let Ok(own) = damping.borrowed().try_map(principal);
+        own
+    });
+    // What a load does to the other bodies is nothing: no rows of it are theirs.
+    let geometric_stiffness = whole
+        .geometric_stiffness
+        .iter()
+        .map(|one| GeometricStiffness { load: one.load.clone(), matrix: one.matrix.principal(kept) })
+        .filter(|one| one.matrix.as_csc().nnz() > 0)
+        .collect();
+    let name = format!("{}-{number}", whole.raw.name);
+    Assembled {
+        raw: RawModel { name, interfaces, ..whole.raw.clone() },
+        nodes,
+        rows,
+        stiffness: whole.stiffness.principal(kept),
+        mass: whole.mass.principal(kept),
+        row_to_internal: None,
+        damping,
+        geometric_stiffness,
     }
-    Ok(all)
 }
 
 /// The interfaces of every body; a complaint about each that belongs to several.
@@ -160,7 +195,7 @@ fn distribute(
                 "interface `{}` has nodes of {} bodies: {}",
                 set.name,
                 bodies.len(),
-                super::layout::name_some(&named)
+                name_some(&named)
             );
             found.push(Diagnostic::new(Code::InterfaceAcross, message));
         } else if let Some((&b, _)) = first.first_key_value() {
@@ -178,12 +213,12 @@ fn coupling(
     rows: &Rows,
     nodes: &Nodes,
 ) -> Option<Diagnostic> {
-    let of = |row: usize| component[rows.vertex(row)];
+    let body_of = |row: usize| component[rows.vertex(row)];
     let (a, b) = (0..matrix.n()).find_map(|row| {
-        let other = |&column: &u32| (of(row) != of(column as usize)).then_some(column);
+        let other = |&column: &u32| (body_of(row) != body_of(column as usize)).then_some(column);
         matrix.row(row).0.iter().find_map(other).map(|column| (row, column as usize))
     })?;
-    let place = |row: usize| format!("node {} of body {}", rows.label(nodes, row).node, of(row) + 1);
+    let place = |row: usize| format!("node {} of body {}", rows.label(nodes, row).node, body_of(row) + 1);
     let message = format!("{name} couples {} with {}", place(a), place(b));
     Some(Diagnostic::new(Code::BodiesCoupled, message))
 }

@@ -30,23 +30,6 @@ fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
 
 /// Turns a failure of the eigen-solver into a diagnostic that names nodes.
 pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
-    let d = model.dimension();
-    let rigid = rigid_count(d);
-    let moving = |vectors: &Mat<f64>| {
-        let mut size: Vec<(usize, f64)> = (0..model.nodes().len())
-            .map(|i| {
-                let square = (0..vectors.ncols())
-                    .flat_map(|j| (0..d).map(move |k| (d * i + k, j)))
-                    .map(|(r, j)| vectors[(r, j)].powi(2))
-                    .sum::<f64>();
-                (i, square)
-            })
-            .collect();
-        size.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let named: Vec<String> =
-            size.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
-        named.join(", ")
-    };
     let diagnostic = match failure {
         EigenFailure::SinglePrecision(failure) => match too_poor(&failure) {
             Some(found) => found,
@@ -59,30 +42,17 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             Code::StiffnessIndefinite,
             format!("K + {shift:.3e} M is not positive definite: K or M is indefinite"),
         ),
-        EigenFailure::NegativeEigenvalue { eigenvalue, vector } => Diagnostic::new(
-            Code::StiffnessIndefinite,
-            format!("eigenvalue {eigenvalue:.6e} is negative; its mode moves nodes {} most", moving(&vector)),
-        ),
+        EigenFailure::NegativeEigenvalue { eigenvalue, vector } => {
+            let moved = most_moved(model, &vector);
+            let message =
+                format!("eigenvalue {eigenvalue:.6e} is negative; its mode moves nodes {moved} most");
+            Diagnostic::new(Code::StiffnessIndefinite, message)
+        }
         EigenFailure::MassIndefinite => {
             Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
         }
         // Their eigenvalues are rounding: no two machines would print the same.
-        EigenFailure::ZeroEnergy { count, vectors, .. } => {
-            let (all, moved) = (count + rigid, moving(&vectors));
-            let message = format!(
-                "{all} zero-energy modes: {rigid} rigid ones and {count} more, which move nodes {moved} most"
-            );
-            if all % rigid == 0 {
-                let message = format!("{message}; {} separate bodies have as many", all / rigid);
-                Diagnostic::new(Code::Mechanism, message).with_help(
-                    "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
-                )
-            } else {
-                Diagnostic::new(Code::Mechanism, message).with_help(
-                    "connect the parts or remove the free degree of freedom; of a body very thin, or with stiffnesses far apart, K has lost its softest ones to rounding",
-                )
-            }
-        }
+        EigenFailure::ZeroEnergy { count, vectors, .. } => mechanism(model, count, &vectors),
         EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
             Code::CompletenessFailed,
             format!(
@@ -93,33 +63,72 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
             Code::FactorizationFailed,
             format!("factorisation leaves a relative residual of {residual:.1e} in a probe"),
         ),
-        EigenFailure::NotCertified { why } => Diagnostic::new(
-            Code::FactorizationFailed,
-            format!("eigenvalue bounds cannot be guaranteed: {why}"),
-        )
-        .with_help("use --accuracy standard"),
-        EigenFailure::Memory { bytes, available } => Diagnostic::new(
-            Code::MemoryShort,
-            format!(
-                "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are left",
-                bytes as f64 * 1e-9,
-                available as f64 * 1e-9
-            ),
-        ),
-        EigenFailure::TooLong { wanted, seconds, bytes } => Diagnostic::new(
-            Code::WorkLong,
-            format!(
-                "{wanted} modes of a model with {} degrees of freedom take about {:.1} hours on one processor, and {:.3} GB",
-                model.stiffness().n(),
-                seconds / 3600.0,
-                bytes as f64 * 1e-9
-            ),
-        )
-        .with_help("ask for fewer modes or a lower frequency, or say --allow-long"),
+        EigenFailure::NotCertified { why } => not_certified(why),
+        EigenFailure::Memory { bytes, available } => memory_short(bytes, available),
+        EigenFailure::TooLong { wanted, seconds, bytes } => too_long(model, wanted, seconds, bytes),
         EigenFailure::TooLarge => Diagnostic::new(
             Code::MemoryShort,
             "the ordering fails: it is out of memory, or the node graph has more than 2^31 entries",
         ),
     };
     diagnostic.into()
+}
+
+/// Numbers of the nodes that the columns of `vectors` move most.
+fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
+    let d = model.dimension();
+    let square = |i: usize| {
+        (0..vectors.ncols())
+            .flat_map(|j| (0..d).map(move |k| (d * i + k, j)))
+            .map(|(row, j)| vectors[(row, j)].powi(2))
+            .sum::<f64>()
+    };
+    let mut moved: Vec<(usize, f64)> = (0..model.nodes().len()).map(|i| (i, square(i))).collect();
+    moved.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let named: Vec<String> = moved.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
+    named.join(", ")
+}
+
+/// As many rigid motions as several bodies have, or a part that is free to move.
+fn mechanism(model: &FeModel, count: usize, vectors: &Mat<f64>) -> Diagnostic {
+    let rigid = rigid_count(model.dimension());
+    let (all, moved) = (count + rigid, most_moved(model, vectors));
+    let message = format!(
+        "{all} zero-energy modes: {rigid} rigid ones and {count} more, which move nodes {moved} most"
+    );
+    if all % rigid == 0 {
+        let message = format!("{message}; {} separate bodies have as many", all / rigid);
+        Diagnostic::new(Code::Mechanism, message).with_help(
+            "bodies that are joined by negligible entries only: remove these entries and use --split, or connect the bodies",
+        )
+    } else {
+        Diagnostic::new(Code::Mechanism, message).with_help(
+            "connect the parts or remove the free degree of freedom; of a body very thin, or with stiffnesses far apart, K has lost its softest ones to rounding",
+        )
+    }
+}
+
+fn not_certified(why: &str) -> Diagnostic {
+    let message = format!("eigenvalue bounds cannot be guaranteed: {why}");
+    Diagnostic::new(Code::FactorizationFailed, message).with_help("use --accuracy standard")
+}
+
+fn memory_short(bytes: u64, available: u64) -> Diagnostic {
+    let message = format!(
+        "the factor and the vectors need {:.3} GB on top of the matrices, {:.3} GB are left",
+        bytes as f64 * 1e-9,
+        available as f64 * 1e-9
+    );
+    Diagnostic::new(Code::MemoryShort, message)
+}
+
+fn too_long(model: &FeModel, wanted: usize, seconds: f64, bytes: u64) -> Diagnostic {
+    let message = format!(
+        "{wanted} modes of a model with {} degrees of freedom take about {:.1} hours on one processor, and {:.3} GB",
+        model.stiffness().n(),
+        seconds / 3600.0,
+        bytes as f64 * 1e-9
+    );
+    Diagnostic::new(Code::WorkLong, message)
+        .with_help("ask for fewer modes or a lower frequency, or say --allow-long")
 }

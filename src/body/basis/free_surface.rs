@@ -1,10 +1,10 @@
 //! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
 
-use super::Loads;
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::residual_vectors::{NamedLoads, with_residual_vectors};
 use super::rigid_modes::rigid_modes;
+use super::{Loads, ModeSettings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::Watch;
@@ -16,9 +16,6 @@ use crate::numerics::linalg::{
     CscMatrix, Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen,
 };
 use faer::{Mat, MatRef};
-
-/// What is asked for.
-pub use crate::numerics::eigen::EigenSettings as ModeSettings;
 
 /// The lowest free-surface modes.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -39,45 +39,45 @@ pub(super) struct Joint {
 
 impl Joint {
     fn new(model: &FeModel, set: &NodeSet, places: &HashMap<i64, usize>) -> Self {
-        let (table, d) = (model.nodes(), model.dimension());
-        // In the order of the node table: equal sets give equal results.
-        let mut nodes: Vec<usize> = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        let displaced: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
-        let rotations = (model.rows().displacements()..).zip(model.rows().rotations());
-        let turned: Vec<usize> = rotations
-            .filter(|(_, (node, _))| nodes.binary_search(&(*node as usize)).is_ok())
-            .map(|(row, _)| row)
-            .collect();
-        let turns = rigid_count(d) - d;
-        let all_turn = turned.len() == turns * nodes.len();
-        let (name, coupling) = (set.name.clone(), set.coupling());
-        if coupling == Coupling::Free {
-            let rows = [displaced.as_slice(), &turned].concat();
-            let unit = Mat::identity(rows.len(), rows.len());
-            let load = |&row: &usize| {
-                let label = model.label(row);
-                let kind = if row < model.rows().displacements() { "force" } else { "torque" };
-                format!("node {} {kind} {}", label.node, AXES[(usize::from(label.direction) - 1) % 3])
-            };
-            return Self {
-                name,
-                coupling,
-                coordinates: rows.iter().map(|&row| model.label(row).to_string()).collect(),
-                loads: rows.iter().map(load).collect(),
-                displacements: displaced.len(),
-                motion: unit.clone(),
-                measure: unit.clone(),
-                centred: unit,
-                // Axes turn only whole vectors.
-                determined: turned.is_empty() || all_turn,
-                holds: all_turn,
-                nodes,
-                rows,
-            };
+        let members = Members::new(model, set, places);
+        match set.coupling() {
+            Coupling::Free => Self::free(model, set, members),
+            _ => Self::at_reference(model, set, members),
         }
-        let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| table.positions[i]).collect();
+    }
+
+    /// Every row of the nodes is a coordinate.
+    fn free(model: &FeModel, set: &NodeSet, members: Members) -> Self {
+        let Members { nodes, displaced, turned, all_turn } = members;
+        let rows = [displaced.as_slice(), &turned].concat();
+        let unit = Mat::identity(rows.len(), rows.len());
+        let load = |&row: &usize| {
+            let label = model.label(row);
+            let kind = if row < model.rows().displacements() { "force" } else { "torque" };
+            format!("node {} {kind} {}", label.node, AXES[(usize::from(label.direction) - 1) % 3])
+        };
+        Self {
+            name: set.name.clone(),
+            coupling: set.coupling(),
+            coordinates: rows.iter().map(|&row| model.label(row).to_string()).collect(),
+            loads: rows.iter().map(load).collect(),
+            displacements: displaced.len(),
+            motion: unit.clone(),
+            measure: unit.clone(),
+            centred: unit,
+            // Axes turn only whole vectors.
+            determined: turned.is_empty() || all_turn,
+            holds: all_turn,
+            nodes,
+            rows,
+        }
+    }
+
+    /// The motion of the reference point is its coordinates.
+    fn at_reference(model: &FeModel, set: &NodeSet, members: Members) -> Self {
+        let Members { nodes, displaced, turned, all_turn } = members;
+        let (coupling, d) = (set.coupling(), model.dimension());
+        let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| model.nodes().positions[i]).collect();
         let reference = match set.reference {
             Reference::Point(x) => Some(x),
             _ => None,
@@ -94,18 +94,13 @@ impl Joint {
         let padded = |a: MatRef<'_, f64>| {
             Mat::from_fn(rows.len(), a.ncols(), |i, j| if i < a.nrows() { a[(i, j)] } else { 0.0 })
         };
-        let named = |along: &str, about: &str| {
-            let turning = if d == 2 { &AXES[2..] } else { &AXES[..] };
-            let along = AXES[..d].iter().map(|axis| format!("{along}{axis}"));
-            along.chain(turning.iter().map(|axis| format!("{about}{axis}"))).collect()
-        };
         // Of all rows, also where some nodes have a part of the rotations only.
         let fields = model.rigid_fields(motion.reference(), 1.0);
         Self {
-            name,
+            name: set.name.clone(),
             coupling,
-            coordinates: named("u", "r"),
-            loads: named("force ", "torque "),
+            coordinates: along_axes(d, "u", "r"),
+            loads: along_axes(d, "force ", "torque "),
             displacements: d,
             motion: Mat::from_fn(rows.len(), fields.ncols(), |i, j| fields[(rows[i], j)]),
             measure: padded(motion.average()),
@@ -141,6 +136,42 @@ impl Joint {
     pub fn gather(&self, whole: MatRef<'_, f64>) -> Mat<f64> {
         Mat::from_fn(self.rows.len(), whole.ncols(), |i, j| whole[(self.rows[i], j)])
     }
+}
+
+/// The nodes of an interface and their rows.
+struct Members {
+    /// Indices of the nodes, ascending.
+    nodes: Vec<usize>,
+    /// Rows of their displacements, and of their rotations where they have them.
+    displaced: Vec<usize>,
+    turned: Vec<usize>,
+    /// Whether every node has all rotations.
+    all_turn: bool,
+}
+
+impl Members {
+    fn new(model: &FeModel, set: &NodeSet, places: &HashMap<i64, usize>) -> Self {
+        let d = model.dimension();
+        // In the order of the node table: equal sets give equal results.
+        let mut nodes: Vec<usize> = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let displaced = nodes.iter().flat_map(|i| (0..d).map(move |k| d * i + k)).collect();
+        let rotations = (model.rows().displacements()..).zip(model.rows().rotations());
+        let turned: Vec<usize> = rotations
+            .filter(|(_, (node, _))| nodes.binary_search(&(*node as usize)).is_ok())
+            .map(|(row, _)| row)
+            .collect();
+        let all_turn = turned.len() == (rigid_count(d) - d) * nodes.len();
+        Self { nodes, displaced, turned, all_turn }
+    }
+}
+
+/// Names of what acts along the axes and about them; in the plane about the third alone.
+fn along_axes(dimension: usize, along: &str, about: &str) -> Vec<String> {
+    let turning = if dimension == 2 { &AXES[2..] } else { &AXES[..] };
+    let along = AXES[..dimension].iter().map(|axis| format!("{along}{axis}"));
+    along.chain(turning.iter().map(|axis| format!("{about}{axis}"))).collect()
 }
 
 /// All interfaces of a model.

@@ -16,11 +16,13 @@ mod pseudo_free_surface;
 mod residual_vectors;
 mod rigid_modes;
 
+/// What is asked for.
+pub use crate::numerics::eigen::EigenSettings as ModeSettings;
 pub use choice::BasisChoice;
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;
-pub use free_surface::{FreeSurface, ModeSettings, free_surface, free_surface_of, free_surface_resumed};
+pub use free_surface::{FreeSurface, free_surface, free_surface_of, free_surface_resumed};
 pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};

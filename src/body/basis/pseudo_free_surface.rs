@@ -37,93 +37,140 @@ pub(super) struct Independent {
 pub(super) fn independent(
     pencil: &Pencil<'_>,
     rigid: MatRef<'_, f64>,
-    mut shapes: Mat<f64>,
+    shapes: Mat<f64>,
     dependent: f64,
 ) -> Option<Independent> {
-    let (n, k) = (shapes.nrows(), shapes.ncols());
-    let diagonal = pencil.mass_diagonal();
-    let diagonal_square = |a: &Mat<f64>, j: usize| -> f64 {
-        diagonal.iter().zip(a.col(j).iter()).map(|(m, s)| m * s * s).sum()
-    };
-    let mut out = Independent {
-        vectors: Mat::zeros(0, 0),
-        kept: Vec::new(),
-        rigid: Vec::new(),
-        massless: Vec::new(),
-        dependent: Vec::new(),
-    };
-    // Unit size first: squares of shapes in any unit stay in range.
-    for j in 0..k {
-        let factor = 1.0 / shapes.col(j).norm_max();
-        if factor.is_finite() {
-            scale(&mut shapes, j, factor);
-        }
+    let mut set = ShapeSet::new(pencil, shapes);
+    set.scale_to_unit_size();
+    set.scale_to_unit_mass()?;
+    // Twice: a shape may be rigid motion but for its last digits.
+    set.remove_rigid(rigid);
+    set.leave_out_rigid();
+    set.remove_rigid(rigid);
+    Some(set.orthonormalised(dependent))
+}
+
+/// Shapes on the way to be independent.
+struct ShapeSet<'a> {
+    pencil: &'a Pencil<'a>,
+    mass_diagonal: Vec<f64>,
+    shapes: Mat<f64>,
+    /// Whether each shape is still in the set.
+    is_in: Vec<bool>,
+    outcome: Independent,
+}
+
+impl<'a> ShapeSet<'a> {
+    fn new(pencil: &'a Pencil<'a>, shapes: Mat<f64>) -> Self {
+        let outcome = Independent {
+            vectors: Mat::zeros(0, 0),
+            kept: Vec::new(),
+            rigid: Vec::new(),
+            massless: Vec::new(),
+            dependent: Vec::new(),
+        };
+        let is_in = vec![true; shapes.ncols()];
+        Self { pencil, mass_diagonal: pencil.mass_diagonal(), shapes, is_in, outcome }
     }
-    let mut products = pencil.apply_mass(shapes.as_ref());
-    let mut moving = vec![true; k];
-    for (j, square) in column_products(shapes.as_ref(), products.as_ref()).into_iter().enumerate() {
-        let bound = diagonal_square(&shapes, j);
-        if square < -MASSLESS.sqrt() * bound {
-            return None;
-        }
-        if square <= MASSLESS * bound {
-            out.massless.push(j);
-            moving[j] = false;
-        } else {
-            scale(&mut shapes, j, 1.0 / square.sqrt());
-        }
-    }
-    for pass in 0..2 {
-        // Twice: a shape may be rigid motion but for its last digits.
-        products = pencil.apply_mass(shapes.as_ref());
-        let along = gram(rigid, products.as_ref());
-        subtract_combination(shapes.as_mut(), rigid, along.as_ref());
-        if pass == 0 {
-            products = pencil.apply_mass(shapes.as_ref());
-            for (j, square) in column_products(shapes.as_ref(), products.as_ref()).into_iter().enumerate() {
-                let left = square.max(0.0).sqrt();
-                if moving[j] && left < RIGID {
-                    out.rigid.push(j);
-                    moving[j] = false;
-                } else if moving[j] {
-                    scale(&mut shapes, j, 1.0 / left);
-                }
+
+    /// Unit size first: squares of shapes in any unit stay in range.
+    fn scale_to_unit_size(&mut self) {
+        for j in 0..self.shapes.ncols() {
+            let factor = 1.0 / self.shapes.col(j).norm_max();
+            if factor.is_finite() {
+                scale(&mut self.shapes, j, factor);
             }
         }
     }
-    products = pencil.apply_mass(shapes.as_ref());
-    // The vectors found so far are the first columns of both blocks.
-    for j in (0..k).filter(|&j| moving[j]) {
-        let found = out.kept.len();
-        let mut vector = shapes.as_ref().subcols(j, 1).to_owned();
-        let mut product = products.as_ref().subcols(j, 1).to_owned();
-        for _ in 0..2 {
-            let along = gram(shapes.as_ref().subcols(0, found), product.as_ref());
-            subtract_combination(vector.as_mut(), shapes.as_ref().subcols(0, found), along.as_ref());
-            subtract_combination(product.as_mut(), products.as_ref().subcols(0, found), along.as_ref());
-        }
-        let left = column_products(vector.as_ref(), product.as_ref())[0].max(0.0).sqrt();
-        if left < dependent {
-            out.dependent.push((j, left));
-            continue;
-        }
-        // Afresh: the product was the difference of larger ones.
-        product = pencil.apply_mass(vector.as_ref());
-        let square = column_products(vector.as_ref(), product.as_ref())[0];
-        // A singular M: what is left of shapes with mass may have none.
-        if square <= NEARLY_MASSLESS * diagonal_square(&vector, 0) {
-            out.massless.push(j);
-            continue;
-        }
-        let norm = square.sqrt();
-        for i in 0..n {
-            shapes[(i, found)] = vector[(i, 0)] / norm;
-            products[(i, found)] = product[(i, 0)] / norm;
-        }
-        out.kept.push(j);
+
+    /// Squares of the M-norms.
+    fn squares(&self) -> Vec<f64> {
+        column_products(self.shapes.as_ref(), self.pencil.apply_mass(self.shapes.as_ref()).as_ref())
     }
-    out.vectors = shapes.as_ref().subcols(0, out.kept.len()).to_owned();
-    Some(out)
+
+    /// Unit M-norms; shapes that move no mass are left out. `None` when one has less than none.
+    fn scale_to_unit_mass(&mut self) -> Option<()> {
+        for (j, square) in self.squares().into_iter().enumerate() {
+            let bound = diagonal_square(&self.mass_diagonal, &self.shapes, j);
+            if square < -MASSLESS.sqrt() * bound {
+                return None;
+            }
+            if square <= MASSLESS * bound {
+                self.outcome.massless.push(j);
+                self.is_in[j] = false;
+            } else {
+                scale(&mut self.shapes, j, 1.0 / square.sqrt());
+            }
+        }
+        Some(())
+    }
+
+    fn remove_rigid(&mut self, rigid: MatRef<'_, f64>) {
+        let products = self.pencil.apply_mass(self.shapes.as_ref());
+        let along = gram(rigid, products.as_ref());
+        subtract_combination(self.shapes.as_mut(), rigid, along.as_ref());
+    }
+
+    /// Leaves out what was rigid motion; unit M-norms again for the others.
+    fn leave_out_rigid(&mut self) {
+        for (j, square) in self.squares().into_iter().enumerate() {
+            let left = square.max(0.0).sqrt();
+            if self.is_in[j] && left < RIGID {
+                self.outcome.rigid.push(j);
+                self.is_in[j] = false;
+            } else if self.is_in[j] {
+                scale(&mut self.shapes, j, 1.0 / left);
+            }
+        }
+    }
+
+    /// The Gram-Schmidt process. The vectors found so far are the first columns of the shapes and of their products.
+    fn orthonormalised(self, dependent: f64) -> Independent {
+        let Self { pencil, mass_diagonal, mut shapes, is_in, mut outcome } = self;
+        let mut products = pencil.apply_mass(shapes.as_ref());
+        for j in (0..shapes.ncols()).filter(|&j| is_in[j]) {
+            let found = outcome.kept.len();
+            let (vector, product) = beside_first(found, &shapes, &products, j);
+            let left = column_products(vector.as_ref(), product.as_ref())[0].max(0.0).sqrt();
+            if left < dependent {
+                outcome.dependent.push((j, left));
+                continue;
+            }
+            // Afresh: the product was the difference of larger ones.
+            let product = pencil.apply_mass(vector.as_ref());
+            let square = column_products(vector.as_ref(), product.as_ref())[0];
+            // A singular M: what is left of shapes with mass may have none.
+            if square <= NEARLY_MASSLESS * diagonal_square(&mass_diagonal, &vector, 0) {
+                outcome.massless.push(j);
+                continue;
+            }
+            let norm = square.sqrt();
+            for i in 0..shapes.nrows() {
+                shapes[(i, found)] = vector[(i, 0)] / norm;
+                products[(i, found)] = product[(i, 0)] / norm;
+            }
+            outcome.kept.push(j);
+        }
+        outcome.vectors = shapes.as_ref().subcols(0, outcome.kept.len()).to_owned();
+        outcome
+    }
+}
+
+/// What is left of shape j beside the first `found` columns, and its product with M.
+fn beside_first(found: usize, shapes: &Mat<f64>, products: &Mat<f64>, j: usize) -> (Mat<f64>, Mat<f64>) {
+    let mut vector = shapes.as_ref().subcols(j, 1).to_owned();
+    let mut product = products.as_ref().subcols(j, 1).to_owned();
+    for _ in 0..2 {
+        let along = gram(shapes.as_ref().subcols(0, found), product.as_ref());
+        subtract_combination(vector.as_mut(), shapes.as_ref().subcols(0, found), along.as_ref());
+        subtract_combination(product.as_mut(), products.as_ref().subcols(0, found), along.as_ref());
+    }
+    (vector, product)
+}
+
+/// sum_i M_ii psi_i^2 of column j.
+fn diagonal_square(mass_diagonal: &[f64], a: &Mat<f64>, j: usize) -> f64 {
+    mass_diagonal.iter().zip(a.col(j).iter()).map(|(m, s)| m * s * s).sum()
 }
 
 impl Independent {

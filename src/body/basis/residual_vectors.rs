@@ -12,10 +12,11 @@ use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
 use crate::model::{FeModel, RawShapes, centre_and_length};
 use crate::numerics::eigen::{
-    Accuracy, EigenFailure, EigenProblem, EigenSolution, Precision, Wanted, modes_of_span, static_responses,
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, Wanted, modes_of_span,
+    static_responses,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
-use faer::Mat;
+use faer::{Mat, MatRef};
 
 /// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
 const LEFT: f64 = 1e-8;
@@ -182,94 +183,21 @@ pub(super) fn with_residual_vectors(
     settings: &ModeSettings,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    let NamedLoads { what, names, forces } = loads;
-    watch(Event::Phase(&format!("{what}s")));
+    watch(Event::Phase(&format!("{}s", loads.what)));
     let failed = |failure: EigenFailure| explain(model, failure);
-    let pencil = &problem.pencil;
     let modes = &free.solution.vectors;
-    let lambda = &free.solution.eigenvalues;
     let mut counters = free.solution.counters;
-    let precision = free.solution.plan.map_or(Precision::Double, |plan| plan.precision);
-    let responses =
-        static_responses(problem, modes.as_ref(), forces.clone(), lambda[0], precision, &mut counters)
-            .map_err(failed)?;
-    // K^+ f = Psi Lambda^-1 Psi'f + what the modes do not have.
-    let modal = gram(modes.as_ref(), forces.as_ref());
-    let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);
-    let mut whole = responses.clone();
-    add_combination(whole.as_mut(), modes.as_ref(), amplitudes.as_ref());
-    let energy = column_products(whole.as_ref(), pencil.apply_stiffness(whole.as_ref()).as_ref());
-    let mass = column_products(whole.as_ref(), pencil.apply_mass(whole.as_ref()).as_ref());
-    let left = column_products(responses.as_ref(), pencil.apply_mass(responses.as_ref()).as_ref());
-    let missed = column_products(responses.as_ref(), pencil.apply_stiffness(responses.as_ref()).as_ref());
-    let equilibrated = {
-        let resultants = gram(problem.rigid, forces.as_ref());
-        forces - pencil.apply_mass(problem.rigid) * resultants
-    };
-    let deforms = |j: usize| {
-        equilibrated.col(j).norm_l2() > SELF_EQUILIBRATED * forces.col(j).norm_l2() && energy[j] > 0.0
-    };
-    let error = |part: f64, j: usize| if deforms(j) { (part.max(0.0) / energy[j]).sqrt() } else { 0.0 };
-
-    let mut dropped: Vec<String> = Vec::new();
-    let mut used = Vec::new();
-    for (j, name) in names.iter().enumerate() {
-        if !deforms(j) {
-            dropped.push(format!("{name} (deforms nothing)"));
-        } else if left[j].max(0.0).sqrt() < LEFT * mass[j].sqrt() {
-            dropped.push(format!("{name} ({:.0e})", (left[j].max(0.0) / mass[j]).sqrt()));
-        } else {
-            used.push(j);
-        }
-    }
-    let candidates = Mat::from_fn(responses.nrows(), used.len(), |i, j| responses[(i, used[j])]);
-    let known = side_by_side(&[problem.rigid, modes.as_ref()]);
-    let found = independent(pencil, known.as_ref(), candidates, LEFT)
-        .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
-    dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({left:.0e})", names[used[j]])));
-    dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", names[used[j]])));
-    dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", names[used[j]])));
-
-    let span = side_by_side(&[modes.as_ref(), found.vectors.as_ref()]);
+    let responses = Responses::new(problem, &free.solution, loads, &mut counters).map_err(failed)?;
+    let added =
+        responses.added(problem, modes.as_ref()).ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+    let span = side_by_side(&[modes.as_ref(), added.vectors.as_ref()]);
     let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
     let ritz = modes_of_span(problem, span.clone(), &all, watch).map_err(failed)?;
-    let parts = gram(span.as_ref(), pencil.apply_mass(ritz.vectors.as_ref()).as_ref());
-    let count = lambda.len();
-    let provenance = (0..ritz.eigenvalues.len())
-        .map(|p| {
-            let share = |c: usize| parts[(c, p)].powi(2);
-            if (0..count).map(share).sum::<f64>() > 0.5 {
-                return "free mode".to_owned();
-            }
-            let largest = (count..span.ncols()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
-            let largest = largest.expect("the span is more than the free modes");
-            let name = &names[used[found.kept[largest - count]]];
-            format!("{what}: {:.0} % {name}", 100.0 * share(largest))
-        })
-        .collect();
-
-    let modal = gram(ritz.vectors.as_ref(), forces.as_ref());
-    let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
-    let mut rest = whole;
-    add_combination(rest.as_mut(), ritz.vectors.as_ref(), amplitudes.as_ref());
-    let rest = column_products(rest.as_ref(), pencil.apply_stiffness(rest.as_ref()).as_ref());
-    let truncation = names.iter().enumerate().map(|(j, name)| Truncation {
-        load: name.clone(),
-        before: error(missed[j], j),
-        after: error(rest[j], j),
-    });
-    let truncation = truncation.collect();
-
+    let parts = gram(span.as_ref(), problem.pencil.apply_mass(ritz.vectors.as_ref()).as_ref());
+    let provenance = added.provenance(loads, parts.as_ref(), modes.ncols());
+    let truncation = responses.truncation(problem, &ritz);
     let mut notes = free.diagnostics;
-    if !dropped.is_empty() {
-        let message = format!(
-            "{} of {} {what}s are left out, they add less than {LEFT:.0e} of their M-norm: {}",
-            dropped.len(),
-            names.len(),
-            dropped.join(", ")
-        );
-        notes.push(Diagnostic::new(Code::LoadsCovered, message));
-    }
+    notes.extend(added.note(loads));
     counters.stiffness_columns += ritz.counters.stiffness_columns;
     counters.mass_columns += ritz.counters.mass_columns;
     // What was proved of the free modes stays: the Ritz values of the others lie above the next eigenvalue.
@@ -284,4 +212,152 @@ pub(super) fn with_residual_vectors(
     let mut basis = ModalBasis::new(model, problem, settings, solution, "")?;
     (basis.provenance, basis.truncation, basis.diagnostics) = (provenance, truncation, notes);
     Ok(basis)
+}
+
+/// Static responses to loads, and what free modes have of them.
+struct Responses<'a> {
+    loads: &'a NamedLoads,
+    /// K^+ f without what the modes have of it (N x m).
+    beside: Mat<f64>,
+    /// K^+ f (N x m).
+    whole: Mat<f64>,
+    /// Squares of the norms of the whole responses in K and in M, and of what is beside the modes.
+    energy: Vec<f64>,
+    mass: Vec<f64>,
+    energy_beside: Vec<f64>,
+    mass_beside: Vec<f64>,
+    /// Whether each load deforms the body.
+    deforms: Vec<bool>,
+}
+
+impl<'a> Responses<'a> {
+    fn new(
+        problem: &EigenProblem<'_>,
+        free: &EigenSolution,
+        loads: &'a NamedLoads,
+        counters: &mut Counters,
+    ) -> std::result::Result<Self, EigenFailure> {
+        let (pencil, forces) = (&problem.pencil, &loads.forces);
+        let (modes, lambda) = (free.vectors.as_ref(), &free.eigenvalues);
+        let precision = free.plan.map_or(Precision::Double, |plan| plan.precision);
+        let beside = static_responses(problem, modes, forces.clone(), lambda[0], precision, counters)?;
+        // K^+ f = Psi Lambda^-1 Psi'f + what the modes do not have.
+        let modal = gram(modes, forces.as_ref());
+        let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);
+        let mut whole = beside.clone();
+        add_combination(whole.as_mut(), modes, amplitudes.as_ref());
+        let in_stiffness =
+            |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_stiffness(x.as_ref()).as_ref());
+        let in_mass = |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_mass(x.as_ref()).as_ref());
+        let energy = in_stiffness(&whole);
+        let deforms = deforming(problem, forces, &energy);
+        Ok(Self {
+            loads,
+            mass: in_mass(&whole),
+            mass_beside: in_mass(&beside),
+            energy_beside: in_stiffness(&beside),
+            beside,
+            whole,
+            energy,
+            deforms,
+        })
+    }
+
+    /// What the modes lack, M-orthonormalised against them; `None` when M is indefinite.
+    fn added(&self, problem: &EigenProblem<'_>, modes: MatRef<'_, f64>) -> Option<Added> {
+        let names = &self.loads.names;
+        let mut dropped: Vec<String> = Vec::new();
+        let mut used = Vec::new();
+        for (j, name) in names.iter().enumerate() {
+            let left = self.mass_beside[j].max(0.0);
+            if !self.deforms[j] {
+                dropped.push(format!("{name} (deforms nothing)"));
+            } else if left.sqrt() < LEFT * self.mass[j].sqrt() {
+                dropped.push(format!("{name} ({:.0e})", (left / self.mass[j]).sqrt()));
+            } else {
+                used.push(j);
+            }
+        }
+        let candidates = Mat::from_fn(self.beside.nrows(), used.len(), |i, j| self.beside[(i, used[j])]);
+        let known = side_by_side(&[problem.rigid, modes]);
+        let found = independent(&problem.pencil, known.as_ref(), candidates, LEFT)?;
+        let name = |j: usize| &names[used[j]];
+        dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({left:.0e})", name(j))));
+        dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", name(j))));
+        dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
+        let kept = found.kept.iter().map(|&j| used[j]).collect();
+        Some(Added { vectors: found.vectors, kept, dropped })
+    }
+
+    /// What the free modes lack of each response, and what the modes of the whole span do.
+    fn truncation(self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
+        let modal = gram(ritz.vectors.as_ref(), self.loads.forces.as_ref());
+        let amplitudes =
+            Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
+        let mut rest = self.whole;
+        add_combination(rest.as_mut(), ritz.vectors.as_ref(), amplitudes.as_ref());
+        let rest = column_products(rest.as_ref(), problem.pencil.apply_stiffness(rest.as_ref()).as_ref());
+        let error = |part: f64, j: usize| {
+            if self.deforms[j] { (part.max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
+        };
+        let of_load = |(j, name): (usize, &String)| Truncation {
+            load: name.clone(),
+            before: error(self.energy_beside[j], j),
+            after: error(rest[j], j),
+        };
+        self.loads.names.iter().enumerate().map(of_load).collect()
+    }
+}
+
+/// Which loads do more than move the body as a whole.
+fn deforming(problem: &EigenProblem<'_>, forces: &Mat<f64>, energy: &[f64]) -> Vec<bool> {
+    let resultants = gram(problem.rigid, forces.as_ref());
+    let equilibrated = forces - problem.pencil.apply_mass(problem.rigid) * resultants;
+    let deforms = |j: usize| {
+        equilibrated.col(j).norm_l2() > SELF_EQUILIBRATED * forces.col(j).norm_l2() && energy[j] > 0.0
+    };
+    (0..forces.ncols()).map(deforms).collect()
+}
+
+/// The responses that join the free modes.
+struct Added {
+    /// M-orthonormal, M-orthogonal to rigid motions and free modes.
+    vectors: Mat<f64>,
+    /// The load that each of them came from.
+    kept: Vec<usize>,
+    /// Names of the other loads, each with the reason.
+    dropped: Vec<String>,
+}
+
+impl Added {
+    /// What each mode is made of: a free mode, or mostly the response to a load. `parts` (span x modes) are the products of the
+    /// modes with the vectors of the span, `free` of which are free modes.
+    fn provenance(&self, loads: &NamedLoads, parts: MatRef<'_, f64>, free: usize) -> Vec<String> {
+        let of_mode = |p: usize| {
+            let share = |c: usize| parts[(c, p)].powi(2);
+            if (0..free).map(share).sum::<f64>() > 0.5 {
+                return "free mode".to_owned();
+            }
+            let largest = (free..parts.nrows()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
+            let largest = largest.expect("the span is more than the free modes");
+            let name = &loads.names[self.kept[largest - free]];
+            format!("{}: {:.0} % {name}", loads.what, 100.0 * share(largest))
+        };
+        (0..parts.ncols()).map(of_mode).collect()
+    }
+
+    /// What the user should know of the loads that are left out.
+    fn note(&self, loads: &NamedLoads) -> Option<Diagnostic> {
+        let NamedLoads { what, names, .. } = loads;
+        let dropped = &self.dropped;
+        (!dropped.is_empty()).then(|| {
+            let message = format!(
+                "{} of {} {what}s are left out, they add less than {LEFT:.0e} of their M-norm: {}",
+                dropped.len(),
+                names.len(),
+                dropped.join(", ")
+            );
+            Diagnostic::new(Code::LoadsCovered, message)
+        })
+    }
 }

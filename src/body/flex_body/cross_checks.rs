@@ -3,6 +3,7 @@
 
 use super::{MassStructure, Parts};
 use crate::body::invariants::{CauchySchwarz, IdentityCheck};
+use crate::numerics::linalg::{larger, largest};
 
 /// Two ways to the same sum: rounding, relative to its Cauchy-Schwarz bound.
 const ROUNDING: f64 = 1e-12;
@@ -30,7 +31,7 @@ impl Parts {
             let bound = &bound;
             (0..3).map(move |k| relative(own.c1[(k, p)] - lumped.c1[(k, p)], bound.c1(p)))
         });
-        let value = first.chain(c1).fold(relative(own.mass - lumped.mass, own.mass), worst);
+        let value = first.chain(c1).fold(relative(own.mass - lumped.mass, own.mass), larger);
         Some(IdentityCheck::new(
             "row_sums",
             "m, c and C1 of the row sums of M are those of M",
@@ -42,19 +43,14 @@ impl Parts {
     /// Damping ratios are those of the diagonal of the modal damping.
     fn damping_ratios(&self) -> Option<IdentityCheck> {
         let damping = self.modes.modal_damping.as_ref()?;
-        let largest = damping.norm_max();
+        let size = damping.norm_max();
         // A ratio is never negative: what is below zero on the diagonal is rounding.
         let difference = |(j, lambda): (usize, &f64)| {
             let of_ratio = 2.0 * self.modes.damping_ratio[j] * lambda.sqrt();
             let difference = (of_ratio - damping[(j, j)].max(0.0)).abs();
-            if difference == 0.0 { 0.0 } else { difference / largest }
+            if difference == 0.0 { 0.0 } else { difference / size }
         };
-        let value = self.modes.eigenvalue.iter().enumerate().map(difference).fold(0.0, worst);
+        let value = largest(self.modes.eigenvalue.iter().enumerate().map(difference));
         Some(IdentityCheck::new("damping_ratios", "zeta_j = D_jj / (2 omega_j)", value, ROUNDING))
     }
-}
-
-/// The larger one; a NaN stays.
-fn worst(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

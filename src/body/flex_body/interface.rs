@@ -1,12 +1,8 @@
 //! Interfaces of a body: what a joint needs of them.
 
-use super::Parts;
-use crate::body::invariants::IdentityCheck;
-use crate::model::{Coupling, InterfaceMotion, Nodes, rigid_count, rigid_fields};
-use crate::numerics::linalg::{combine, gram};
+use crate::model::{Coupling, InterfaceMotion, Nodes};
+use crate::numerics::linalg::combine;
 use faer::{Mat, MatRef};
-use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeSet;
 
 /// A named interface of the body.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,117 +98,4 @@ pub struct InterfaceCoordinates {
     pub mass: Mat<f64>,
     /// B (nc x nf): coordinates B p for the amplitudes p of the modes, B'K B = diag(lambda), B'M B = I.
     pub of_modes: Mat<f64>,
-}
-
-/// What the numbers of two ways to the same energy may differ by.
-const ENERGY: f64 = 1e-9;
-
-impl Parts {
-    /// What must hold for the interface coordinates: they carry the energies of the modes and the mass of the rigid body.
-    pub fn interface_identities(&self) -> Vec<IdentityCheck> {
-        let Some(coordinates) = &self.coordinates else { return Vec::new() };
-        let InterfaceCoordinates { stiffness, mass, of_modes, .. } = coordinates;
-        let check = |name, formula, value: f64, limit| IdentityCheck {
-            name,
-            formula,
-            value,
-            limit,
-            passed: value <= limit,
-        };
-        let twice = |a: &Mat<f64>, b: &Mat<f64>| gram(b.as_ref(), combine(a.as_ref(), b.as_ref()).as_ref());
-        let (energy, inertia) = (twice(stiffness, of_modes), twice(mass, of_modes));
-        let root: Vec<f64> = self.modes.eigenvalue.iter().map(|l| l.sqrt()).collect();
-        let nf = root.len();
-        let worst = |f: &dyn Fn(usize, usize) -> f64, rows: usize, columns: usize| {
-            let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-            places.fold(0.0f64, |m, (i, j)| {
-                let value = f(i, j).abs();
-                if value.is_nan() { f64::INFINITY } else { m.max(value) }
-            })
-        };
-        let identity = |i: usize, j: usize| f64::from(i == j);
-        let mut checks = vec![
-            check(
-                "interface_stiffness",
-                "B' K B = diag(lambda)",
-                worst(&|i, j| energy[(i, j)] / (root[i] * root[j]) - identity(i, j), nf, nf),
-                // What K makes of rigid motion is in the shapes, but not in the modes.
-                ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
-            ),
-            check(
-                "interface_mass",
-                "B' M B = I",
-                worst(&|i, j| inertia[(i, j)] - identity(i, j), nf, nf),
-                ENERGY,
-            ),
-        ];
-        if let Some(rigid) = self.rigid_coordinates() {
-            let (expected, own) = (self.rigid_mass(), twice(mass, &rigid));
-            let r = rigid.ncols();
-            checks.push(check(
-                "interface_rigid_mass",
-                "R' M R = [m, -c~; c~, I0]",
-                worst(
-                    &|i, j| (own[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
-                    r,
-                    r,
-                ),
-                ENERGY,
-            ));
-            let (energy, first) = (twice(stiffness, &rigid), root.first().map_or(1.0, |root| root * root));
-            checks.push(check(
-                "interface_rigid_motion",
-                "R' K R = 0 beside lambda_1 R' M R",
-                worst(&|i, j| energy[(i, j)] / (first * (expected[(i, i)] * expected[(j, j)]).sqrt()), r, r),
-                ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
-            ));
-        }
-        checks
-    }
-
-    /// R (nc x 6, in the plane nc x 3): rigid motion about the origin of the body frame in interface coordinates. `None` when the
-    /// coordinates are not those of the interfaces.
-    pub fn rigid_coordinates(&self) -> Option<Mat<f64>> {
-        let (coordinates, d) = (self.coordinates.as_ref()?, self.dimension);
-        let fields = |positions: &[[f64; 3]]| rigid_fields(positions, d, [0.0; 3], 1.0);
-        let mut rows: Vec<Vec<f64>> = Vec::new();
-        for interface in &self.interfaces {
-            let positions = match interface.reference {
-                Some(reference) => vec![reference],
-                None => {
-                    let nodes: BTreeSet<usize> = interface.nodes.iter().copied().collect();
-                    nodes.into_iter().map(|i| self.nodes.positions[i]).collect()
-                }
-            };
-            let moved = fields(&positions);
-            rows.extend((0..moved.nrows()).map(|i| moved.row(i).iter().copied().collect()));
-            if interface.reference.is_some() {
-                rows.extend(
-                    (d..rigid_count(d))
-                        .map(|turn| (0..rigid_count(d)).map(|column| f64::from(column == turn)).collect()),
-                );
-            }
-        }
-        let size = coordinates.names.len();
-        let modal = coordinates.names.iter().filter(|name| name.starts_with("fixed-interface mode ")).count();
-        // Rotations of the nodes of a free interface are not told from the interface alone.
-        (rows.len() + modal == size).then(|| {
-            Mat::from_fn(size, rigid_count(d), |i, j| rows.get(i).map_or(0.0, |row: &Vec<f64>| row[j]))
-        })
-    }
-
-    /// The mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the origin of the body frame, body
-    /// axes: translations, then rotations.
-    pub fn rigid_mass(&self) -> Mat<f64> {
-        let (m, c, inertia) = (self.invariants.mass, self.invariants.first_moment, self.invariants.inertia());
-        let lever: Matrix3<f64> = Vector3::cross_matrix(&c);
-        // Translations and rotations that are there: in the plane two and the third.
-        let axes: Vec<usize> = if self.dimension == 2 { vec![0, 1, 5] } else { (0..6).collect() };
-        Mat::from_fn(axes.len(), axes.len(), |i, j| match (axes[i], axes[j]) {
-            (i, j) if i < 3 && j < 3 => m * f64::from(i == j),
-            (i, j) if i < 3 => -lever[(i, j - 3)],
-            (i, j) if j < 3 => lever[(i - 3, j)],
-            (i, j) => inertia[(i - 3, j - 3)],
-        })
-    }
 }

@@ -1,7 +1,7 @@
 //! The size that each entry of the invariants can have at most: the scale of every comparison.
 
 use super::Invariants;
-use super::dense::worst;
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -159,25 +159,25 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
     };
     let entries = |x: Mat<f64>, y: Mat<f64>, bound: &dyn Fn(usize, usize) -> f64| {
         let all = (0..x.nrows()).flat_map(|i| (0..x.ncols()).map(move |j| (i, j)));
-        all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))).fold(0.0, worst)
+        all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))).fold(0.0, larger)
     };
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
     let w3 = || Some(("W3", entries(a.w3()?, b.w3()?, &by_modes)));
     let modal_mass = || ("modal_mass", entries(a.modal_mass(), b.modal_mass(), &by_modes));
     let mut table = vec![
         ("mass", scaled(a.mass - b.mass, a.mass.abs())),
-        ("first_moment", (0..3).map(first).fold(0.0, worst)),
-        ("second_moment", axes().map(second).fold(0.0, worst)),
-        ("C1", (0..3).flat_map(|k| (0..nf).map(move |p| c1(k, p))).fold(0.0, worst)),
+        ("first_moment", (0..3).map(first).fold(0.0, larger)),
+        ("second_moment", axes().map(second).fold(0.0, larger)),
+        ("C1", (0..3).flat_map(|k| (0..nf).map(move |p| c1(k, p))).fold(0.0, larger)),
         match groups.w1 {
-            true => ("Ibar", axes().flat_map(|kl| (0..nf).map(move |p| ibar(kl, p))).fold(0.0, worst)),
+            true => ("Ibar", axes().flat_map(|kl| (0..nf).map(move |p| ibar(kl, p))).fold(0.0, larger)),
             false => ("C2", entries(a.c2(), b.c2(), &|k, p| bound.c2(k, p))),
         },
     ];
     if groups.w2 {
-        table.push(("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, worst)));
+        table.push(("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, larger)));
     }
-    table.push(("modal_stiffness", modes().map(k_ff).fold(0.0, worst)));
+    table.push(("modal_stiffness", modes().map(k_ff).fold(0.0, larger)));
     if general {
         table.push(("W0", entries(a.w0(), b.w0(), &|_, column| bound.c1(column % nf))));
     }

@@ -4,9 +4,9 @@
 //! What separates these modes from the exact ones is another matter (`/modes/shape_error`).
 
 use super::condense::{CHUNK, Columns, MAX_GROUPS, fill_symmetric, from_gram, group_length};
-use super::dense::worst;
 use super::derived::CYCLIC;
 use super::{CauchySchwarz, Invariants};
+use crate::numerics::linalg::larger;
 use crate::numerics::linalg::{
     CompensatedBlock, DoubleDouble, LANES, SymmetricMatrix, accumulate, accumulate_pair, gram_compensated,
     multiply_compensated, sum_length, with_fma,
@@ -230,7 +230,7 @@ fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
         for i in 0..rows {
             for j in 0..columns {
                 let (error, scale) = f(i, j);
-                largest = worst(largest, if error == 0.0 { 0.0 } else { error / scale });
+                largest = larger(largest, if error == 0.0 { 0.0 } else { error / scale });
             }
         }
         largest

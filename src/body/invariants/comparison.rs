@@ -1,8 +1,9 @@
 //! Error norms of invariants from lumped masses against the exact ones (theory section 9).
 
 use super::cauchy_schwarz::scaled;
-use super::dense::{frobenius_norm, spectral_norm, worst};
+use super::dense::{frobenius_norm, spectral_norm};
 use super::{CauchySchwarz, Invariants};
+use crate::numerics::linalg::larger;
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
@@ -86,11 +87,11 @@ pub fn error_norms(exact: &Invariants, other: &Invariants) -> Vec<(String, f64)>
 fn norms(a: &Mat<f64>, b: &Mat<f64>, least: f64, bound: impl Fn(usize, usize) -> f64) -> [f64; 3] {
     let difference = Mat::from_fn(a.nrows(), a.ncols(), |p, q| b[(p, q)] - a[(p, q)]);
     let relative =
-        |norm: fn(MatRef<'_, f64>) -> f64| scaled(norm(difference.as_ref()), worst(norm(a.as_ref()), least));
+        |norm: fn(MatRef<'_, f64>) -> f64| scaled(norm(difference.as_ref()), larger(norm(a.as_ref()), least));
     let mut largest = 0.0;
     for q in 0..a.ncols() {
         for p in 0..a.nrows() {
-            largest = worst(largest, scaled(difference[(p, q)], bound(p, q)));
+            largest = larger(largest, scaled(difference[(p, q)], bound(p, q)));
         }
     }
     [relative(frobenius_norm), relative(spectral_norm), largest]

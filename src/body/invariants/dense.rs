@@ -1,5 +1,6 @@
 //! Small dense kernels on one thread, so that no result depends on the number of threads.
 
+use crate::numerics::linalg::largest_entry;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::matmul;
@@ -22,19 +23,9 @@ pub(super) fn entries<'a>(a: MatRef<'a, f64>) -> impl Iterator<Item = f64> + 'a 
     (0..a.ncols()).flat_map(move |q| (0..a.nrows()).map(move |p| a[(p, q)]))
 }
 
-/// The larger of two numbers, NaN when one of them is: a NaN must never pass a check.
-pub(super) fn worst(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
-/// Largest magnitude; NaN when there is a NaN.
-pub(super) fn max_norm(a: MatRef<'_, f64>) -> f64 {
-    entries(a).fold(0.0, |m, v| worst(m, v.abs()))
-}
-
 /// Frobenius norm, safe against overflow.
 pub(super) fn frobenius_norm(a: MatRef<'_, f64>) -> f64 {
-    let scale = max_norm(a);
+    let scale = largest_entry(a);
     if scale == 0.0 || !scale.is_finite() {
         return scale;
     }
@@ -44,7 +35,7 @@ pub(super) fn frobenius_norm(a: MatRef<'_, f64>) -> f64 {
 /// Spectral norm: the square root of the largest eigenvalue of the smaller Gram matrix. NaN when an entry is not
 /// finite.
 pub(super) fn spectral_norm(a: MatRef<'_, f64>) -> f64 {
-    let scale = max_norm(a);
+    let scale = largest_entry(a);
     if scale == 0.0 {
         return 0.0;
     }
@@ -59,7 +50,7 @@ pub(super) fn spectral_norm(a: MatRef<'_, f64>) -> f64 {
 /// iteration fails.
 pub(super) fn symmetric_eigenvalues(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
     let n = a.nrows();
-    if !max_norm(a).is_finite() {
+    if !largest_entry(a).is_finite() {
         return None;
     }
     let mut values = faer::diag::Diag::<f64>::zeros(n);

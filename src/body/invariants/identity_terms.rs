@@ -1,10 +1,11 @@
 //! How far a body is from each identity: dimensionless numbers, NaN when a number of the body is.
 
 use super::cauchy_schwarz::scaled;
-use super::dense::{entries, spectral_norm, symmetric_eigenvalues, worst};
+use super::dense::{entries, spectral_norm, symmetric_eigenvalues};
 use super::derived::{CYCLIC, inertia_of};
 use super::{CauchySchwarz, Invariants};
 use crate::numerics::linalg::dense_cholesky;
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::Matrix3;
 
@@ -13,7 +14,7 @@ fn over(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
     let mut largest = 0.0;
     for q in 0..columns {
         for p in 0..rows {
-            largest = worst(largest, f(p, q));
+            largest = larger(largest, f(p, q));
         }
     }
     largest

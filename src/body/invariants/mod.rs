@@ -18,6 +18,7 @@ mod lumped;
 mod numbered;
 mod primary;
 mod principal_axes;
+mod restriction;
 mod rigid_modes;
 mod softening;
 mod transform;
@@ -33,9 +34,9 @@ pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_general_f
 pub(crate) use general::symmetrise;
 pub use general::{GENERAL_REMARK, RigidMotion, condense_general, condense_general_linear};
 pub use groups::{Group, Groups};
-pub(crate) use groups::{ibar_of_c2, s_of_modal_mass};
 pub use identities::{Expected, IdentityCheck, derived_identities, identities};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use numbered::Numbered;
 pub use primary::{GeneralTerms, Invariants};
+pub(crate) use restriction::{ibar_of_c2, s_of_modal_mass};
 pub use softening::relative_norm;

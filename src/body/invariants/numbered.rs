@@ -1,8 +1,8 @@
 //! The invariants as other programs number them: I1 to I9 of Adams and MBDyn, from which every other set of names follows.
 
-use super::dense::worst;
 use super::general::{s_of, second_moment_of};
 use super::{CauchySchwarz, GeneralTerms, Groups, Invariants, s_of_modal_mass};
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -96,7 +96,7 @@ impl Invariants {
             let places = (0..told.nrows()).flat_map(|i| (0..nf).map(move |j| (i, j)));
             let worst = places
                 .map(|(i, j)| super::cauchy_schwarz::scaled(own[(i, j)] - told[(i, j)], scale(i, j)))
-                .fold(0.0, worst);
+                .fold(0.0, larger);
             worst.is_nan() || worst > rounding
         };
         let differs =

@@ -9,7 +9,10 @@
 
 use super::canonical::clusters;
 use super::completeness::count_below;
-use super::problem::{Counters, EigenFailure, EigenProblem, EigenvalueBounds};
+use super::counters::Counters;
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
+use super::solution::EigenvalueBounds;
 use crate::numerics::linalg::{
     Analysis, Cholesky, CompensatedBlock, DoubleDouble, LANES, Pencil, Solve, gram_compensated,
     multiply_compensated, small_pencil_eigenvalues, sum_length,

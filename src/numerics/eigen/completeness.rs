@@ -1,7 +1,9 @@
 //! The proof that no mode is missed: by Sylvester's law the number of negative pivots of K - sigma M is the number of
 //! eigenvalues below sigma (M positive semidefinite).
 
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::counters::Counters;
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
 use crate::numerics::linalg::{Analysis, Inertia};
 
 /// A probe residual above this means that element growth may have spoilt the count.

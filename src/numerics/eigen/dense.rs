@@ -1,6 +1,7 @@
 //! All finite modes of a small pencil by one dense symmetric eigenproblem.
 
-use super::problem::{EigenFailure, EigenProblem};
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
 use crate::numerics::linalg::{
     Pencil, Solve, SymmetricEigen, SymmetricMatrix, dense_cholesky, gram, symmetric_eigen,
 };

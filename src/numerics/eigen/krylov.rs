@@ -1,7 +1,8 @@
 //! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
 
-use super::problem::{Counters, EigenProblem};
-use super::start::Snapshot;
+use super::counters::Counters;
+use super::problem::EigenProblem;
+use super::resume::Snapshot;
 use crate::numerics::linalg::{Solve, combine, gram, subtract_combination};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};

@@ -5,13 +5,17 @@
 //! eigenvalues complete up to what the later inertia count proves.
 
 use super::canonical::cluster_end;
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::krylov::Krylov;
 use super::noise::energy_noise;
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::problem::EigenProblem;
 use super::refine::Refined;
-use super::start::{Snapshot, snapshot};
+use super::resume::Snapshot;
+use super::start::snapshot;
+use super::zero_energy::NOISE_FACTOR;
 use crate::base::progress::{Event, Watch};
-use crate::numerics::linalg::{Analysis, Cholesky, Real, Solve, SymmetricEigen, symmetric_eigen};
+use crate::numerics::linalg::{Solve, SymmetricEigen, symmetric_eigen};
 use faer::Mat;
 
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
@@ -24,9 +28,6 @@ const MAX_RESTARTS: u64 = 100;
 
 /// Basis vectors beyond two for each wanted mode: restarts are then rare.
 const SPARE: usize = 128;
-
-/// Energy this many standard deviations above the noise of the entries of K is real.
-pub(super) const NOISE_FACTOR: f64 = 30.0;
 
 /// A search is saved when at least so many more modes have converged, or a quarter of those wanted.
 const SAVED_AFTER: usize = 5;
@@ -56,32 +57,6 @@ pub(super) enum Search {
     },
     /// Early: with this shift it would be shorter and more accurate.
     ShiftTooLarge(f64),
-}
-
-/// Cholesky factor with a probe of its accuracy.
-pub(super) fn factorise<'a, T: Real>(
-    problem: &EigenProblem<'_>,
-    analysis: &'a Analysis,
-    tau: f64,
-    counters: &mut Counters,
-) -> Result<Cholesky<'a, T>, EigenFailure> {
-    counters.factorizations += 1;
-    let pencil = &problem.pencil;
-    let factor =
-        Cholesky::new(analysis, pencil, tau).ok_or(EigenFailure::NotPositiveDefinite { shift: tau })?;
-    let b = Mat::from_fn(pencil.n(), 1, |i, _| if i % 3 == i % 2 { 1.0 } else { -0.5 });
-    let mut x = b.clone();
-    factor.solve_in_place(x.as_mut());
-    let residual = &b - pencil.apply_stiffness(x.as_ref()) - pencil.apply_mass(x.as_ref()) * faer::Scale(tau);
-    // The backward error: what matters of a factor, however ill-conditioned the matrix.
-    let row_sum = |i: usize| pencil.stiffness().row(i).1.iter().map(|v| v.abs()).sum::<f64>();
-    let scale = b.norm_max() + (0..pencil.n()).map(row_sum).fold(0.0, f64::max) * x.norm_max();
-    let relative = residual.norm_max() / scale;
-    // Backward stable factors leave about the unit roundoff here; a wrong one leaves O(1).
-    if relative.is_nan() || relative > T::ROUNDOFF.sqrt() {
-        return Err(EigenFailure::Inaccurate { residual: relative });
-    }
-    Ok(factor)
 }
 
 /// Block steps after which the shift is judged: the lowest Ritz value is then near the first eigenvalue.
@@ -167,7 +142,8 @@ pub(super) struct Goal {
     pub attempt: u64,
 }
 
-/// The lowest flexible modes.
+/// The lowest flexible modes: the basis is expanded and its Ritz pairs are tested until they are good enough to be handed over; a
+/// full basis is restarted from the best of them.
 pub(super) fn lowest_modes(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
@@ -176,110 +152,274 @@ pub(super) fn lowest_modes(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Search, EigenFailure> {
-    let Goal { wanted, tolerance, cluster_gap, block, rough, attempt } = *goal;
-    let tau = factor.shift();
-    let free = problem.pencil.n() - problem.rigid.ncols();
-    let capacity = (2 * wanted + SPARE).min(free + block);
-    let mut krylov = Krylov::new(problem, factor, capacity);
-    krylov.choose_random(1000 * attempt);
-    match start {
-        // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for any part of them.
-        Some(start) => {
-            let room = capacity.saturating_sub(start.coupling.nrows() + block);
-            let taken = start.eigenvalues.len().min(room);
-            counters.taken_up = taken as u64;
-            krylov.take_up(start, tau, taken, counters);
-        }
-        None => krylov.append_random(block.min(free), counters),
-    }
-    // A start is looked at before the first step: it may hold all that is wanted.
-    let mut taken_up = krylov.projected() > 0 && !krylov.exhausted();
-    let (mut checked, mut steps, mut saved) = (0, 0, 0);
-    let (mut asked, mut least_excess) = (tolerance, f64::INFINITY);
+    let mut iteration = Iteration::begin(problem, factor, goal, start, watch, counters);
     loop {
-        if krylov.exhausted() {
-            // An invariant subspace: go on with new directions, or everything is found.
-            krylov.append_random(block.min(krylov.room()), counters);
-        }
-        let complete = krylov.exhausted();
-        let at_start = std::mem::take(&mut taken_up);
-        if !complete && !at_start {
-            krylov.step(counters);
-            steps += 1;
-        }
-        if steps == STEPS_TO_JUDGE
-            && let Some(shift) = better_shift(problem, &krylov, factor, wanted, counters)?
-        {
+        iteration.expand(counters);
+        if let Some(shift) = iteration.better_shift(counters)? {
             return Ok(Search::ShiftTooLarge(shift));
         }
-        let size = krylov.projected();
-        let full = krylov.room() < block;
-        // The projected eigenproblem costs size^3: beyond 100 vectors or so not after every step.
-        if !(complete || full) && (size < wanted + 1 || size < checked + checked / 25) {
+        if !iteration.is_test_due() {
             continue;
         }
-        checked = size;
-        let ritz = descending(&krylov)?;
-        if ritz.values.first().is_some_and(|&theta| theta < -1e-8 * ritz.values[size - 1].abs()) {
+        let ritz = iteration.test()?;
+        iteration.save(&ritz);
+        if let Some(found) = iteration.hand_over(&ritz, counters)? {
+            return Ok(found);
+        }
+        if let Some(shift) = iteration.restart(&ritz, counters)? {
+            return Ok(Search::ShiftTooLarge(shift));
+        }
+    }
+}
+
+/// A search as it goes on.
+struct Iteration<'a> {
+    problem: &'a EigenProblem<'a>,
+    factor: &'a dyn Solve,
+    goal: &'a Goal,
+    watch: Watch<'a>,
+    krylov: Krylov<'a>,
+    /// Vectors that the basis has room for.
+    capacity: usize,
+    /// Block steps so far.
+    steps: usize,
+    /// Whether the basis is an earlier search as it was taken up, before the first step.
+    at_start: bool,
+    /// Whether the basis spans all there is.
+    complete: bool,
+    /// Size of the projected eigenproblem that was tested last.
+    tested: usize,
+    /// Modes that had converged when the search was saved last.
+    saved: usize,
+    /// K-residual that an estimate has to keep before the true residuals are looked at.
+    asked: f64,
+    /// Least excess of the true residuals so far.
+    least_excess: f64,
+}
+
+/// Ritz pairs of a basis, theta descending, and which of them are modes.
+struct Ritz {
+    theta: Vec<f64>,
+    /// Coefficients of the vectors.
+    s: Mat<f64>,
+    /// M-norms of the residuals of the operator.
+    norms: Vec<f64>,
+    tau: f64,
+    /// Number of the modes to find: those wanted and what completes the cluster of the last one.
+    last: usize,
+    /// How many of them are good enough by their estimates.
+    converged: usize,
+    /// Whether the next one shows that the cluster has ended.
+    beyond: bool,
+}
+
+impl Ritz {
+    fn size(&self) -> usize {
+        self.theta.len()
+    }
+
+    fn lambda(&self, i: usize) -> f64 {
+        1.0 / self.theta[i] - self.tau
+    }
+
+    /// Whether the residual of the operator is within `tolerance` of theta.
+    fn is_good(&self, i: usize, tolerance: f64) -> bool {
+        self.norms[i] <= tolerance * self.theta[i]
+    }
+
+    /// K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with M-norms for the
+    /// Euclidean ones.
+    fn estimate(&self, i: usize) -> f64 {
+        let theta = self.theta[i];
+        0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta).max(SMALLEST_PART))
+    }
+
+    /// Whether the first pair beyond the modes is as good as the gap below it needs.
+    fn shows_gap(&self) -> bool {
+        let last = self.last;
+        last < self.size() && {
+            let gap = if last > 0 { self.theta[last - 1] - self.theta[last] } else { f64::MAX };
+            self.is_good(last, 1e-3) && self.norms[last] <= 0.1 * gap
+        }
+    }
+
+    /// Whether all modes are there by their estimates.
+    fn all_there(&self) -> bool {
+        self.converged == self.last && self.beyond
+    }
+}
+
+impl<'a> Iteration<'a> {
+    /// Begins with random vectors, or where an earlier search stood.
+    fn begin(
+        problem: &'a EigenProblem<'a>,
+        factor: &'a dyn Solve,
+        goal: &'a Goal,
+        start: Option<&Snapshot>,
+        watch: Watch<'a>,
+        counters: &mut Counters,
+    ) -> Self {
+        let block = goal.block;
+        let free = problem.pencil.n() - problem.rigid.ncols();
+        let capacity = (2 * goal.wanted + SPARE).min(free + block);
+        let mut krylov = Krylov::new(problem, factor, capacity);
+        krylov.choose_random(1000 * goal.attempt);
+        match start {
+            // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for any part of them.
+            Some(start) => {
+                let room = capacity.saturating_sub(start.coupling.nrows() + block);
+                let taken = start.eigenvalues.len().min(room);
+                counters.taken_up = taken as u64;
+                krylov.take_up(start, factor.shift(), taken, counters);
+            }
+            None => krylov.append_random(block.min(free), counters),
+        }
+        // A start is looked at before the first step: it may hold all that is wanted.
+        let at_start = krylov.projected() > 0 && !krylov.exhausted();
+        Self {
+            problem,
+            factor,
+            goal,
+            watch,
+            krylov,
+            capacity,
+            steps: 0,
+            at_start,
+            complete: false,
+            tested: 0,
+            saved: 0,
+            asked: goal.tolerance,
+            least_excess: f64::INFINITY,
+        }
+    }
+
+    /// Expands the basis by a block, unless it spans all there is.
+    fn expand(&mut self, counters: &mut Counters) {
+        let Self { krylov, goal, .. } = self;
+        if krylov.exhausted() {
+            // An invariant subspace: go on with new directions, or everything is found.
+            krylov.append_random(goal.block.min(krylov.room()), counters);
+        }
+        self.complete = krylov.exhausted();
+        if !self.complete && !self.at_start {
+            krylov.step(counters);
+            self.steps += 1;
+        }
+    }
+
+    /// The shift to use instead of this one, once the lowest Ritz value tells.
+    fn better_shift(&self, counters: &mut Counters) -> Result<Option<f64>, EigenFailure> {
+        if self.steps != STEPS_TO_JUDGE {
+            return Ok(None);
+        }
+        better_shift(self.problem, &self.krylov, self.factor, self.goal.wanted, counters)
+    }
+
+    /// Whether no further step fits before a restart.
+    fn is_full(&self) -> bool {
+        self.krylov.room() < self.goal.block
+    }
+
+    /// Whether the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100 vectors or so not after
+    /// every step.
+    fn is_test_due(&mut self) -> bool {
+        let size = self.krylov.projected();
+        let small = size < self.goal.wanted + 1 || size < self.tested + self.tested / 25;
+        // What was taken up is a start no more, tested or not.
+        if !(self.complete || self.is_full()) && small {
+            self.at_start = false;
+            return false;
+        }
+        self.tested = size;
+        true
+    }
+
+    /// Solves the projected eigenproblem, and sees which Ritz pairs are modes.
+    fn test(&self) -> Result<Ritz, EigenFailure> {
+        let (krylov, wanted, tau) = (&self.krylov, self.goal.wanted, self.factor.shift());
+        let size = krylov.projected();
+        let found = descending(krylov)?;
+        if found.values.first().is_some_and(|&theta| theta < -1e-8 * found.values[size - 1].abs()) {
             return Err(EigenFailure::MassIndefinite);
         }
-        let theta: Vec<f64> = ritz.values.iter().rev().copied().collect();
-        let lambda = |i: usize| 1.0 / theta[i] - tau;
-        let s = Mat::from_fn(size, size, |i, j| ritz.vectors[(i, size - 1 - j)]);
+        let theta: Vec<f64> = found.values.iter().rev().copied().collect();
+        let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, size - 1 - j)]);
         let norms = krylov.residual_norms(s.as_ref());
-        let good = |i: usize, tol: f64| norms[i] <= tol * theta[i];
-        let last = cluster_end(wanted, size, cluster_gap, lambda);
-        // K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with M-norms
-        // for the Euclidean ones.
-        let estimate = |i: usize| 0.5 * norms[i] / (theta[i] * (1.0 - tau * theta[i]).max(SMALLEST_PART));
-        let converged = (0..last).take_while(|&i| complete || estimate(i) <= asked).count();
-        // One more, as well as the gap below it needs: it shows that the cluster of the last mode has ended.
-        let beyond = complete
-            || (last < size && {
-                let gap = if last > 0 { theta[last - 1] - theta[last] } else { f64::MAX };
-                good(last, 1e-3) && norms[last] <= 0.1 * gap
-            });
-        watch(Event::Fraction(converged as f64 / wanted.max(1) as f64));
-        if at_start {
-            saved = converged;
-        } else if converged > 0
-            && !rough
-            && (converged >= saved + SAVED_AFTER.max(wanted / 4) || (converged == last && beyond))
-        {
+        let last = cluster_end(wanted, size, self.goal.cluster_gap, |i| 1.0 / theta[i] - tau);
+        let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
+        let is_mode = |i: &usize| self.complete || ritz.estimate(*i) <= self.asked;
+        let converged = (0..last).take_while(is_mode).count();
+        ritz.converged = converged;
+        ritz.beyond = self.complete || ritz.shows_gap();
+        (self.watch)(Event::Fraction(converged as f64 / wanted.max(1) as f64));
+        Ok(ritz)
+    }
+
+    /// Saves the search when enough modes have converged since the last time.
+    fn save(&mut self, ritz: &Ritz) {
+        let converged = ritz.converged;
+        if std::mem::take(&mut self.at_start) {
+            self.saved = converged;
+            return;
+        }
+        let many = self.saved + SAVED_AFTER.max(self.goal.wanted / 4);
+        if converged > 0 && !self.goal.rough && (converged >= many || ritz.all_there()) {
             // All Ritz vectors: with a third of those that are no modes yet, 60 modes after 20 take 36 columns more.
-            problem.resume.save(|| snapshot(&krylov, s.as_ref(), &theta, (tau, converged)));
-            saved = converged;
+            self.problem
+                .resume
+                .save(|| snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged)));
+            self.saved = converged;
         }
-        if converged == last && beyond && rough && !complete {
+    }
+
+    /// Hands the modes over when they are there and keep what was asked for; else more is asked of the estimates.
+    fn hand_over(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<Search>, EigenFailure> {
+        if !ritz.all_there() {
+            return Ok(None);
+        }
+        let (size, last) = (ritz.size(), ritz.last);
+        let iterated = |count: usize| {
+            self.krylov.inverse_iterated(ritz.s.as_ref().subcols(0, count), &ritz.theta[..count])
+        };
+        if self.goal.rough && !self.complete {
             // Half as many again: what the corrections would have to find of the next modes is then there.
-            let count = (last + last / 2 + 2 * block).min(size);
-            let vectors = krylov.inverse_iterated(s.as_ref().subcols(0, count), &theta[..count]);
-            return Ok(Search::Rough { vectors, wanted: last });
+            let vectors = iterated((last + last / 2 + 2 * self.goal.block).min(size));
+            return Ok(Some(Search::Rough { vectors, wanted: last }));
         }
-        if converged == last && beyond {
-            let x = krylov.inverse_iterated(s.as_ref().subcols(0, last), &theta[..last]);
-            let modes = Refined::new(problem, x, counters)?;
-            let excess = modes.excess(tolerance);
-            // Another step costs a block, the refinement a column for each mode that needs it.
-            if excess <= 1.0 || complete || excess > 0.5 * least_excess {
-                let next = (last..size).take_while(|&i| complete || good(i, 1e-2)).map(lambda).collect();
-                return Ok(Search::Found { modes, next });
-            }
-            least_excess = excess;
-            asked /= 1.2 * excess;
+        let modes = Refined::new(self.problem, iterated(last), counters)?;
+        let excess = modes.excess(self.goal.tolerance);
+        // Another step costs a block, the refinement a column for each mode that needs it.
+        let gains_nothing = excess.is_nan() || excess > 0.5 * self.least_excess;
+        if excess <= 1.0 || self.complete || gains_nothing {
+            let is_known = |i: &usize| self.complete || ritz.is_good(*i, 1e-2);
+            let next = (last..size).take_while(is_known).map(|i| ritz.lambda(i)).collect();
+            return Ok(Some(Search::Found { modes, next }));
         }
-        if complete || counters.restarts >= MAX_RESTARTS {
-            return Err(EigenFailure::NotConverged { converged, wanted });
+        self.least_excess = excess;
+        self.asked /= 1.2 * excess;
+        Ok(None)
+    }
+
+    /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better start anew.
+    ///
+    /// # Errors
+    /// [`EigenFailure::NotConverged`] when there is nothing left to search in, or after too many restarts.
+    fn restart(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<f64>, EigenFailure> {
+        let Ritz { last, converged, .. } = *ritz;
+        if self.complete || counters.restarts >= MAX_RESTARTS {
+            return Err(EigenFailure::NotConverged { converged, wanted: self.goal.wanted });
         }
-        if full {
-            if let Some(shift) = suited_shift(lambda(0), lambda(last.max(1) - 1), tau) {
-                return Ok(Search::ShiftTooLarge(shift));
-            }
-            counters.restarts += 1;
-            let keep = (last + (capacity - last) / 3).min(size.saturating_sub(block));
-            krylov.restart(s.as_ref().subcols(0, keep), &theta[..keep]);
-            checked = 0;
+        if !self.is_full() {
+            return Ok(None);
         }
+        if let Some(shift) = suited_shift(ritz.lambda(0), ritz.lambda(last.max(1) - 1), ritz.tau) {
+            return Ok(Some(shift));
+        }
+        counters.restarts += 1;
+        let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.goal.block));
+        self.krylov.restart(ritz.s.as_ref().subcols(0, keep), &ritz.theta[..keep]);
+        self.tested = 0;
+        Ok(None)
     }
 }
 

@@ -4,29 +4,37 @@
 mod bounds;
 mod canonical;
 mod completeness;
+mod counters;
 mod dense;
+mod factorise;
+mod failure;
 mod krylov;
 mod lanczos;
 mod noise;
 mod plan;
 mod problem;
 mod refine;
+mod resume;
+mod settings;
 mod single;
+mod solution;
 mod solve;
 mod span;
 mod start;
 mod static_response;
+mod zero_energy;
 
 pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
+pub use counters::Counters;
+pub use failure::EigenFailure;
 pub use noise::{energy_noise, rounding_residual};
-pub use plan::{FactorChoice, Plan, Precision};
-pub use problem::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
-    Wanted,
-};
+pub use plan::Plan;
+pub use problem::EigenProblem;
 pub use refine::{relative_residual, residual_scale};
+pub use resume::{Resume, Save, Snapshot};
+pub use settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
+pub use solution::{EigenSolution, EigenvalueBounds};
 pub use solve::solve;
 pub use span::modes_of_span;
-pub use start::{Resume, Save, Snapshot};
 pub use static_response::{static_responses, static_responses_twice};

@@ -1,35 +1,9 @@
 //! Memory and precision, decided before the work: the symbolic analysis knows what a factor needs.
 
-use super::problem::{Accuracy, EigenFailure, EigenProblem, EigenSettings};
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
+use super::settings::{Accuracy, EigenSettings, FactorChoice, Precision};
 use crate::numerics::linalg::{Analysis, Peaks};
-
-/// Numbers of the factor that the search solves with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    /// f64.
-    Double,
-    /// f32, with all residuals and projections in f64: half the memory, and half the time where factorisation dominates.
-    Single,
-}
-
-impl Precision {
-    /// Bytes of a number.
-    fn bytes(self) -> u64 {
-        match self {
-            Self::Double => 8,
-            Self::Single => 4,
-        }
-    }
-}
-
-/// What the user says about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FactorChoice {
-    /// Single where double does not fit the memory, or where it is faster; back to double where conditioning defeats it.
-    Auto,
-    /// This one.
-    Always(Precision),
-}
 
 /// What was decided, and what it needs.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,10 @@
 //! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals.
 
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::noise::rounding_residual;
-use super::problem::{Counters, EigenFailure, EigenProblem};
-use crate::numerics::linalg::{Solve, combine, gram, subtract_combination, symmetric_eigen};
+use super::problem::EigenProblem;
+use crate::numerics::linalg::{Solve, combine, gram, largest, subtract_combination, symmetric_eigen};
 use faer::{ColRef, Mat, MatRef};
 
 /// Refined modes with their products.
@@ -126,10 +128,11 @@ pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f6
     k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
 }
 
-/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros.
+/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros, NaN for one
+/// that is no number.
 pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
     let scale = residual_scale(k_psi, m_psi, lambda);
-    if scale > 0.0 { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale } else { 0.0 }
+    if scale == 0.0 { 0.0 } else { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale }
 }
 
 impl Refined {
@@ -153,9 +156,9 @@ impl Refined {
         self.residuals[i] / tolerance.max(self.floors[i])
     }
 
-    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors.
+    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors; NaN when one is no number.
     pub(super) fn excess(&self, tolerance: f64) -> f64 {
-        (0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)).fold(0.0, f64::max)
+        largest((0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)))
     }
 }
 
@@ -170,7 +173,8 @@ pub(super) fn refine(
 ) -> Result<Refined, EigenFailure> {
     for round in 0..3 {
         let least = best.excess(tolerance);
-        if least <= 1.0 {
+        // No inverse iteration makes a number of what is none.
+        if least.is_nan() || least <= 1.0 {
             break;
         }
         let poor: Vec<usize> =
@@ -186,7 +190,7 @@ pub(super) fn refine(
         if excess < least {
             best = refined;
         }
-        if excess > 0.5 * least {
+        if excess.is_nan() || excess > 0.5 * least {
             break;
         }
     }

@@ -7,13 +7,17 @@
 //! digits again for one solved column, where refining every solve of Lanczos would cost several.
 
 use super::canonical::cluster_end;
-use super::lanczos::{self, Goal, Search, factorise};
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::counters::Counters;
+use super::factorise::{Attempt, with_suited_shift};
+use super::failure::EigenFailure;
+use super::lanczos::{self, Goal, Search};
+use super::problem::EigenProblem;
 use super::refine::{Refined, relative_residual, residuals, small_ritz};
-use super::start::{Snapshot, first_shift, fitting_start};
+use super::resume::Snapshot;
+use super::start::fitting_start;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{
-    Analysis, Cholesky, Solve, add_combination, combine, gram, subtract_combination,
+    Analysis, Cholesky, Solve, add_combination, combine, gram, largest, subtract_combination,
 };
 use faer::{Mat, MatRef};
 
@@ -42,27 +46,23 @@ pub(super) fn search(
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
     let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, ..*goal };
     let start = fitting_start(problem, goal.attempt).filter(|start| start.converged >= goal.wanted);
-    let mut tau = first_shift(problem, start);
-    loop {
-        watch(Event::Phase("factorisation"));
-        let factor: Cholesky<'_, f32> = factorise(problem, analysis, tau, counters)?;
-        watch(Event::Phase("modes"));
-        let (vectors, wanted) = if let Some(start) = start {
-            counters.taken_up = start.eigenvalues.len() as u64;
-            (start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned(), goal.wanted)
-        } else {
-            match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
-                Search::ShiftTooLarge(shift) => {
-                    tau = shift;
-                    continue;
-                }
-                Search::Found { modes, next } => return Ok((modes, next, tau)),
-                Search::Rough { vectors, wanted } => (vectors, wanted),
+    let search = |factor: &Cholesky<'_, f32>, start: Option<&Snapshot>, counters: &mut Counters| {
+        let (vectors, wanted) = match start {
+            Some(start) => {
+                counters.taken_up = start.eigenvalues.len() as u64;
+                (start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned(), goal.wanted)
             }
+            None => match lanczos::lowest_modes(problem, factor, &rough, None, watch, counters)? {
+                Search::ShiftTooLarge(shift) => return Ok(Attempt::ShiftTooLarge(shift)),
+                Search::Found { modes, next } => return Ok(Attempt::Done((modes, next))),
+                Search::Rough { vectors, wanted } => (vectors, wanted),
+            },
         };
-        let (modes, next) = correct(problem, &factor, vectors, wanted, goal, watch, counters)?;
-        return Ok((modes, next, tau));
-    }
+        let corrected = Correction::begin(problem, factor, goal, vectors, wanted, watch, counters)?;
+        corrected.run(counters).map(Attempt::Done)
+    };
+    let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
+    Ok((modes, next, tau))
 }
 
 /// Vectors with their products.
@@ -99,77 +99,144 @@ impl Span {
     }
 }
 
-/// Corrects the span of `x` until its lowest `wanted` Ritz pairs keep the tolerance, and the end of their cluster is seen.
-fn correct(
-    problem: &EigenProblem<'_>,
-    factor: &dyn Solve,
-    mut x: Mat<f64>,
-    mut wanted: usize,
-    goal: &Goal,
-    watch: Watch<'_>,
-    counters: &mut Counters,
-) -> Result<(Refined, Vec<f64>), EigenFailure> {
-    let m_rigid = problem.pencil.apply_mass(problem.rigid);
-    let along = gram(m_rigid.as_ref(), x.as_ref());
-    subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
-    let mut span = Span::new(problem, x, counters);
-    let gram_of = |x: &Mat<f64>, y: &Mat<f64>| gram(x.as_ref(), y.as_ref());
-    let (mut lambda, coefficients) = small_ritz(gram_of(&span.x, &span.mx), gram_of(&span.x, &span.kx))?;
-    span.combine(coefficients.as_ref());
-    // The span keeps earlier corrections until it has twice this size: with them the last modes take half the columns.
-    let base = lambda.len();
-    let (mut least, mut since, mut converged) = (f64::INFINITY, 0, 0);
-    let mut floors = Vec::new();
-    for _ in 0..MAX_ROUNDS {
-        wanted = cluster_end(wanted, lambda.len(), goal.cluster_gap, |i| lambda[i]);
-        let looked = (wanted + 1).min(lambda.len());
-        if floors.len() < looked {
+/// A span of vectors that is corrected until its lowest Ritz pairs keep the tolerance, and the end of their cluster is seen.
+struct Correction<'a> {
+    problem: &'a EigenProblem<'a>,
+    factor: &'a dyn Solve,
+    goal: &'a Goal,
+    watch: Watch<'a>,
+    /// M times the rigid modes.
+    m_rigid: Mat<f64>,
+    /// Ritz vectors, and their values, ascending.
+    span: Span,
+    lambda: Vec<f64>,
+    /// The span keeps earlier corrections until it has twice this size: with them the last modes take half the columns.
+    base: usize,
+    /// Modes wanted, to the end of the cluster of the last one.
+    wanted: usize,
+    /// Those that keep the tolerance.
+    converged: usize,
+    /// Rounding floors of the pairs that are looked at.
+    floors: Vec<f64>,
+    /// Least excess so far, and the rounds since.
+    least: f64,
+    since: usize,
+}
+
+impl<'a> Correction<'a> {
+    /// Ritz pairs of the span of `x`.
+    fn begin(
+        problem: &'a EigenProblem<'a>,
+        factor: &'a dyn Solve,
+        goal: &'a Goal,
+        mut x: Mat<f64>,
+        wanted: usize,
+        watch: Watch<'a>,
+        counters: &mut Counters,
+    ) -> Result<Self, EigenFailure> {
+        let m_rigid = problem.pencil.apply_mass(problem.rigid);
+        let along = gram(m_rigid.as_ref(), x.as_ref());
+        subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
+        let mut span = Span::new(problem, x, counters);
+        let (gm, gk) = (products(&span.x, &span.mx), products(&span.x, &span.kx));
+        let (lambda, coefficients) = small_ritz(gm, gk)?;
+        span.combine(coefficients.as_ref());
+        Ok(Self {
+            problem,
+            factor,
+            goal,
+            watch,
+            m_rigid,
+            span,
+            base: lambda.len(),
+            lambda,
+            wanted,
+            converged: 0,
+            floors: Vec::new(),
+            least: f64::INFINITY,
+            since: 0,
+        })
+    }
+
+    /// The modes, and the eigenvalue after them.
+    fn run(mut self, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
+        for _ in 0..MAX_ROUNDS {
+            let excess = self.excess(counters);
+            self.converged = excess[..self.wanted].iter().filter(|e| **e <= 1.0).count();
+            let poor: Vec<usize> =
+                (0..excess.len()).filter(|&i| excess[i].is_nan() || excess[i] > 1.0).collect();
+            (self.watch)(Event::Fraction(1.0 - poor.len() as f64 / excess.len() as f64));
+            if poor.is_empty() {
+                return self.hand_over(excess.len(), counters);
+            }
+            if !self.gains(largest(excess)) {
+                break;
+            }
+            self.extend(&poor, counters)?;
+        }
+        Err(EigenFailure::NotConverged { converged: self.converged, wanted: self.wanted })
+    }
+
+    /// Residuals of the wanted pairs and the one after them, in units of what they may have.
+    fn excess(&mut self, counters: &mut Counters) -> Vec<f64> {
+        let Self { problem, goal, span, lambda, .. } = self;
+        self.wanted = cluster_end(self.wanted, lambda.len(), goal.cluster_gap, |i| lambda[i]);
+        let looked = (self.wanted + 1).min(lambda.len());
+        if self.floors.len() < looked {
             let lowest = span.x.as_ref().subcols(0, looked);
-            floors = residuals(problem, &lambda[..looked], lowest, counters).1;
+            self.floors = residuals(problem, &lambda[..looked], lowest, counters).1;
         }
-        let excess: Vec<f64> = (0..looked)
-            .map(|j| {
-                let allowed = if j < wanted { goal.tolerance.max(floors[j]) } else { BEYOND };
-                relative_residual(span.kx.col(j), span.mx.col(j), lambda[j]) / allowed
-            })
-            .collect();
-        converged = excess[..wanted].iter().filter(|e| **e <= 1.0).count();
-        let poor: Vec<usize> = (0..looked).filter(|&i| excess[i] > 1.0).collect();
-        watch(Event::Fraction(1.0 - poor.len() as f64 / looked as f64));
-        if poor.is_empty() {
-            let next = lambda[wanted..looked].to_vec();
-            problem.resume.save(|| Snapshot {
-                shift: factor.shift(),
-                eigenvalues: lambda.clone(),
-                basis: span.x.clone(),
-                coupling: Mat::zeros(0, lambda.len()),
-                converged: wanted,
-            });
-            return Ok((
-                Refined::new(problem, span.x.as_ref().subcols(0, wanted).to_owned(), counters)?,
-                next,
-            ));
-        }
-        let worst = excess.iter().fold(0.0f64, |m, e| if e.is_nan() { f64::NAN } else { m.max(*e) });
-        if worst < 0.5 * least {
-            (least, since) = (worst, 0);
+        let excess = |j: usize| {
+            let allowed = if j < self.wanted { goal.tolerance.max(self.floors[j]) } else { BEYOND };
+            relative_residual(span.kx.col(j), span.mx.col(j), lambda[j]) / allowed
+        };
+        (0..looked).map(excess).collect()
+    }
+
+    /// Keeps the search, and hands its modes out.
+    fn hand_over(self, looked: usize, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
+        let Self { problem, factor, span, lambda, wanted, .. } = self;
+        let next = lambda[wanted..looked].to_vec();
+        problem.resume.save(|| Snapshot {
+            shift: factor.shift(),
+            eigenvalues: lambda.clone(),
+            basis: span.x.clone(),
+            coupling: Mat::zeros(0, lambda.len()),
+            converged: wanted,
+        });
+        let modes = Refined::new(problem, span.x.as_ref().subcols(0, wanted).to_owned(), counters)?;
+        Ok((modes, next))
+    }
+
+    /// Whether corrections are worth going on with when the largest excess is `worst`.
+    fn gains(&mut self, worst: f64) -> bool {
+        if worst < 0.5 * self.least {
+            (self.least, self.since) = (worst, 0);
         } else {
-            since += 1;
+            self.since += 1;
         }
-        if since > PATIENCE || worst.is_nan() {
-            break;
-        }
-        let new = corrections(problem, factor, &span, &poor, &lambda, m_rigid.as_ref(), counters);
+        self.since <= PATIENCE && !worst.is_nan()
+    }
+
+    /// Adds corrections of some pairs to the span, and takes its Ritz pairs.
+    fn extend(&mut self, poor: &[usize], counters: &mut Counters) -> Result<(), EigenFailure> {
+        let Self { problem, factor, m_rigid, span, lambda, base, .. } = self;
+        let new = corrections(problem, *factor, span, poor, lambda, m_rigid.as_ref(), counters);
         // X' M X = I and X' K X = Lambda hold already.
         let ones = vec![1.0; lambda.len()];
-        let gm = bordered(&ones, &gram_of(&span.x, &new.mx), &gram_of(&new.x, &new.mx));
-        let gk = bordered(&lambda, &gram_of(&span.x, &new.kx), &gram_of(&new.x, &new.kx));
+        let gm = bordered(&ones, &products(&span.x, &new.mx), &products(&new.x, &new.mx));
+        let gk = bordered(lambda, &products(&span.x, &new.kx), &products(&new.x, &new.kx));
         let (values, coefficients) = small_ritz(gm, gk)?;
-        let kept = if values.len() <= 2 * base { values.len() } else { base };
+        let kept = if values.len() <= 2 * *base { values.len() } else { *base };
         span.combine_with(&new, coefficients.as_ref().subcols(0, kept));
-        lambda = values[..kept].to_vec();
+        *lambda = values[..kept].to_vec();
+        Ok(())
     }
-    Err(EigenFailure::NotConverged { converged, wanted })
+}
+
+/// X' Y.
+fn products(x: &Mat<f64>, y: &Mat<f64>) -> Mat<f64> {
+    gram(x.as_ref(), y.as_ref())
 }
 
 /// [diag(a), B; B', C].

@@ -1,19 +1,22 @@
 //! The one entry: chooses the method, refines, counts, puts into canonical form.
 
 use super::bounds::enclose;
-use super::canonical::{canonical_basis, cluster_end, clusters};
+use super::canonical::{CLUSTER_GAP, canonical_basis, cluster_end, clusters};
 use super::completeness::{Completeness, Proof, count_below};
+use super::counters::Counters;
 use super::dense;
-use super::lanczos::{self, BLOCK, Goal, NOISE_FACTOR};
-use super::noise::energy_noise;
-use super::plan::{FactorChoice, Plan, Precision, gigabytes};
-use super::problem::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method,
-    Wanted,
-};
+use super::factorise::{Attempt, with_suited_shift};
+use super::failure::EigenFailure;
+use super::lanczos::{self, BLOCK, Goal};
+use super::plan::{Plan, gigabytes};
+use super::problem::EigenProblem;
 use super::refine::{Refined, refine, residuals as residuals_of};
+use super::resume::Snapshot;
+use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted, keeps};
 use super::single;
-use super::start::{Snapshot, first_shift, fitting_start};
+use super::solution::{EigenSolution, EigenvalueBounds};
+use super::start::{first_shift, fitting_start};
+use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 use faer::Mat;
@@ -30,9 +33,6 @@ const DENSE_PART: f64 = 0.2;
 /// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one: a digit.
 const FAR: f64 = 0.1;
 
-/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
-pub(super) const CLUSTER_GAP: f64 = 1e-9;
-
 /// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
 /// residuals, up to the root of m times the largest.
 const SEARCHED: f64 = 0.4;
@@ -47,60 +47,21 @@ pub fn solve(
     watch: Watch<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
     let mut counters = Counters::default();
-    let pencil = &problem.pencil;
-    watch(Event::Phase("ordering"));
-    let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
-    counters.factor_len = analysis.factor_len() as u64;
-    counters.factor_flops = analysis.flops() as u64;
-    if !is_positive_semidefinite(pencil.mass(), &analysis) {
-        return Err(EigenFailure::MassIndefinite);
-    }
-    let rigid = problem.rigid.ncols();
-    let available = pencil.n() - rigid;
-    let wanted = match settings.wanted {
-        Wanted::Lowest(count) => count.min(available),
-        Wanted::Below(lambda) => {
-            watch(Event::Phase("counting modes"));
-            count_below(problem, &analysis, lambda, &mut counters)?.saturating_sub(rigid)
-        }
-    };
-    let dense = match settings.method {
-        Method::Dense => true,
-        Method::Lanczos => false,
-        Method::Auto => {
-            pencil.n() <= DENSE_ALWAYS
-                || (pencil.n() <= DENSE_AT_MOST && wanted as f64 > DENSE_PART * available as f64)
-        }
-    };
+    let analysis = analyse(problem, watch, &mut counters)?;
+    let wanted = count_wanted(problem, settings, &analysis, watch, &mut counters)?;
+    let dense = is_dense(problem, settings, wanted);
     let plan = Plan::new(problem, settings, &analysis, wanted, dense)?;
     let tolerance = SEARCHED * settings.accuracy.residual();
     let mut sparse = Sparse { problem, settings, analysis: &analysis, plan };
-    let (mut search, finite_modes) = if dense {
+    let (search, finite_modes) = if dense {
         let (search, finite) = search_densely(problem, wanted, tolerance, watch, &mut counters)?;
         (search, Some(finite))
     } else {
         watch(Event::Plan(&sparse.plan.to_string()));
         (sparse.search(wanted, 0, watch, &mut counters)?, None)
     };
-    let mut completeness = prove(&sparse, &search, watch, &mut counters)?;
-    let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
-    if missed > 0 {
-        // Once more, from other directions and for as many modes as there are.
-        search = sparse.search(wanted + missed, 1, watch, &mut counters)?;
-        completeness = prove(&sparse, &search, watch, &mut counters)?;
-    }
-    let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
-    if found != counted {
-        return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
-    }
-    let bounds = if settings.accuracy == Accuracy::Certified && found > 0 {
-        watch(Event::Phase("bounds"));
-        let (modes, values) = (&search.refined.vectors, &search.refined.eigenvalues[..found]);
-        let modes = modes.as_ref().subcols(0, found);
-        Some(enclose(problem, &analysis, modes, values, completeness.shift, CLUSTER_GAP, &mut counters)?)
-    } else {
-        None
-    };
+    let (search, completeness) = complete(&mut sparse, search, wanted, watch, &mut counters)?;
+    let bounds = bounds(&sparse, &search, &completeness, watch, &mut counters)?;
     let plan = (!dense).then_some(sparse.plan);
     finish(
         problem,
@@ -110,6 +71,98 @@ pub fn solve(
         (plan, finite_modes),
         counters,
     )
+}
+
+/// The order of elimination, and whether M is a mass at all.
+fn analyse(
+    problem: &EigenProblem<'_>,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Analysis, EigenFailure> {
+    watch(Event::Phase("ordering"));
+    let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
+    counters.factor_len = analysis.factor_len() as u64;
+    counters.factor_flops = analysis.flops() as u64;
+    if !is_positive_semidefinite(problem.pencil.mass(), &analysis) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    Ok(analysis)
+}
+
+/// How many modes are wanted, of those that there may be.
+fn count_wanted(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    analysis: &Analysis,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<usize, EigenFailure> {
+    match settings.wanted {
+        Wanted::Lowest(count) => Ok(count.min(flexible_rows(problem))),
+        Wanted::Below(lambda) => {
+            watch(Event::Phase("counting modes"));
+            Ok(count_below(problem, analysis, lambda, counters)?.saturating_sub(problem.rigid.ncols()))
+        }
+    }
+}
+
+/// As many modes as there are beside rigid motion, at the most.
+fn flexible_rows(problem: &EigenProblem<'_>) -> usize {
+    problem.pencil.n() - problem.rigid.ncols()
+}
+
+/// Whether the dense path finds so many modes with less work, or was asked for.
+fn is_dense(problem: &EigenProblem<'_>, settings: &EigenSettings, wanted: usize) -> bool {
+    let n = problem.pencil.n();
+    let most = || wanted as f64 > DENSE_PART * flexible_rows(problem) as f64;
+    match settings.method {
+        Method::Dense => true,
+        Method::Lanczos => false,
+        Method::Auto => n <= DENSE_ALWAYS || (n <= DENSE_AT_MOST && most()),
+    }
+}
+
+/// The proof that no mode is missing; where one is, it is searched for once more, from other directions and for as many modes as
+/// there are.
+fn complete(
+    sparse: &mut Sparse<'_>,
+    mut search: Search,
+    wanted: usize,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<(Search, Completeness), EigenFailure> {
+    let rigid = sparse.problem.rigid.ncols();
+    let mut completeness = prove(sparse, &search, watch, counters)?;
+    let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
+    if missed > 0 {
+        search = sparse.search(wanted + missed, 1, watch, counters)?;
+        completeness = prove(sparse, &search, watch, counters)?;
+    }
+    let (found, counted) = (completeness.modes_below, completeness.counted(rigid));
+    if found != counted {
+        return Err(EigenFailure::CountDiffers { found, counted, shift: completeness.shift });
+    }
+    Ok((search, completeness))
+}
+
+/// Guaranteed bounds of the eigenvalues that were counted, where they are asked for.
+fn bounds(
+    sparse: &Sparse<'_>,
+    search: &Search,
+    completeness: &Completeness,
+    watch: Watch<'_>,
+    counters: &mut Counters,
+) -> Result<Option<EigenvalueBounds>, EigenFailure> {
+    let Sparse { problem, settings, analysis, .. } = sparse;
+    let found = completeness.modes_below;
+    if settings.accuracy != Accuracy::Certified || found == 0 {
+        return Ok(None);
+    }
+    watch(Event::Phase("bounds"));
+    let Refined { vectors, eigenvalues, .. } = &search.refined;
+    let modes = vectors.as_ref().subcols(0, found);
+    enclose(problem, analysis, modes, &eigenvalues[..found], completeness.shift, CLUSTER_GAP, counters)
+        .map(Some)
 }
 
 /// Modes as a method found them.
@@ -214,41 +267,18 @@ fn search_in_double(
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    let mut start = fitting_start(problem, goal.attempt);
-    let mut tau = first_shift(problem, start);
-    loop {
-        watch(Event::Phase("factorisation"));
-        let factor: Cholesky<'_, f64> = lanczos::factorise(problem, analysis, tau, counters)?;
-        watch(Event::Phase("modes"));
-        match lanczos::lowest_modes(problem, &factor, goal, start, watch, counters)? {
+    let start = fitting_start(problem, goal.attempt);
+    let search = |factor: &Cholesky<'_, f64>, start: Option<&Snapshot>, counters: &mut Counters| {
+        match lanczos::lowest_modes(problem, factor, goal, start, watch, counters)? {
             lanczos::Search::Found { modes, next } => {
-                return Ok((refine(problem, &factor, modes, goal.tolerance, counters)?, next, tau));
+                Ok(Attempt::Done((refine(problem, factor, modes, goal.tolerance, counters)?, next)))
             }
-            lanczos::Search::ShiftTooLarge(shift) => (tau, start) = (shift, None),
+            lanczos::Search::ShiftTooLarge(shift) => Ok(Attempt::ShiftTooLarge(shift)),
             lanczos::Search::Rough { .. } => unreachable!("not asked for"),
         }
-    }
-}
-
-/// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
-pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
-    let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
-    let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
-    if let Some(&lambda) = refined.eigenvalues.first()
-        && lambda < -NOISE_FACTOR * noise[0]
-    {
-        let vector = refined.vectors.as_ref().subcols(0, 1).to_owned();
-        return Err(EigenFailure::NegativeEigenvalue { eigenvalue: lambda, vector });
-    }
-    let count = refined.eigenvalues.iter().zip(&noise).take_while(|(l, n)| **l <= NOISE_FACTOR * **n).count();
-    if count > 0 {
-        return Err(EigenFailure::ZeroEnergy {
-            count,
-            eigenvalues: refined.eigenvalues[..count].to_vec(),
-            vectors: refined.vectors.as_ref().subcols(0, count).to_owned(),
-        });
-    }
-    Ok(())
+    };
+    let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
+    Ok((modes, next, tau))
 }
 
 /// The inertia count in the gap above the last mode.
@@ -291,11 +321,6 @@ fn prove(
         modes_below: below,
         remark: String::new(),
     })
-}
-
-/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
-pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
-    residual <= tolerance.max(30.0 * floor)
 }
 
 /// Canonical form, the wanted number of modes, residuals of what is handed out.

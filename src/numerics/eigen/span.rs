@@ -2,12 +2,16 @@
 //! out to be eigenvectors. Nothing is factored unless that count is made.
 
 use super::bounds::enclose;
-use super::canonical::{canonical_basis, clusters};
+use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
 use super::completeness::{Completeness, Proof, count_below};
+use super::counters::Counters;
+use super::failure::EigenFailure;
 use super::plan::{Plan, gigabytes};
-use super::problem::{Accuracy, Counters, EigenFailure, EigenProblem, EigenSettings, EigenSolution, Wanted};
+use super::problem::EigenProblem;
 use super::refine::{Refined, residuals as residuals_of};
-use super::solve::{CLUSTER_GAP, check_zero_energy, keeps};
+use super::settings::{Accuracy, EigenSettings, Wanted, keeps};
+use super::solution::EigenSolution;
+use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, is_positive_semidefinite};
 use faer::Mat;
@@ -34,6 +38,52 @@ pub fn modes_of_span(
     let mut counters = Counters::default();
     let refined = Refined::new(problem, basis, &mut counters)?;
     check_zero_energy(problem, &refined)?;
+    let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, &mut counters);
+    let exact = modes.exact(settings.accuracy);
+    let analysis = (exact > 0 && settings.accuracy != Accuracy::Fast).then(|| {
+        watch(Event::Phase("completeness"));
+        Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)
+    });
+    let analysis = analysis.transpose()?;
+    let completeness = match &analysis {
+        Some(analysis) => count(problem, analysis, &modes.eigenvalues[..exact], settings, &mut counters)?,
+        None => uncounted(&modes, exact, settings.accuracy),
+    };
+    let mut bounds = None;
+    if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
+        let analysis = certifiable(&modes, exact, &completeness, analysis.as_ref())
+            .map_err(|why| EigenFailure::NotCertified { why })?;
+        watch(Event::Phase("bounds"));
+        // Refuses what does not fit the memory.
+        Plan::new(problem, settings, analysis, modes.eigenvalues.len(), false)?;
+        let (vectors, high) = (modes.vectors.as_ref(), completeness.shift);
+        let found =
+            enclose(problem, analysis, vectors, &modes.eigenvalues, high, CLUSTER_GAP, &mut counters)?;
+        found.clamp(&mut modes.eigenvalues);
+        bounds = Some(found);
+    }
+    Ok(EigenSolution {
+        eigenvalues: modes.eigenvalues,
+        vectors: modes.vectors,
+        residuals: modes.residuals,
+        rounding_floors: modes.floors,
+        completeness,
+        plan: None,
+        bounds,
+        next_eigenvalue,
+        finite_modes: None,
+        shift: 0.0,
+        counters,
+    })
+}
+
+/// The modes that are wanted, in canonical form, with their residuals, and the eigenvalue after them.
+fn canonical_modes(
+    problem: &EigenProblem<'_>,
+    refined: Refined,
+    settings: &EigenSettings,
+    counters: &mut Counters,
+) -> (Refined, Option<f64>) {
     let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = refined;
     let given = match settings.wanted {
         Wanted::Lowest(count) => count.min(eigenvalues.len()),
@@ -45,63 +95,49 @@ pub fn modes_of_span(
     let groups = clusters(&eigenvalues, CLUSTER_GAP);
     canonical_basis(vectors.as_mut(), &groups);
     if groups.iter().any(|group| group.len() > 1) {
-        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
+        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), counters);
     }
     residuals.truncate(given);
     floors.truncate(given);
-    let tolerance = settings.accuracy.residual();
-    let exact = (0..given).take_while(|&i| keeps(residuals[i], floors[i], tolerance)).count();
-    let mut analysis = None;
-    let completeness = if exact == 0 || settings.accuracy == Accuracy::Fast {
-        let remark = if exact < given {
-            let others = residuals.iter().zip(&floors).filter(|(r, f)| !keeps(**r, **f, tolerance)).count();
-            format!("{others} of {given} modes of the given subspace are no eigenvectors")
-        } else {
-            "accuracy `fast` leaves the count out".to_owned()
-        };
-        let shift = eigenvalues.last().copied().unwrap_or(0.0);
-        Completeness { proof: Proof::NotProved, shift, negative_pivots: None, modes_below: given, remark }
+    (Refined { eigenvalues, vectors, residuals, floors }, next_eigenvalue)
+}
+
+impl Refined {
+    /// How many of the lowest are eigenvectors to the K-residual of `accuracy`.
+    fn exact(&self, accuracy: Accuracy) -> usize {
+        let pairs = self.residuals.iter().zip(&self.floors);
+        pairs.take_while(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()
+    }
+}
+
+/// What is known without a count.
+fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
+    let given = modes.eigenvalues.len();
+    let remark = if exact < given {
+        let pairs = modes.residuals.iter().zip(&modes.floors);
+        let others = pairs.filter(|(r, f)| !keeps(**r, **f, accuracy.residual())).count();
+        format!("{others} of {given} modes of the given subspace are no eigenvectors")
     } else {
-        watch(Event::Phase("completeness"));
-        let analysis = analysis.insert(Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?);
-        count(problem, analysis, &eigenvalues[..exact], settings, &mut counters)?
+        "accuracy `fast` leaves the count out".to_owned()
     };
-    let mut bounds = None;
-    if settings.accuracy == Accuracy::Certified && given > 0 {
-        let why = match &analysis {
-            _ if exact < given => "not every mode of the subspace is an eigenvector to a K-residual of 1e-12",
-            _ if completeness.proof == Proof::NotProved => "modes are missing in the subspace",
-            Some(analysis) => {
-                watch(Event::Phase("bounds"));
-                // Refuses what does not fit the memory.
-                Plan::new(problem, settings, analysis, given, false)?;
-                let (modes, high) = (vectors.as_ref(), completeness.shift);
-                bounds =
-                    Some(enclose(problem, analysis, modes, &eigenvalues, high, CLUSTER_GAP, &mut counters)?);
-                ""
-            }
-            None => unreachable!("a count needs the analysis"),
-        };
-        if bounds.is_none() {
-            return Err(EigenFailure::NotCertified { why });
-        }
+    let shift = modes.eigenvalues.last().copied().unwrap_or(0.0);
+    Completeness { proof: Proof::NotProved, shift, negative_pivots: None, modes_below: given, remark }
+}
+
+/// The analysis that bounds are computed with, or the reason why there are none.
+fn certifiable<'a>(
+    modes: &Refined,
+    exact: usize,
+    completeness: &Completeness,
+    analysis: Option<&'a Analysis>,
+) -> Result<&'a Analysis, &'static str> {
+    if exact < modes.eigenvalues.len() {
+        return Err("not every mode of the subspace is an eigenvector to a K-residual of 1e-12");
     }
-    if let Some(bounds) = &bounds {
-        bounds.clamp(&mut eigenvalues);
+    if completeness.proof == Proof::NotProved {
+        return Err("modes are missing in the subspace");
     }
-    Ok(EigenSolution {
-        eigenvalues,
-        vectors,
-        residuals,
-        rounding_floors: floors,
-        completeness,
-        plan: None,
-        bounds,
-        next_eigenvalue,
-        finite_modes: None,
-        shift: 0.0,
-        counters,
-    })
+    Ok(analysis.expect("a count needs the analysis"))
 }
 
 /// Counts the modes below a shift just above the last of `eigenvalues`, all of which belong to eigenvectors.

@@ -2,53 +2,9 @@
 
 use super::krylov::Krylov;
 use super::problem::EigenProblem;
-use crate::numerics::linalg::gram;
-use faer::{Mat, MatRef};
-
-/// A search as it stands: (K + tau M)^-1 M V = V Theta + F C with theta = 1 / (lambda + tau). It does not depend on how
-/// the factor was made, and a search for more modes, or for the same ones more accurately, goes on from it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {
-    /// tau.
-    pub shift: f64,
-    /// lambda of the k Ritz vectors V, ascending.
-    pub eigenvalues: Vec<f64>,
-    /// V, then the newest block F (N x (k + b)): M-orthonormal, M-orthogonal to the rigid modes.
-    pub basis: Mat<f64>,
-    /// C (b x k).
-    pub coupling: Mat<f64>,
-    /// How many of the Ritz vectors are modes at the accuracy that was asked for.
-    pub converged: usize,
-}
-
-/// Takes a snapshot whenever modes have converged.
-pub type Save<'a> = &'a (dyn Fn(&Snapshot) + Sync);
-
-/// Where a search starts, and who keeps how far it came. Neither changes what a result promises: residuals and
-/// completeness are those of the outcome, whatever the start was.
-#[derive(Clone, Copy, Default)]
-pub struct Resume<'a> {
-    /// An earlier search on the same pencil; one that does not fit the pencil is left aside.
-    pub start: Option<&'a Snapshot>,
-    /// Called in the thread of the search.
-    pub save: Option<Save<'a>>,
-}
-
-impl std::fmt::Debug for Resume<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let start = self.start.map(|snapshot| snapshot.converged);
-        f.debug_struct("Resume").field("start", &start).field("save", &self.save.is_some()).finish()
-    }
-}
-
-impl Resume<'_> {
-    /// Hands a snapshot to whoever keeps them; it is only made where there is somebody.
-    pub(super) fn save(&self, snapshot: impl FnOnce() -> Snapshot) {
-        if let Some(save) = self.save {
-            save(&snapshot());
-        }
-    }
-}
+use super::resume::Snapshot;
+use crate::numerics::linalg::{gram, largest, largest_entry};
+use faer::MatRef;
 
 /// Largest entry of V' M V - I and R' M V of a basis that is orthonormal to rounding.
 const ORTHONORMAL: f64 = 1e-9;
@@ -87,7 +43,7 @@ fn fits(problem: &EigenProblem<'_>, snapshot: &Snapshot) -> bool {
         let x = basis.as_ref().subcols(from, width);
         let mx = pencil.apply_mass(x);
         let orthonormal = off_identity(gram(basis.as_ref(), mx.as_ref()).as_ref(), from) <= ORTHONORMAL
-            && gram(problem.rigid, mx.as_ref()).norm_max() <= ORTHONORMAL;
+            && largest_entry(gram(problem.rigid, mx.as_ref()).as_ref()) <= ORTHONORMAL;
         let modes = converged.saturating_sub(from).min(width);
         let energy = gram(x, pencil.apply_stiffness(x).as_ref());
         orthonormal
@@ -101,19 +57,10 @@ fn fits(problem: &EigenProblem<'_>, snapshot: &Snapshot) -> bool {
 /// Columns of a start that are checked at a time.
 const CHECKED: usize = 16;
 
-/// Largest difference of `block` from the columns `from..` of the identity; infinite when one is no number.
+/// Largest difference of `block` from the columns `from..` of the identity; NaN when one is no number.
 fn off_identity(block: MatRef<'_, f64>, from: usize) -> f64 {
-    let mut largest = 0.0f64;
-    for j in 0..block.ncols() {
-        for i in 0..block.nrows() {
-            let off = (block[(i, j)] - f64::from(i == from + j)).abs();
-            if off.is_nan() {
-                return f64::INFINITY;
-            }
-            largest = largest.max(off);
-        }
-    }
-    largest
+    let off = |i: usize, j: usize| (block[(i, j)] - f64::from(i == from + j)).abs();
+    largest((0..block.ncols()).flat_map(|j| (0..block.nrows()).map(move |i| off(i, j))))
 }
 
 /// A snapshot of a search with the Ritz vectors S (projected x k), theta descending.

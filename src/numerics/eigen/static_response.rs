@@ -1,10 +1,12 @@
 //! Static responses of the free body: x = K^+ f on the M-orthogonal complement of given modes, by conjugate gradients
 //! that the factor of K + tau M preconditions.
 
-use super::lanczos::factorise;
+use super::counters::Counters;
+use super::factorise::factorise;
+use super::failure::EigenFailure;
 use super::noise::rounding_residual;
-use super::plan::Precision;
-use super::problem::{Counters, EigenFailure, EigenProblem};
+use super::problem::EigenProblem;
+use super::settings::Precision;
 use crate::numerics::linalg::{
     Analysis, Cholesky, Pencil, Solve, column_products, gram, side_by_side, subtract_combination,
 };

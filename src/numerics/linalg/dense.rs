@@ -1,6 +1,7 @@
 //! Dense symmetric eigenproblems of moderate size.
 
 use super::combine;
+use super::largest::largest_entry;
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltParams, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
@@ -84,7 +85,7 @@ fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     let n = a.nrows();
     let scaled = Mat::from_fn(n, n, |i, j| eigen.vectors[(i, j)] * eigen.values[j]);
     let difference = combine(a.as_ref(), eigen.vectors.as_ref()) - scaled;
-    difference.norm_max() / a.norm_max().max(f64::MIN_POSITIVE)
+    largest_entry(difference.as_ref()) / a.norm_max().max(f64::MIN_POSITIVE)
 }
 
 /// L^-1 B of a lower triangle L.

@@ -5,6 +5,7 @@ use super::factor::Analysis;
 use super::front::{
     PANEL, Trapezoid, by_rows, divide_rows, extend_add, subtract_eliminated, subtract_from_rest,
 };
+use super::largest::largest;
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
@@ -50,14 +51,11 @@ impl Inertia {
             }
             let width = pivots.width();
             let (negative, zero) = eliminate(&mut pivots, &mut rest, &mut growth);
-            let worst =
-                growth[..width].iter().fold(0.0f64, |m, g| if g.is_nan() { f64::NAN } else { m.max(*g) });
-            *count = (negative, zero, worst);
+            *count = (negative, zero, largest(growth[..width].iter().copied()));
             Ok::<_, Infallible>(Contribution { schur: rest, growth: growth.split_off(width) })
         };
         let Ok(()) = analysis.walk.up(tree, &mut counts, &visit);
-        let growth =
-            counts.iter().fold(0.0f64, |m, c| if c.2.is_nan() || m.is_nan() { f64::NAN } else { m.max(c.2) });
+        let growth = largest(counts.iter().map(|count| count.2));
         Self {
             negative: counts.iter().map(|c| c.0).sum(),
             zero: counts.iter().map(|c| c.1).sum(),

@@ -26,78 +26,22 @@ impl SparseLdl {
     ///
     /// `None` when a pivot lies below minus that: the matrix is indefinite; also when it is too large for the ordering.
     pub fn new(a: &SymmetricMatrix, floor: f64) -> Option<Self> {
-        let n = a.n();
-        let order = nested_dissection(&mut node_graph(&Pencil::new(a, a, 1))?)?;
-        let mut place = vec![0u32; n];
-        order.iter().enumerate().for_each(|(k, &row)| place[row as usize] = k as u32);
-
-        // The elimination tree and the number of entries of each column.
-        let (mut parent, mut met) = (vec![NONE; n], vec![NONE; n]);
-        let mut col_ptr = vec![0usize; n + 1];
-        for k in 0..n as u32 {
-            met[k as usize] = k;
-            for &column in a.row(order[k as usize] as usize).0 {
-                let mut i = place[column as usize];
-                while i < k && met[i as usize] != k {
-                    let at = i as usize;
-                    col_ptr[at + 1] += 1;
-                    met[at] = k;
-                    if parent[at] == NONE {
-                        parent[at] = k;
-                    }
-                    i = parent[at];
-                }
-            }
-        }
-        (0..n).for_each(|j| col_ptr[j + 1] += col_ptr[j]);
-
-        let mut end = col_ptr[..n].to_vec();
-        let (mut row_idx, mut values) = (vec![0u32; col_ptr[n]], vec![0.0; col_ptr[n]]);
-        let (mut pivots, mut sums) = (vec![0.0; n], vec![0.0; n]);
-        let (mut path, mut reach) = (Vec::new(), Vec::new());
+        let mut rows = RowByRow::new(a, Structure::new(a)?);
         let mut null_rows = Vec::new();
-        met.fill(NONE);
-        for k in 0..n {
-            met[k] = k as u32;
-            reach.clear();
-            let row = order[k] as usize;
-            let (columns, entries) = a.row(row);
-            for (&column, &value) in columns.iter().zip(entries) {
-                let mut i = place[column as usize] as usize;
-                if i > k {
-                    continue;
-                }
-                sums[i] += value;
-                while met[i] != k as u32 {
-                    path.push(i);
-                    met[i] = k as u32;
-                    i = parent[i] as usize;
-                }
-                // Taken from its end below: each path before those that it ends in.
-                reach.extend(path.drain(..).rev());
-            }
-            let diagonal = std::mem::take(&mut sums[k]);
-            let mut pivot = diagonal;
-            for &i in reach.iter().rev() {
-                let own = std::mem::take(&mut sums[i]);
-                for at in col_ptr[i]..end[i] {
-                    sums[row_idx[at] as usize] -= values[at] * own;
-                }
-                let entry = own / pivots[i];
-                pivot -= entry * own;
-                (row_idx[end[i]], values[end[i]]) = (k as u32, entry);
-                end[i] += 1;
-            }
+        for k in 0..a.n() {
+            rows.gather(k);
+            let (diagonal, pivot) = rows.eliminate(k);
             if pivot > floor * diagonal {
-                pivots[k] = pivot;
+                rows.pivots[k] = pivot;
             } else if pivot >= -floor * diagonal && diagonal >= 0.0 {
-                null_rows.push(row);
-                pivots[k] = if diagonal > 0.0 { diagonal } else { 1.0 };
+                null_rows.push(rows.structure.order[k] as usize);
+                rows.pivots[k] = if diagonal > 0.0 { diagonal } else { 1.0 };
             } else {
                 return None;
             }
         }
         null_rows.sort_unstable();
+        let RowByRow { structure: Structure { order, col_ptr, .. }, row_idx, values, pivots, .. } = rows;
         let inverse_pivots = pivots.into_iter().map(f64::recip).collect();
         Some(Self { order, col_ptr, row_idx, values, inverse_pivots, null_rows })
     }
@@ -152,6 +96,122 @@ impl SparseLdl {
         for (y, &row) in y.iter().zip(&self.order) {
             x[row as usize] = *y;
         }
+    }
+}
+
+/// What is known of L before any number of it.
+struct Structure {
+    /// Row at each place of the elimination order, and the place of each row.
+    order: Vec<u32>,
+    place: Vec<u32>,
+    /// The elimination tree.
+    parent: Vec<u32>,
+    /// Where each column of L begins.
+    col_ptr: Vec<usize>,
+}
+
+impl Structure {
+    /// `None` when the matrix is too large for the ordering.
+    fn new(a: &SymmetricMatrix) -> Option<Self> {
+        let n = a.n();
+        let order = nested_dissection(&mut node_graph(&Pencil::new(a, a, 1))?)?;
+        let mut place = vec![0u32; n];
+        order.iter().enumerate().for_each(|(k, &row)| place[row as usize] = k as u32);
+        let (mut parent, mut met) = (vec![NONE; n], vec![NONE; n]);
+        let mut col_ptr = vec![0usize; n + 1];
+        for k in 0..n as u32 {
+            met[k as usize] = k;
+            for &column in a.row(order[k as usize] as usize).0 {
+                let mut i = place[column as usize];
+                while i < k && met[i as usize] != k {
+                    let at = i as usize;
+                    col_ptr[at + 1] += 1;
+                    met[at] = k;
+                    if parent[at] == NONE {
+                        parent[at] = k;
+                    }
+                    i = parent[at];
+                }
+            }
+        }
+        (0..n).for_each(|j| col_ptr[j + 1] += col_ptr[j]);
+        Some(Self { order, place, parent, col_ptr })
+    }
+}
+
+/// The factorisation as it goes on: the columns of L grow row by row.
+struct RowByRow<'a> {
+    a: &'a SymmetricMatrix,
+    structure: Structure,
+    /// End of what is there of each column.
+    end: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+    pivots: Vec<f64>,
+    /// The row in work, zero elsewhere.
+    sums: Vec<f64>,
+    /// Columns that the row in work has entries in, against the order in which they are eliminated.
+    reach: Vec<usize>,
+    /// The row that met each column last, and the path in the tree from one entry.
+    met: Vec<u32>,
+    path: Vec<usize>,
+}
+
+impl<'a> RowByRow<'a> {
+    fn new(a: &'a SymmetricMatrix, structure: Structure) -> Self {
+        let (n, entries) = (a.n(), structure.col_ptr[a.n()]);
+        Self {
+            a,
+            end: structure.col_ptr[..n].to_vec(),
+            row_idx: vec![0; entries],
+            values: vec![0.0; entries],
+            pivots: vec![0.0; n],
+            sums: vec![0.0; n],
+            reach: Vec::new(),
+            met: vec![NONE; n],
+            path: Vec::new(),
+            structure,
+        }
+    }
+
+    /// The entries of row k of A, and which columns of L they reach.
+    fn gather(&mut self, k: usize) {
+        let Self { a, structure: Structure { order, place, parent, .. }, sums, reach, met, path, .. } = self;
+        met[k] = k as u32;
+        reach.clear();
+        let (columns, entries) = a.row(order[k] as usize);
+        for (&column, &value) in columns.iter().zip(entries) {
+            let mut i = place[column as usize] as usize;
+            if i > k {
+                continue;
+            }
+            sums[i] += value;
+            while met[i] != k as u32 {
+                path.push(i);
+                met[i] = k as u32;
+                i = parent[i] as usize;
+            }
+            // Taken from its end below: each path before those that it ends in.
+            reach.extend(path.drain(..).rev());
+        }
+    }
+
+    /// Row k of L. Returns the diagonal entry of A and what is left of it.
+    fn eliminate(&mut self, k: usize) -> (f64, f64) {
+        let Self { structure, end, row_idx, values, pivots, sums, reach, .. } = self;
+        let diagonal = std::mem::take(&mut sums[k]);
+        let mut pivot = diagonal;
+        for &i in reach.iter().rev() {
+            let own = std::mem::take(&mut sums[i]);
+            for at in structure.col_ptr[i]..end[i] {
+                sums[row_idx[at] as usize] -= values[at] * own;
+            }
+            let entry = own / pivots[i];
+            pivot -= entry * own;
+            (row_idx[end[i]], values[end[i]]) = (k as u32, entry);
+            end[i] += 1;
+        }
+        (diagonal, pivot)
     }
 }
 

@@ -1,0 +1,126 @@
+//! What is asked of the eigen-solver: which modes, how good, by which method and with what precision.
+
+/// Which modes are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wanted {
+    /// The lowest so many flexible modes.
+    Lowest(usize),
+    /// Every flexible mode with an eigenvalue below this one.
+    Below(f64),
+}
+
+/// Promises about the result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accuracy {
+    /// K-residual 1e-6; completeness is not proved.
+    Fast,
+    /// K-residual 1e-9 or the rounding floor of the matrices; completeness proved.
+    Standard,
+    /// K-residual 1e-12 or the rounding floor; completeness proved from both sides; guaranteed bounds of every eigenvalue
+    /// and, in a conversion, of the invariants.
+    Certified,
+}
+
+impl Accuracy {
+    /// K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) that is promised.
+    pub fn residual(self) -> f64 {
+        match self {
+            Self::Fast => 1e-6,
+            Self::Standard => 1e-9,
+            Self::Certified => 1e-12,
+        }
+    }
+
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Standard => "standard",
+            Self::Certified => "certified",
+        }
+    }
+}
+
+/// Which algorithm computes the modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Dense for small models or when most modes are wanted, Lanczos otherwise.
+    Auto,
+    /// Dense generalised eigenproblem.
+    Dense,
+    /// Shift-invert block Lanczos with thick restart.
+    Lanczos,
+}
+
+/// Settings of the eigen-solver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EigenSettings {
+    /// Which modes.
+    pub wanted: Wanted,
+    /// How good.
+    pub accuracy: Accuracy,
+    /// How.
+    pub method: Method,
+    /// Precision of the factor.
+    pub factor: FactorChoice,
+    /// Multiplications and additions of a factorisation above which [`FactorChoice::Auto`] tries single precision for its speed.
+    pub single_pays: f64,
+    /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
+    pub memory: Option<u64>,
+    /// Seconds that the search may take by its estimate, without the factorisation; `None`: as many as it needs.
+    pub longest: Option<f64>,
+}
+
+impl EigenSettings {
+    /// Number of modes when nothing else is said: the usual size of a modal basis.
+    pub const DEFAULT_COUNT: usize = 20;
+}
+
+impl Default for EigenSettings {
+    /// 20 modes, proved, by the method that suits the size.
+    fn default() -> Self {
+        Self {
+            wanted: Wanted::Lowest(Self::DEFAULT_COUNT),
+            accuracy: Accuracy::Standard,
+            method: Method::Auto,
+            factor: FactorChoice::Auto,
+            // Below, the columns that its corrections solve cost what the factorisation saves.
+            single_pays: 4e11,
+            memory: None,
+            longest: None,
+        }
+    }
+}
+
+/// Numbers of the factor that the search solves with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// f64.
+    Double,
+    /// f32, with all residuals and projections in f64: half the memory, and half the time where factorisation dominates.
+    Single,
+}
+
+impl Precision {
+    /// Bytes of a number.
+    pub(super) fn bytes(self) -> u64 {
+        match self {
+            Self::Double => 8,
+            Self::Single => 4,
+        }
+    }
+}
+
+/// What the user says about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FactorChoice {
+    /// Single where double does not fit the memory, or where it is faster; back to double where conditioning defeats it.
+    Auto,
+    /// This one.
+    Always(Precision),
+}
+
+/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
+pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
+    residual <= tolerance.max(30.0 * floor)
+}
