@@ -4,7 +4,7 @@ use super::arrays::{Array, Arrays, FrameArrays, largest};
 use super::parse::Listed;
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{Groups, Numbered};
-use crate::formats::import::{ForeignBody, ForeignFrame};
+use crate::formats::import::{ImportedBody, ImportedFrame};
 use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 use faer::Mat;
 use nalgebra::Vector3;
@@ -68,7 +68,7 @@ pub(crate) fn body(
     frames: Vec<FrameArrays>,
     declared: &Declared,
     spin_in_oe: bool,
-) -> (ForeignBody, Vec<String>) {
+) -> (ImportedBody, Vec<String>) {
     let nq = arrays.nq;
     let (mut notes, mut stiffness) = (Vec::new(), Vec::new());
     let i8 = |k: usize| 0.5 * (arrays.j1(k) - arrays.cr0(k).cross_matrix());
@@ -111,7 +111,7 @@ pub(crate) fn body(
     let listed_frames = listed.frames.iter().zip(frames);
     let frames = listed_frames.map(|(frame, arrays)| place(&frame.label, arrays, &mut stiffness)).collect();
     let damped = largest(&arrays.de.m0) > 0.0;
-    let body = ForeignBody {
+    let body = ImportedBody {
         name: declared.name.clone(),
         units: declared.units.clone(),
         inertia: Numbered {
@@ -207,7 +207,7 @@ fn place(
     label: &str,
     arrays: FrameArrays,
     stiffness: &mut Vec<GeometricStiffness<Mat<f64>>>,
-) -> ForeignFrame {
+) -> ImportedFrame {
     let FrameArrays { origin, phi, psi, .. } = arrays;
     let mut loaded = false;
     let mut take = |array: &Array, kind: fn(String) -> LoadKind| {
@@ -221,7 +221,7 @@ fn place(
     if let Some(psi) = &psi {
         take(psi, LoadKind::Moment);
     }
-    ForeignFrame {
+    ImportedFrame {
         label: label.to_owned(),
         interface: loaded.then(|| label.to_owned()),
         position: [0, 1, 2].map(|a| origin.m0[(a, 0)]),

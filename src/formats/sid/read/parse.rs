@@ -2,9 +2,9 @@
 
 use super::head::Head;
 use super::lines::{Line, Lines};
+use super::taylor::{ModeIndex, Taylor};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::formats::import::digits::Digits;
-use crate::formats::sid::checks::taylor::{ModeIndex, Taylor};
 use std::path::Path;
 
 /// Objects of the body in the order of the format, lower case, with other names that are in use.
