@@ -8,14 +8,14 @@ use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::base::provenance::SourceFile;
 use crate::body::verification::accept;
-use crate::formats::find_foreign;
+use crate::formats::find_import_format;
 use crate::formats::flex_body_file;
-use crate::formats::import::adopt;
+use crate::formats::import::import_body;
 use crate::input::{InputFile, parse_units};
 use crate::report::{Facts, Format, RunData, render};
 
 pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
-    let format = find_foreign(from)?;
+    let format = find_import_format(from)?;
     let Some(path) = &arguments.model else {
         let message = format!("--from {from} needs the file to convert");
         return Err(Diagnostic::new(Code::Usage, message).into());
@@ -29,7 +29,8 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
 
     let file = InputFile::open(path)?;
     let source = SourceFile::new("body", path, file.sha256());
-    let mut adopted = adopt(&format.read(&file)?, source, units).map_err(|error| error.in_file(path))?;
+    let mut adopted =
+        import_body(&format.read(&file)?, source, units).map_err(|error| error.in_file(path))?;
     if arguments.storage == StorageName::F32 {
         adopted.body = adopted.body.rounded_to_f32()?;
     }

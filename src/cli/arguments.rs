@@ -1,7 +1,7 @@
 //! What can be said on the command line.
 
-use crate::formats::FOREIGN_FORMATS;
 use crate::formats::FORMATS;
+use crate::formats::IMPORT_FORMATS;
 use crate::formats::export::ExportFormat;
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -123,7 +123,7 @@ pub struct AuditArguments {
 
 /// Names of the formats that are read.
 fn foreign_formats() -> clap::builder::PossibleValuesParser {
-    FOREIGN_FORMATS.iter().map(|format| PossibleValue::new(format.name())).collect::<Vec<_>>().into()
+    IMPORT_FORMATS.iter().map(|format| PossibleValue::new(format.name())).collect::<Vec<_>>().into()
 }
 
 /// Arguments of `trade`.

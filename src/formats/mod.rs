@@ -21,4 +21,4 @@ mod sid;
 mod simscape;
 
 pub use embedded::embedded_markdown;
-pub use registry::{FOREIGN_FORMATS, FORMATS, export, find_foreign, find_format, recognise};
+pub use registry::{FORMATS, IMPORT_FORMATS, export, find_format, find_import_format, recognise};

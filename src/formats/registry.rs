@@ -1,7 +1,7 @@
 //! Every format of other programs: those that are written, and those that are read.
 
 use super::export::{ExportFormat, ExportOptions, Exported, Points};
-use super::import::ForeignFormat;
+use super::import::ImportFormat;
 use super::{adams, chrono, embedded, json, mbdyn, npz, openradioss, sid};
 #[cfg(feature = "hdf5")]
 use super::{exudyn, mbsim, simscape};
@@ -96,9 +96,9 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
 }
 
 /// Every format, in the order in which files are recognised.
-pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] = &[
-    &sid::read::SidFile,
-    &mbdyn::read::Mbdyn,
+pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
+    &sid::import::SidFile,
+    &mbdyn::import::Mbdyn,
     #[cfg(feature = "hdf5")]
     &mbsim::read::Mbsim,
     #[cfg(feature = "hdf5")]
@@ -109,9 +109,9 @@ pub const FOREIGN_FORMATS: &[&dyn ForeignFormat] = &[
 ///
 /// # Errors
 /// [`Usage`](Code::Usage), with the names that there are.
-pub fn find_foreign(name: &str) -> Result<&'static dyn ForeignFormat> {
-    FOREIGN_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = FOREIGN_FORMATS.iter().map(|format| format.name()).collect();
+pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
+    IMPORT_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
         let message = format!("`{name}` is no format that is read");
         Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
     })
@@ -121,9 +121,9 @@ pub fn find_foreign(name: &str) -> Result<&'static dyn ForeignFormat> {
 ///
 /// # Errors
 /// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is none of them.
-pub fn recognise(file: &InputFile) -> Result<&'static dyn ForeignFormat> {
-    FOREIGN_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
-        let names: Vec<&str> = FOREIGN_FORMATS.iter().map(|format| format.name()).collect();
+pub fn recognise(file: &InputFile) -> Result<&'static dyn ImportFormat> {
+    IMPORT_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
+        let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
         let message = format!("the file is of no format that is read: {}", names.join(", "));
         Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()).into()
     })

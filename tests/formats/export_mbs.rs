@@ -10,9 +10,9 @@ use flexbody::base::diagnostic::Code;
 use flexbody::body::flex_body::{FlexBody, LoadKind};
 use flexbody::body::invariants::{BodyFrame, CauchySchwarz, Invariants, primary_differences};
 use flexbody::formats::export::{ExportOptions, Points, frames};
-use flexbody::formats::import::{Foreign, audit};
+use flexbody::formats::import::{ImportedFile, audit};
 use flexbody::formats::{export, find_format};
-use flexbody::formats::{find_foreign, recognise};
+use flexbody::formats::{find_import_format, recognise};
 use flexbody::input::InputFile;
 use flexbody::model::FeModel;
 use hdf5_metno as hdf5;
@@ -37,13 +37,13 @@ fn written(body: &FlexBody, format: &str, options: &ExportOptions) -> (Vec<u8>, 
     (exported.file, losses.iter().map(|loss| loss.message().to_owned()).collect())
 }
 
-fn read(bytes: &[u8], format: &str) -> Foreign {
+fn read(bytes: &[u8], format: &str) -> ImportedFile {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("file");
     std::fs::write(&path, bytes).expect("written");
     let file = InputFile::open(&path).expect("a file");
     assert_eq!(recognise(&file).expect("known").name(), format);
-    find_foreign(format).expect("a format").read(&file).expect("readable")
+    find_import_format(format).expect("a format").read(&file).expect("readable")
 }
 
 fn models() -> Vec<String> {
@@ -56,8 +56,8 @@ fn models() -> Vec<String> {
     names
 }
 
-fn told(foreign: &Foreign) -> Invariants {
-    Invariants::from_numbered(&foreign.body.inertia, foreign.body.modal_stiffness.clone(), 1e-12)
+fn told(imported: &ImportedFile) -> Invariants {
+    Invariants::from_numbered(&imported.body.inertia, imported.body.modal_stiffness.clone(), 1e-12)
 }
 
 /// What of a body these formats hold: no W0 beyond C1, W3 antisymmetric.
@@ -112,7 +112,7 @@ fn every_fixture_is_read_back_with_every_number() {
 }
 
 /// Inertia and stiffness.
-fn values(body: &FlexBody, found: &Foreign, format: &str, case: &str) {
+fn values(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
     assert_eq!(found.body.modal_stiffness, body.invariants().modal_stiffness, "{case}");
     // MBSim has m_ff as a sum: of a general mass W2 is what it makes of it.
     let own_w2 = format != "mbsim" || body.invariants().general.is_none();
@@ -140,7 +140,7 @@ fn same(expected: &Invariants, found: &Invariants, with_w2: bool, case: &str) {
     }
 }
 
-fn places(body: &FlexBody, found: &Foreign, format: &str, case: &str) {
+fn places(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
     let points = if format == "exudyn" { Points::Nodes } else { Points::Usual };
     let places = frames(body, &points);
     assert_eq!(found.body.frames.len(), places.len(), "{case}");

@@ -7,8 +7,8 @@ use faer::Mat;
 use flexbody::body::flex_body::{FlexBody, Groups};
 use flexbody::body::invariants::BodyFrame;
 use flexbody::formats::export::{ExportFormat, ExportOptions, Points};
-use flexbody::formats::find_foreign;
-use flexbody::formats::import::Foreign;
+use flexbody::formats::find_import_format;
+use flexbody::formats::import::ImportedFile;
 use flexbody::formats::{export, find_format};
 use flexbody::input::InputFile;
 use flexbody::model::{GeometricStiffness, LoadKind, UnitLoad};
@@ -50,12 +50,12 @@ fn text(body: &FlexBody, options: &ExportOptions) -> String {
     String::from_utf8(exported.file).expect("text")
 }
 
-fn read(text: &str) -> Foreign {
+fn read(text: &str) -> ImportedFile {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("body.SID_FEM");
     std::fs::write(&path, text).expect("writes");
     let file = InputFile::open(&path).expect("opens");
-    let format = find_foreign("sid").expect("a format");
+    let format = find_import_format("sid").expect("a format");
     assert!(format.recognises(&file));
     format.read(&file).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -271,11 +271,11 @@ fn every_dialect_of_every_fixture_is_read_back_as_the_body() {
         for (body, own_stiffness) in bodies.iter().zip([false, true]) {
             for name in sid().dialects() {
                 let options = dialect(name);
-                let foreign = read(&text(body, &options));
-                assert_eq!(foreign.dialect, *name, "{model}");
-                let failed: Vec<_> = foreign.checks.iter().filter_map(|check| check.finding()).collect();
+                let imported = read(&text(body, &options));
+                assert_eq!(imported.dialect, *name, "{model}");
+                let failed: Vec<_> = imported.checks.iter().filter_map(|check| check.finding()).collect();
                 assert!(failed.is_empty(), "{model} {name}: {failed:?}");
-                let (found, own) = (&foreign.body, body.invariants().numbered());
+                let (found, own) = (&imported.body, body.invariants().numbered());
                 assert_eq!(found.inertia.i1, own.i1);
                 assert_eq!(found.inertia.i2, own.i2);
                 same(&found.inertia.i3, &own.i3, "I3");
@@ -381,10 +381,10 @@ fn bodies_without_groups_and_with_damping_are_written() {
     let body = fixture("bracket_hex20", MODES, BodyFrame::Principal);
     for groups in combinations() {
         let partial = with_groups(&body, groups);
-        let foreign = read(&text(&partial, &ExportOptions::default()));
-        let failed: Vec<_> = foreign.checks.iter().filter_map(|check| check.finding()).collect();
+        let imported = read(&text(&partial, &ExportOptions::default()));
+        let failed: Vec<_> = imported.checks.iter().filter_map(|check| check.finding()).collect();
         assert!(failed.is_empty(), "{groups:?}: {failed:?}");
-        assert_eq!(foreign.body.inertia.groups, groups);
+        assert_eq!(imported.body.inertia.groups, groups);
         assert!(groups == Groups::ALL || text(&partial, &ExportOptions::default()).contains("without W"));
     }
     let mut parts = body.into_parts();
@@ -412,22 +412,22 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
         let losses = sid().losses(&body, &options);
         // Forces at the tip need its reference point.
         assert_eq!(losses.is_empty(), points == Points::Usual, "{losses:?}");
-        let foreign = read(&text(&body, &options)).body;
-        assert_eq!(foreign.frames.len(), count);
+        let imported = read(&text(&body, &options)).body;
+        assert_eq!(imported.frames.len(), count);
         let expected = flexbody::formats::export::frames(&body, &points);
-        for (frame, own) in foreign.frames.iter().zip(&expected) {
+        for (frame, own) in imported.frames.iter().zip(&expected) {
             assert_eq!(frame.label, own.id.to_string());
             assert_eq!(frame.position, own.position);
             same(&frame.translation, &own.translation, "phi");
             assert_eq!(frame.rotation.is_some(), own.rotation.is_some());
         }
     }
-    let foreign = read(&text(&body, &ExportOptions::default())).body;
-    let tip = foreign.frames[1].interface.clone().expect("its forces have geometric stiffness");
+    let imported = read(&text(&body, &ExportOptions::default())).body;
+    let tip = imported.frames[1].interface.clone().expect("its forces have geometric stiffness");
     for kind in [LoadKind::Force as fn(String) -> LoadKind, LoadKind::Moment] {
         for component in 0..3 {
             let of = |name: &str| UnitLoad { kind: kind(name.to_owned()), component };
-            let found = stiffness(&foreign.geometric_stiffness, &of(&tip)).expect("phi1 and psi1");
+            let found = stiffness(&imported.geometric_stiffness, &of(&tip)).expect("phi1 and psi1");
             same(&found, &stiffness(body.geometric_stiffness(), &of("tip")).expect("given"), "K at the tip");
         }
     }

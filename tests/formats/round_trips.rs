@@ -6,9 +6,9 @@ use flexbody::base::provenance::SourceFile;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, primary_differences};
 use flexbody::formats::export::{ExportFormat, ExportOptions, Points};
-use flexbody::formats::import::{Adopted, Foreign, ForeignFormat, adopt, audit};
+use flexbody::formats::import::{ImportFormat, Imported, ImportedFile, audit, import_body};
 use flexbody::formats::{FORMATS, export};
-use flexbody::formats::{find_foreign, recognise};
+use flexbody::formats::{find_import_format, recognise};
 use flexbody::input::InputFile;
 use flexbody::model::LoadKind;
 use std::path::Path;
@@ -30,10 +30,10 @@ fn bodies() -> Vec<(String, FlexBody)> {
 }
 
 /// Every format that is written and read, with each of its dialects.
-fn readable() -> Vec<(&'static dyn ExportFormat, &'static dyn ForeignFormat, Option<&'static str>)> {
+fn readable() -> Vec<(&'static dyn ExportFormat, &'static dyn ImportFormat, Option<&'static str>)> {
     let mut all = Vec::new();
     for format in FORMATS.iter().copied() {
-        let Ok(reader) = find_foreign(format.name()) else { continue };
+        let Ok(reader) = find_import_format(format.name()) else { continue };
         match format.dialects() {
             [] => all.push((format, reader, None)),
             dialects => all.extend(dialects.iter().map(|dialect| (format, reader, Some(*dialect)))),
@@ -53,12 +53,12 @@ fn written(body: &FlexBody, format: &dyn ExportFormat, dialect: Option<&str>, fo
     InputFile::open(&path).expect("readable")
 }
 
-fn taken(foreign: &Foreign) -> Adopted {
+fn taken(imported: &ImportedFile) -> Imported {
     let source = SourceFile::new("body", Path::new("body.file"), "0".repeat(64));
-    adopt(foreign, source, flexbody::base::units::UnitSystem::default()).expect("a body")
+    import_body(imported, source, flexbody::base::units::UnitSystem::default()).expect("a body")
 }
 
-/// What no foreign format tells of a general mass: W0 beyond C1.
+/// What no format of other programs tells of a general mass: W0 beyond C1.
 fn without_w0(invariants: &Invariants) -> Invariants {
     let mut told = invariants.clone();
     if let Some(general) = &mut told.general {
@@ -84,10 +84,10 @@ fn what_is_written_comes_back() {
             let mut complain = |text: String| wrong.push(format!("{what}: {text}"));
             let file = written(&body, *format, *dialect, folder.path());
             assert_eq!(recognise(&file).expect("known").name(), reader.name(), "{what}");
-            let foreign = reader.read(&file).expect(&what);
+            let imported = reader.read(&file).expect(&what);
             // A file without coupling says so in its audit, and what it has is right.
             let coupled = *dialect != Some("level13");
-            let found = audit(&foreign, 1e-11);
+            let found = audit(&imported, 1e-11);
             // What MBSim keeps of a mass that does not commute with rotations is a body of no mass.
             let lossless = format.losses(&body, &ExportOptions::default()).is_empty();
             let whole =
@@ -98,7 +98,7 @@ fn what_is_written_comes_back() {
             if !coupled && found.passed() {
                 complain("the missing coupling is not found".to_owned());
             }
-            let Adopted { body: back, diagnostics } = taken(&foreign);
+            let Imported { body: back, diagnostics } = taken(&imported);
             if diagnostics.iter().any(|d| d.code() == flexbody::base::diagnostic::Code::ForeignChanged) {
                 complain("the modes were changed".to_owned());
             }

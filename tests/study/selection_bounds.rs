@@ -10,7 +10,7 @@ use flexbody::motion::dynamics::{BodyPoint, Terms};
 use flexbody::motion::scene::{
     Measure, OutputErrors, Point, Recording, Scene, Stage, Trace, simulate, trace_at,
 };
-use flexbody::study::selection::{Bench, Norms, Situation};
+use flexbody::study::selection::{Norms, Situation, TrialRuns};
 use nalgebra::{DMatrix, DVector, Vector3};
 use proptest::prelude::*;
 
@@ -50,9 +50,9 @@ impl<'t> Tested<'t> {
         Self { body, scene, situation, loads, watched }
     }
 
-    fn bench(&self) -> Bench<'_> {
+    fn runs(&self) -> TrialRuns<'_> {
         let Self { body, scene, situation, loads, watched } = self;
-        Bench { body, scene, situation, loads, watched, memory: None }
+        TrialRuns { body, scene, situation, loads, watched, memory: None }
     }
 
     /// The motion at the instants of the scene.
@@ -62,7 +62,7 @@ impl<'t> Tested<'t> {
 
     /// The continuous motion of the whole body.
     fn whole(&self) -> Trace {
-        self.bench().motion(Groups::ALL).expect("a motion").0
+        self.runs().motion(Groups::ALL).expect("a motion").0
     }
 
     /// That with some groups, where that of the whole body was looked at.
@@ -112,7 +112,7 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     let mut found = Broken::default();
     for kept in combinations() {
         let own = tested.recording(kept);
-        let fine = tested.bench().fine_motion(kept).expect("a motion");
+        let fine = tested.runs().fine_motion(kept).expect("a motion");
         // None where the spin turns too fast to be followed.
         let steps = fine.as_ref().unwrap_or(&own);
         let errors = measure.of_subset(&tested.beside(&continuous, kept), &all).largest();
@@ -168,7 +168,7 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
                 }
             }
             for (run, which) in [(None, "a priori"), (fine.as_ref(), "along the run")] {
-                let trial = tested.bench().bounded(&norms, run, kept, 1.0);
+                let trial = tested.runs().bounded(&norms, run, kept, 1.0);
                 let Some(bounds) = trial.errors else { continue };
                 let OutputErrors { deflection, stress, reaction, .. } = errors;
                 let pairs = [
@@ -282,10 +282,10 @@ proptest! {
 fn follows(body: &FlexBody, scene: &Scene) -> bool {
     let stage = Stage::new(body, scene).expect("one frame");
     let tested = Tested::new(&stage.body, &stage.scene);
-    combinations().all(|kept| tested.bench().motion(kept).is_ok() && tested.bench().fine_motion(kept).is_ok())
+    combinations().all(|kept| tested.runs().motion(kept).is_ok() && tested.runs().fine_motion(kept).is_ok())
 }
 
-/// The body with the damping of the scene, which benches ask for.
+/// The body with the damping of the scene, which runs ask for.
 fn damped(body: FlexBody, doing: &Doing) -> FlexBody {
     let mut parts = body.into_parts();
     parts.modes.damping_ratio.fill(doing.damping);

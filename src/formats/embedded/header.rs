@@ -1,8 +1,7 @@
 //! The C99 header of a body: the committed template with its sizes on top, under names of its own.
 
 use super::arrays::Content;
-use super::layout::{ARRAYS, CHECKED_FROM, HEADER, VERSION, fixed_header, header_offset};
-use super::write::Place;
+use super::layout::{ARRAYS, CHECKED_FROM, HEADER, Place, VERSION, fixed_header, header_offset};
 use crate::body::flex_body::FlexBody;
 use std::fmt::Write;
 

@@ -138,6 +138,22 @@ const PARTS: &[(&str, &str)] = &[
     ),
 ];
 
+/// Where an array stands.
+pub(crate) struct Place {
+    pub offset: usize,
+    pub rows: usize,
+    pub columns: usize,
+    pub stride: usize,
+}
+
+impl Place {
+    /// The entry of the table.
+    pub fn entry(place: Option<&Self>) -> [u32; 4] {
+        // A file has less than 4 GiB, as the writer makes sure.
+        place.map_or([0; 4], |p| [p.offset, p.rows, p.columns, p.stride].map(|v| v as u32))
+    }
+}
+
 /// Bytes of the entries in front of the table.
 pub(crate) fn fixed_header() -> usize {
     HEADER.iter().map(|(_, kind, _)| kind.bytes()).sum()

@@ -3,7 +3,8 @@
 use super::arrays::{Array, Content, Numbers, loads};
 use super::header::{expected, header};
 use super::layout::{
-    ALIGNMENT, ARRAYS, BYTE_ORDER, CHECKED_FROM, MAGIC, VERSION, fixed_header, header_bytes, header_offset,
+    ALIGNMENT, ARRAYS, BYTE_ORDER, CHECKED_FROM, MAGIC, Place, VERSION, fixed_header, header_bytes,
+    header_offset,
 };
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -51,22 +52,6 @@ impl ExportFormat for Embedded {
         let (file, places) = bytes(body, &content, precision)?;
         let header = header(body, &content, &places, precision, file.len());
         Ok(Exported { file, beside: vec![("h", header.into_bytes())] })
-    }
-}
-
-/// Where an array stands.
-pub(crate) struct Place {
-    pub offset: usize,
-    pub rows: usize,
-    pub columns: usize,
-    pub stride: usize,
-}
-
-impl Place {
-    /// The entry of the table.
-    pub fn entry(place: Option<&Self>) -> [u32; 4] {
-        // A file has less than 4 GiB, as `bytes` makes sure.
-        place.map_or([0; 4], |p| [p.offset, p.rows, p.columns, p.stride].map(|v| v as u32))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::base::error::Result;
 use crate::body::invariants::{Groups, Numbered};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
 use crate::formats::import::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative, worst};
-use crate::formats::import::{AuditCheck, Foreign, ForeignBody, ForeignFormat, ForeignFrame};
+use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use crate::input::InputFile;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -32,7 +32,7 @@ const REQUIRED: [&str; 16] = [
     "mXRefTildePsiTilde",
 ];
 
-impl ForeignFormat for Exudyn {
+impl ImportFormat for Exudyn {
     fn name(&self) -> &'static str {
         "exudyn"
     }
@@ -41,7 +41,7 @@ impl ForeignFormat for Exudyn {
         Hdf5Arrays::is_with(file, &["modeBasis", "mPsiTildePsi"])
     }
 
-    fn read(&self, file: &InputFile) -> Result<Foreign> {
+    fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         let mut arrays = Hdf5Arrays::open(file)?;
         arrays.require(&REQUIRED)?;
         let (rows, nf) = arrays.extents("modeBasis")?;
@@ -60,7 +60,7 @@ impl ForeignFormat for Exudyn {
         let told = given.numbered();
         let general = arrays.attribute("massMatrixReduced", "mass_structure").as_deref() == Some("general");
         let checks = given.checks(&told, general);
-        let frame = |i: usize| ForeignFrame {
+        let frame = |i: usize| ImportedFrame {
             label: i.to_string(),
             interface: None,
             position: [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]],
@@ -77,13 +77,13 @@ impl ForeignFormat for Exudyn {
             inertia.i9 = None;
             lacks.push("mPsiTildePsiTilde is zero: the body does without W2".to_owned());
         }
-        Ok(Foreign {
+        Ok(ImportedFile {
             format: "exudyn",
             dialect: String::new(),
             notes,
             checks,
             unsound: Vec::new(),
-            body: ForeignBody {
+            body: ImportedBody {
                 name: String::new(),
                 units: None,
                 inertia,

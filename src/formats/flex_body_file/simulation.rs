@@ -18,7 +18,7 @@ const FORMAT: &str = "flexbody-simulation";
 const VERSION: i64 = 2;
 
 /// Unit exponents of mass^(1/2), length and time.
-const fn of(mass_halves: i8, length: i8, time: i8) -> Units {
+const fn unit(mass_halves: i8, length: i8, time: i8) -> Units {
     Units::Of { mass_halves, length, time }
 }
 
@@ -70,110 +70,164 @@ impl Place<'_> {
 }
 
 fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<()> {
-    let Recording { states, balances, time, .. } = recording;
-    let n = time.len();
-    let file = create(path)?;
-    put_text(&file, "format", FORMAT)?;
-    file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
-    for (name, text) in [("generator", &generator()), ("scene", &recording.scene), ("body", &recording.body)]
-    {
-        put_text(&file, name, text)?;
+    let writer = Writer { recording, units, file: create(path)? };
+    writer.origin()?;
+    writer.method()?;
+    writer.summary()?;
+    let top = Place { group: writer.file.as_group()?, units };
+    top.put("time", unit(0, 0, 1), "instants", writer.instants(), &recording.time)?;
+    writer.frame()?;
+    writer.modes()?;
+    writer.energy()?;
+    writer.momentum()?;
+    writer.reaction()?;
+    writer.points()?;
+    writer.file.flush()?;
+    writer.file.close()
+}
+
+/// The file and what it is to hold. Everything is written in a fixed order, so that equal recordings give equal bytes.
+struct Writer<'a> {
+    recording: &'a Recording,
+    units: &'a UnitSystem,
+    file: hdf5::File,
+}
+
+impl Writer<'_> {
+    fn group(&self, name: &str) -> hdf5::Result<Place<'_>> {
+        Ok(Place { group: make(&self.file, name)?, units: self.units })
     }
-    let number = |name: &str, value: f64| file.new_attr::<f64>().create(name)?.write_scalar(&value);
-    match recording.scheme {
-        Scheme::Adaptive { tolerance } => {
-            put_text(&file, "method", "adaptive")?;
-            number("tolerance", tolerance)?;
+
+    fn instants(&self) -> usize {
+        self.recording.time.len()
+    }
+
+    fn number(&self, name: &str, value: f64) -> hdf5::Result<()> {
+        self.file.new_attr::<f64>().create(name)?.write_scalar(&value)
+    }
+
+    /// Format, program, scene and body.
+    fn origin(&self) -> hdf5::Result<()> {
+        put_text(&self.file, "format", FORMAT)?;
+        self.file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
+        put_text(&self.file, "generator", &generator())?;
+        put_text(&self.file, "scene", &self.recording.scene)?;
+        put_text(&self.file, "body", &self.recording.body)
+    }
+
+    /// The integration method and its settings.
+    fn method(&self) -> hdf5::Result<()> {
+        match self.recording.scheme {
+            Scheme::Adaptive { tolerance } => {
+                put_text(&self.file, "method", "adaptive")?;
+                self.number("tolerance", tolerance)
+            }
+            Scheme::Conserving { order, step } => {
+                put_text(&self.file, "method", "conserving")?;
+                self.file.new_attr::<i64>().create("order")?.write_scalar(&(order as i64))?;
+                step.map_or(Ok(()), |step| self.number("step", step))
+            }
         }
-        Scheme::Conserving { order, step } => {
-            put_text(&file, "method", "conserving")?;
-            file.new_attr::<i64>().create("order")?.write_scalar(&(order as i64))?;
-            step.map_or(Ok(()), |step| number("step", step))?;
-        }
-    }
-    let drift = recording.drift();
-    for (name, value) in [
-        ("energy_drift", drift.energy),
-        ("linear_momentum_drift", drift.linear),
-        ("angular_momentum_drift", drift.angular),
-        ("largest_deflection", recording.extremes.deflection.value),
-    ] {
-        number(name, value)?;
     }
 
-    let group = |name: &str| Ok::<_, hdf5::Error>(Place { group: make(&file, name)?, units });
-    let top = Place { group: file.as_group()?, units };
-    top.put("time", of(0, 0, 1), "instants", n, time)?;
-
-    let frame = group("frame")?;
-    frame.vectors(
-        "origin",
-        of(0, 1, 0),
-        &format!("{}, origin of the frame; world axes", recording.setting.origin_in_words()),
-        states.iter().map(|s| &s.origin),
-    )?;
-    let in_model = "origin of the frame in the coordinates of the model";
-    frame.put("origin_in_model", of(0, 1, 0), in_model, 1, recording.setting.origin.as_slice())?;
-    let attitudes: Vec<f64> = states.iter().flat_map(|s| s.attitude.0).collect();
-    frame.put(
-        "attitude",
-        Units::One,
-        "Euler parameters of the frame, from axes of the model, turning with the body, to world axes; the cosine of half the angle first",
-        n,
-        &attitudes,
-    )?;
-    let velocities = states.iter().map(|s| &s.velocity);
-    frame.vectors("velocity", of(0, 1, -1), "velocity of the origin, world axes", velocities)?;
-    let rates = states.iter().map(|s| &s.omega);
-    frame.vectors(
-        "angular_velocity",
-        of(0, 0, -1),
-        "angular velocity of the frame, axes of the model, turning with the body",
-        rates,
-    )?;
-
-    let modes = group("modes")?;
-    let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
-    modes.put("q", of(1, 1, 0), "modal coordinates", n, &q)?;
-    let qd: Vec<f64> = states.iter().flat_map(|s| s.qd.iter().copied()).collect();
-    modes.put("qd", of(1, 1, -1), "their rates", n, &qd)?;
-
-    let energy = group("energy")?;
-    let numbers = |of: fn(&Balance) -> f64| balances.iter().map(of).collect::<Vec<f64>>();
-    for (name, description, values) in [
-        ("kinetic", "kinetic energy", numbers(|b| b.kinetic)),
-        ("elastic", "elastic energy", numbers(|b| b.elastic)),
-        ("work", "work of loads, damping and prescribed motion since the start", numbers(|b| b.work)),
-    ] {
-        energy.put(name, of(2, 2, -2), description, n, &values)?;
+    /// How far conserved quantities drift, and the largest deflection.
+    fn summary(&self) -> hdf5::Result<()> {
+        let drift = self.recording.drift();
+        self.number("energy_drift", drift.energy)?;
+        self.number("linear_momentum_drift", drift.linear)?;
+        self.number("angular_momentum_drift", drift.angular)?;
+        self.number("largest_deflection", self.recording.extremes.deflection.value)
     }
 
-    let momentum = group("momentum")?;
-    let (linear, angular) = (of(2, 1, -1), of(2, 2, -1));
-    momentum.vectors("linear", linear, "linear momentum, world axes", balances.iter().map(|b| &b.linear))?;
-    let about_start = "angular momentum about the origin of the frame at the start, world axes";
-    momentum.vectors("angular", angular, about_start, balances.iter().map(|b| &b.angular))?;
-    let impulses = balances.iter().map(|b| &b.impulse);
-    momentum.vectors("impulse", linear, "impulse of the forces since the start, world axes", impulses)?;
-    let impulses = balances.iter().map(|b| &b.angular_impulse);
-    momentum.vectors("angular_impulse", angular, "their angular impulse about the same point", impulses)?;
+    /// Place, attitude and velocities of the frame.
+    fn frame(&self) -> hdf5::Result<()> {
+        let Recording { states, setting, .. } = self.recording;
+        let frame = self.group("frame")?;
+        frame.vectors(
+            "origin",
+            unit(0, 1, 0),
+            &format!("{}, origin of the frame; world axes", setting.origin_in_words()),
+            states.iter().map(|s| &s.origin),
+        )?;
+        let in_model = "origin of the frame in the coordinates of the model";
+        frame.put("origin_in_model", unit(0, 1, 0), in_model, 1, setting.origin.as_slice())?;
+        let attitudes: Vec<f64> = states.iter().flat_map(|s| s.attitude.0).collect();
+        frame.put(
+            "attitude",
+            Units::One,
+            "Euler parameters of the frame, from axes of the model, turning with the body, to world axes; the cosine of half the angle first",
+            self.instants(),
+            &attitudes,
+        )?;
+        let velocities = states.iter().map(|s| &s.velocity);
+        frame.vectors("velocity", unit(0, 1, -1), "velocity of the origin, world axes", velocities)?;
+        frame.vectors(
+            "angular_velocity",
+            unit(0, 0, -1),
+            "angular velocity of the frame, axes of the model, turning with the body",
+            states.iter().map(|s| &s.omega),
+        )
+    }
 
-    if let Some(reactions) = &recording.reactions {
-        let reaction = group("reaction")?;
+    /// Modal coordinates and their rates.
+    fn modes(&self) -> hdf5::Result<()> {
+        let states = &self.recording.states;
+        let modes = self.group("modes")?;
+        let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
+        modes.put("q", unit(1, 1, 0), "modal coordinates", self.instants(), &q)?;
+        let qd: Vec<f64> = states.iter().flat_map(|s| s.qd.iter().copied()).collect();
+        modes.put("qd", unit(1, 1, -1), "their rates", self.instants(), &qd)
+    }
+
+    fn energy(&self) -> hdf5::Result<()> {
+        let balances = &self.recording.balances;
+        let energy = self.group("energy")?;
+        let put = |name: &str, description: &str, part: fn(&Balance) -> f64| {
+            let values: Vec<f64> = balances.iter().map(part).collect();
+            energy.put(name, unit(2, 2, -2), description, self.instants(), &values)
+        };
+        put("kinetic", "kinetic energy", |b| b.kinetic)?;
+        put("elastic", "elastic energy", |b| b.elastic)?;
+        put("work", "work of loads, damping and prescribed motion since the start", |b| b.work)
+    }
+
+    /// Momenta, and the impulses that change them.
+    fn momentum(&self) -> hdf5::Result<()> {
+        let momentum = self.group("momentum")?;
+        let put = |name: &str, units: Units, description: &str, part: fn(&Balance) -> &Vector3<f64>| {
+            momentum.vectors(name, units, description, self.recording.balances.iter().map(part))
+        };
+        let (linear, angular) = (unit(2, 1, -1), unit(2, 2, -1));
+        put("linear", linear, "linear momentum, world axes", |b| &b.linear)?;
+        let about_start = "angular momentum about the origin of the frame at the start, world axes";
+        put("angular", angular, about_start, |b| &b.angular)?;
+        put("impulse", linear, "impulse of the forces since the start, world axes", |b| &b.impulse)?;
+        let about_same = "their angular impulse about the same point";
+        put("angular_impulse", angular, about_same, |b| &b.angular_impulse)
+    }
+
+    /// What prescribed motion takes, where there is such.
+    fn reaction(&self) -> hdf5::Result<()> {
+        let Some(reactions) = &self.recording.reactions else { return Ok(()) };
+        let reaction = self.group("reaction")?;
         let description = "force that the prescribed motion takes, axes of the model, turning with the body";
-        reaction.vectors("force", of(2, 1, -2), description, reactions.iter().map(|r| &r.0))?;
+        reaction.vectors("force", unit(2, 1, -2), description, reactions.iter().map(|r| &r.0))?;
         let description = "torque about the origin of the frame that the prescribed motion takes, axes of the model, turning with the body";
-        reaction.vectors("torque", of(2, 2, -2), description, reactions.iter().map(|r| &r.1))?;
+        reaction.vectors("torque", unit(2, 2, -2), description, reactions.iter().map(|r| &r.1))
     }
-    if !recording.paths.is_empty() {
-        let points = group("points")?;
-        for path in &recording.paths {
-            let point = Place { group: make(&points.group, &names::encode(&path.name))?, units };
-            point.vectors("place", of(0, 1, 0), "place, world axes", path.place.iter())?;
-            let description = "deflection from the undeformed body, axes of the model, turning with the body";
-            point.vectors("deflection", of(0, 1, 0), description, path.deflection.iter())?;
+
+    /// Paths of watched points, where there are such.
+    fn points(&self) -> hdf5::Result<()> {
+        if self.recording.paths.is_empty() {
+            return Ok(());
         }
+        let points = self.group("points")?;
+        for path in &self.recording.paths {
+            let point = Place { group: make(&points.group, &names::encode(&path.name))?, units: self.units };
+            point.vectors("place", unit(0, 1, 0), "place, world axes", path.place.iter())?;
+            let description = "deflection from the undeformed body, axes of the model, turning with the body";
+            point.vectors("deflection", unit(0, 1, 0), description, path.deflection.iter())?;
+        }
+        Ok(())
     }
-    file.flush()?;
-    file.close()
 }

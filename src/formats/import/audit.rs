@@ -1,8 +1,8 @@
 //! The audit of a file: what its format promises, and what every flexible body must fulfil.
 
-use super::adopt::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
+use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
 use super::free_surface::is_free_surface;
-use super::{AuditCheck, Foreign, ForeignBody};
+use super::{AuditCheck, ImportedBody, ImportedFile};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::body::invariants::{IdentityCheck, Invariants, identities};
 use crate::numerics::linalg::{dense_cholesky, symmetric_eigen};
@@ -49,12 +49,12 @@ impl Audit {
 
 /// Holds a file to its format and to theory section 10. Identities pass up to `tolerance`, relative to the size of their terms, or the
 /// rounding of their formulas where that is more.
-pub fn audit(foreign: &Foreign, tolerance: f64) -> Audit {
-    let body = &foreign.body;
+pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
+    let body = &file.body;
     let invariants =
         Invariants::from_numbered(&body.inertia, body.modal_stiffness.clone(), tolerance.max(DIGITS));
-    let mut checks = foreign.checks.clone();
-    let mut notes = foreign.notes.clone();
+    let mut checks = file.checks.clone();
+    let mut notes = file.notes.clone();
     let of_any_body = identities(&invariants, &ANY_BODY);
     if let Some(cause) = of_any_body.iter().find(|check| is_cause_of_others(check)) {
         // What follows from it would only repeat it.
@@ -78,8 +78,8 @@ pub fn audit(foreign: &Foreign, tolerance: f64) -> Audit {
         (k / m).sqrt() / std::f64::consts::TAU
     };
     Audit {
-        format: foreign.format,
-        dialect: foreign.dialect.clone(),
+        format: file.format,
+        dialect: file.dialect.clone(),
         name: body.name.clone(),
         mass: body.inertia.i1,
         n_modes: body.n_modes(),
@@ -95,8 +95,8 @@ fn is_cause_of_others(check: &IdentityCheck) -> bool {
     matches!(check.name, "finite" | "mass_positive") && !check.passed
 }
 
-/// Rotation about every axis has inertia: [`adopt`](super::adopt()) makes no other body.
-fn turns(body: &ForeignBody) -> AuditCheck {
+/// Rotation about every axis has inertia: [`import_body`](super::import_body()) makes no other body.
+fn turns(body: &ImportedBody) -> AuditCheck {
     AuditCheck {
         name: "turns_about_every_axis",
         formula: "principal moments about the centre of mass that are zero",
@@ -205,7 +205,7 @@ fn asymmetry(a: &Mat<f64>) -> f64 {
 }
 
 /// Inertia, centre of mass and places of the body against each other.
-fn size(body: &ForeignBody) -> Vec<AuditCheck> {
+fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     let inertia = &body.inertia;
     let positions: Vec<_> = body.frames.iter().map(|frame| nalgebra::Vector3::from(frame.position)).collect();
     let centre = inertia.i2 / inertia.i1;

@@ -8,7 +8,7 @@ use faer::Mat;
 /// A body as a file of another program describes it. Nothing of it is checked beyond its shapes: modes may be any, matrices not
 /// symmetric, numbers not finite.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ForeignBody {
+pub struct ImportedBody {
     /// Name, where the file has one.
     pub name: String,
     /// Units, where the file states them.
@@ -22,14 +22,14 @@ pub struct ForeignBody {
     /// Psi' K_geo Psi (nf x nf) of unit loads along body axes.
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     /// Places of the body.
-    pub frames: Vec<ForeignFrame>,
+    pub frames: Vec<ImportedFrame>,
     /// What the file lacks of a body, or what of it cannot be taken, as fragments of sentences.
     pub lacks: Vec<String>,
 }
 
 /// A node or frame of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ForeignFrame {
+pub struct ImportedFrame {
     /// What the file calls it.
     pub label: String,
     /// Name of the interface that it is, where the file says so.
@@ -42,7 +42,7 @@ pub struct ForeignFrame {
     pub rotation: Option<Mat<f64>>,
 }
 
-impl ForeignBody {
+impl ImportedBody {
     /// Number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.inertia.i8.len()

@@ -1,12 +1,12 @@
 //! What a reader of another program's file is, and the registry.
 
-use super::{AuditCheck, ForeignBody};
+use super::{AuditCheck, ImportedBody};
 use crate::base::error::Result;
 use crate::input::InputFile;
 
 /// A file of another program, read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Foreign {
+pub struct ImportedFile {
     /// Name of the format.
     pub format: &'static str,
     /// The variant that was detected, as the documentation calls it; empty where there is a single one.
@@ -18,11 +18,11 @@ pub struct Foreign {
     /// Why no body must be made of the file although it can be read: whole sentences without a full stop. Checks say the same.
     pub unsound: Vec<String>,
     /// The body.
-    pub body: ForeignBody,
+    pub body: ImportedBody,
 }
 
 /// A format that is read.
-pub trait ForeignFormat: Sync {
+pub trait ImportFormat: Sync {
     /// Name on the command line.
     fn name(&self) -> &'static str;
 
@@ -34,5 +34,5 @@ pub trait ForeignFormat: Sync {
     /// # Errors
     /// [`ForeignUnreadable`](Code::ForeignUnreadable) with the line, [`ForeignIncomplete`](Code::ForeignIncomplete) for a file from
     /// which not even shapes of arrays follow.
-    fn read(&self, file: &InputFile) -> Result<Foreign>;
+    fn read(&self, file: &InputFile) -> Result<ImportedFile>;
 }

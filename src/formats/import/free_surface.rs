@@ -1,6 +1,7 @@
 //! Free-surface mass-normalised modes from any modes, with nothing but their invariants (theory 5.2).
 
-use super::adopt::{ANY_BODY, DIGITS};
+use super::any_body::{ANY_BODY, DIGITS};
+use super::redundant::worst;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::invariants::{Expected, GeneralTerms, IdentityCheck, Invariants, identities};
@@ -21,14 +22,15 @@ pub(crate) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
         .into_iter()
         .filter(|check| about_modes.contains(&check.name) && !check.passed)
         .map(|check| check.value)
-        .fold(0.0, f64::max);
+        .fold(0.0, worst);
     let beside = beside_diagonal(invariants);
     let k = &invariants.modal_stiffness;
     let nearly = |j: usize| k[(j - 1, j - 1)] - k[(j, j)] <= DIGITS * k[(j, j)];
     let ascending = k[(0, 0)] > 0.0 && (1..k.ncols()).all(nearly);
     let diagonal = beside <= NEARLY_DIAGONAL;
     let missed = if diagonal { missed } else { missed.max(beside) };
-    (missed > 0.0 || !diagonal || !ascending).then_some(missed)
+    // A value that is no number is not zero either.
+    (missed != 0.0 || !diagonal || !ascending).then_some(missed)
 }
 
 /// The largest entry of K_ff beside its diagonal, relative to the diagonal entries of its row and column.

@@ -1,6 +1,6 @@
 //! What the formats that are read share: the trait, the body as a file has it, its audit, and the way to a flexible body.
 
-mod adopt;
+mod any_body;
 mod audit;
 mod body;
 pub(crate) mod check;
@@ -9,10 +9,11 @@ mod format;
 mod free_surface;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_arrays;
+mod import_body;
 pub(crate) mod redundant;
 
-pub use adopt::{Adopted, adopt};
 pub use audit::{Audit, audit};
-pub use body::{ForeignBody, ForeignFrame};
+pub use body::{ImportedBody, ImportedFrame};
 pub use check::AuditCheck;
-pub use format::{Foreign, ForeignFormat};
+pub use format::{ImportFormat, ImportedFile};
+pub use import_body::{Imported, import_body};

@@ -1,5 +1,6 @@
 //! The `.fem` file of MBDyn's modal joint.
 
 mod checks;
-pub(super) mod read;
+pub(super) mod import;
+mod read;
 pub(super) mod write;

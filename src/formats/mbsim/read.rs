@@ -5,7 +5,7 @@ use crate::base::error::Result;
 use crate::body::invariants::{Groups, Invariants, Numbered};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
 use crate::formats::import::redundant::{ROUNDING, asymmetry, relative, worst};
-use crate::formats::import::{AuditCheck, Foreign, ForeignBody, ForeignFormat, ForeignFrame};
+use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use crate::input::InputFile;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -31,7 +31,7 @@ const ROTATIONS: &str = "nodal shape matrix of rotation";
 /// Beside the diagonal of the stiffness matrix, relative to it: below this the modes are eigenmodes.
 const DIAGONAL: f64 = 1e-8;
 
-impl ForeignFormat for Mbsim {
+impl ImportFormat for Mbsim {
     fn name(&self) -> &'static str {
         "mbsim"
     }
@@ -40,7 +40,7 @@ impl ForeignFormat for Mbsim {
         Hdf5Arrays::is_with(file, &["position position integral", "shape function integral"])
     }
 
-    fn read(&self, file: &InputFile) -> Result<Foreign> {
+    fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         let mut arrays = Hdf5Arrays::open(file)?;
         arrays.require(&REQUIRED)?;
         let (_, nf) = arrays.extents("shape function integral")?;
@@ -54,13 +54,13 @@ impl ForeignFormat for Mbsim {
             "the modal mass is the sum of the shape function shape function integrals: MBSim knows no other"
                 .to_owned(),
         );
-        Ok(Foreign {
+        Ok(ImportedFile {
             format: "mbsim",
             dialect: String::new(),
             notes,
             checks: checks(&integrals, &inertia, &stiffness, damping.as_ref()),
             unsound: Vec::new(),
-            body: ForeignBody {
+            body: ImportedBody {
                 name: String::new(),
                 units: None,
                 inertia,
@@ -133,7 +133,7 @@ impl Integrals {
     }
 }
 
-fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ForeignFrame>> {
+fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
     // A place whose motion is not known is none.
     if !(arrays.has(POSITIONS) && arrays.has(TRANSLATIONS)) {
         return Ok(Vec::new());
@@ -155,7 +155,7 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ForeignFrame>> {
     let translations = arrays.matrix(TRANSLATIONS, 3 * n, nf)?;
     let rotations = arrays.has(ROTATIONS).then(|| arrays.matrix(ROTATIONS, 3 * n, nf)).transpose()?;
     let rows = |shapes: &Mat<f64>, i: usize| shapes.as_ref().subrows(3 * i, 3).to_owned();
-    let frame = |(i, label): (usize, String)| ForeignFrame {
+    let frame = |(i, label): (usize, String)| ImportedFrame {
         label,
         interface: None,
         position: [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]],

@@ -2,5 +2,6 @@
 //! description of the format alone and shares nothing with the writer.
 
 mod checks;
-pub(super) mod read;
+pub(super) mod import;
+mod read;
 pub(super) mod write;

@@ -2,40 +2,8 @@
 
 use super::Evaluation;
 use super::kernels::{add_scaled, dot};
+use super::prescribed::{NotPositiveDefinite, Prescribed};
 use nalgebra::{Vector3, Vector6};
-
-/// The mass matrix at a state is not positive definite: terms were dropped and the deformation is too large for what is left, or
-/// the invariants are not those of a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NotPositiveDefinite;
-
-impl std::fmt::Display for NotPositiveDefinite {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the mass matrix of the deformed body is not positive definite")
-    }
-}
-
-impl std::error::Error for NotPositiveDefinite {}
-
-/// Rigid motion that is given instead of following from forces, in body axes: velocities of the frame or, where accelerations are asked
-/// for, their rates of change. What is `None` is free.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Prescribed {
-    /// V or V'.
-    pub linear: Option<Vector3<f64>>,
-    /// omega or omega'.
-    pub angular: Option<Vector3<f64>>,
-}
-
-impl Prescribed {
-    /// Nothing: a free body.
-    pub const NOTHING: Self = Self { linear: None, angular: None };
-
-    /// What is given of entry `axis` of (V, omega).
-    fn of(&self, axis: usize) -> Option<f64> {
-        if axis < 3 { self.linear.map(|v| v[axis]) } else { self.angular.map(|w| w[axis - 3]) }
-    }
-}
 
 impl Evaluation<'_> {
     /// nu' from Mc(q) nu' = applied - h_nu - (0, 0, K_ff q + D qd).
@@ -91,9 +59,42 @@ impl Evaluation<'_> {
         Ok(())
     }
 
+    /// Goes to the state with modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of nu. At the cost of
+    /// [`Evaluation::set`] and one solution with Mc.
+    ///
+    /// * `prescribed`: V or omega that are given instead; the momenta that belong to them follow, and those of `momenta` are not read.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`]; the state is then without meaning.
+    ///
+    /// # Panics
+    /// When the lengths are not those of the equations.
+    pub fn set_momenta(
+        &mut self,
+        q: &[f64],
+        momenta: &[f64],
+        prescribed: &Prescribed,
+    ) -> Result<(), NotPositiveDefinite> {
+        let body = self.equations;
+        assert_eq!(q.len(), body.nf, "one coordinate per mode");
+        let (p, h, pi) = body.split(momenta);
+        self.q.copy_from_slice(q);
+        self.modal.copy_from_slice(pi);
+        self.arch()
+            .dispatch(|| {
+                self.deform();
+                let (velocity, omega) = self.solve(&p, &h, prescribed)?;
+                (self.velocity, self.omega) = (velocity, omega);
+                self.qd.copy_from_slice(&self.modal);
+                self.move_on();
+                Some(())
+            })
+            .ok_or(NotPositiveDefinite)
+    }
+
     /// Solves Mc(q) x = (linear, angular, `self.modal`): x of V and omega, that of the modes to `self.modal`.
     #[inline(always)] // compiled once per instruction set
-    pub(super) fn solve(
+    fn solve(
         &mut self,
         linear: &Vector3<f64>,
         angular: &Vector3<f64>,
@@ -118,7 +119,7 @@ impl Evaluation<'_> {
         }
         // Motions that are given, or that a plane body does not have.
         for i in 0..6 {
-            let given = if body.rigid.contains(&i) { prescribed.of(i) } else { Some(0.0) };
+            let given = if body.rigid.contains(&i) { prescribed.entry(i) } else { Some(0.0) };
             let Some(value) = given else { continue };
             for j in 0..6 {
                 sides[j] -= matrix[(j, i)] * value;

@@ -5,6 +5,7 @@ use super::geometric::geometric_stiffness;
 use super::kernels::Panels;
 use super::modal_matrix::{ModalMass, ModalMatrix};
 use crate::body::flex_body::FlexBody;
+use crate::body::invariants::Invariants;
 use crate::model::LoadKind;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -89,101 +90,31 @@ impl EquationsOfMotion {
     /// Taken as they are meant: m_ff that is the identity to 1e-12 (with arrays of 32-bit floats to their rounding) is the identity; K_ff and D whose entries beside the diagonal are
     /// below 1e-10 of sqrt(a_ii a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
     pub fn new(body: &FlexBody, terms: Terms) -> Self {
-        let (invariants, nf) = (body.invariants(), body.n_modes());
-        let plane = body.dimension() == 2;
-        let (rigid, axes, pairs): (&[usize], &[usize], &[(usize, usize)]) =
-            if plane { (&[0, 1, 5], &[2], &PAIRS[2..3]) } else { (&[0, 1, 2, 3, 4, 5], &[0, 1, 2], &PAIRS) };
-        let turns = |a: usize| axes.contains(&a);
-        let moves = |k: usize| rigid.contains(&k);
-
-        let terms = terms.held(invariants.groups);
-        let (w0, c2) = (invariants.w0(), invariants.c2());
-        let w1 = invariants.w1().filter(|_| terms.w1);
-        let of_row = |row: usize, j: usize| match row {
-            row if row < W1 => {
-                let (k, b) = (row / 3, row % 3);
-                if moves(k) && turns(b) { w0[(k, b * nf + j)] } else { 0.0 }
-            }
-            row if row < C1 => {
-                let (a, b) = PAIRS[row - W1];
-                let mean = |w1: &Mat<f64>| 0.5 * (w1[(a, b * nf + j)] + w1[(b, a * nf + j)]);
-                w1.as_ref().filter(|_| turns(a) && turns(b)).map_or(0.0, mean)
-            }
-            row if row < C2 => f64::from(moves(row - C1)) * invariants.c1[(row - C1, j)],
-            row => f64::from(turns(row - C2)) * c2[(row - C2, j)],
-        };
-        let linear: Vec<f64> = (0..LINEAR * nf).map(|at| of_row(at / nf, at % nf)).collect();
-        let linear_panels = Panels::new(LINEAR, nf, |row, j| linear[row * nf + j]);
-
-        let geometric = |kind| terms.geometric_stiffness.then(|| geometric_stiffness(body, &kind)).flatten();
-        let stacked = |count: usize, entry: &dyn Fn(usize, usize, usize) -> f64| {
-            let block = |at| Mat::from_fn(nf, nf, |i, j| entry(at, i, j));
-            Panels::stacked(&(0..count).map(block).collect::<Vec<_>>())
-        };
-        let spin = geometric(LoadKind::Spin);
-        let w2 = invariants.w2().filter(|_| terms.w2);
-        let w2 = (w2.is_some() || spin.is_some()).then(|| {
-            stacked(pairs.len(), &|at, i, j| {
-                let (a, b) = pairs[at];
-                let own = w2
-                    .as_ref()
-                    .map_or(0.0, |w2| 0.5 * (w2[(a * nf + i, b * nf + j)] + w2[(a * nf + j, b * nf + i)]));
-                let component = LoadKind::SPIN.iter().position(|&axes| axes == (a, b));
-                let taken = spin.as_ref().zip(component).map_or(0.0, |(spin, c)| spin(c, i, j));
-                // w'E w has both orders of a pair, the load one.
-                own - if a == b { taken } else { 0.5 * taken }
-            })
-        });
-        let turned = geometric(LoadKind::AngularAcceleration);
-        let (w3, w3_skew) = if terms.w3 || turned.is_some() {
-            let w3 = invariants.w3().filter(|_| terms.w3);
-            // (W3_a)_ij and (W3_a)_ji.
-            let entries = |at: usize, i: usize, j: usize| {
-                let a = axes[at];
-                w3.as_ref().map_or((0.0, 0.0), |w3| (w3[(a * nf + i, j)], w3[(a * nf + j, i)]))
-            };
-            let general = invariants.general.is_some();
-            let transposed = stacked(axes.len(), &|at, i, j| {
-                let (own, mirrored) = entries(at, i, j);
-                // Of a solid the blocks are skew: what is left of W3 + W3' is rounding.
-                let w3 = if general { mirrored } else { 0.5 * (mirrored - own) };
-                w3 + turned.as_ref().map_or(0.0, |turned| turned(axes[at], i, j))
-            });
-            let skew = |at: usize, i: usize, j: usize| {
-                let (own, mirrored) = entries(at, i, j);
-                mirrored - own
-            };
-            (Some(transposed), (general || turned.is_some()).then(|| stacked(axes.len(), &skew)))
-        } else {
-            (None, None)
-        };
-        let accelerated =
-            geometric(LoadKind::Acceleration).map(|along| stacked(if plane { 2 } else { 3 }, &along));
-        let damping = ModalMatrix::new(body.damping().as_ref(), STIFFNESS_ROUNDING);
-        let inertia = invariants.inertia();
+        let parts = EquationParts::new(body, terms);
+        let (invariants, nf) = (parts.invariants, parts.nf);
+        let linear = parts.linear();
+        let (w3, w3_skew) = parts.w3();
         Self {
-            rigid,
-            axes,
-            pairs,
+            rigid: parts.rigid,
+            axes: parts.axes,
+            pairs: parts.pairs,
             nf,
             mass: invariants.mass,
-            first_moment: Vector3::from_fn(|k, _| if moves(k) { invariants.first_moment[k] } else { 0.0 }),
-            inertia: Matrix3::from_fn(|k, l| {
-                if turns(k) && turns(l) { 0.5 * (inertia[(k, l)] + inertia[(l, k)]) } else { 0.0 }
-            }),
+            first_moment: parts.first_moment(),
+            inertia: parts.inertia(),
+            linear_panels: Panels::new(LINEAR, nf, |row, j| linear[row * nf + j]),
             linear,
-            linear_panels,
-            w2,
+            w2: parts.w2(),
             w3,
             w3_skew,
-            accelerated,
+            accelerated: parts.accelerated(),
             modal_mass: ModalMass::new(
                 invariants.modal_mass().as_ref(),
                 MASS_ROUNDING + body.storage().rounding(),
             ),
             stiffness: ModalMatrix::new(invariants.modal_stiffness.as_ref(), STIFFNESS_ROUNDING),
-            damping,
-            terms,
+            damping: ModalMatrix::new(body.damping().as_ref(), STIFFNESS_ROUNDING),
+            terms: parts.terms,
         }
     }
 
@@ -264,5 +195,131 @@ impl EquationsOfMotion {
     pub(super) fn put_rigid(&self, force: Vector3<f64>, torque: Vector3<f64>, rigid: &mut [f64]) {
         let at = |axis: usize| if axis < 3 { force[axis] } else { torque[axis - 3] };
         rigid.iter_mut().zip(self.rigid).for_each(|(entry, &axis)| *entry = at(axis));
+    }
+}
+
+/// What the constants of the equations are made of: the body, the terms that it holds and that are wanted, and the axes of its motion.
+struct EquationParts<'b> {
+    body: &'b FlexBody,
+    invariants: &'b Invariants,
+    nf: usize,
+    rigid: &'static [usize],
+    axes: &'static [usize],
+    pairs: &'static [(usize, usize)],
+    terms: Terms,
+}
+
+impl<'b> EquationParts<'b> {
+    fn new(body: &'b FlexBody, terms: Terms) -> Self {
+        let (rigid, axes, pairs): (&[usize], &[usize], &[(usize, usize)]) = if body.dimension() == 2 {
+            (&[0, 1, 5], &[2], &PAIRS[2..3])
+        } else {
+            (&[0, 1, 2, 3, 4, 5], &[0, 1, 2], &PAIRS)
+        };
+        let invariants = body.invariants();
+        let terms = terms.held(invariants.groups);
+        Self { body, invariants, nf: body.n_modes(), rigid, axes, pairs, terms }
+    }
+
+    fn turns(&self, a: usize) -> bool {
+        self.axes.contains(&a)
+    }
+
+    fn moves(&self, k: usize) -> bool {
+        self.rigid.contains(&k)
+    }
+
+    fn first_moment(&self) -> Vector3<f64> {
+        Vector3::from_fn(|k, _| if self.moves(k) { self.invariants.first_moment[k] } else { 0.0 })
+    }
+
+    fn inertia(&self) -> Matrix3<f64> {
+        let inertia = self.invariants.inertia();
+        Matrix3::from_fn(|k, l| {
+            if self.turns(k) && self.turns(l) { 0.5 * (inertia[(k, l)] + inertia[(l, k)]) } else { 0.0 }
+        })
+    }
+
+    /// The rows of [`EquationsOfMotion::linear`].
+    fn linear(&self) -> Vec<f64> {
+        let (invariants, nf) = (self.invariants, self.nf);
+        let (w0, c2) = (invariants.w0(), invariants.c2());
+        let w1 = invariants.w1().filter(|_| self.terms.w1);
+        let entry = |row: usize, j: usize| match row {
+            row if row < W1 => {
+                let (k, b) = (row / 3, row % 3);
+                if self.moves(k) && self.turns(b) { w0[(k, b * nf + j)] } else { 0.0 }
+            }
+            row if row < C1 => {
+                let (a, b) = PAIRS[row - W1];
+                let mean = |w1: &Mat<f64>| 0.5 * (w1[(a, b * nf + j)] + w1[(b, a * nf + j)]);
+                w1.as_ref().filter(|_| self.turns(a) && self.turns(b)).map_or(0.0, mean)
+            }
+            row if row < C2 => f64::from(self.moves(row - C1)) * invariants.c1[(row - C1, j)],
+            row => f64::from(self.turns(row - C2)) * c2[(row - C2, j)],
+        };
+        (0..LINEAR * nf).map(|at| entry(at / nf, at % nf)).collect()
+    }
+
+    /// The symmetric parts of W2, less geometric stiffness for spin.
+    fn w2(&self) -> Option<Panels> {
+        let nf = self.nf;
+        let spin = self.geometric(LoadKind::Spin);
+        let w2 = self.invariants.w2().filter(|_| self.terms.w2);
+        (w2.is_some() || spin.is_some()).then(|| {
+            self.stacked(self.pairs.len(), &|at, i, j| {
+                let (a, b) = self.pairs[at];
+                let own = w2
+                    .as_ref()
+                    .map_or(0.0, |w2| 0.5 * (w2[(a * nf + i, b * nf + j)] + w2[(a * nf + j, b * nf + i)]));
+                let component = LoadKind::SPIN.iter().position(|&axes| axes == (a, b));
+                let taken = spin.as_ref().zip(component).map_or(0.0, |(spin, c)| spin(c, i, j));
+                // w'E w has both orders of a pair, the load one.
+                own - if a == b { taken } else { 0.5 * taken }
+            })
+        })
+    }
+
+    /// W3', with geometric stiffness for angular acceleration; and W3' - W3 where that is not twice W3'.
+    fn w3(&self) -> (Option<Panels>, Option<Panels>) {
+        let (nf, axes) = (self.nf, self.axes);
+        let turned = self.geometric(LoadKind::AngularAcceleration);
+        if !(self.terms.w3 || turned.is_some()) {
+            return (None, None);
+        }
+        let w3 = self.invariants.w3().filter(|_| self.terms.w3);
+        // (W3_a)_ij and (W3_a)_ji.
+        let entries = |at: usize, i: usize, j: usize| {
+            let a = axes[at];
+            w3.as_ref().map_or((0.0, 0.0), |w3| (w3[(a * nf + i, j)], w3[(a * nf + j, i)]))
+        };
+        let general = self.invariants.general.is_some();
+        let transposed = self.stacked(axes.len(), &|at, i, j| {
+            let (own, mirrored) = entries(at, i, j);
+            // Of a solid the blocks are skew: what is left of W3 + W3' is rounding.
+            let w3 = if general { mirrored } else { 0.5 * (mirrored - own) };
+            w3 + turned.as_ref().map_or(0.0, |turned| turned(axes[at], i, j))
+        });
+        let skew = |at: usize, i: usize, j: usize| {
+            let (own, mirrored) = entries(at, i, j);
+            mirrored - own
+        };
+        (Some(transposed), (general || turned.is_some()).then(|| self.stacked(axes.len(), &skew)))
+    }
+
+    /// Geometric stiffness for acceleration.
+    fn accelerated(&self) -> Option<Panels> {
+        let along = self.geometric(LoadKind::Acceleration)?;
+        Some(self.stacked(if self.body.dimension() == 2 { 2 } else { 3 }, &along))
+    }
+
+    fn geometric(&self, kind: LoadKind) -> Option<impl Fn(usize, usize, usize) -> f64 + use<'b>> {
+        self.terms.geometric_stiffness.then(|| geometric_stiffness(self.body, &kind)).flatten()
+    }
+
+    /// `count` square matrices on top of each other, with the entries (matrix, i, j).
+    fn stacked(&self, count: usize, entry: &dyn Fn(usize, usize, usize) -> f64) -> Panels {
+        let block = |at| Mat::from_fn(self.nf, self.nf, |i, j| entry(at, i, j));
+        Panels::stacked(&(0..count).map(block).collect::<Vec<_>>())
     }
 }

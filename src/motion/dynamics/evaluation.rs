@@ -1,8 +1,8 @@
 //! The equations of motion at one state.
 
+use super::EquationsOfMotion;
 use super::equations::{C1, LINEAR, PAIRS, W0, W1};
 use super::kernels::{WIDTH, add_scaled, dot};
-use super::{EquationsOfMotion, NotPositiveDefinite, Prescribed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use pulp::Arch;
 
@@ -59,9 +59,9 @@ impl<'a> Evaluation<'a> {
     pub fn new(equations: &'a EquationsOfMotion) -> Self {
         let nf = equations.nf;
         let zeros = |n: usize| vec![0.0; n];
-        let of_pairs = || zeros(equations.w2.as_ref().map_or(0, |w2| w2.padded_rows()));
-        let of_axes = || zeros(equations.w3.as_ref().map_or(0, |w3| w3.padded_rows()));
-        let of_translations = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
+        let pair_products = || zeros(equations.w2.as_ref().map_or(0, |w2| w2.padded_rows()));
+        let axis_products = || zeros(equations.w3.as_ref().map_or(0, |w3| w3.padded_rows()));
+        let translation_products = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
         let mut evaluation = Self {
             equations,
             arch: Arch::new(),
@@ -69,12 +69,12 @@ impl<'a> Evaluation<'a> {
             qd: zeros(nf),
             velocity: Vector3::zeros(),
             omega: Vector3::zeros(),
-            w2_q: of_pairs(),
-            w3_q: of_axes(),
-            w3_qd: of_axes(),
-            skew_qd: of_axes(),
-            accelerated_q: of_translations(),
-            accelerated_qd: of_translations(),
+            w2_q: pair_products(),
+            w3_q: axis_products(),
+            w3_qd: axis_products(),
+            skew_qd: axis_products(),
+            accelerated_q: translation_products(),
+            accelerated_qd: translation_products(),
             coupling: zeros(6 * nf),
             first_moment: Vector3::zeros(),
             c1_qd: Vector3::zeros(),
@@ -87,9 +87,9 @@ impl<'a> Evaluation<'a> {
             velocity_forces: zeros(equations.n_velocities()),
             whitened: zeros(6 * nf),
             modal: zeros(nf),
-            w2_scratch: of_pairs(),
-            w3_scratch: [of_axes(), of_axes()],
-            accelerated_scratch: of_translations(),
+            w2_scratch: pair_products(),
+            w3_scratch: [axis_products(), axis_products()],
+            accelerated_scratch: translation_products(),
         };
         let (q, nu) = (zeros(nf), zeros(equations.n_velocities()));
         evaluation.set(&q, &nu);
@@ -120,52 +120,19 @@ impl<'a> Evaluation<'a> {
         });
     }
 
-    /// Goes to the state with modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of nu. At the cost of
-    /// [`Evaluation::set`] and one solution with Mc.
-    ///
-    /// * `prescribed`: V or omega that are given instead; the momenta that belong to them follow, and those of `momenta` are not read.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`]; the state is then without meaning.
-    ///
-    /// # Panics
-    /// When the lengths are not those of the equations.
-    pub fn set_momenta(
-        &mut self,
-        q: &[f64],
-        momenta: &[f64],
-        prescribed: &Prescribed,
-    ) -> Result<(), NotPositiveDefinite> {
-        let body = self.equations;
-        assert_eq!(q.len(), body.nf, "one coordinate per mode");
-        let (p, h, pi) = body.split(momenta);
-        self.q.copy_from_slice(q);
-        self.modal.copy_from_slice(pi);
-        self.arch
-            .dispatch(|| {
-                self.deform();
-                let (velocity, omega) = self.solve(&p, &h, prescribed)?;
-                (self.velocity, self.omega) = (velocity, omega);
-                self.qd.copy_from_slice(&self.modal);
-                self.move_on();
-                Some(())
-            })
-            .ok_or(NotPositiveDefinite)
-    }
-
     /// What depends on q alone.
     #[inline(always)] // compiled once per instruction set
-    fn deform(&mut self) {
+    pub(super) fn deform(&mut self) {
         let body = self.equations;
         let nf = body.nf;
         let q = &self.q[..];
-        let mut of_q = [0.0; WIDTH];
-        body.linear_panels.times(q, &mut of_q);
-        self.first_moment = body.first_moment + Vector3::from_fn(|k, _| of_q[C1 + k]);
-        self.lever = Matrix3::from_fn(|k, b| of_q[W0 + 3 * k + b]) - body.first_moment.cross_matrix();
+        let mut linear_q = [0.0; WIDTH];
+        body.linear_panels.times(q, &mut linear_q);
+        self.first_moment = body.first_moment + Vector3::from_fn(|k, _| linear_q[C1 + k]);
+        self.lever = Matrix3::from_fn(|k, b| linear_q[W0 + 3 * k + b]) - body.first_moment.cross_matrix();
         self.inertia = body.inertia;
         for (pair, &axes) in PAIRS.iter().enumerate() {
-            add_symmetric(&mut self.inertia, axes, of_q[W1 + pair]);
+            add_symmetric(&mut self.inertia, axes, linear_q[W1 + pair]);
         }
         if let Some(w2) = &body.w2 {
             w2.times(q, &mut self.w2_q);
@@ -194,14 +161,24 @@ impl<'a> Evaluation<'a> {
 
     /// What depends on the velocities, after [`Evaluation::deform`].
     #[inline(always)] // compiled once per instruction set
-    fn move_on(&mut self) {
+    pub(super) fn move_on(&mut self) {
+        let c1_rate_qd = self.set_lever_and_inertia_rates();
+        let (coupling_qd, coupling_rate_qd) = self.set_coupling_products();
+        self.set_momenta_of_frame(&coupling_qd);
+        self.set_rigid_velocity_forces(&c1_rate_qd, &coupling_rate_qd);
+        self.set_modal_velocity_forces();
+    }
+
+    /// C1 qd and the rates of lever and inertia; gives dC1/dt qd.
+    #[inline(always)] // compiled once per instruction set
+    fn set_lever_and_inertia_rates(&mut self) -> Vector3<f64> {
         let body = self.equations;
-        let (nf, v, w) = (body.nf, self.velocity, self.omega);
+        let nf = body.nf;
         let qd = &self.qd[..];
-        let mut of_qd = [0.0; WIDTH];
-        body.linear_panels.times(qd, &mut of_qd);
-        self.c1_qd = Vector3::from_fn(|k, _| of_qd[C1 + k]);
-        self.lever_rate = Matrix3::from_fn(|k, b| of_qd[W0 + 3 * k + b]);
+        let mut linear_qd = [0.0; WIDTH];
+        body.linear_panels.times(qd, &mut linear_qd);
+        self.c1_qd = Vector3::from_fn(|k, _| linear_qd[C1 + k]);
+        self.lever_rate = Matrix3::from_fn(|k, b| linear_qd[W0 + 3 * k + b]);
         let mut c1_rate_qd = Vector3::zeros();
         if let Some(accelerated) = &body.accelerated {
             accelerated.times(qd, &mut self.accelerated_qd);
@@ -215,13 +192,22 @@ impl<'a> Evaluation<'a> {
         }
         self.inertia_rate = Matrix3::zeros();
         for (pair, &axes) in PAIRS.iter().enumerate() {
-            add_symmetric(&mut self.inertia_rate, axes, of_qd[W1 + pair]);
+            add_symmetric(&mut self.inertia_rate, axes, linear_qd[W1 + pair]);
         }
         if body.w2.is_some() {
             for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
                 add_symmetric(&mut self.inertia_rate, pair, 2.0 * dot(qd, product));
             }
         }
+        c1_rate_qd
+    }
+
+    /// Products of W3 with qd; gives C(q) qd and dC/dt qd.
+    #[inline(always)] // compiled once per instruction set
+    fn set_coupling_products(&mut self) -> (Vector3<f64>, Vector3<f64>) {
+        let body = self.equations;
+        let nf = body.nf;
+        let qd = &self.qd[..];
         let coupling_qd = Vector3::from_fn(|a, _| dot(&self.coupling[(3 + a) * nf..][..nf], qd));
         let mut coupling_rate_qd = Vector3::zeros();
         if let Some(w3) = &body.w3 {
@@ -236,16 +222,33 @@ impl<'a> Evaluation<'a> {
                 None => self.skew_qd.iter_mut().zip(&self.w3_qd).for_each(|(skew, w3)| *skew = 2.0 * w3),
             }
         }
+        (coupling_qd, coupling_rate_qd)
+    }
 
-        let p = body.mass * v + self.relative_momentum();
-        let h = self.lever.tr_mul(&v) + self.inertia * w + coupling_qd;
-        (self.momentum, self.angular_momentum) = (p, h);
+    /// p and h.
+    #[inline(always)] // compiled once per instruction set
+    fn set_momenta_of_frame(&mut self, coupling_qd: &Vector3<f64>) {
+        self.momentum = self.equations.mass * self.velocity + self.relative_momentum();
+        self.angular_momentum = self.lever.tr_mul(&self.velocity) + self.inertia * self.omega + coupling_qd;
+    }
+
+    /// The rigid entries of h_nu.
+    #[inline(always)] // compiled once per instruction set
+    fn set_rigid_velocity_forces(&mut self, c1_rate_qd: &Vector3<f64>, coupling_rate_qd: &Vector3<f64>) {
+        let body = self.equations;
+        let (v, w, p, h) = (self.velocity, self.omega, self.momentum, self.angular_momentum);
         let force = self.lever_rate * w + c1_rate_qd + w.cross(&p);
         let torque =
             self.lever_rate.tr_mul(&v) + self.inertia_rate * w + coupling_rate_qd + w.cross(&h) + v.cross(&p);
+        body.put_rigid(force, torque, &mut self.velocity_forces[..body.rigid.len()]);
+    }
 
-        let (rigid, modal) = self.velocity_forces.split_at_mut(body.rigid.len());
-        body.put_rigid(force, torque, rigid);
+    /// The modal entries of h_nu.
+    #[inline(always)] // compiled once per instruction set
+    fn set_modal_velocity_forces(&mut self) {
+        let body = self.equations;
+        let (nf, v, w) = (body.nf, self.velocity, self.omega);
+        let modal = &mut self.velocity_forces[body.rigid.len()..];
         modal.fill(0.0);
         for at in 0..9 {
             let weight = v[at / 3] * w[at % 3];
@@ -313,8 +316,9 @@ impl<'a> Evaluation<'a> {
     /// T = nu' Mc(q) nu / 2.
     pub fn kinetic_energy(&self) -> f64 {
         // V'p + omega'h has the coupling to qd once.
-        let of_qd = |axis: usize| dot(self.equations.coupling_row(&self.coupling, axis), &self.qd);
-        let coupling: f64 = (0..3).map(|k| self.velocity[k] * of_qd(k) + self.omega[k] * of_qd(3 + k)).sum();
+        let product = |axis: usize| dot(self.equations.coupling_row(&self.coupling, axis), &self.qd);
+        let coupling: f64 =
+            (0..3).map(|k| self.velocity[k] * product(k) + self.omega[k] * product(3 + k)).sum();
         let rigid = self.velocity.dot(&self.momentum) + self.omega.dot(&self.angular_momentum);
         0.5 * (rigid + coupling + self.equations.modal_mass.quadratic(&self.qd))
     }

@@ -5,6 +5,26 @@ use super::equations::{PAIRS, W0, W1};
 use super::evaluation::{add_symmetric, spin_product};
 use nalgebra::{Matrix3, Vector3};
 
+/// What the derivatives with respect to q_j and qd_j of one mode j consist of.
+struct ModeDerivatives {
+    /// dN/dq_j.
+    lever: Matrix3<f64>,
+    /// dI/dq_j, and its rate.
+    inertia: Matrix3<f64>,
+    inertia_rate: Matrix3<f64>,
+    /// (K^a qdd)_j and (K^a qd)_j.
+    accelerated_modal: Vector3<f64>,
+    accelerated_qd: Vector3<f64>,
+    /// (W3 qdd)_j and (W3 qd)_j.
+    w3_modal: Vector3<f64>,
+    w3_qd: Vector3<f64>,
+    /// ((W3' - W3) qd)_j.
+    skew_qd: Vector3<f64>,
+    /// C1_j and C(q)_j.
+    c1: Vector3<f64>,
+    coupling: Vector3<f64>,
+}
+
 impl Evaluation<'_> {
     /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd), at constant accelerations nu'.
     ///
@@ -103,48 +123,19 @@ impl Evaluation<'_> {
         let body = self.equations;
         let (n, nf, r) = (body.n_velocities(), body.nf, body.rigid.len());
         let (v, w) = (&self.velocity, &self.omega);
-        let mut lever = Matrix3::from_fn(|k, b| body.row(W0 + 3 * k + b)[j]);
-        let (mut accelerated_modal, mut accelerated_qd) = (Vector3::zeros(), Vector3::zeros());
-        if body.accelerated.is_some() {
-            let of = |products: &[f64]| {
-                let mut column = Vector3::zeros();
-                (0..body.translations()).for_each(|k| column[k] = products[k * nf + j]);
-                column
-            };
-            lever -= of(&self.accelerated_q).cross_matrix();
-            (accelerated_modal, accelerated_qd) = (of(&self.accelerated_scratch), of(&self.accelerated_qd));
-        }
-        let (mut inertia, mut inertia_rate) = (Matrix3::zeros(), Matrix3::zeros());
-        for (pair, &axes) in PAIRS.iter().enumerate() {
-            add_symmetric(&mut inertia, axes, body.row(W1 + pair)[j]);
-        }
-        if body.w2.is_some() {
-            for (at, &pair) in body.pairs.iter().enumerate() {
-                add_symmetric(&mut inertia, pair, 2.0 * self.w2_q[at * nf + j]);
-                add_symmetric(&mut inertia_rate, pair, 2.0 * self.w2_scratch[at * nf + j]);
-            }
-        }
-        // (W3_a x)_j is that of the transpose less that of the difference.
-        let w3_times = |transposed: &[f64], skew: &[f64]| {
-            let mut product = Vector3::zeros();
-            if body.w3.is_some() {
-                for (at, &a) in body.axes.iter().enumerate() {
-                    product[a] = transposed[at * nf + j] - skew[at * nf + j];
-                }
-            }
-            product
-        };
-        let [transposed, skew] = &self.w3_scratch;
-        let (w3_modal, w3_qd) = (w3_times(transposed, skew), w3_times(&self.w3_qd, &self.skew_qd));
-        let mut skew_qd = Vector3::zeros();
-        if body.w3.is_some() {
-            body.axes.iter().enumerate().for_each(|(at, &a)| skew_qd[a] = self.skew_qd[at * nf + j]);
-        }
-        let row = |axis: usize| body.coupling_row(&self.coupling, axis)[j];
-        let c1 = Vector3::from_fn(|k, _| row(k));
-        let coupling = Vector3::from_fn(|k, _| row(3 + k));
+        let ModeDerivatives {
+            lever,
+            inertia,
+            inertia_rate,
+            accelerated_modal,
+            accelerated_qd,
+            w3_modal,
+            w3_qd,
+            skew_qd,
+            c1,
+            coupling,
+        } = self.mode_derivatives(j);
         let (p, rate) = (lever * w, lever.tr_mul(v) + inertia * w);
-
         let by_qj = (
             lever * angular + accelerated_modal + w.cross(&(p + 2.0 * accelerated_qd)),
             lever.tr_mul(linear)
@@ -170,6 +161,71 @@ impl Evaluation<'_> {
         }
     }
 
+    /// The entries of mode `j` in all that the derivatives by q_j and qd_j take.
+    fn mode_derivatives(&self, j: usize) -> ModeDerivatives {
+        let body = self.equations;
+        let mut lever = Matrix3::from_fn(|k, b| body.row(W0 + 3 * k + b)[j]);
+        let (mut accelerated_modal, mut accelerated_qd) = (Vector3::zeros(), Vector3::zeros());
+        if body.accelerated.is_some() {
+            lever -= self.accelerated_column(&self.accelerated_q, j).cross_matrix();
+            accelerated_modal = self.accelerated_column(&self.accelerated_scratch, j);
+            accelerated_qd = self.accelerated_column(&self.accelerated_qd, j);
+        }
+        let (inertia, inertia_rate) = self.inertia_derivatives(j);
+        // (W3_a x)_j is that of the transpose less that of the difference.
+        let w3_times = |transposed: &[f64], skew: &[f64]| {
+            self.w3_column(|at| transposed[at * body.nf + j] - skew[at * body.nf + j])
+        };
+        let [transposed, skew] = &self.w3_scratch;
+        let row = |axis: usize| body.coupling_row(&self.coupling, axis)[j];
+        ModeDerivatives {
+            lever,
+            inertia,
+            inertia_rate,
+            accelerated_modal,
+            accelerated_qd,
+            w3_modal: w3_times(transposed, skew),
+            w3_qd: w3_times(&self.w3_qd, &self.skew_qd),
+            skew_qd: self.w3_column(|at| self.skew_qd[at * body.nf + j]),
+            c1: Vector3::from_fn(|k, _| row(k)),
+            coupling: Vector3::from_fn(|k, _| row(3 + k)),
+        }
+    }
+
+    /// Entry `j` of the product with K^a of every axis that the body moves along.
+    fn accelerated_column(&self, products: &[f64], j: usize) -> Vector3<f64> {
+        let body = self.equations;
+        let mut column = Vector3::zeros();
+        (0..body.translations()).for_each(|k| column[k] = products[k * body.nf + j]);
+        column
+    }
+
+    /// `entry` of every axis that the body turns about (by its place among them); zero without W3.
+    fn w3_column(&self, entry: impl Fn(usize) -> f64) -> Vector3<f64> {
+        let body = self.equations;
+        let mut column = Vector3::zeros();
+        if body.w3.is_some() {
+            body.axes.iter().enumerate().for_each(|(at, &a)| column[a] = entry(at));
+        }
+        column
+    }
+
+    /// dI/dq_j and its rate.
+    fn inertia_derivatives(&self, j: usize) -> (Matrix3<f64>, Matrix3<f64>) {
+        let (body, nf) = (self.equations, self.equations.nf);
+        let (mut inertia, mut rate) = (Matrix3::zeros(), Matrix3::zeros());
+        for (pair, &axes) in PAIRS.iter().enumerate() {
+            add_symmetric(&mut inertia, axes, body.row(W1 + pair)[j]);
+        }
+        if body.w2.is_some() {
+            for (at, &pair) in body.pairs.iter().enumerate() {
+                add_symmetric(&mut inertia, pair, 2.0 * self.w2_q[at * nf + j]);
+                add_symmetric(&mut rate, pair, 2.0 * self.w2_scratch[at * nf + j]);
+            }
+        }
+        (inertia, rate)
+    }
+
     /// Derivatives of the modal forces by q and qd; `linear` is the acceleration of the origin, V' + omega x V.
     fn modal_block(
         &self,
@@ -187,16 +243,16 @@ impl Evaluation<'_> {
             }
         }
         for i in 0..nf {
-            let of_q = &mut by_q[(r + i) * nf..][..nf];
+            let row = &mut by_q[(r + i) * nf..][..nf];
             if let Some(w2) = &body.w2 {
                 for (at, &pair) in body.pairs.iter().enumerate() {
                     let factor = spin_product(w, pair);
-                    of_q.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
+                    row.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
                 }
             }
             if let Some(accelerated) = &body.accelerated {
                 for k in 0..body.translations() {
-                    of_q.iter_mut()
+                    row.iter_mut()
                         .zip(accelerated.row(k * nf + i))
                         .for_each(|(sum, e)| *sum += linear[k] * e);
                 }
@@ -204,7 +260,7 @@ impl Evaluation<'_> {
             if let Some(w3) = &body.w3 {
                 for (at, &a) in body.axes.iter().enumerate() {
                     for (j, transposed) in w3.row(at * nf + i).enumerate() {
-                        of_q[j] += angular[a] * transposed;
+                        row[j] += angular[a] * transposed;
                         by_nu[(r + i) * n + r + j] += w[a] * transposed;
                         by_nu[(r + j) * n + r + i] -= w[a] * transposed;
                     }

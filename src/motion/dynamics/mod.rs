@@ -16,21 +16,22 @@ mod motion;
 mod nodal;
 mod orientation;
 mod points;
+mod prescribed;
 mod snapshot;
 mod terms;
 
-pub use accelerations::{NotPositiveDefinite, Prescribed};
 pub(crate) use constants::Constants;
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
 pub(crate) use geometric::geometric_stiffness;
 pub use load_jacobian::{LoadAxes, LoadJacobian};
-pub use motion::{EmptySpace, Motion, Place, Surroundings};
+pub use motion::{EmptySpace, Motion, Surroundings};
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
     ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use points::BodyPoint;
-pub use snapshot::{Balance, Configuration, Snapshot};
+pub use prescribed::{NotPositiveDefinite, Prescribed};
+pub use snapshot::{Balance, Configuration, Place, Snapshot};
 pub use terms::Terms;

@@ -1,25 +1,16 @@
 //! The motion of one body in space as a system that can be integrated.
 
 use super::{
-    Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Prescribed, Snapshot,
+    Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Prescribed, Snapshot,
 };
 use crate::numerics::integration::{Failure, Oscillator, System};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Deformations below this part of the size of the body count as this much, so that a body at rest has a scale.
 const LEAST_DEFORMATION: f64 = 1e-6;
 
 /// The scale of vibration is at least this part of that of the whole internal motion.
 const LEAST_VIBRATION: f64 = 1e-3;
-
-/// Where a body is: its frame in the world.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    /// Origin of the body frame, world axes.
-    pub origin: Vector3<f64>,
-    /// A: body axes to world axes.
-    pub axes: Matrix3<f64>,
-}
 
 /// What acts on a body from outside.
 pub trait Surroundings {
@@ -178,7 +169,7 @@ impl<'a> Motion<'a> {
         put(&(axes * evaluation.angular_momentum()), layout.angular(), &mut state);
         evaluation.modal_momentum(&mut state[layout.modal()..layout.offset()]);
 
-        let of_mode = |j: usize| {
+        let oscillator = |j: usize| {
             let (stiffness, damping) = equations.oscillator(j)?;
             Some(Oscillator {
                 coordinate: Layout::MODES + j,
@@ -192,7 +183,7 @@ impl<'a> Motion<'a> {
             surroundings,
             reference: start.origin,
             size: Size::new(equations),
-            oscillators: (0..nf).filter_map(of_mode).collect(),
+            oscillators: (0..nf).filter_map(oscillator).collect(),
             momenta: vec![0.0; n],
             forces: vec![0.0; n],
             rates: vec![0.0; n],

@@ -1,7 +1,16 @@
 //! A body at one state of its motion, as a reader thinks of it.
 
-use super::{EulerParameters, Evaluation, Place};
-use nalgebra::Vector3;
+use super::{EulerParameters, Evaluation};
+use nalgebra::{Matrix3, Vector3};
+
+/// Where a body is: its frame in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Origin of the body frame, world axes.
+    pub origin: Vector3<f64>,
+    /// A: body axes to world axes.
+    pub axes: Matrix3<f64>,
+}
 
 /// A state in the velocities that a reader thinks in.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! A scene as data. Numbers are in the units of the body that it is for.
 
-use super::{History, Requirements};
+use super::{Axes, History, Requirements};
 use crate::base::provenance::SourceFile;
 use crate::motion::dynamics::Terms;
 use nalgebra::Vector3;
@@ -182,29 +182,6 @@ pub struct Load {
     pub axes: Axes,
     /// Factor over time.
     pub history: History,
-}
-
-/// Axes that a vector is given in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Axes {
-    /// Fixed in space.
-    World,
-    /// Those of the model, turning with the body. Of a body that came without a model these are those of its file.
-    #[default]
-    Model,
-    /// Those of the body frame of the flex-body file, turning with the body.
-    Body,
-}
-
-impl Axes {
-    /// Name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::World => "world",
-            Self::Model => "model",
-            Self::Body => "body",
-        }
-    }
 }
 
 /// Prescribed angular velocity of the body frame.

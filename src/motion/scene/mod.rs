@@ -1,5 +1,6 @@
 //! What a body is to do: the scene file, and its simulation.
 
+mod axes;
 mod contradictions;
 mod description;
 mod effort;
@@ -12,6 +13,7 @@ mod prepared;
 mod read;
 mod read_carried;
 mod read_requirements;
+mod read_values;
 mod recording;
 mod requirements;
 mod simulate;
@@ -19,8 +21,9 @@ mod stage;
 mod surroundings;
 mod trace;
 
+pub use axes::Axes;
 pub use description::{
-    Axes, Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin, Translation,
+    Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin, Translation,
 };
 pub(crate) use errors::LEAST_REACTION;
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};

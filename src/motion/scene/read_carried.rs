@@ -1,6 +1,6 @@
 //! Reads the table of a scene that says what carries the body.
 
-use super::read::{EVERY, axes, direction, history, place, transposed, vector};
+use super::read_values::{EVERY, axes, direction, history, place, transposed, vector};
 use super::{Axes, Carried, CarriedSpin, Drive, History, Translation};
 use crate::input::{Table, Walk};
 use nalgebra::Vector3;

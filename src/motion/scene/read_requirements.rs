@@ -1,7 +1,7 @@
 //! Reads the tables of a scene that say what is demanded of the body.
 
 use super::Axes;
-use super::read::{axes, finite, list, place_of, positive, vector};
+use super::read_values::{axes, finite, list, mode_number, place_of, positive, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 use crate::input::{Table, Value, Walk, integer, real};
 use nalgebra::{Matrix3, Vector3};
@@ -25,93 +25,110 @@ const CRITICAL: f64 = 1.0;
 
 /// `None` only with something in `found`.
 pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requirements> {
-    let mut all = Some(Requirements::default());
+    let mut requirements = Requirements::default();
+    let mut complete = true;
     for (name, keys) in TABLES {
-        let Some((table, span)) = walk.table(top, name) else {
-            if top.contains_key(name) {
-                all = None;
+        match walk.table(top, name) {
+            Some((table, span)) => {
+                walk.known_keys(table, &format!("[{name}]"), keys);
+                let mut section = Section { walk, table, span };
+                complete &= section.read(name, &mut requirements).is_some();
             }
-            continue;
-        };
-        walk.known_keys(table, &format!("[{name}]"), keys);
-        let optional = |walk: &mut Walk<'_>, key: &str| match table.contains_key(key) {
-            true => positive(walk, table, key, &span).map(Some),
-            false => Some(None),
-        };
-        let mut put = || -> Option<()> {
-            let mut read = Requirements::default();
-            let target = all.as_mut().unwrap_or(&mut read);
-            match name {
-                "motion" => {
-                    let [velocity, acceleration] =
-                        ["angular_velocity", "angular_acceleration"].map(|key| range(walk, table, key));
-                    let axes = turning_axes(walk, table);
-                    target.motion = MotionRange {
-                        angular_velocity: velocity?,
-                        angular_acceleration: acceleration?,
-                        axes: axes?,
-                    };
-                }
-                "attachment" => {
-                    let (kind, inertia) = (kind(walk, table), attached_inertia(walk, table));
-                    let first_frequency = optional(walk, "first_frequency");
-                    let axes = turning_axes(walk, table);
-                    target.attachment = Attachment {
-                        kind: kind?,
-                        inertia: Matrix3::from_diagonal(&inertia?),
-                        axes: axes?,
-                        first_frequency: first_frequency?,
-                    };
-                }
-                "limits" => target.limits = limits(walk, table, &span)?,
-                "band" => target.band = Some(positive(walk, table, "frequency", &span)?),
-                "damping" => {
-                    let ratio = positive(walk, table, "ratio", &span)?;
-                    if ratio >= CRITICAL {
-                        let message = format!("`ratio` is {ratio}, expected a number below 1");
-                        walk.wrong(place_of(table, "ratio", &span), message);
-                        return None;
-                    }
-                    target.damping = Some(ratio);
-                }
-                "tolerance" => {
-                    let Tolerance { attitude, deflection, stress, reaction, .. } = Tolerance::default();
-                    let [a, d, s, r] = [
-                        ("attitude", attitude),
-                        ("deflection", deflection),
-                        ("stress", stress),
-                        ("reaction", reaction),
-                    ]
-                    .map(|(key, default)| Some(optional(walk, key)?.unwrap_or(default)));
-                    let least_deflection = optional(walk, "least_deflection");
-                    target.tolerance = Tolerance {
-                        attitude: a?,
-                        deflection: d?,
-                        stress: s?,
-                        reaction: r?,
-                        least_deflection: least_deflection?,
-                    };
-                }
-                _ => {
-                    let value = table.get("multiplications");
-                    let count = value
-                        .and_then(integer)
-                        .and_then(|count| usize::try_from(count).ok())
-                        .filter(|&count| count > 0);
-                    if count.is_none() {
-                        let message = "`multiplications` is not a positive whole number".to_owned();
-                        walk.wrong(place_of(table, "multiplications", &span), message);
-                    }
-                    target.multiplications = Some(count?);
-                }
-            }
-            Some(())
-        };
-        if put().is_none() {
-            all = None;
+            // What is there and no table was complained about.
+            None => complete &= !top.contains_key(name),
         }
     }
-    all
+    complete.then_some(requirements)
+}
+
+/// One of the tables.
+struct Section<'s, 'w> {
+    walk: &'s mut Walk<'w>,
+    table: &'s Table<'s>,
+    span: std::ops::Range<usize>,
+}
+
+impl Section<'_, '_> {
+    fn read(&mut self, name: &str, requirements: &mut Requirements) -> Option<()> {
+        match name {
+            "motion" => requirements.motion = self.motion()?,
+            "attachment" => requirements.attachment = self.attachment()?,
+            "limits" => requirements.limits = limits(self.walk, self.table, &self.span)?,
+            "band" => requirements.band = Some(positive(self.walk, self.table, "frequency", &self.span)?),
+            "damping" => requirements.damping = Some(self.damping_ratio()?),
+            "tolerance" => requirements.tolerance = self.tolerance()?,
+            _ => requirements.multiplications = Some(self.multiplications()?),
+        }
+        Some(())
+    }
+
+    /// A positive number that may be there.
+    fn optional(&mut self, key: &str) -> Option<Option<f64>> {
+        match self.table.contains_key(key) {
+            true => positive(self.walk, self.table, key, &self.span).map(Some),
+            false => Some(None),
+        }
+    }
+
+    fn motion(&mut self) -> Option<MotionRange> {
+        let [velocity, acceleration] =
+            ["angular_velocity", "angular_acceleration"].map(|key| range(self.walk, self.table, key));
+        let axes = turning_axes(self.walk, self.table);
+        Some(MotionRange { angular_velocity: velocity?, angular_acceleration: acceleration?, axes: axes? })
+    }
+
+    fn attachment(&mut self) -> Option<Attachment> {
+        let kind = kind(self.walk, self.table);
+        let inertia = attached_inertia(self.walk, self.table);
+        let first_frequency = self.optional("first_frequency");
+        let axes = turning_axes(self.walk, self.table);
+        Some(Attachment {
+            kind: kind?,
+            inertia: Matrix3::from_diagonal(&inertia?),
+            axes: axes?,
+            first_frequency: first_frequency?,
+        })
+    }
+
+    fn damping_ratio(&mut self) -> Option<f64> {
+        let ratio = positive(self.walk, self.table, "ratio", &self.span)?;
+        if ratio >= CRITICAL {
+            let message = format!("`ratio` is {ratio}, expected a number below 1");
+            self.walk.wrong(place_of(self.table, "ratio", &self.span), message);
+            return None;
+        }
+        Some(ratio)
+    }
+
+    fn tolerance(&mut self) -> Option<Tolerance> {
+        let default = Tolerance::default();
+        let [attitude, deflection, stress, reaction] = [
+            ("attitude", default.attitude),
+            ("deflection", default.deflection),
+            ("stress", default.stress),
+            ("reaction", default.reaction),
+        ]
+        .map(|(key, default)| Some(self.optional(key)?.unwrap_or(default)));
+        let least_deflection = self.optional("least_deflection");
+        Some(Tolerance {
+            attitude: attitude?,
+            deflection: deflection?,
+            stress: stress?,
+            reaction: reaction?,
+            least_deflection: least_deflection?,
+        })
+    }
+
+    fn multiplications(&mut self) -> Option<usize> {
+        let value = self.table.get("multiplications");
+        let count =
+            value.and_then(integer).and_then(|count| usize::try_from(count).ok()).filter(|&count| count > 0);
+        if count.is_none() {
+            let message = "`multiplications` is not a positive whole number".to_owned();
+            self.walk.wrong(place_of(self.table, "multiplications", &self.span), message);
+        }
+        count
+    }
 }
 
 /// Axes that turn with the body.
@@ -196,7 +213,7 @@ fn limits(walk: &mut Walk<'_>, table: &Table, span: &std::ops::Range<usize>) -> 
     };
     let modes = list(walk, table, "mode", |walk, table, span| {
         walk.known_keys(table, "[[limits.mode]]", LIMITED_MODE);
-        let number = super::read::mode_number(walk, table, &span, "[[limits.mode]]");
+        let number = mode_number(walk, table, &span, "[[limits.mode]]");
         let amplitude = finite(walk, table, "amplitude", &span).filter(|amplitude| *amplitude >= 0.0);
         if amplitude.is_none() && table.contains_key("amplitude") {
             walk.wrong(span, "`amplitude` is a magnitude and cannot be negative".to_owned());

@@ -239,19 +239,25 @@ impl Driven {
     }
 
     /// What the torque lacks without the groups `dropped`, at motion within `own`.
-    pub fn lacking(&self, dropped: Groups, norms: &Norms, own: &Amplitude) -> Lacking {
+    pub fn torque_defect(&self, dropped: Groups, norms: &Norms, own: &Amplitude) -> TorqueDefect {
         let (w, turn) = (self.rotation.largest, self.rotation.acceleration + self.rotation.largest.powi(2));
         let (q, v, a) = (own.coordinate, own.rate, own.acceleration);
         let there = |group: bool, torque: f64| if group { torque } else { 0.0 };
         let torque = there(dropped.w1, norms.inertia * (v * w + q * turn))
             + there(dropped.w2, 2.0 * q * v * w + q * q * turn)
             + there(dropped.w3, product(norms.turning, product(q, a) + w * q * v));
-        Lacking { torque, stiff: product(norms.turning * norms.last, q) }
+        TorqueDefect { torque, stiff: product(norms.turning * norms.last, q) }
     }
 
     /// Bound of the error of the torque that the rotation takes, without that of the levers of loads: what it lacks, and what the whole
     /// body makes of the `error` of a motion within `own`.
-    pub fn torque_error(&self, norms: &Norms, own: &Amplitude, error: &ErrorBound, lacking: &Lacking) -> f64 {
+    pub fn torque_error(
+        &self,
+        norms: &Norms,
+        own: &Amplitude,
+        error: &ErrorBound,
+        defect: &TorqueDefect,
+    ) -> f64 {
         let r = &self.rotation;
         let (w, turn) = (r.largest, r.acceleration + r.largest.powi(2));
         let (dq, dv) = (error.coordinate, error.rate);
@@ -259,17 +265,17 @@ impl Driven {
         let linear = norms.inertia * (dv * w + dq * turn);
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
         // q'W3 e'' with e'' of the equations of motion, whose part Lambda e meets W3'q in the norm of stiffness.
-        let stiff = product(lacking.stiff + product(norms.turning * norms.last, dq), error.energy);
+        let stiff = product(defect.stiff + product(norms.turning * norms.last, dq), error.energy);
         let rest = product(product(norms.turning, q), error.acceleration_without_stiffness);
         let coupled =
             stiff + rest + product(norms.turning, product(dq, own.acceleration) + w * (q * dv + dq * v));
-        lacking.torque + linear + quadratic + coupled
+        defect.torque + linear + quadratic + coupled
     }
 }
 
 /// What the balance of torques lacks without some groups.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lacking {
+pub struct TorqueDefect {
     /// Largest torque.
     pub torque: f64,
     /// Largest |Lambda^(1/2) W3' q|.

@@ -2,7 +2,7 @@
 
 use super::norms::Norms;
 use super::situation::Situation;
-use super::trial::{Bench, Trial};
+use super::trial::{Trial, TrialRuns};
 use super::variation::Variation;
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Group, Groups};
@@ -98,9 +98,9 @@ impl<'c> Case<'c> {
         [Some(rigid), own].into_iter().flatten().collect()
     }
 
-    pub fn bench(&self) -> Bench<'_> {
+    pub fn runs(&self) -> TrialRuns<'_> {
         let Self { body, scene, situation, loads, watched, memory } = self;
-        Bench { body, scene, situation, loads, watched, memory: *memory }
+        TrialRuns { body, scene, situation, loads, watched, memory: *memory }
     }
 }
 
@@ -113,19 +113,19 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     let only_w1 = Groups::NONE.with(Group::W1);
     for kept in sets().filter(|set| *set != Groups::ALL) {
         let by_tier = cases.iter().zip(&norms).map(|(case, norms)| -> Result<Vec<Trial>> {
-            let bench = case.bench();
-            let Bench { body, scene, situation, .. } = bench;
+            let runs = case.runs();
+            let TrialRuns { body, scene, situation, .. } = runs;
             let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
             let has_axis = driven.rotation.axis.is_some();
             let of_run = scene.spin.is_some() && scene.run.duration.is_some() && has_axis;
             let held = body.invariants().groups;
-            let runs = kept == Groups::NONE || kept == only_w1 && held.w1;
-            if of_run && !runs {
+            let is_cheap = kept == Groups::NONE || kept == only_w1 && held.w1;
+            if of_run && !is_cheap {
                 return Ok(Vec::new());
             }
-            let run = if of_run { bench.fine_motion(kept)? } else { None };
+            let run = if of_run { runs.fine_motion(kept)? } else { None };
             let tiers = norms.iter();
-            Ok(tiers.map(|norms| bench.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
+            Ok(tiers.map(|norms| runs.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
         });
         let by_case: Vec<Vec<Trial>> = by_tier.collect::<Result<_>>()?;
         let tiers = by_case.iter().map(Vec::len).min().unwrap_or(0);

@@ -16,8 +16,8 @@ pub(super) fn decisions(
     short_of: Option<(f64, f64)>,
 ) -> Vec<TermDecision> {
     let held = body.invariants().groups;
-    let of_groups = |kept: Groups| trials.iter().rfind(move |trial| trial.kept == kept);
-    let within = |kept: Groups| trials.iter().find(move |trial| trial.kept == kept && trial.passed());
+    let last_with = |kept: Groups| trials.iter().rfind(move |trial| trial.kept == kept);
+    let first_passed = |kept: Groups| trials.iter().find(move |trial| trial.kept == kept && trial.passed());
     let decide = |group: Group| {
         let kept = choice.groups.has(group);
         let undecided = |kept: bool, reason: &str| TermDecision {
@@ -33,9 +33,9 @@ pub(super) fn decisions(
             return earlier.cloned().unwrap_or_else(|| undecided(false, "the body does not hold it"));
         }
         let basis = if kept {
-            of_groups(choice.groups.and(Groups::without(group)))
+            last_with(choice.groups.and(Groups::without(group)))
         } else {
-            within(choice.groups).or(choice.chosen.as_ref())
+            first_passed(choice.groups).or(choice.chosen.as_ref())
         };
         let mut decided = match basis {
             Some(trial) => decision(group, kept, trial, scene, rotation),

@@ -1,10 +1,10 @@
 //! What a body needs in a scene: sizes of the terms, guaranteed bounds of what dropping them does, measured errors, and the decision.
 
-mod along;
 mod basis;
 mod bounds;
 mod cases;
 mod decisions;
+mod dropped_terms;
 mod norms;
 mod participation;
 mod rows;
@@ -17,11 +17,11 @@ mod variation;
 mod warnings;
 
 pub use basis::{BEYOND_BAND, WantedResponses, largest_eigenvalue};
-pub use bounds::{Amplitude, Driven, ErrorBound, Lacking, LoadSizes, ModalLoad, Start};
+pub use bounds::{Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Start, TorqueDefect};
 pub use norms::Norms;
 pub use participation::{Participation, participations};
 pub use select::{Selection, rule_out, select};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
-pub use trial::{Bench, ModeShare, Trial};
+pub use trial::{ModeShare, Trial, TrialRuns};
 pub use variation::{Rotation, Variation};

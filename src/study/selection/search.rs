@@ -1,7 +1,7 @@
 //! The search for a cheaper model, by measured motion.
 
 use super::cases::{PART_OF_BOUNDS, sets_in, worst};
-use super::trial::{Bench, ModeShare, Trial, multiplications};
+use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Groups};
 use crate::motion::scene::{Measure, Tolerance};
@@ -29,7 +29,7 @@ impl Choice {
 
 /// The scenes with their reference motions.
 pub(super) struct Search<'s> {
-    pub cases: &'s [(Bench<'s>, Measure<'s>)],
+    pub cases: &'s [(TrialRuns<'s>, Measure<'s>)],
     /// Whether terms were dropped by bounds already.
     pub by_bounds: bool,
 }
@@ -50,10 +50,10 @@ impl Search<'_> {
     }
 
     fn measured(&self, modes: &[usize], groups: Groups, budget: f64) -> Result<Trial> {
-        let of_case = |(bench, measure): &(Bench<'_>, Measure<'_>)| -> Result<Trial> {
-            Ok(bench.measured(measure, modes, groups, budget)?.0)
+        let measured = |(runs, measure): &(TrialRuns<'_>, Measure<'_>)| -> Result<Trial> {
+            Ok(runs.measured(measure, modes, groups, budget)?.0)
         };
-        Ok(worst(self.cases.iter().map(of_case).collect::<Result<Vec<_>>>()?.into_iter()))
+        Ok(worst(self.cases.iter().map(measured).collect::<Result<Vec<_>>>()?.into_iter()))
     }
 
     /// The cheapest groups with all modes; they leave a part of the tolerances for these.
@@ -84,9 +84,9 @@ impl Search<'_> {
 
     /// Modes by what they do, most first.
     fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
-        let mut of_cases = self.cases.iter().map(|(bench, measure)| bench.shares(measure.trace()));
-        choice.shares = of_cases.next().unwrap_or_default();
-        for other in of_cases {
+        let mut by_case = self.cases.iter().map(|(runs, measure)| runs.shares(measure.trace()));
+        choice.shares = by_case.next().unwrap_or_default();
+        for other in by_case {
             for (share, other) in choice.shares.iter_mut().zip(other) {
                 share.amplitude = share.amplitude.max(other.amplitude);
                 share.deflection = share.deflection.max(other.deflection);

@@ -13,7 +13,7 @@ use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::{FlexBody, Groups, TermDecision};
-use crate::motion::scene::{Measure, Scene, Stage, damped, points_of};
+use crate::motion::scene::{Measure, Scene, Stage, Trace, damped, points_of};
 
 /// What was decided, and on what grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,88 +101,15 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
     let situation = Situation::new(body, scene, &loads);
     let scenes = scenes(body, scene)?;
     let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
-    let held = body.invariants().groups;
-    let eigenvalues = &body.modes().eigenvalue;
     let significances = significances(&situation, body);
 
     watch(Event::Phase("bounds"));
-    let mut trials = bounded(&cases, true)?;
-    let by_bounds = trials.iter().find(|trial| trial.passed()).map(|trial| trial.kept);
-    let whole = by_bounds.map_or(held, |kept| kept.and(held));
-    let all: Vec<usize> = (0..body.n_modes()).collect();
-    let mut choice = Choice { groups: whole, modes: all.clone(), shares: Vec::new(), chosen: None };
-    let mut diagnostics = stage.found.clone();
-    let mode_reason;
-    let mut short_of = None;
-    match scene.run.duration {
-        None => {
-            let band = scene.requirements.band;
-            let within = |&j: &usize| {
-                let frequency = eigenvalues[j].sqrt() / std::f64::consts::TAU;
-                // Residual vectors are what makes up for the modes beyond the band.
-                let free = body.modes().provenance.get(j).is_none_or(|from| from == "free mode");
-                band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
-            };
-            let within: Vec<usize> = all.iter().copied().filter(within).collect();
-            if !within.is_empty() {
-                choice.modes = within;
-            }
-            mode_reason = match band {
-                Some(band) => {
-                    format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
-                }
-                None => "the scene has neither a duration nor a band: all".to_owned(),
-            };
-        }
-        Some(_) => {
-            watch(Event::Phase("reference motion"));
-            let mut references = Vec::new();
-            for case in &cases {
-                let (reference, said) = case.bench().motion(whole)?;
-                diagnostics.extend(said);
-                references.push(reference);
-            }
-            let measures = references.iter().map(|reference| Measure::new(body, reference));
-            let tried: Vec<_> = cases.iter().map(Case::bench).zip(measures).collect();
-            let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
-            if situation.spin.value > SLACK_OF_RANGE * largest
-                && scene.requirements.motion.angular_velocity.is_some()
-            {
-                short_of = Some((largest, situation.spin.value));
-            }
-            watch(Event::Phase("trials"));
-            let search = Search { cases: &tried, by_bounds: by_bounds.is_some() };
-            mode_reason = match scene.requirements.multiplications {
-                Some(most) => match search.within_cost(most, &mut choice, &mut trials)? {
-                    true => format!("the most accurate of at most {most} multiplications"),
-                    false => format!("no model takes {most} multiplications or fewer: everything is kept"),
-                },
-                None => {
-                    if short_of.is_none() {
-                        search.terms(&mut choice, &mut trials)?;
-                    }
-                    search.modes(&mut choice, &mut trials)?;
-                    if short_of.is_none() {
-                        search.fewer_terms(&mut choice, &mut trials)?;
-                    }
-                    "the fewest whose motion is within the tolerances".to_owned()
-                }
-            };
-            let mut chosen = Vec::new();
-            let mut growth = None;
-            for (bench, measure) in &tried {
-                let (trial, history) =
-                    bench.measured(measure, &choice.modes, choice.groups, search.budget())?;
-                let own = history.and_then(|history| growth_of(bench, measure, &history));
-                growth = [growth, own].into_iter().flatten().reduce(f64::max);
-                diagnostics.extend(resonances(bench, measure, &choice.modes));
-                chosen.push(trial);
-            }
-            diagnostics.extend(growth.map(phase_drifts));
-            choice.chosen = Some(worst(chosen.into_iter()));
-        }
-    }
-    let terms = decisions(body, scene, &situation.spin, &choice, &trials, short_of);
+    let mut deciding = Deciding::new(body, scene, &cases, stage.found.clone())?;
+    let mode_reason = match scene.run.duration {
+        None => deciding.choose_by_band(),
+        Some(_) => deciding.choose_by_motion(&situation.spin, watch)?,
+    };
+    let Deciding { choice, trials, diagnostics, short_of, .. } = deciding;
     let tolerance = scene.requirements.tolerance;
     Ok(Selection {
         scene: scene.name.clone(),
@@ -190,11 +117,11 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         inputs: situation.inputs().into_iter().cloned().collect(),
         tolerance: [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction],
         significances,
-        multiplications: multiplications(body, held),
-        terms,
+        multiplications: multiplications(body, body.invariants().groups),
+        terms: decisions(body, scene, &situation.spin, &choice, &trials, short_of),
         guideline: guideline(choice.groups),
         groups: choice.groups,
-        n_modes: all.len(),
+        n_modes: body.n_modes(),
         participations: participations(body, scene, &loads, &choice.modes),
         modes: choice.modes,
         shares: choice.shares,
@@ -204,6 +131,131 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         trials,
         diagnostics: once(diagnostics),
     })
+}
+
+/// A selection on its way: what was tried and what is chosen so far.
+struct Deciding<'s> {
+    body: &'s FlexBody,
+    scene: &'s Scene,
+    cases: &'s [Case<'s>],
+    /// The groups that bounds leave, where these rule out some.
+    by_bounds: Option<Groups>,
+    choice: Choice,
+    trials: Vec<Trial>,
+    /// The largest rotation of the runs and that which the scene allows, where the runs stay behind it.
+    short_of: Option<(f64, f64)>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'s> Deciding<'s> {
+    /// All modes, and what bounds leave of the groups.
+    fn new(
+        body: &'s FlexBody,
+        scene: &'s Scene,
+        cases: &'s [Case<'s>],
+        diagnostics: Vec<Diagnostic>,
+    ) -> Result<Self> {
+        let trials = bounded(cases, true)?;
+        let by_bounds = trials.iter().find(|trial| trial.passed()).map(|trial| trial.kept);
+        let held = body.invariants().groups;
+        let choice = Choice {
+            groups: by_bounds.map_or(held, |kept| kept.and(held)),
+            modes: (0..body.n_modes()).collect(),
+            shares: Vec::new(),
+            chosen: None,
+        };
+        Ok(Self { body, scene, cases, by_bounds, choice, trials, short_of: None, diagnostics })
+    }
+
+    /// Chooses the modes of the band of the scene, all without one; gives the reason.
+    fn choose_by_band(&mut self) -> String {
+        let band = self.scene.requirements.band;
+        let modes = self.body.modes();
+        let within = |&j: &usize| {
+            let frequency = modes.eigenvalue[j].sqrt() / std::f64::consts::TAU;
+            // Residual vectors are what makes up for the modes beyond the band.
+            let free = modes.provenance.get(j).is_none_or(|from| from == "free mode");
+            band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
+        };
+        let within: Vec<usize> = self.choice.modes.iter().copied().filter(within).collect();
+        if !within.is_empty() {
+            self.choice.modes = within;
+        }
+        match band {
+            Some(band) => {
+                format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
+            }
+            None => "the scene has neither a duration nor a band: all".to_owned(),
+        }
+    }
+
+    /// Chooses terms and modes by motion that is integrated; gives the reason for the modes.
+    fn choose_by_motion(&mut self, spin: &Input, watch: Watch<'_>) -> Result<String> {
+        watch(Event::Phase("reference motion"));
+        let references = self.reference_motions()?;
+        let (body, cases) = (self.body, self.cases);
+        let measures = references.iter().map(|reference| Measure::new(body, reference));
+        let measured: Vec<_> = cases.iter().map(Case::runs).zip(measures).collect();
+        let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
+        if spin.value > SLACK_OF_RANGE * largest && self.scene.requirements.motion.angular_velocity.is_some()
+        {
+            self.short_of = Some((largest, spin.value));
+        }
+        watch(Event::Phase("trials"));
+        let search = Search { cases: &measured, by_bounds: self.by_bounds.is_some() };
+        let reason = self.search(&search)?;
+        self.measure_choice(&search)?;
+        Ok(reason)
+    }
+
+    /// The motion of the whole body, as far as bounds leave it whole, in every case.
+    fn reference_motions(&mut self) -> Result<Vec<Trace>> {
+        let mut references = Vec::new();
+        for case in self.cases {
+            let (reference, said) = case.runs().motion(self.choice.groups)?;
+            self.diagnostics.extend(said);
+            references.push(reference);
+        }
+        Ok(references)
+    }
+
+    /// Drops terms and modes; gives the reason for the modes.
+    fn search(&mut self, search: &Search<'_>) -> Result<String> {
+        let (choice, trials) = (&mut self.choice, &mut self.trials);
+        if let Some(most) = self.scene.requirements.multiplications {
+            return Ok(match search.within_cost(most, choice, trials)? {
+                true => format!("the most accurate of at most {most} multiplications"),
+                false => format!("no model takes {most} multiplications or fewer: everything is kept"),
+            });
+        }
+        // A run that turns slower than the scene allows shows of no term that it may be dropped.
+        let shows_terms = self.short_of.is_none();
+        if shows_terms {
+            search.terms(choice, trials)?;
+        }
+        search.modes(choice, trials)?;
+        if shows_terms {
+            search.fewer_terms(choice, trials)?;
+        }
+        Ok("the fewest whose motion is within the tolerances".to_owned())
+    }
+
+    /// Measures the chosen model in every case, and says what may go wrong with it.
+    fn measure_choice(&mut self, search: &Search<'_>) -> Result<()> {
+        let mut chosen = Vec::new();
+        let mut growth = None;
+        for (runs, measure) in search.cases {
+            let (modes, groups) = (&self.choice.modes, self.choice.groups);
+            let (trial, history) = runs.measured(measure, modes, groups, search.budget())?;
+            let own = history.and_then(|history| growth_of(runs, measure, &history));
+            growth = [growth, own].into_iter().flatten().reduce(f64::max);
+            self.diagnostics.extend(resonances(runs, measure, modes));
+            chosen.push(trial);
+        }
+        self.diagnostics.extend(growth.map(phase_drifts));
+        self.choice.chosen = Some(worst(chosen.into_iter()));
+        Ok(())
+    }
 }
 
 /// Each diagnostic once.

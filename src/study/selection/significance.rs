@@ -25,6 +25,79 @@ pub struct Significance {
     pub of_body: Option<f64>,
 }
 
+/// A term in words.
+struct Term {
+    name: &'static str,
+    beside: &'static str,
+    formula: &'static str,
+    group: Group,
+    guideline: &'static str,
+}
+
+const fn term(
+    name: &'static str,
+    beside: &'static str,
+    formula: &'static str,
+    group: Group,
+    guideline: &'static str,
+) -> Term {
+    Term { name, beside, formula, group, guideline }
+}
+
+/// Every term, in the order of [`sizes`].
+const TERMS: [Term; 8] = [
+    term("linear inertia W1 Q", "I0", "2 eta", Group::W1, "III"),
+    term("quadratic inertia Q'W2 Q", "I0", "eta^2", Group::W2, "III, free slender bodies"),
+    term("inertia coupling Q'W3", "I0 (Schur complement)", "eta^2", Group::W3, "III, free slender bodies"),
+    term(
+        "constant centrifugal load W1'w w / 2",
+        "elastic forces at the largest amplitude",
+        "w^2 sqrt(e'I0 e) / (Omega_1^2 |q|)",
+        Group::W1,
+        "II",
+    ),
+    term(
+        "centrifugal load that grows with q, W2 Q w w",
+        "elastic forces",
+        "(w / Omega_1)^2",
+        Group::W2,
+        "III",
+    ),
+    term(
+        "Coriolis force on modes 2 W3' Qd w",
+        "inertia forces of the modes",
+        "2 w / Omega_1",
+        Group::W3,
+        "IV",
+    ),
+    term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "IV"),
+    term(
+        "Coriolis torque 2 w (sqrt(tr J) + |q|) |qd|",
+        "I0 w per unit of time",
+        "2 Omega_1 |q| (sqrt(tr J) + |q|) / I0",
+        Group::W1,
+        "III",
+    ),
+];
+
+/// Sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
+fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] {
+    let inertia = &situation.inertia;
+    let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
+    let trace = (0.5 * inertia.trace()).sqrt();
+    let about = axis.dot(&(inertia * axis));
+    [
+        2.0 * norms.centrifugal * q / about,
+        norms.spin * q * q / about,
+        (norms.coupling * q).powi(2) / about,
+        norms.centrifugal_energy * w * w / (norms.first * q),
+        norms.softening * w * w,
+        2.0 * norms.coupling * w / situation.first_rate.value,
+        norms.coupling * alpha / (norms.first * norms.first),
+        2.0 * norms.first * q * (trace + q) / about,
+    ]
+}
+
 /// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation or the body axis where they
 /// are largest.
 ///
@@ -32,22 +105,6 @@ pub struct Significance {
 /// the largest angular velocity and acceleration.
 pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
     let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
-    let inertia = &situation.inertia;
-    let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
-    let trace = (0.5 * inertia.trace()).sqrt();
-    let sizes = |norms: &Norms, axis: &Vector3<f64>| {
-        let about = axis.dot(&(inertia * axis));
-        [
-            2.0 * norms.centrifugal * q / about,
-            norms.spin * q * q / about,
-            (norms.coupling * q).powi(2) / about,
-            norms.centrifugal_energy * w * w / (norms.first * q),
-            norms.softening * w * w,
-            2.0 * norms.coupling * w / situation.first_rate.value,
-            norms.coupling * alpha / (norms.first * norms.first),
-            2.0 * norms.first * q * (trace + q) / about,
-        ]
-    };
     let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
     let axes = match driven {
         Some(axis) => vec![axis],
@@ -56,57 +113,21 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
     };
     let largest = |norms: &dyn Fn(&Vector3<f64>) -> Option<Norms>| -> Option<[f64; 8]> {
         axes.iter().try_fold([0.0; 8], |most: [f64; 8], axis| {
-            let own = sizes(&norms(axis)?, axis);
+            let own = sizes(situation, &norms(axis)?, axis);
             Some(std::array::from_fn(|i| most[i].max(own[i])))
         })
     };
     let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
     let bound = bound.unwrap_or([f64::INFINITY; 8]);
     let own = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));
-    let rows: [(&str, &str, &str, Group, &str); 8] = [
-        ("linear inertia W1 Q", "I0", "2 eta", Group::W1, "III"),
-        ("quadratic inertia Q'W2 Q", "I0", "eta^2", Group::W2, "III, free slender bodies"),
-        ("inertia coupling Q'W3", "I0 (Schur complement)", "eta^2", Group::W3, "III, free slender bodies"),
-        (
-            "constant centrifugal load W1'w w / 2",
-            "elastic forces at the largest amplitude",
-            "w^2 sqrt(e'I0 e) / (Omega_1^2 |q|)",
-            Group::W1,
-            "II",
-        ),
-        (
-            "centrifugal load that grows with q, W2 Q w w",
-            "elastic forces",
-            "(w / Omega_1)^2",
-            Group::W2,
-            "III",
-        ),
-        (
-            "Coriolis force on modes 2 W3' Qd w",
-            "inertia forces of the modes",
-            "2 w / Omega_1",
-            Group::W3,
-            "IV",
-        ),
-        ("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "IV"),
-        (
-            "Coriolis torque 2 w (sqrt(tr J) + |q|) |qd|",
-            "I0 w per unit of time",
-            "2 Omega_1 |q| (sqrt(tr J) + |q|) / I0",
-            Group::W1,
-            "III",
-        ),
-    ];
-    rows.into_iter()
-        .enumerate()
-        .map(|(i, (term, beside, formula, group, guideline))| Significance {
-            term,
-            beside,
-            formula,
-            group,
-            guideline,
-            bound: bound[i],
-            of_body: own.map(|own| own[i]),
-        })
-        .collect()
+    let significance = |(i, term): (usize, Term)| Significance {
+        term: term.name,
+        beside: term.beside,
+        formula: term.formula,
+        group: term.group,
+        guideline: term.guideline,
+        bound: bound[i],
+        of_body: own.map(|own| own[i]),
+    };
+    TERMS.into_iter().enumerate().map(significance).collect()
 }

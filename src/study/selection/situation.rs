@@ -6,7 +6,7 @@ use super::variation::{Rotation, Variation};
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::Invariants;
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
-use crate::motion::scene::{AttachmentKind, Axes, Range, Scene};
+use crate::motion::scene::{AttachmentKind, Axes, Load, Range, Scene};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::f64::consts::TAU;
 
@@ -109,6 +109,9 @@ impl Situation {
     }
 }
 
+/// A size of a motion, and where it comes from.
+type Sourced = (f64, String);
+
 /// Largest angular velocity and acceleration of the frame.
 fn turning(
     body: &FlexBody,
@@ -118,9 +121,37 @@ fn turning(
     points: &[BodyPoint],
 ) -> (Input, Input) {
     let motion = &scene.requirements.motion;
-    let principal = inertia.symmetric_eigenvalues();
-    let (least, most) = (principal.min(), principal.max());
-    let run = match (scene.rotation(), &scene.carried) {
+    let [spin, acceleration] = turning_of_run(body, scene, inertia, duration, points);
+    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what it is.
+    let larger = |range: &Option<Range>, (value, source): Sourced, key: &str| match range {
+        Some(range) if !scene.prescribes() || range.length() > value => {
+            (range.length(), format!("[motion] {key}"))
+        }
+        _ => (value, source),
+    };
+    let (spin, spin_source) = larger(&motion.angular_velocity, spin, "angular_velocity");
+    // Free rotation has accelerations of the size of the square of its angular velocity.
+    let (acceleration, acceleration_source) = match (&motion.angular_acceleration, &motion.angular_velocity) {
+        (None, Some(_)) if spin * spin > acceleration.0 => {
+            (spin * spin, "default: square of the angular velocity".to_owned())
+        }
+        (range, _) => larger(range, acceleration, "angular_acceleration"),
+    };
+    (
+        Input { name: "angular velocity", value: spin, source: spin_source },
+        Input { name: "angular acceleration", value: acceleration, source: acceleration_source },
+    )
+}
+
+/// Largest angular velocity and acceleration in the run of the scene.
+fn turning_of_run(
+    body: &FlexBody,
+    scene: &Scene,
+    inertia: &Matrix3<f64>,
+    duration: f64,
+    points: &[BodyPoint],
+) -> [Sourced; 2] {
+    match (scene.rotation(), &scene.carried) {
         (Some((_, rate)), carried) => {
             let rate = Variation::of(rate, duration);
             let source = if carried.is_some() { "[carried.spin] rate" } else { "[spin] rate" }.to_owned();
@@ -133,17 +164,9 @@ fn turning(
         (None, None) => {
             // The angular momentum of a free body is that of the start and what torques add.
             let start = inertia * scene.initial.angular_velocity;
-            let torque: f64 = scene
-                .loads
-                .iter()
-                .zip(points)
-                .map(|(load, point)| {
-                    let size = Variation::of(&load.history, duration).largest;
-                    let lever =
-                        point.place(&Evaluation::new(&EquationsOfMotion::new(body, Terms::NONE))).norm();
-                    size * (load.force.norm() * lever + load.torque.norm())
-                })
-                .sum();
+            let torque = largest_torque(body, scene, duration, points);
+            let principal = inertia.symmetric_eigenvalues();
+            let (least, most) = (principal.min(), principal.max());
             let spin = (start.norm() + torque * duration) / least;
             let source = match scene.loads.is_empty() {
                 true => "[initial] angular_velocity, of a rigid body",
@@ -153,27 +176,17 @@ fn turning(
             let acceleration = ((most - least) * spin * spin + torque) / least;
             [(spin, source.to_owned()), (acceleration, source.to_owned())]
         }
+    }
+}
+
+/// What the loads can turn the undeformed body with.
+fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
+    let torque = |(load, point): (&Load, &BodyPoint)| {
+        let size = Variation::of(&load.history, duration).largest;
+        let lever = point.place(&Evaluation::new(&EquationsOfMotion::new(body, Terms::NONE))).norm();
+        size * (load.force.norm() * lever + load.torque.norm())
     };
-    let [(spin, spin_source), (acceleration, acceleration_source)] = run;
-    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what it is.
-    let larger = |range: &Option<Range>, value: f64, source: String, key: &str| match range {
-        Some(range) if !scene.prescribes() || range.length() > value => {
-            (range.length(), format!("[motion] {key}"))
-        }
-        _ => (value, source),
-    };
-    let (spin, spin_source) = larger(&motion.angular_velocity, spin, spin_source, "angular_velocity");
-    // Free rotation has accelerations of the size of the square of its angular velocity.
-    let (acceleration, acceleration_source) = match (&motion.angular_acceleration, &motion.angular_velocity) {
-        (None, Some(_)) if spin * spin > acceleration => {
-            (spin * spin, "default: square of the angular velocity".to_owned())
-        }
-        (range, _) => larger(range, acceleration, acceleration_source, "angular_acceleration"),
-    };
-    (
-        Input { name: "angular velocity", value: spin, source: spin_source },
-        Input { name: "angular acceleration", value: acceleration, source: acceleration_source },
-    )
+    scene.loads.iter().zip(points).map(torque).sum()
 }
 
 /// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more than what a load of the
@@ -200,11 +213,30 @@ fn driven(
     acceleration: &Input,
     duration: f64,
 ) -> Result<Driven, String> {
-    let of_run = scene.spin.as_ref().filter(|_| spin.source.starts_with("[spin]"));
-    let rotation = match (of_run, scene.requirements.attachment.kind) {
+    let rotation = given_rotation(scene, spin, acceleration, duration)?;
+    refuse_beyond_bounds(body, scene)?;
+    let root: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
+    let damping = damping_norm(body, &root);
+    Ok(Driven {
+        loads: modal_loads(body, scene, points, &rotation, &root),
+        start: start_of_modes(scene, damping, &root),
+        rotation,
+        damping,
+    })
+}
+
+/// The rotation of the frame, where the scene gives it.
+fn given_rotation(
+    scene: &Scene,
+    spin: &Input,
+    acceleration: &Input,
+    duration: f64,
+) -> Result<Rotation, String> {
+    let spin_of_run = scene.spin.as_ref().filter(|_| spin.source.starts_with("[spin]"));
+    match (spin_of_run, scene.requirements.attachment.kind) {
         (Some(spin), _) => {
             let rate = Variation::of(&spin.rate, duration);
-            Rotation {
+            Ok(Rotation {
                 axis: Some(spin.axis),
                 largest: rate.largest,
                 start: rate.start,
@@ -212,9 +244,9 @@ fn driven(
                 acceleration: rate.rate,
                 jerk: rate.rate_total,
                 duration,
-            }
+            })
         }
-        (None, AttachmentKind::Stiff) if spin.value > 0.0 => Rotation {
+        (None, AttachmentKind::Stiff) if spin.value > 0.0 => Ok(Rotation {
             axis: None,
             largest: spin.value,
             start: spin.value,
@@ -222,61 +254,80 @@ fn driven(
             acceleration: acceleration.value,
             jerk: f64::INFINITY,
             duration,
-        },
-        _ => return Err("its rotation is not given: neither [spin] nor a stiff attachment".to_owned()),
-    };
-    if scene.carried.is_some() {
-        return Err("the body is carried: its frame moves its modes".to_owned());
+        }),
+        _ => Err("its rotation is not given: neither [spin] nor a stiff attachment".to_owned()),
     }
-    if body.invariants().general.is_some() {
-        return Err("the mass matrix does not commute with rotations".to_owned());
-    }
-    if !body.geometric_stiffness().is_empty() {
-        return Err("the body has geometric stiffness".to_owned());
-    }
-    if scene.loads.iter().any(|load| load.torque != Vector3::zeros()) {
-        return Err("a torque acts on axes that turn with the deformation".to_owned());
-    }
-    if !is_about_centre(body.invariants()) {
-        return Err("the frame is not that of free-surface modes about the centre of mass".to_owned());
-    }
+}
 
-    let nf = body.n_modes();
+/// Says why the bounds do not hold for the body and the scene.
+fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
+    let reason = if scene.carried.is_some() {
+        "the body is carried: its frame moves its modes"
+    } else if body.invariants().general.is_some() {
+        "the mass matrix does not commute with rotations"
+    } else if !body.geometric_stiffness().is_empty() {
+        "the body has geometric stiffness"
+    } else if scene.loads.iter().any(|load| load.torque != Vector3::zeros()) {
+        "a torque acts on axes that turn with the deformation"
+    } else if !is_about_centre(body.invariants()) {
+        "the frame is not that of free-surface modes about the centre of mass"
+    } else {
+        return Ok(());
+    };
+    Err(reason.to_owned())
+}
+
+/// The loads of the scene on the modes; `root` is sqrt(Lambda).
+fn modal_loads(
+    body: &FlexBody,
+    scene: &Scene,
+    points: &[BodyPoint],
+    rotation: &Rotation,
+    root: &[f64],
+) -> Vec<ModalLoad> {
     let rows = PointRows::new(body);
-    let root: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
-    let loads = scene.loads.iter().zip(points).map(|(load, point)| {
-        let history = Variation::of(&load.history, duration);
+    let modal_load = |(load, point): (&Load, &BodyPoint)| {
+        let history = Variation::of(&load.history, rotation.duration);
         let psi = rows.of(point);
         let (psi, size, factor) = match load.axes {
             Axes::Model | Axes::Body => {
-                let along = DMatrix::from_fn(1, nf, |_, j| psi.column(j).dot(&load.force));
+                let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(&load.force));
                 (along, 1.0, history)
             }
-            Axes::World => (psi, load.force.norm(), history.times(&Variation::direction(&rotation))),
+            Axes::World => (psi, load.force.norm(), history.times(&Variation::direction(rotation))),
         };
         ModalLoad {
             force: size * PointRows::norm(&psi),
             energy: size * PointRows::norm(&PointRows::weighted(&psi, |j| 1.0 / root[j])),
             factor,
         }
-    });
-    let damping = match &body.modes().modal_damping {
+    };
+    scene.loads.iter().zip(points).map(modal_load).collect()
+}
+
+/// |D|, or a bound of it.
+fn damping_norm(body: &FlexBody, root: &[f64]) -> f64 {
+    let nf = body.n_modes();
+    match &body.modes().modal_damping {
         Some(damping) => {
             (0..nf).map(|j| (0..nf).map(|i| damping[(i, j)].powi(2)).sum::<f64>()).sum::<f64>().sqrt()
         }
         None => (0..nf).map(|j| 2.0 * body.modes().damping_ratio[j] * root[j]).fold(0.0, f64::max),
-    };
+    }
+}
+
+/// The modes that the scene does not start at rest, together.
+fn start_of_modes(scene: &Scene, damping: f64, root: &[f64]) -> Start {
     let starts = scene.initial.modes.iter().map(|start| {
         let omega = root[start.mode];
         let energy = start.rate.abs() + omega * start.amplitude.abs();
         let acceleration = omega * omega * start.amplitude.abs() + damping * start.rate.abs();
         Start { energy, rate_energy: acceleration + omega * start.rate.abs() }
     });
-    let start = starts.fold(Start::default(), |sum, one| Start {
+    starts.fold(Start::default(), |sum, one| Start {
         energy: sum.energy + one.energy,
         rate_energy: sum.rate_energy + one.rate_energy,
-    });
-    Ok(Driven { rotation, loads: loads.collect(), start, damping })
+    })
 }
 
 /// Whether C1, C2 and c vanish and m_ff is the identity, up to rounding.

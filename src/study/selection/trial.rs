@@ -1,7 +1,7 @@
 //! Models with fewer terms or modes, tried: by bounds, and by integration.
 
-use super::along::Along;
-use super::bounds::Lacking;
+use super::bounds::{Driven, ErrorBound};
+use super::dropped_terms::DroppedTerms;
 use super::norms::Norms;
 use super::rows::PointRows;
 use super::situation::Situation;
@@ -53,7 +53,7 @@ impl Trial {
 }
 
 /// A body and a scene that trials are made with, both on their [`Stage`](crate::motion::scene::Stage).
-pub struct Bench<'a> {
+pub struct TrialRuns<'a> {
     /// The body, with the damping of the scene.
     pub body: &'a FlexBody,
     /// The scene.
@@ -68,7 +68,7 @@ pub struct Bench<'a> {
     pub memory: Option<u64>,
 }
 
-impl Bench<'_> {
+impl TrialRuns<'_> {
     /// The continuous motion of the body with the groups `kept`.
     ///
     /// # Errors
@@ -189,52 +189,69 @@ impl Bench<'_> {
         let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
         let softened = || "the spin may take the stiffness of some motion".to_owned();
-        let (own, residual, lacking) = match run {
+        let (own, residual, defect) = match run {
             Some(run) => {
-                let along = Along::new(self, run, kept, norms);
-                (along.amplitude, vec![along.load], Lacking { torque: along.torque, stiff: along.stiff })
+                let terms = DroppedTerms::new(self.body, self.scene, run, kept, norms);
+                (terms.amplitude, vec![terms.load], terms.defect)
             }
             None => {
                 let own = driven.amplitude(kept, norms).ok_or_else(softened)?;
                 let residual = driven.residual(dropped, norms, &own);
-                (own, residual, driven.lacking(dropped, norms, &own))
+                (own, residual, driven.torque_defect(dropped, norms, &own))
             }
         };
         let error = driven.error(norms, &residual).ok_or_else(softened)?;
-        // The levers of the loads deform with the body.
+        let levers = self.lever_torques(driven) * error.energy;
+        let torque = driven.torque_error(norms, &own, &error, &defect) + levers;
+        Ok(self.relative_errors(driven, run, &error, torque))
+    }
+
+    /// Torques of the loads for |Lambda^(1/2) e| = 1, since their levers deform with the body.
+    fn lever_torques(&self, driven: &Driven) -> f64 {
         let rows = PointRows::new(self.body);
         let lever = |(load, point): (&Load, &BodyPoint)| {
             let largest = Variation::of(&load.history, driven.rotation.duration).largest;
             largest * load.force.norm() * self.reach_of(&rows.of(point))
         };
-        let levers = self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>() * error.energy;
-        let torque = driven.torque_error(norms, &own, &error, &lacking) + levers;
+        self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>()
+    }
 
-        // Relative to what is certain of the whole motion, or to the least that counts.
+    /// Errors relative to what is certain of the whole motion, or to the least that counts; `torque` is the bound of the error of that.
+    fn relative_errors(
+        &self,
+        driven: &Driven,
+        run: Option<&Recording>,
+        error: &ErrorBound,
+        torque: f64,
+    ) -> OutputErrors {
         let least = Resolution::new(self.body, self.scene.requirements.tolerance.least_deflection);
-        let relative = |error: f64, of_run: &dyn Fn(&Recording) -> f64, least: f64| {
-            error / (run.map_or(0.0, of_run) - error).max(least)
+        let relative = |error: f64, size: &dyn Fn(&Recording) -> f64, least: f64| {
+            error / (run.map_or(0.0, size) - error).max(least)
         };
         let paths = |run: &Recording| run.extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max);
         let energies = |run: &Recording| run.extremes.elastic.sqrt();
         let torques = |run: &Recording| {
             run.reactions.iter().flatten().map(|(_, torque)| torque.norm()).fold(0.0, f64::max)
         };
-        // The inertia whose radius of gyration a recording has: of a plane body that about its normal alone.
-        let inertia = self.body.invariants().inertia();
-        let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
-        let rate = |spin: &Spin| {
-            let even =
-                (0..=LEAST_INSTANTS).map(|i| driven.rotation.duration * (i as f64 / LEAST_INSTANTS as f64));
-            even.map(|time| spin.rate.at(time).0.abs()).fold(0.0, f64::max)
-        };
-        let least_torque = LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2);
-        Ok(OutputErrors {
+        let least_torque = self.least_torque(driven.rotation.duration);
+        OutputErrors {
             attitude: 0.0,
             deflection: Some(relative(self.reach() * error.energy, &paths, least.deflection)),
             stress: Some(relative(error.energy / 2f64.sqrt(), &energies, least.root_energy)),
             reaction: self.scene.spin.is_some().then(|| relative(torque, &torques, least_torque)),
-        })
+        }
+    }
+
+    /// The least torque of a prescribed spin that counts.
+    fn least_torque(&self, duration: f64) -> f64 {
+        // The inertia whose radius of gyration a recording has: of a plane body that about its normal alone.
+        let inertia = self.body.invariants().inertia();
+        let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
+        let rate = |spin: &Spin| {
+            let even = (0..=LEAST_INSTANTS).map(|i| duration * (i as f64 / LEAST_INSTANTS as f64));
+            even.map(|time| spin.rate.at(time).0.abs()).fold(0.0, f64::max)
+        };
+        LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2)
     }
 
     /// Largest deflection of a watched point, or without any of a node, for |Lambda^(1/2) q| = 1.

@@ -1,7 +1,7 @@
 //! What may go wrong in a scene although the tolerances hold.
 
 use super::rows::PointRows;
-use super::trial::Bench;
+use super::trial::TrialRuns;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::motion::scene::{Axes, ErrorHistory, History, Measure};
 use std::f64::consts::TAU;
@@ -17,21 +17,21 @@ const NEAR: f64 = 0.1;
 
 /// How much more the errors of a model grow from the first half of the run to the second than the motion does, where those of the second
 /// matter: about 1 for errors that stay in step with the motion, more where phases run apart.
-pub(super) fn growth_of(bench: &Bench<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
+pub(super) fn growth_of(runs: &TrialRuns<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
     let growth = |(first, second): (f64, f64), allowed: f64| {
         (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
     };
     let energies = measure.trace().elastic.iter().map(|energy| energy.max(0.0).sqrt());
     let motion = growth(errors.halves(&energies.collect::<Vec<_>>()), 0.0)?;
-    let tolerance = &bench.scene.requirements.tolerance;
+    let tolerance = &runs.scene.requirements.tolerance;
     // The attitude has no amplitude: it grows when it grows.
-    let of_attitude = growth(errors.halves(&errors.attitude), tolerance.attitude);
-    let of_stress = errors.stress.as_ref().and_then(|stress| growth(errors.halves(stress), tolerance.stress));
-    let beyond_motion = of_stress.map(|growth| growth / motion.max(1.0));
-    [of_attitude, beyond_motion].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
+    let attitude = growth(errors.halves(&errors.attitude), tolerance.attitude);
+    let stress = errors.stress.as_ref().and_then(|stress| growth(errors.halves(stress), tolerance.stress));
+    let stress_beyond_motion = stress.map(|growth| growth / motion.max(1.0));
+    [attitude, stress_beyond_motion].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
 }
 
-/// The warning about it.
+/// The warning that the errors of the selected model grow faster than its motion, by this factor.
 pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
     let message = format!(
         "errors of the selected model grow {growth:.1} times more than the motion from the first half of the run to the second"
@@ -40,12 +40,12 @@ pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
 }
 
 /// Modes that are dropped and that a load drives near their frequency.
-pub(super) fn resonances(bench: &Bench<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
-    let (body, scene) = (bench.body, bench.scene);
+pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
+    let (body, scene) = (runs.body, runs.scene);
     let rows = PointRows::new(body);
     let spin = measure.trace().extremes.spin;
     let mut found = Vec::new();
-    for (load, point) in scene.loads.iter().zip(bench.loads) {
+    for (load, point) in scene.loads.iter().zip(runs.loads) {
         // Seen from the body a force that is fixed in space turns the other way round.
         let turning = if load.axes == Axes::World { spin } else { 0.0 };
         let rates: Vec<f64> = match &load.history {

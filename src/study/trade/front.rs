@@ -57,11 +57,11 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
 
 /// (multiplications, worst ratio, row) of what was measured, ascending.
 fn points(rows: &[Row]) -> Vec<(usize, f64, usize)> {
-    let of = |(at, row): (usize, &Row)| {
+    let point = |(at, row): (usize, &Row)| {
         let measured = row.outcome.as_ref().ok()?;
         Some((measured.multiplications, measured.worst, at))
     };
-    let mut points: Vec<_> = rows.iter().enumerate().filter_map(of).collect();
+    let mut points: Vec<_> = rows.iter().enumerate().filter_map(point).collect();
     points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     points
 }

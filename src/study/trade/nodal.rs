@@ -7,10 +7,11 @@ use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
 use crate::motion::dynamics::{
-    NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, ReferenceConditions,
+    EulerParameters, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
+    ReferenceConditions,
 };
 use crate::motion::scene::{Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace};
-use crate::numerics::integration::{Explicit, Failure, Method, integrate};
+use crate::numerics::integration::{Explicit, Failure, Method, Work, integrate};
 use crate::numerics::linalg::{combine, multiply};
 use faer::Mat;
 use nalgebra::Vector3;
@@ -86,59 +87,18 @@ impl<'m> NodalReference<'m> {
     ) -> Result<Self> {
         let loads = Self::refuse(model, scene)?;
         refuse_too_much(model, motion, memory)?;
-        let end = motion.time.last().copied().unwrap_or(0.0);
         let equations =
             NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes).map_err(refused)?;
         let modes = NodalModes::new(&equations, body).ok_or_else(|| refused("the body has other rows"))?;
-        let start = modes.lift(&motion.start);
-        let mut state = equations.state(&start).map_err(refused)?;
-        let act = |time: f64, evaluation: &mut NodalEvaluation<'_>| {
-            if let Some(gravity) = &scene.gravity {
-                evaluation.add_gravity(gravity);
-            }
-            for (node, load) in &loads {
-                let factor = load.history.at(time).0;
-                let in_world = |v: &Vector3<f64>| match load.axes {
-                    Axes::World => v * factor,
-                    Axes::Model | Axes::Body => evaluation.axes() * v * factor,
-                };
-                let (force, torque) = (in_world(&load.force), in_world(&load.torque));
-                evaluation.add_force(*node, &force);
-                if load.torque != Vector3::zeros() {
-                    evaluation.add_torque(*node, &torque);
-                }
-            }
-        };
+        let start = equations.state(&modes.lift(&motion.start)).map_err(refused)?;
         let tolerance = match scene.run.scheme {
             Scheme::Adaptive { tolerance } => tolerance.max(TOLERANCE),
             Scheme::Conserving { .. } => TOLERANCE,
         };
-        let mut method = Method::Explicit(Explicit::new(state.len(), tolerance, end));
-        let mut system = NodalMotion::new(&equations, act);
-        let mut observer = NodalEvaluation::new(&equations);
-        let mut displacements = Mat::zeros(equations.n_rows(), motion.time.len());
-        let (mut attitude, mut elastic) = (Vec::new(), Vec::new());
-        let (mut spin, mut internal) = (Peak::default(), Peak::default());
-        let breaks = scene.breaks();
-        let observe = |time: f64, state: &[f64]| {
-            observer.set(state)?;
-            displacements.col_as_slice_mut(attitude.len()).copy_from_slice(observer.displacements());
-            let now = observer.configuration();
-            let flight = 0.5 * observer.momenta().0.norm_squared() / motion.size.0;
-            let energy = observer.elastic_energy();
-            spin.see(time, now.omega.norm());
-            internal.see(time, (observer.kinetic_energy() - flight + energy).max(0.0).sqrt());
-            attitude.push(now.attitude);
-            elastic.push(energy);
-            watch(Event::Fraction(time / end));
-            Ok::<(), Failure>(())
-        };
-        integrate(&mut method, &mut system, &mut state, &motion.time, &breaks, observe).map_err(
-            |failure| {
-                let message = format!("the nodal reference of `{}` stopped: {failure}", scene.name);
-                Error::from(Diagnostic::new(Code::SimulationStopped, message))
-            },
-        )?;
+        let mut observed = Observed::new(&equations, motion);
+        let acting = Acting { scene, loads };
+        let work = integrated(&equations, start, &acting, tolerance, &mut observed, watch)?;
+        let Observed { displacements, attitude, elastic, spin, internal, .. } = observed;
         let own = Shapes::new(model, body, &displacements);
         let trace = Trace {
             scheme: Scheme::Adaptive { tolerance },
@@ -147,7 +107,7 @@ impl<'m> NodalReference<'m> {
             q: Vec::new(),
             reactions: None,
             deflections: scene.watched.iter().map(|point| own.path(body, point)).collect(),
-            work: method.work(),
+            work,
             extremes: Extremes { spin: spin.value, internal: internal.value.powi(2), ..Extremes::default() },
             ..motion.clone()
         };
@@ -179,6 +139,100 @@ impl<'m> NodalReference<'m> {
     }
 }
 
+/// What acts on the body.
+struct Acting<'s> {
+    scene: &'s Scene,
+    /// Loads with the nodes that they act at.
+    loads: Vec<(usize, &'s Load)>,
+}
+
+impl Acting<'_> {
+    fn add(&self, time: f64, evaluation: &mut NodalEvaluation<'_>) {
+        if let Some(gravity) = &self.scene.gravity {
+            evaluation.add_gravity(gravity);
+        }
+        for (node, load) in &self.loads {
+            let factor = load.history.at(time).0;
+            let in_world = |v: &Vector3<f64>| match load.axes {
+                Axes::World => v * factor,
+                Axes::Model | Axes::Body => evaluation.axes() * v * factor,
+            };
+            let (force, torque) = (in_world(&load.force), in_world(&load.torque));
+            evaluation.add_force(*node, &force);
+            if load.torque != Vector3::zeros() {
+                evaluation.add_torque(*node, &torque);
+            }
+        }
+    }
+}
+
+/// What is kept of the motion, at the instants of another one.
+struct Observed<'e> {
+    evaluation: NodalEvaluation<'e>,
+    motion: &'e Trace,
+    displacements: Mat<f64>,
+    attitude: Vec<EulerParameters>,
+    elastic: Vec<f64>,
+    spin: Peak,
+    internal: Peak,
+}
+
+impl<'e> Observed<'e> {
+    fn new(equations: &'e NodalEquations<'e>, motion: &'e Trace) -> Self {
+        Self {
+            evaluation: NodalEvaluation::new(equations),
+            motion,
+            displacements: Mat::zeros(equations.n_rows(), motion.time.len()),
+            attitude: Vec::new(),
+            elastic: Vec::new(),
+            spin: Peak::default(),
+            internal: Peak::default(),
+        }
+    }
+
+    fn see(&mut self, time: f64, state: &[f64]) -> std::result::Result<(), Failure> {
+        let evaluation = &mut self.evaluation;
+        evaluation.set(state)?;
+        let column = self.displacements.col_as_slice_mut(self.attitude.len());
+        column.copy_from_slice(evaluation.displacements());
+        let now = evaluation.configuration();
+        let flight = 0.5 * evaluation.momenta().0.norm_squared() / self.motion.size.0;
+        let energy = evaluation.elastic_energy();
+        self.spin.see(time, now.omega.norm());
+        self.internal.see(time, (evaluation.kinetic_energy() - flight + energy).max(0.0).sqrt());
+        self.attitude.push(now.attitude);
+        self.elastic.push(energy);
+        Ok(())
+    }
+}
+
+/// Integrates from `state` through the instants that are observed.
+fn integrated(
+    equations: &NodalEquations<'_>,
+    mut state: Vec<f64>,
+    acting: &Acting<'_>,
+    tolerance: f64,
+    observed: &mut Observed<'_>,
+    watch: Watch<'_>,
+) -> Result<Work> {
+    let instants = &observed.motion.time;
+    let end = instants.last().copied().unwrap_or(0.0);
+    let act = |time: f64, evaluation: &mut NodalEvaluation<'_>| acting.add(time, evaluation);
+    let mut method = Method::Explicit(Explicit::new(state.len(), tolerance, end));
+    let mut system = NodalMotion::new(equations, act);
+    let breaks = acting.scene.breaks();
+    let observe = |time: f64, state: &[f64]| {
+        observed.see(time, state)?;
+        watch(Event::Fraction(time / end));
+        Ok::<(), Failure>(())
+    };
+    integrate(&mut method, &mut system, &mut state, instants, &breaks, observe).map_err(|failure| {
+        let message = format!("the nodal reference of `{}` stopped: {failure}", acting.scene.name);
+        Error::from(Diagnostic::new(Code::SimulationStopped, message))
+    })?;
+    Ok(method.work())
+}
+
 /// The displacements of all rows are kept wherever the motion is looked at.
 fn refuse_too_much(model: &FeModel, motion: &Trace, memory: Option<u64>) -> Result<()> {
     const DOUBLE: f64 = 8.0;
@@ -187,7 +241,7 @@ fn refuse_too_much(model: &FeModel, motion: &Trace, memory: Option<u64>) -> Resu
     refuse_beyond(memory, needed, "the motion of all nodes", help)
 }
 
-/// What the reference cannot be.
+/// The error for what the nodal equations do not have.
 fn refused(what: impl std::fmt::Display) -> Error {
     let diagnostic = Diagnostic::new(Code::Usage, format!("--reference nodal: {what}"));
     diagnostic.with_help("take --reference full").into()
@@ -241,18 +295,18 @@ impl Shapes {
     /// Deflections of a watched point.
     fn path(&self, body: &FlexBody, point: &Point) -> Vec<Vector3<f64>> {
         let at = |a: &Mat<f64>, first: usize, i: usize| Vector3::from_fn(|k, _| a[(first + k, i)]);
-        let of = |a: &Mat<f64>, first: usize| (0..a.ncols()).map(|i| at(a, first, i)).collect();
+        let path = |a: &Mat<f64>, first: usize| (0..a.ncols()).map(|i| at(a, first, i)).collect();
         match point {
             Point::Node(number) => {
                 let node = body.nodes().ids.iter().position(|id| id == number);
-                node.map_or_else(Vec::new, |node| of(&self.shape, 3 * node))
+                node.map_or_else(Vec::new, |node| path(&self.shape, 3 * node))
             }
             Point::Interface(name) => {
                 let interface = body.interfaces().iter().find(|interface| interface.name == *name);
                 let rotation = self.rotation.as_ref().map(Mat::as_ref);
                 let rows = interface
                     .and_then(|own| own.rows(body.nodes(), self.shape.as_ref(), rotation, body.dimension()));
-                rows.map_or_else(Vec::new, |rows| of(&rows.translation, 0))
+                rows.map_or_else(Vec::new, |rows| path(&rows.translation, 0))
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
 use super::candidate::candidates;
-use super::{Candidate, NodalReference, Recommendation, Source, front, timing};
+use super::{Candidate, Failed, Measured, NodalReference, Recommendation, Row, Source, Times, front, timing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::memory::refuse_beyond;
@@ -10,10 +10,7 @@ use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
 use crate::model::FeModel;
 use crate::motion::dynamics::{EquationsOfMotion, Terms};
-use crate::motion::scene::{
-    Measure, OutputErrors, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at,
-};
-use crate::numerics::integration::Work;
+use crate::motion::scene::{Measure, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -44,53 +41,6 @@ pub struct Settings {
     pub repeat: usize,
     /// Bytes that there are; `None` where it is not known.
     pub memory: Option<u64>,
-}
-
-/// Times of a candidate. Unit: s.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Times {
-    /// To make the body that it is of, where that is known.
-    pub preprocessing: Option<f64>,
-    /// Of one evaluation of the equations.
-    pub evaluation: f64,
-    /// Of the simulation.
-    pub integration: f64,
-}
-
-/// What was found of a candidate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
-    /// Largest errors, with the steps of the reference.
-    pub errors: OutputErrors,
-    /// Largest ratio of error to tolerance.
-    pub worst: f64,
-    /// [`ErrorHistory::growth`](crate::motion::scene::ErrorHistory::growth).
-    pub growth: Option<f64>,
-    /// Multiplications of one evaluation of the equations.
-    pub multiplications: usize,
-    /// Size of its file. Unit: bytes.
-    pub bytes: u64,
-    /// Work of its simulation, with the steps that a scene without a given step takes for it.
-    pub work: Work,
-    /// Times.
-    pub times: Times,
-}
-
-/// Why there is nothing of a candidate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Failed(pub Diagnostic);
-
-/// A candidate and what was found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// What it is.
-    pub candidate: Candidate,
-    /// What it is made of.
-    pub source: String,
-    /// Frequency of its last mode in hertz.
-    pub last_frequency_hz: f64,
-    /// What was measured.
-    pub outcome: std::result::Result<Measured, Failed>,
 }
 
 /// A finished study.
@@ -157,30 +107,7 @@ pub fn trade(
     };
     let measure = Measure::new(source.body(), &motion);
     let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref() };
-
-    watch(Event::Phase("errors"));
-    let all = candidates(sources, &motion, scene.carried.is_some());
-    let (count, done) = (all.len() as f64, AtomicUsize::new(0));
-    let step = |done: &AtomicUsize| {
-        let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
-        watch(Event::Fraction(finished as f64 / count));
-    };
-    let found = all
-        .into_par_iter()
-        .map(|candidate| {
-            let row = job.measure(candidate);
-            step(&done);
-            row
-        })
-        .collect::<Result<Vec<_>>>()?;
-    watch(Event::Phase("times"));
-    let done = AtomicUsize::new(0);
-    let timed = |mut row: Row| {
-        job.time(&mut row, settings.repeat)?;
-        step(&done);
-        Ok(row)
-    };
-    let rows = found.into_iter().map(timed).collect::<Result<Vec<_>>>()?;
+    let rows = job.rows(settings.repeat, watch)?;
     let allowed = scene.requirements.multiplications;
     Ok(Trade {
         scene: scene.name.clone(),
@@ -195,6 +122,25 @@ pub fn trade(
     })
 }
 
+/// Candidates that are done, told as the fraction of all.
+struct Progress<'w> {
+    watch: Watch<'w>,
+    count: f64,
+    done: AtomicUsize,
+}
+
+impl<'w> Progress<'w> {
+    fn new(watch: Watch<'w>, phase: &'static str, count: usize) -> Self {
+        watch(Event::Phase(phase));
+        Self { watch, count: count as f64, done: AtomicUsize::new(0) }
+    }
+
+    fn step(&self) {
+        let finished = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.watch)(Event::Fraction(finished as f64 / self.count));
+    }
+}
+
 /// What all candidates have in common.
 struct Job<'j> {
     sources: &'j [Source],
@@ -205,6 +151,26 @@ struct Job<'j> {
 }
 
 impl Job<'_> {
+    /// Every candidate: what can be found on all threads, then the times, one after the other.
+    fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<Row>> {
+        let all = candidates(self.sources, self.motion, self.scene.carried.is_some());
+        let count = all.len();
+        let progress = Progress::new(watch, "errors", count);
+        let measured = |candidate| {
+            let row = self.measure(candidate);
+            progress.step();
+            row
+        };
+        let found = all.into_par_iter().map(measured).collect::<Result<Vec<_>>>()?;
+        let progress = Progress::new(watch, "times", count);
+        let timed = |mut row: Row| {
+            self.time(&mut row, repeat)?;
+            progress.step();
+            Ok(row)
+        };
+        found.into_iter().map(timed).collect()
+    }
+
     /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
     fn measure(&self, candidate: Candidate) -> Result<Row> {
         let source = &self.sources[candidate.source];
@@ -287,8 +253,9 @@ fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -
     const DOUBLE: f64 = 8.0;
     /// W1 to W3, their panels and copies, and S: squares of the modes.
     const SQUARES: f64 = 40.0;
-    let most =
-        |of: &dyn Fn(&FlexBody) -> usize| sources.iter().map(|s| of(s.body())).max().unwrap_or(0) as f64;
+    let most = |count: &dyn Fn(&FlexBody) -> usize| {
+        sources.iter().map(|s| count(s.body())).max().unwrap_or(0) as f64
+    };
     let (nodes, modes) = (most(&FlexBody::n_nodes), most(&FlexBody::n_modes));
     let body = nodes * (7.0 + 6.0 * modes) + SQUARES * modes * modes;
     let motion = reference.bytes(most(&FlexBody::n_modes) as usize);

@@ -5,7 +5,7 @@ use super::records::Records;
 use crate::body::flex_body::{GeometricStiffness, LoadKind, UnitLoad};
 use crate::body::invariants::{Groups, Numbered};
 use crate::formats::import::redundant::lacks_w2;
-use crate::formats::import::{ForeignBody, ForeignFrame};
+use crate::formats::import::{ImportedBody, ImportedFrame};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,7 +14,7 @@ pub(crate) const COUPLING: [usize; 5] = [14, 15, 16, 17, 18];
 
 /// A body, and what was found on the way.
 pub(crate) struct Read {
-    pub(crate) body: ForeignBody,
+    pub(crate) body: ImportedBody,
     pub(crate) lumped: Option<Lumped>,
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
     let turns = (0..records.n_nodes)
         .map(|node| (0..nf).any(|mode| (3..6).any(|component| records.shape(node, component, mode) != 0.0)));
     let frames = turns.enumerate().map(|(node, turns)| frame(records, node, turns, &named)).collect();
-    let body = ForeignBody {
+    let body = ImportedBody {
         name: String::new(),
         units: None,
         inertia,
@@ -123,12 +123,12 @@ fn rigid(told: &mut Numbered, values: &[f64]) {
     told.i7 = about_center - center.cross_matrix() * center.cross_matrix() * told.i1;
 }
 
-fn frame(records: &Records, node: usize, turns: bool, named: &[String]) -> ForeignFrame {
+fn frame(records: &Records, node: usize, turns: bool, named: &[String]) -> ImportedFrame {
     let rows =
         |first: usize| Mat::from_fn(3, records.n_modes, |k, mode| records.shape(node, first + k, mode));
     let label = &records.labels[node];
     let is_interface = label.parse::<i64>().is_err() || named.contains(label);
-    ForeignFrame {
+    ImportedFrame {
         label: label.clone(),
         interface: is_interface.then(|| label.clone()),
         position: records.position(node),

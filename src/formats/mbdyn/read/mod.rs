@@ -1,9 +1,6 @@
 //! The `.fem` file as record groups, and the body that they describe.
 
 pub(super) mod body;
-mod format;
 mod lumped;
 pub(super) mod records;
 pub(super) mod words;
-
-pub(crate) use format::Mbdyn;

@@ -1,14 +1,13 @@
 //! The record groups of a file, read as MBDyn does: of each group as many numbers as the header says. What stands after them MBDyn skips
 //! without a word; here it is told.
 
-use super::words::{Surplus, Words};
+use super::words::{GROUP, Surplus, Words};
 use crate::base::error::Result;
 use crate::formats::import::digits::Digits;
 use crate::input::InputFile;
 use std::collections::BTreeMap;
 
-/// First word of a record group.
-pub(crate) const GROUP: &str = "** RECORD GROUP ";
+/// Beginning of the last line.
 const END: &str = "** END OF FILE";
 /// Beginning of the comment of flexbody's own files about a mass that does not commute with rotations.
 const GENERAL_MASS: &str = "** GENERAL MASS";

@@ -1,10 +1,12 @@
 //! Lines and blank-separated words of a file, with their places.
 
-use super::records::GROUP;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::formats::import::digits::Digits;
 use std::path::Path;
+
+/// First words of a record group.
+pub(crate) const GROUP: &str = "** RECORD GROUP ";
 
 /// A place in the text.
 pub(crate) struct Words<'t> {

@@ -1,6 +1,6 @@
 //! Arrays that are zero although others say that they must not be.
 
-use super::redundant::worst;
+use super::missed::largest_entry;
 use crate::base::diagnostic::Code;
 use crate::formats::import::AuditCheck;
 use crate::formats::sid::read::arrays::{Array, Arrays};
@@ -40,7 +40,7 @@ impl Sizes {
         let largest = |part: &dyn Fn(Matrix3<f64>) -> Matrix3<f64>| {
             (0..nq).map(|k| 0.5 * part(layout.gr.gr(arrays, k)).amax()).fold(0.0, f64::max)
         };
-        let skew = |a: usize| worst(nq, nq, |k, l| arrays.cr1_skew(k, l, a));
+        let skew = |a: usize| largest_entry(nq, nq, |k, l| arrays.cr1_skew(k, l, a));
         Self {
             mdcm1: linear(&arrays.first_moment),
             ct0: constant(&arrays.ct),

@@ -1,6 +1,10 @@
 //! What the redundant arrays of a SID file must fulfil.
 
-pub(crate) mod frequencies;
-pub(crate) mod missing;
-pub(crate) mod redundant;
-pub(crate) mod taylor;
+mod digits;
+mod frames;
+mod frequencies;
+mod missed;
+mod missing;
+mod redundant;
+
+pub(crate) use redundant::checks;

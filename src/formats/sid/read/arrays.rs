@@ -1,8 +1,8 @@
 //! The arrays of the body, dense, and how exactly they are written.
 
 use super::parse::{Frame, Listed};
+use super::taylor::Taylor;
 use crate::formats::import::digits::Digits;
-use crate::formats::sid::checks::taylor::Taylor;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 

@@ -4,7 +4,7 @@ use super::arrays::{Array, Arrays, FrameArrays, largest};
 use super::parse::Listed;
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{Groups, Numbered};
-use crate::formats::import::{ForeignBody, ForeignFrame};
+use crate::formats::import::{ImportedBody, ImportedFrame};
 use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
 use faer::Mat;
 use nalgebra::Vector3;
@@ -61,40 +61,63 @@ impl Declared {
     }
 }
 
-/// The body, and what is to be said of it. `spin_in_oe`: Oe1 holds more than Me, which is taken as geometric stiffness for spin.
+/// The body of a file, and notes on how its arrays were taken. `spin_in_oe`: Oe1 holds more than Me, which is taken as geometric stiffness
+/// for spin.
 pub(crate) fn body(
     listed: &Listed<'_>,
     arrays: &Arrays,
     frames: Vec<FrameArrays>,
     declared: &Declared,
     spin_in_oe: bool,
-) -> (ForeignBody, Vec<String>) {
-    let nq = arrays.nq;
-    let (mut notes, mut stiffness) = (Vec::new(), Vec::new());
-    let i8 = |k: usize| 0.5 * (arrays.j1(k) - arrays.cr0(k).cross_matrix());
-    let general = declared.general && !declared.turned;
-    let i5 = coupling(arrays, general, &mut stiffness, &mut notes);
-    let oe1 =
-        |k: usize, l: usize, pair: usize| 0.5 * (arrays.oe.linear(l, k, pair) + arrays.oe.linear(k, l, pair));
-    let i9 = match (&arrays.oe.m1, spin_in_oe) {
-        (None, _) => None,
-        (Some(_), false) => Some(centrifugal(nq, oe1, i5.as_ref())),
-        (Some(_), true) => {
-            let load = |pair| Mat::from_fn(nq, nq, |k, l| oe1(k, l, pair));
-            push(&mut stiffness, &LoadKind::Spin, (0..6).map(load));
-            notes.push(
-                "Oe1 is taken as geometric stiffness for spin as a whole, since W2 cannot be told from it: the equations are the same"
-                    .to_owned(),
-            );
-            None
-        }
-    };
-    if let Some(m1) = &arrays.ct.m1 {
-        push(&mut stiffness, &LoadKind::Acceleration, (0..3).map(|a| second(nq, |k, l| m1[l][(k, a)])));
-        notes.push("Ct1 is taken as geometric stiffness for acceleration".to_owned());
+) -> (ImportedBody, Vec<String>) {
+    let mut terms = Terms { arrays, stiffness: Vec::new(), notes: Vec::new() };
+    let i5 = terms.coupling(declared.general && !declared.turned);
+    let i9 = terms.centrifugal(i5.as_ref(), spin_in_oe);
+    terms.accelerated();
+    if frames.iter().any(has_own_axes) {
+        terms.notes.push(
+            "frames have axes other than those of the body (AP), which a body of ours does not hold"
+                .to_owned(),
+        );
     }
-    let groups =
-        Groups { w1: (0..nq).any(|k| arrays.j1(k).amax() > 0.0), w2: i9.is_some(), w3: i5.is_some() };
+    let Terms { mut stiffness, notes, .. } = terms;
+    let listed_frames = listed.frames.iter().zip(frames);
+    let frames = listed_frames.map(|(frame, arrays)| place(&frame.label, arrays, &mut stiffness)).collect();
+    let damped = largest(&arrays.de.m0) > 0.0;
+    let body = ImportedBody {
+        name: declared.name.clone(),
+        units: declared.units.clone(),
+        inertia: numbered(arrays, i5, i9),
+        modal_stiffness: arrays.ke.m0.clone(),
+        modal_damping: damped.then(|| arrays.de.m0.clone()),
+        geometric_stiffness: stiffness,
+        frames,
+        lacks: lacks(arrays),
+    };
+    (body, notes)
+}
+
+/// The nine invariants; `i5` and `i9` are those of W3 and W2, where the file has them.
+fn numbered(arrays: &Arrays, i5: Option<Mat<f64>>, i9: Option<Mat<f64>>) -> Numbered {
+    let nq = arrays.nq;
+    let i8 = |k: usize| 0.5 * (arrays.j1(k) - arrays.cr0(k).cross_matrix());
+    let w1 = (0..nq).any(|k| arrays.j1(k).amax() > 0.0);
+    Numbered {
+        i1: arrays.mass,
+        i2: Vector3::from_fn(|a, _| arrays.first_moment.m0[(a, 0)]),
+        i3: Mat::from_fn(3, nq, |a, k| arrays.ct.m0[(k, a)]),
+        i4: Mat::from_fn(3, nq, |a, k| arrays.cr.m0[(k, a)]),
+        groups: Groups { w1, w2: i9.is_some(), w3: i5.is_some() },
+        i5,
+        i6: arrays.me.m0.clone(),
+        i7: arrays.j0(),
+        i8: (0..nq).map(i8).collect(),
+        i9,
+    }
+}
+
+/// Arrays of the file that a body of ours has no place for.
+fn lacks(arrays: &Arrays) -> Vec<String> {
     let mut lacks = Vec::new();
     if largest(&arrays.ksigma.m0) > 0.0 {
         lacks.push("ksigma: forces of initial stress on the modes are not taken".to_owned());
@@ -102,64 +125,65 @@ pub(crate) fn body(
     if arrays.gr.m1.is_some() {
         lacks.push("Gr1: it follows from the other arrays and is not taken".to_owned());
     }
-    if frames.iter().any(has_own_axes) {
-        notes.push(
-            "frames have axes other than those of the body (AP), which a body of ours does not hold"
-                .to_owned(),
-        );
-    }
-    let listed_frames = listed.frames.iter().zip(frames);
-    let frames = listed_frames.map(|(frame, arrays)| place(&frame.label, arrays, &mut stiffness)).collect();
-    let damped = largest(&arrays.de.m0) > 0.0;
-    let body = ForeignBody {
-        name: declared.name.clone(),
-        units: declared.units.clone(),
-        inertia: Numbered {
-            i1: arrays.mass,
-            i2: Vector3::from_fn(|a, _| arrays.first_moment.m0[(a, 0)]),
-            i3: Mat::from_fn(3, nq, |a, k| arrays.ct.m0[(k, a)]),
-            i4: Mat::from_fn(3, nq, |a, k| arrays.cr.m0[(k, a)]),
-            i5,
-            i6: arrays.me.m0.clone(),
-            i7: arrays.j0(),
-            i8: (0..nq).map(i8).collect(),
-            i9,
-            groups,
-        },
-        modal_stiffness: arrays.ke.m0.clone(),
-        modal_damping: damped.then(|| arrays.de.m0.clone()),
-        geometric_stiffness: stiffness,
-        frames,
-        lacks,
-    };
-    (body, notes)
+    lacks
 }
 
-/// W3 from Cr1: its skew part; what is symmetric in the modes is geometric stiffness for angular
-/// acceleration, or W3 too of a mass that does not commute with rotations (`general`).
-fn coupling(
-    arrays: &Arrays,
-    general: bool,
-    stiffness: &mut Vec<GeometricStiffness<Mat<f64>>>,
-    notes: &mut Vec<String>,
-) -> Option<Mat<f64>> {
-    let nq = arrays.nq;
-    arrays.cr.m1.as_ref()?;
-    if general {
-        return Some(Mat::from_fn(3 * nq, nq, |row, k| arrays.cr.linear(row % nq, k, row / nq)));
+/// What is read from arrays that hold terms of the kinetic energy and geometric stiffness together.
+struct Terms<'a> {
+    arrays: &'a Arrays,
+    stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    notes: Vec<String>,
+}
+
+impl Terms<'_> {
+    /// W3 from Cr1: its skew part; what is symmetric in the modes is geometric stiffness for angular
+    /// acceleration, or W3 too of a mass that does not commute with rotations (`general`).
+    fn coupling(&mut self, general: bool) -> Option<Mat<f64>> {
+        let (arrays, nq) = (self.arrays, self.arrays.nq);
+        arrays.cr.m1.as_ref()?;
+        if general {
+            return Some(Mat::from_fn(3 * nq, nq, |row, k| arrays.cr.linear(row % nq, k, row / nq)));
+        }
+        let even = |a: usize| symmetric_part(nq, |k, l| arrays.cr.linear(l, k, a));
+        let size = arrays.cr.sizes()[1];
+        let rounding = ROUNDING * size + 2.0 * arrays.cr.rounding[1];
+        if (0..3).any(|a| largest(&even(a)) > rounding) {
+            push(&mut self.stiffness, &LoadKind::AngularAcceleration, (0..3).map(even));
+            self.notes.push(
+                "what Cr1 has symmetric in the modes is taken as geometric stiffness for angular acceleration: the equations are the same"
+                    .to_owned(),
+            );
+        }
+        let i5 = Mat::from_fn(3 * nq, nq, |row, k| 0.5 * arrays.cr1_skew(k, row % nq, row / nq));
+        (largest(&i5) > 0.0).then_some(i5)
     }
-    let even = |a: usize| second(nq, |k, l| arrays.cr.linear(l, k, a));
-    let size = arrays.cr.sizes()[1];
-    let rounding = ROUNDING * size + 2.0 * arrays.cr.rounding[1];
-    if (0..3).any(|a| largest(&even(a)) > rounding) {
-        push(stiffness, &LoadKind::AngularAcceleration, (0..3).map(even));
-        notes.push(
-            "what Cr1 has symmetric in the modes is taken as geometric stiffness for angular acceleration: the equations are the same"
+
+    /// I9 from Oe1, unless that is taken as geometric stiffness for spin.
+    fn centrifugal(&mut self, i5: Option<&Mat<f64>>, spin_in_oe: bool) -> Option<Mat<f64>> {
+        let (arrays, nq) = (self.arrays, self.arrays.nq);
+        arrays.oe.m1.as_ref()?;
+        let oe1 = |k: usize, l: usize, pair: usize| {
+            0.5 * (arrays.oe.linear(l, k, pair) + arrays.oe.linear(k, l, pair))
+        };
+        if !spin_in_oe {
+            return Some(centrifugal(nq, oe1, i5));
+        }
+        let load = |pair| Mat::from_fn(nq, nq, |k, l| oe1(k, l, pair));
+        push(&mut self.stiffness, &LoadKind::Spin, (0..6).map(load));
+        self.notes.push(
+            "Oe1 is taken as geometric stiffness for spin as a whole, since W2 cannot be told from it: the equations are the same"
                 .to_owned(),
         );
+        None
     }
-    let i5 = Mat::from_fn(3 * nq, nq, |row, k| 0.5 * arrays.cr1_skew(k, row % nq, row / nq));
-    (largest(&i5) > 0.0).then_some(i5)
+
+    /// Geometric stiffness for acceleration from Ct1.
+    fn accelerated(&mut self) {
+        let Some(m1) = &self.arrays.ct.m1 else { return };
+        let along = |a: usize| symmetric_part(self.arrays.nq, |k, l| m1[l][(k, a)]);
+        push(&mut self.stiffness, &LoadKind::Acceleration, (0..3).map(along));
+        self.notes.push("Ct1 is taken as geometric stiffness for acceleration".to_owned());
+    }
 }
 
 /// I9 = -W2: its part symmetric in the modes is Oe1, the other that of W3.
@@ -180,9 +204,9 @@ fn centrifugal(nq: usize, oe1: impl Fn(usize, usize, usize) -> f64, i5: Option<&
     })
 }
 
-/// The part of a matrix that is symmetric.
-fn second(nq: usize, of: impl Fn(usize, usize) -> f64) -> Mat<f64> {
-    Mat::from_fn(nq, nq, |k, l| 0.5 * (of(k, l) + of(l, k)))
+/// The symmetric part of the matrix with these entries.
+fn symmetric_part(nq: usize, entry: impl Fn(usize, usize) -> f64) -> Mat<f64> {
+    Mat::from_fn(nq, nq, |k, l| 0.5 * (entry(k, l) + entry(l, k)))
 }
 
 /// Takes the components that are not zero.
@@ -207,21 +231,21 @@ fn place(
     label: &str,
     arrays: FrameArrays,
     stiffness: &mut Vec<GeometricStiffness<Mat<f64>>>,
-) -> ForeignFrame {
+) -> ImportedFrame {
     let FrameArrays { origin, phi, psi, .. } = arrays;
     let mut loaded = false;
     let mut take = |array: &Array, kind: fn(String) -> LoadKind| {
         if let Some(m1) = &array.m1 {
             loaded = true;
-            let of = |a: usize| second(m1.len(), |k, l| -m1[l][(a, k)]);
-            push(stiffness, &kind(label.to_owned()), (0..3).map(of));
+            let along = |a: usize| symmetric_part(m1.len(), |k, l| -m1[l][(a, k)]);
+            push(stiffness, &kind(label.to_owned()), (0..3).map(along));
         }
     };
     take(&phi, LoadKind::Force);
     if let Some(psi) = &psi {
         take(psi, LoadKind::Moment);
     }
-    ForeignFrame {
+    ImportedFrame {
         label: label.to_owned(),
         interface: loaded.then(|| label.to_owned()),
         position: [0, 1, 2].map(|a| origin.m0[(a, 0)]),

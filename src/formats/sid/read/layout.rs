@@ -2,7 +2,7 @@
 
 use super::arrays::Arrays;
 use super::parse::Listed;
-use crate::formats::sid::checks::taylor::ModeIndex;
+use super::taylor::ModeIndex;
 use nalgebra::Matrix3;
 
 /// Order of the columns of Gr and Ge.

@@ -2,10 +2,8 @@
 
 pub(crate) mod arrays;
 pub(crate) mod body;
-mod format;
 pub(crate) mod head;
 pub(crate) mod layout;
 pub(crate) mod lines;
 pub(crate) mod parse;
-
-pub use format::SidFile;
+pub(crate) mod taylor;

@@ -2,9 +2,9 @@
 
 use super::head::Head;
 use super::lines::{Line, Lines};
+use super::taylor::{ModeIndex, Taylor};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::formats::import::digits::Digits;
-use crate::formats::sid::checks::taylor::{ModeIndex, Taylor};
 use std::path::Path;
 
 /// Objects of the body in the order of the format, lower case, with other names that are in use.
@@ -74,56 +74,12 @@ impl<'t> Listed<'t> {
     pub(crate) fn read(path: &'t Path, text: &'t str) -> Result<Self, Diagnostic> {
         let mut lines = Lines::new(path, text);
         let Head { comment, stated } = Head::read(&mut lines)?;
-        let line = lines.next("part")?;
-        expect(&lines, &line, "new modal")?;
-        let mut refmod = None;
-        let mut frames: Option<Vec<Frame>> = None;
-        let mut objects: [Option<Taylor>; 11] = Default::default();
-        loop {
-            let line = lines.next("new modal")?;
-            let twice = || lines.unreadable(line.number, format!("`{}` is there twice", line.key));
-            match line.key.as_str() {
-                "end modal" => break,
-                "refmod" if refmod.is_some() => return Err(twice()),
-                "refmod" => refmod = Some(Refmod::read(&mut lines)?),
-                "frame" | "new frame" if frames.is_some() => return Err(twice()),
-                "frame" | "new frame" => frames = Some(read_frames(&mut lines)?),
-                key => {
-                    let is = |(name, others): &(&str, &[&str])| *name == key || others.contains(&key);
-                    let Some(at) = OBJECTS.iter().position(is) else {
-                        let message = format!("`{key}` in `new modal`, expected one of its objects");
-                        return Err(lines.unreadable(line.number, message));
-                    };
-                    if objects[at].is_some() {
-                        return Err(twice());
-                    }
-                    objects[at] = Some(Taylor::read(&mut lines, &line)?);
-                }
-            }
-        }
-        let line = lines.next("part")?;
-        expect(&lines, &line, "end part")?;
+        let Modal { refmod, frames, objects } = Modal::read(&mut lines)?;
         let incomplete = |message: String| Diagnostic::new(Code::ForeignIncomplete, message).in_file(path);
         let refmod = refmod.ok_or_else(|| incomplete("no `refmod` with the mass".to_owned()))?;
-        let frames = frames.unwrap_or_default();
         let nq = refmod.nq;
         if let Some((_, modes)) = stated.filter(|(_, modes)| *modes != nq) {
             return Err(lines.unreadable(1, format!("first line has {modes} modes, `refmod` has {nq}")));
-        }
-        for at in [0, 1, 4, 9] {
-            if objects[at].is_none() {
-                return Err(incomplete(format!("no `{}`", OBJECTS[at].0)));
-            }
-        }
-        let entries: usize = objects.iter().flatten().map(Taylor::n_entries).sum();
-        if nq == 0 || nq > MODES_OF_ANY_FILE.max((64.0 * entries as f64).sqrt() as usize) {
-            return Err(incomplete(format!("{entries} numbers are no body of {nq} modes")));
-        }
-        let of_frames: usize =
-            frames.iter().flat_map(|f| f.objects.iter().flatten()).map(Taylor::n_entries).sum();
-        if frames.len().saturating_mul(nq) > NUMBERS_OF_ANY_FILE.max(64 * of_frames) {
-            let n = frames.len();
-            return Err(incomplete(format!("{of_frames} numbers are no {n} frames of {nq} modes")));
         }
         let mut listed = Self {
             comment,
@@ -131,14 +87,37 @@ impl<'t> Listed<'t> {
             mass: refmod.mass,
             nq,
             mode_texts: refmod.texts,
-            frames,
+            frames: frames.unwrap_or_default(),
             objects,
             modes: ModeIndex::Middle,
         };
+        listed.refuse_incomplete().map_err(incomplete)?;
         listed.find_mode_index();
         listed.check(&lines)?;
         lines.finish()?;
         Ok(listed)
+    }
+
+    /// Says what required object is missing, or that there are fewer numbers than a body of so many modes and frames can have: arrays are
+    /// made of the sizes that the file states, which nothing else bounds.
+    fn refuse_incomplete(&self) -> Result<(), String> {
+        for at in [0, 1, 4, 9] {
+            if self.objects[at].is_none() {
+                return Err(format!("no `{}`", OBJECTS[at].0));
+            }
+        }
+        let nq = self.nq;
+        let entries: usize = self.objects.iter().flatten().map(Taylor::n_entries).sum();
+        if nq == 0 || nq > MODES_OF_ANY_FILE.max((64.0 * entries as f64).sqrt() as usize) {
+            return Err(format!("{entries} numbers are no body of {nq} modes"));
+        }
+        let frame_objects = self.frames.iter().flat_map(|f| f.objects.iter().flatten());
+        let numbers: usize = frame_objects.map(Taylor::n_entries).sum();
+        let n = self.frames.len();
+        if n.saturating_mul(nq) > NUMBERS_OF_ANY_FILE.max(64 * numbers) {
+            return Err(format!("{numbers} numbers are no {n} frames of {nq} modes"));
+        }
+        Ok(())
     }
 
     /// Whether J is a 3 x 3 matrix.
@@ -152,8 +131,8 @@ impl<'t> Listed<'t> {
     }
 
     fn all_objects(&self) -> impl Iterator<Item = &Taylor> {
-        let of_frames = self.frames.iter().flat_map(|frame| frame.objects.iter().flatten());
-        self.objects.iter().flatten().chain(of_frames)
+        let frame_objects = self.frames.iter().flat_map(|frame| frame.objects.iter().flatten());
+        self.objects.iter().flatten().chain(frame_objects)
     }
 
     /// Names of objects that list something and have no `structure`, each once.
@@ -220,6 +199,56 @@ impl<'t> Listed<'t> {
             "ap" => (3, 3),
             _ => (nq, nq),
         }
+    }
+}
+
+/// What stands in `new modal`, up to `end part`.
+#[derive(Default)]
+struct Modal<'t> {
+    refmod: Option<Refmod<'t>>,
+    frames: Option<Vec<Frame>>,
+    objects: [Option<Taylor>; 11],
+}
+
+impl<'t> Modal<'t> {
+    fn read(lines: &mut Lines<'t>) -> Result<Self, Diagnostic> {
+        let line = lines.next("part")?;
+        expect(lines, &line, "new modal")?;
+        let mut modal = Self::default();
+        loop {
+            let line = lines.next("new modal")?;
+            if line.key == "end modal" {
+                break;
+            }
+            modal.read_part(lines, &line)?;
+        }
+        let line = lines.next("part")?;
+        expect(lines, &line, "end part")?;
+        Ok(modal)
+    }
+
+    /// Reads what begins with `line`.
+    fn read_part(&mut self, lines: &mut Lines<'t>, line: &Line<'t>) -> Result<(), Diagnostic> {
+        let twice =
+            |lines: &Lines<'_>| lines.unreadable(line.number, format!("`{}` is there twice", line.key));
+        match line.key.as_str() {
+            "refmod" if self.refmod.is_some() => return Err(twice(lines)),
+            "refmod" => self.refmod = Some(Refmod::read(lines)?),
+            "frame" | "new frame" if self.frames.is_some() => return Err(twice(lines)),
+            "frame" | "new frame" => self.frames = Some(read_frames(lines)?),
+            key => {
+                let is = |(name, others): &(&str, &[&str])| *name == key || others.contains(&key);
+                let Some(at) = OBJECTS.iter().position(is) else {
+                    let message = format!("`{key}` in `new modal`, expected one of its objects");
+                    return Err(lines.unreadable(line.number, message));
+                };
+                if self.objects[at].is_some() {
+                    return Err(twice(lines));
+                }
+                self.objects[at] = Some(Taylor::read(lines, line)?);
+            }
+        }
+        Ok(())
     }
 }
 

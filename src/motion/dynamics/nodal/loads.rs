@@ -33,7 +33,7 @@ impl NodalEvaluation<'_> {
     pub fn add_force(&mut self, i: usize, force: &Vector3<f64>) {
         let d = self.equations.model.dimension();
         let own = self.in_body(force);
-        let place = self.equations.positions[i] + self.of_node(&self.u, i);
+        let place = self.equations.positions[i] + self.node_vector(&self.u, i);
         self.force += own;
         self.torque += place.cross(&own);
         self.row_forces[d * i..d * (i + 1)].iter_mut().zip(&own).for_each(|(sum, value)| *sum += value);

@@ -9,6 +9,7 @@ mod loads;
 mod massless;
 mod modes;
 mod motion;
+mod observed;
 mod reframe;
 mod state;
 

@@ -1,9 +1,9 @@
 //! States of the nodal equations.
 
+use super::NodalError;
 use super::equations::NodalEquations;
-use super::{NodalError, NodalEvaluation};
 use crate::motion::dynamics::{EulerParameters, Orientation};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Largest rigid motion in displacements that is rounding, relative to the largest of them.
 const ROUNDING: f64 = 1e-8;
@@ -88,79 +88,7 @@ impl NodalEquations<'_> {
         let (u, w) = nodes.split_at(self.n_rows());
         (frame, u, w)
     }
-}
 
-/// The Euler parameters of a state.
-pub(super) fn attitude(frame: &[f64]) -> EulerParameters {
-    EulerParameters([frame[ATTITUDE], frame[ATTITUDE + 1], frame[ATTITUDE + 2], frame[ATTITUDE + 3]])
-}
-
-impl NodalEvaluation<'_> {
-    /// The state as positions and velocities.
-    pub fn configuration(&self) -> NodalConfiguration {
-        NodalConfiguration {
-            origin: self.origin,
-            attitude: self.attitude.normalised(),
-            velocity: self.axes * self.velocity,
-            omega: self.equations.frame.axes.tr_mul(&self.omega),
-            u: self.u.clone(),
-            ud: self.ud.clone(),
-        }
-    }
-
-    /// Axes of the frame in the world, in columns.
-    pub fn axes(&self) -> Matrix3<f64> {
-        self.axes * self.equations.frame.axes
-    }
-
-    /// u (N), model axes.
-    pub fn displacements(&self) -> &[f64] {
-        &self.u
-    }
-
-    /// u' (N), model axes, C u' = 0.
-    pub fn displacement_rates(&self) -> &[f64] {
-        &self.ud
-    }
-
-    /// Place of node `i`, world axes.
-    ///
-    /// # Panics
-    /// When `i` is not below the number of nodes.
-    pub fn place(&self, i: usize) -> Vector3<f64> {
-        self.origin + self.axes * (self.equations.positions[i] + self.of_node(&self.u, i))
-    }
-
-    /// Velocity of node `i`, world axes.
-    ///
-    /// # Panics
-    /// As [`NodalEvaluation::place`].
-    pub fn node_velocity(&self, i: usize) -> Vector3<f64> {
-        self.axes * self.of_node(&self.vbar, i)
-    }
-
-    pub(super) fn of_node(&self, x: &[f64], i: usize) -> Vector3<f64> {
-        let d = self.equations.model.dimension();
-        Vector3::from_fn(|k, _| if k < d { x[d * i + k] } else { 0.0 })
-    }
-
-    /// The linear momentum P and the angular momentum L about the origin of the frame, world axes.
-    pub fn momenta(&self) -> (Vector3<f64>, Vector3<f64>) {
-        (self.axes * self.p, self.axes * self.h)
-    }
-
-    /// T = vbar'M vbar / 2.
-    pub fn kinetic_energy(&self) -> f64 {
-        0.5 * self.vbar.iter().zip(&self.w).map(|(v, w)| v * w).sum::<f64>()
-    }
-
-    /// U = u'K u / 2.
-    pub fn elastic_energy(&self) -> f64 {
-        self.equations.elastic_energy(&self.u)
-    }
-}
-
-impl NodalEquations<'_> {
     /// u'K u / 2.
     pub(super) fn elastic_energy(&self, u: &[f64]) -> f64 {
         let row = |(i, ui): (usize, &f64)| {
@@ -169,4 +97,9 @@ impl NodalEquations<'_> {
         };
         0.5 * u.iter().enumerate().map(row).sum::<f64>()
     }
+}
+
+/// The Euler parameters of a state.
+pub(super) fn attitude(frame: &[f64]) -> EulerParameters {
+    EulerParameters([frame[ATTITUDE], frame[ATTITUDE + 1], frame[ATTITUDE + 2], frame[ATTITUDE + 3]])
 }

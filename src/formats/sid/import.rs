@@ -1,13 +1,13 @@
-//! SID_FEM as a format of other programs.
+//! SID_FEM as a format that is imported.
 
-use super::arrays::{Arrays, FrameArrays};
-use super::body::{Declared, body};
-use super::layout::Layout;
-use super::parse::Listed;
+use super::checks::checks;
+use super::read::arrays::{Arrays, FrameArrays};
+use super::read::body::{Declared, body};
+use super::read::layout::Layout;
+use super::read::parse::Listed;
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;
-use crate::formats::import::{AuditCheck, Foreign, ForeignFormat};
-use crate::formats::sid::checks::redundant::checks;
+use crate::formats::import::{AuditCheck, ImportFormat, ImportedFile};
 use crate::input::InputFile;
 
 /// SID_FEM text (Wallrapp, Standard Input Data).
@@ -25,7 +25,7 @@ fn unsound(checks: &[AuditCheck]) -> Vec<String> {
     checks.iter().filter(broken).map(|check| check.meaning.clone()).collect()
 }
 
-impl ForeignFormat for SidFile {
+impl ImportFormat for SidFile {
     fn name(&self) -> &'static str {
         "sid"
     }
@@ -36,7 +36,7 @@ impl ForeignFormat for SidFile {
         head.lines().any(|line| line.trim() == "part") && head.contains("new modal")
     }
 
-    fn read(&self, file: &InputFile) -> Result<Foreign> {
+    fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         // Names may be of any encoding, keywords and numbers are ASCII.
         let text = String::from_utf8_lossy(file.bytes());
         let listed = Listed::read(file.path(), &text)?;
@@ -56,7 +56,7 @@ impl ForeignFormat for SidFile {
             let names = inferred.join(", ");
             notes.push(format!("{names} have no `structure`: it is taken from the entries that they list"));
         }
-        Ok(Foreign {
+        Ok(ImportedFile {
             format: "sid",
             dialect: layout.dialect.to_owned(),
             notes,

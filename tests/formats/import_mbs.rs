@@ -10,9 +10,9 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
 use flexbody::formats::export::{ExportOptions, Points};
-use flexbody::formats::import::{Foreign, adopt, audit};
+use flexbody::formats::import::{ImportedFile, audit, import_body};
 use flexbody::formats::{export, find_format};
-use flexbody::formats::{find_foreign, recognise};
+use flexbody::formats::{find_import_format, recognise};
 use flexbody::input::InputFile;
 use flexbody::model::FeModel;
 use hdf5_metno as hdf5;
@@ -39,16 +39,16 @@ fn fem() -> String {
     String::from_utf8(exported("mbdyn", None)).expect("text")
 }
 
-fn read(bytes: &[u8], format: &str) -> Result<Foreign, Error> {
+fn read(bytes: &[u8], format: &str) -> Result<ImportedFile, Error> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("file");
     std::fs::write(&path, bytes).expect("written");
-    find_foreign(format).expect("a format").read(&InputFile::open(&path).map_err(Error::from)?)
+    find_import_format(format).expect("a format").read(&InputFile::open(&path).map_err(Error::from)?)
 }
 
 /// Names and codes of the checks of the format that fail.
-fn findings(foreign: &Foreign) -> Vec<(&'static str, Code)> {
-    foreign.checks.iter().filter(|check| !check.passed()).map(|check| (check.name, check.code)).collect()
+fn findings(imported: &ImportedFile) -> Vec<(&'static str, Code)> {
+    imported.checks.iter().filter(|check| !check.passed()).map(|check| (check.name, check.code)).collect()
 }
 
 /// The text with the `at`-th number of a record group changed.
@@ -190,8 +190,8 @@ fn what_mbdyn_skips_is_a_finding() {
     let text = fem();
     let surplus = ("no_more_than_the_header_says", Code::AuditSurplus);
     let of = |text: &str| {
-        let foreign = read(text.as_bytes(), "mbdyn").expect("readable");
-        (findings(&foreign), foreign.unsound)
+        let imported = read(text.as_bytes(), "mbdyn").expect("readable");
+        (findings(&imported), imported.unsound)
     };
     // femgen writes a row of zeros too many.
     let masses = row_sums();
@@ -213,9 +213,9 @@ fn what_mbdyn_skips_is_a_finding() {
     // A header that counts fewer modes than there are.
     let (found, unsound) = of(&text.replacen("REV0 18 3", "REV0 18 2", 1));
     assert!(found.contains(&surplus) && unsound.len() > 3, "{found:?} {unsound:?}");
-    let foreign = read(text.replacen("REV0 18 3", "REV0 18 2", 1).as_bytes(), "mbdyn").expect("readable");
+    let imported = read(text.replacen("REV0 18 3", "REV0 18 2", 1).as_bytes(), "mbdyn").expect("readable");
     let source = SourceFile::new("body", Path::new("body.fem"), "0".repeat(64));
-    let error = adopt(&foreign, source, UnitSystem::default()).expect_err("another body");
+    let error = import_body(&imported, source, UnitSystem::default()).expect_err("another body");
     assert!(error.has(Code::ForeignUnsound), "{error}");
 }
 
@@ -479,7 +479,7 @@ static EXPORTS: LazyLock<Vec<(&str, Vec<u8>)>> =
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is changed, reading ends in a body or in a report, and so do audit and adoption of what is read.
+    /// Whatever is changed, reading ends in a body or in a report, and so do audit and import of what is read.
     #[test]
     fn damaged_files_never_panic(which in 0..3usize, damages in proptest::collection::vec(damage(), 1..4)) {
         let (format, bytes) = &EXPORTS[which];
@@ -489,12 +489,12 @@ proptest! {
         std::fs::write(&path, &bytes).expect("written");
         let Ok(file) = InputFile::open(&path) else { return Ok(()) };
         let _ = recognise(&file);
-        match find_foreign(format).expect("a format").read(&file) {
+        match find_import_format(format).expect("a format").read(&file) {
             Ok(found) => {
                 prop_assert!(found.body.frames.iter().all(|frame| frame.translation.ncols() == found.body.n_modes()));
                 let _ = audit(&found, 1e-6);
                 let source = SourceFile::new("body", &path, "0".repeat(64));
-                let _ = adopt(&found, source, UnitSystem::default());
+                let _ = import_body(&found, source, UnitSystem::default());
             }
             Err(error) => {
                 let about = [Code::ForeignUnreadable, Code::ForeignIncomplete, Code::FileUnreadable];

@@ -10,7 +10,9 @@ use flexbody::base::provenance::SourceFile;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, condense, primary_differences};
-use flexbody::formats::import::{Adopted, Audit, Foreign, ForeignBody, ForeignFrame, adopt, audit};
+use flexbody::formats::import::{
+    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, audit, import_body,
+};
 use flexbody::model::{FeModel, GeometricStiffness};
 use flexbody::report::{Tolerances, compare};
 use std::path::Path;
@@ -27,21 +29,21 @@ fn block(modes: usize) -> (FeModel, FlexBody) {
 }
 
 /// A file that describes `body` by other modes.
-fn foreign(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Foreign {
-    let frame = |i: usize| ForeignFrame {
+fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> ImportedFile {
+    let frame = |i: usize| ImportedFrame {
         label: body.nodes().ids[i].to_string(),
         interface: None,
         position: body.nodes().positions[i],
         translation: shape.as_ref().subrows(3 * i, 3).to_owned(),
         rotation: None,
     };
-    Foreign {
+    ImportedFile {
         format: "test",
         dialect: String::new(),
         notes: Vec::new(),
         checks: Vec::new(),
         unsound: Vec::new(),
-        body: ForeignBody {
+        body: ImportedBody {
             name: "block".to_owned(),
             units: None,
             inertia: invariants.numbered(),
@@ -54,9 +56,9 @@ fn foreign(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Foreig
     }
 }
 
-fn adopted(foreign: &Foreign) -> Result<Adopted, flexbody::base::error::Error> {
+fn imported(file: &ImportedFile) -> Result<Imported, flexbody::base::error::Error> {
     let source = SourceFile::new("body", Path::new("block.file"), "0".repeat(64));
-    adopt(foreign, source, UnitSystem::default())
+    import_body(file, source, UnitSystem::default())
 }
 
 fn random(random: &mut Random, rows: usize, columns: usize) -> Mat<f64> {
@@ -76,8 +78,8 @@ fn worst_difference(a: &Invariants, b: &Invariants) -> f64 {
 fn free_surface_modes_are_taken_to_the_last_bit() {
     for name in ["bracket_hex20", "frame_beams", "shell_folded", "turbine_blade"] {
         let body = fixture(name, 6, BodyFrame::Principal);
-        let Adopted { body: taken, diagnostics } =
-            adopted(&foreign(&body, &body.modes().shape, body.invariants())).expect("a body");
+        let Imported { body: taken, diagnostics } =
+            imported(&file_with(&body, &body.modes().shape, body.invariants())).expect("a body");
         assert!(diagnostics.is_empty(), "{name}: {diagnostics:?}");
         assert_eq!(taken.modes().shape, body.modes().shape, "{name}");
         assert_eq!(taken.invariants().modal_stiffness, body.invariants().modal_stiffness, "{name}");
@@ -109,7 +111,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     let shape = own * &mix + rigid(&body) * (random(&mut numbers, 6, nf) * faer::Scale(size));
     let stiffness = mix.transpose() * &body.invariants().modal_stiffness * &mix;
     let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
-    let mut told = foreign(&body, &shape, &invariants);
+    let mut told = file_with(&body, &shape, &invariants);
     // A damping that is not diagonal, and what it is in the modes of the body.
     let damping = Mat::from_fn(nf, nf, |i, j| 0.01 * (1 + i.min(j)) as f64);
     told.body.modal_damping = Some(mix.transpose() * &damping * &mix);
@@ -117,7 +119,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     told.body.geometric_stiffness =
         vec![GeometricStiffness { load, matrix: mix.transpose() * &damping * &mix }];
 
-    let Adopted { body: taken, diagnostics } = adopted(&told).expect("a body");
+    let Imported { body: taken, diagnostics } = imported(&told).expect("a body");
     assert_eq!(diagnostics.iter().map(|d| d.code()).collect::<Vec<_>>(), [Code::ForeignChanged]);
     let failed: Vec<_> = taken.identities(BodyFrame::Model).into_iter().filter(|c| !c.passed).collect();
     assert!(failed.is_empty(), "{failed:?}");
@@ -161,7 +163,8 @@ fn a_rigid_motion_among_the_modes_is_left_out() {
         _ => lambda[i - 1],
     });
     let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
-    let Adopted { body: taken, diagnostics } = adopted(&foreign(&body, &shape, &invariants)).expect("a body");
+    let Imported { body: taken, diagnostics } =
+        imported(&file_with(&body, &shape, &invariants)).expect("a body");
     assert!(diagnostics[0].message().ends_with("rigid motions left out: 2"), "{}", diagnostics[0]);
     assert_eq!(taken.n_modes(), 4);
     assert!(worst_difference(body.invariants(), taken.invariants()) < 1e-10);
@@ -170,11 +173,11 @@ fn a_rigid_motion_among_the_modes_is_left_out() {
 #[test]
 fn what_is_no_body_is_refused_in_words() {
     let (_, body) = block(3);
-    let good = foreign(&body, &body.modes().shape, body.invariants());
-    let refused = |change: &dyn Fn(&mut ForeignBody), code: Code, words: &str| {
+    let good = file_with(&body, &body.modes().shape, body.invariants());
+    let refused = |change: &dyn Fn(&mut ImportedBody), code: Code, words: &str| {
         let mut bad = good.clone();
         change(&mut bad.body);
-        let error = adopted(&bad).expect_err(words);
+        let error = imported(&bad).expect_err(words);
         let first = &error.diagnostics()[0];
         assert!(first.code() == code && first.message().contains(words), "{words}: {first}");
     };
@@ -184,7 +187,8 @@ fn what_is_no_body_is_refused_in_words() {
     refused(&|b| b.modal_stiffness[(0, 0)] *= -1.0, Code::ForeignIncomplete, "not positive definite beside");
     refused(&|b| b.inertia.i3[(0, 1)] = 1e3, Code::ForeignIncomplete, "mode 2 and rigid motion together");
     // Masses on the axis x.
-    let line = |b: &mut ForeignBody| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into());
+    let line =
+        |b: &mut ImportedBody| b.inertia.i7 = nalgebra::Matrix3::from_diagonal(&[0.0, 1.0, 1.0].into());
     refused(&line, Code::ForeignIncomplete, "all masses lie on a line");
     refused(
         &|b| {
@@ -199,10 +203,10 @@ fn what_is_no_body_is_refused_in_words() {
 #[test]
 fn groups_that_a_file_lacks_are_dropped_and_named() {
     let (_, body) = block(3);
-    let mut without = foreign(&body, &body.modes().shape, body.invariants());
+    let mut without = file_with(&body, &body.modes().shape, body.invariants());
     without.body.inertia.i9 = None;
     without.body.lacks = vec!["inertia that is quadratic in the modes".to_owned()];
-    let Adopted { body: taken, diagnostics } = adopted(&without).expect("a body");
+    let Imported { body: taken, diagnostics } = imported(&without).expect("a body");
     assert_eq!(diagnostics[0].code(), Code::ForeignDropped);
     let (w1, w2, w3) = (taken.invariants().w1(), taken.invariants().w2(), taken.invariants().w3());
     assert!(w1.is_some() && w2.is_none() && w3.is_some());
@@ -216,11 +220,11 @@ fn codes(found: &Audit) -> Vec<Code> {
 #[test]
 fn an_audit_passes_a_body_and_names_what_is_wrong_with_another() {
     let (_, body) = block(4);
-    let good = foreign(&body, &body.modes().shape, body.invariants());
+    let good = file_with(&body, &body.modes().shape, body.invariants());
     let found = audit(&good, 1e-9);
     assert!(found.passed() && found.checks.len() > 12, "{:?}", found.findings());
     assert!(found.notes.iter().any(|note| note.contains("free-surface")));
-    let of = |change: &dyn Fn(&mut ForeignBody)| {
+    let of = |change: &dyn Fn(&mut ImportedBody)| {
         let mut bad = good.clone();
         change(&mut bad.body);
         audit(&bad, 1e-9)

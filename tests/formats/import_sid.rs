@@ -8,9 +8,9 @@ use flexbody::base::provenance::SourceFile;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::formats::export::{ExportOptions, Points};
-use flexbody::formats::import::{Foreign, ForeignFormat, adopt, audit};
+use flexbody::formats::import::{ImportFormat, ImportedFile, audit, import_body};
 use flexbody::formats::{export, find_format};
-use flexbody::formats::{find_foreign, recognise};
+use flexbody::formats::{find_import_format, recognise};
 use flexbody::input::InputFile;
 use flexbody::model::LoadKind;
 use proptest::prelude::*;
@@ -35,24 +35,24 @@ fn file(dialect: &str) -> &'static str {
     &FILES.iter().find(|(name, _)| *name == dialect).expect("a dialect").1
 }
 
-fn reader() -> &'static dyn ForeignFormat {
-    find_foreign("sid").expect("a format")
+fn reader() -> &'static dyn ImportFormat {
+    find_import_format("sid").expect("a format")
 }
 
-fn try_read(bytes: &[u8]) -> Result<Foreign, Error> {
+fn try_read(bytes: &[u8]) -> Result<ImportedFile, Error> {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("body.SID_FEM");
     std::fs::write(&path, bytes).expect("writes");
     reader().read(&InputFile::open(&path).map_err(Error::from)?)
 }
 
-fn read(text: &str) -> Foreign {
+fn read(text: &str) -> ImportedFile {
     try_read(text.as_bytes()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Findings as `CODE check`.
-fn findings(foreign: &Foreign) -> Vec<String> {
-    let failed = foreign.checks.iter().filter(|check| !check.passed());
+fn findings(imported: &ImportedFile) -> Vec<String> {
+    let failed = imported.checks.iter().filter(|check| !check.passed());
     failed.map(|check| format!("{} {}", check.code.id(), check.name)).collect()
 }
 
@@ -112,11 +112,11 @@ fn scaled(key: &str, text: &str, factor: f64) -> Option<(String, String)> {
 #[test]
 fn sound_files_have_no_findings_and_name_their_dialect() {
     for (name, text) in FILES.iter() {
-        let foreign = read(text);
-        assert_eq!(findings(&foreign), Vec::<String>::new(), "{name}");
-        assert_eq!(foreign.dialect, *name);
-        assert!(foreign.checks.len() >= 15, "{name}: {}", foreign.checks.len());
-        assert!(foreign.body.lacks.is_empty());
+        let imported = read(text);
+        assert_eq!(findings(&imported), Vec::<String>::new(), "{name}");
+        assert_eq!(imported.dialect, *name);
+        assert!(imported.checks.len() >= 15, "{name}: {}", imported.checks.len());
+        assert!(imported.body.lacks.is_empty());
     }
 }
 
@@ -125,9 +125,9 @@ fn the_numbers_alone_tell_the_dialect() {
     // What a writer says of itself in the first line is taken away.
     let anonymous = |text: &str| text.replacen("flexbody", "someone", 1);
     for (name, text) in FILES.iter() {
-        let foreign = read(&anonymous(text));
-        assert_eq!(foreign.dialect, *name);
-        assert_eq!(findings(&foreign), Vec::<String>::new(), "{name}");
+        let imported = read(&anonymous(text));
+        assert_eq!(imported.dialect, *name);
+        assert_eq!(findings(&imported), Vec::<String>::new(), "{name}");
     }
 }
 
@@ -273,9 +273,9 @@ fn every_fault_gives_the_finding_that_names_it() {
         ),
     ];
     for (what, change, expected) in cases {
-        let foreign = read(&edited(text, change));
-        assert_eq!(findings(&foreign), expected, "{what}: {:#?}", foreign.checks);
-        for check in &foreign.checks {
+        let imported = read(&edited(text, change));
+        assert_eq!(findings(&imported), expected, "{what}: {:#?}", imported.checks);
+        for check in &imported.checks {
             let finding = check.finding();
             assert!(finding.is_none_or(|finding| finding.message().contains(check.formula)));
         }
@@ -312,8 +312,8 @@ fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
         let (exported, _) = export(&body, sid, &ExportOptions::default(), true).expect("written");
         let text = String::from_utf8(exported.file).expect("text");
         let undeclared: Vec<&str> = text.lines().skip(1).collect();
-        let foreign = read(&undeclared.join("\n"));
-        (findings(&foreign), foreign.body.geometric_stiffness.len())
+        let imported = read(&undeclared.join("\n"));
+        (findings(&imported), imported.body.geometric_stiffness.len())
     };
     assert_eq!(findings_of(&[LoadKind::Spin, LoadKind::Acceleration]), (Vec::new(), 9));
     assert_eq!(findings_of(&[LoadKind::Spin]), (vec!["FB741 oe1_is_me".to_owned()], 6));
@@ -335,9 +335,9 @@ fn coupling_of(
     text: &str,
     change: impl Fn(&str, &str, &str) -> Option<(String, String)>,
 ) -> (Vec<String>, String) {
-    let foreign = read(&edited(text, change));
-    let failed = foreign.checks.iter().filter(|check| !check.passed());
-    (findings(&foreign), failed.map(|check| check.meaning.as_str()).collect::<Vec<_>>().join("; "))
+    let imported = read(&edited(text, change));
+    let failed = imported.checks.iter().filter(|check| !check.passed());
+    (findings(&imported), failed.map(|check| check.meaning.as_str()).collect::<Vec<_>>().join("; "))
 }
 
 #[test]
@@ -386,9 +386,9 @@ fn ge_with_the_symmetric_part_of_cr1_is_named() {
     let (before, rest) = text.split_once("\n           Ge\n").expect("Ge");
     let (_, after) = rest.split_once("end Ge").expect("its end");
     let sizes = "order = 0\nnrow = 3\nncol = 9\nnq = 3\nnqn = 0\nstructure = 3\n";
-    let foreign = read(&format!("{before}\nGe\n{sizes}{entries}end Ge{after}"));
-    assert_eq!(findings(&foreign), ["FB740 ge_is_twice_cr1"]);
-    let check = foreign.checks.iter().find(|check| check.name == "ge_is_twice_cr1").expect("a check");
+    let imported = read(&format!("{before}\nGe\n{sizes}{entries}end Ge{after}"));
+    assert_eq!(findings(&imported), ["FB740 ge_is_twice_cr1"]);
+    let check = imported.checks.iter().find(|check| check.name == "ge_is_twice_cr1").expect("a check");
     assert!(check.meaning.contains("Ge is 2 Cr1") && check.meaning.contains("FEMBS"), "{}", check.meaning);
 }
 
@@ -410,10 +410,10 @@ fn axes_that_are_no_rotation_are_refused() {
         ),
     ];
     for (change, words) in cases {
-        let foreign = read(&edited(file("fembs"), change));
-        assert_eq!(findings(&foreign), ["FB748 ap_is_a_rotation"]);
+        let imported = read(&edited(file("fembs"), change));
+        assert_eq!(findings(&imported), ["FB748 ap_is_a_rotation"]);
         let source = SourceFile::new("body", Path::new("body.SID_FEM"), "0".repeat(64));
-        let error = adopt(&foreign, source, UnitSystem::default()).expect_err(words);
+        let error = import_body(&imported, source, UnitSystem::default()).expect_err(words);
         assert!(error.has(Code::ForeignUnsound) && error.to_string().contains(words), "{error}");
     }
 }
@@ -421,8 +421,8 @@ fn axes_that_are_no_rotation_are_refused() {
 /// Axes of a frame that are a rotation are sound; that they are not taken is said.
 #[test]
 fn turned_axes_of_a_frame_are_noted() {
-    let note = |foreign: &Foreign| {
-        foreign.notes.iter().any(|note| note.contains("axes other than those of the body"))
+    let note = |imported: &ImportedFile| {
+        imported.notes.iter().any(|note| note.contains("axes other than those of the body"))
     };
     assert!(!note(&read(file("fembs"))));
     let turned = read(&edited(file("fembs"), |object, key, v| match (object, key) {
@@ -536,10 +536,10 @@ fn samples_of_other_programs_have_the_findings_that_they_are_known_for() {
         }
         let file = InputFile::open(&path).expect("opens");
         assert_eq!(recognise(&file).expect("a format").name(), "sid");
-        let foreign = reader().read(&file).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!((foreign.dialect.as_str(), foreign.body.n_modes()), (dialect, modes));
-        assert_eq!(findings(&foreign), expected, "{name}");
-        assert!(foreign.body.modal_damping.is_some());
+        let imported = reader().read(&file).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!((imported.dialect.as_str(), imported.body.n_modes()), (dialect, modes));
+        assert_eq!(findings(&imported), expected, "{name}");
+        assert!(imported.body.modal_damping.is_some());
     }
 }
 
@@ -562,8 +562,8 @@ proptest! {
         let at = (0.37 * len) as usize;
         bytes.splice(at..at, inserted.bytes());
         bytes.truncate(((cut * bytes.len() as f64) as usize).max(1));
-        if let Ok(foreign) = try_read(&bytes) {
-            for check in &foreign.checks {
+        if let Ok(imported) = try_read(&bytes) {
+            for check in &imported.checks {
                 prop_assert!(check.passed() || check.finding().is_some());
             }
         }

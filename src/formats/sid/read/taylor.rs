@@ -1,8 +1,8 @@
 //! An object of the file: sizes and the entries that are listed.
 
+use super::lines::{Line, Lines};
 use crate::base::diagnostic::Diagnostic;
 use crate::formats::import::digits::Digits;
-use crate::formats::sid::read::lines::{Line, Lines};
 use faer::Mat;
 
 /// An entry, indices from 0; of `m0` the third is not used.

@@ -1,12 +1,12 @@
 //! The format: recognised by its record groups.
 
-use super::body::{COUPLING, body, from_masses};
-use super::records::{GROUP, Records};
-use super::words::Surplus;
+use super::checks::checks;
+use super::read::body::{COUPLING, body, from_masses};
+use super::read::records::Records;
+use super::read::words::{GROUP, Surplus};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::formats::import::{Foreign, ForeignFormat};
-use crate::formats::mbdyn::checks::checks;
+use crate::formats::import::{ImportFormat, ImportedFile};
 use crate::input::InputFile;
 
 /// The format.
@@ -15,7 +15,7 @@ pub(crate) struct Mbdyn;
 /// The first record group stands near the beginning.
 const HEAD: usize = 1 << 16;
 
-impl ForeignFormat for Mbdyn {
+impl ImportFormat for Mbdyn {
     fn name(&self) -> &'static str {
         "mbdyn"
     }
@@ -25,7 +25,7 @@ impl ForeignFormat for Mbdyn {
         head.split(|byte| *byte == b'\n').any(|line| line.starts_with(GROUP.as_bytes()))
     }
 
-    fn read(&self, file: &InputFile) -> Result<Foreign> {
+    fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         let records = Records::read(file)?;
         let Some(read) = body(&records) else {
             let message = "the file lacks mass and inertia: neither record group 12 nor 11 is there";
@@ -33,7 +33,7 @@ impl ForeignFormat for Mbdyn {
         };
         let newest = (1..=19).rev().find(|group| records.has(*group)).unwrap_or(10);
         let dialect = if newest > 13 { "level19" } else { "level13" };
-        Ok(Foreign {
+        Ok(ImportedFile {
             format: "mbdyn",
             dialect: dialect.to_owned(),
             notes: notes(&records, newest),
