@@ -1,7 +1,7 @@
 //! `flexbody audit`.
 
 use super::arguments::AuditArguments;
-use super::output::Outcome;
+use super::outcome::Outcome;
 use crate::base::error::Result;
 use crate::formats::import::audit;
 use crate::formats::{find_import_format, recognise};

@@ -1,7 +1,7 @@
 //! `flexbody check`.
 
 use super::arguments::CheckArguments;
-use super::output::Outcome;
+use super::outcome::Outcome;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;

@@ -1,7 +1,7 @@
 //! `flexbody compare`.
 
 use super::arguments::CompareArguments;
-use super::output::Outcome;
+use super::outcome::Outcome;
 use crate::base::error::Result;
 use crate::formats::flex_body_file;
 use crate::report::{Tolerances, compare, compare_common};

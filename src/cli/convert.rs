@@ -1,8 +1,8 @@
 //! `flexbody convert`.
 
-use super::adopt;
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
-use super::output::{Outcome, refuse_warnings};
+use super::import;
+use super::outcome::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::watcher::Watcher;
@@ -28,7 +28,7 @@ use crate::study::tailoring::{Tailoring, convert_for_scene, loads_for, read_load
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
-        return adopt::run(arguments, from);
+        return import::run(arguments, from);
     }
     if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
         let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";

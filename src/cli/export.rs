@@ -1,7 +1,7 @@
 //! `flexbody export`.
 
 use super::arguments::ExportArguments;
-use super::output::{Outcome, refuse_warnings};
+use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;

@@ -1,7 +1,7 @@
 //! `flexbody inspect`.
 
 use super::arguments::InspectArguments;
-use super::output::Outcome;
+use super::outcome::Outcome;
 use crate::base::error::Result;
 use crate::formats::flex_body_file;
 use crate::report::{Facts, Format, RunData, render};

@@ -1,13 +1,14 @@
 //! The command line: arguments, one file per command, progress. The only room that prints or exits; no arithmetic.
 
-mod adopt;
 mod arguments;
 mod audit;
 mod check;
 mod compare;
 mod convert;
 mod export;
+mod import;
 mod inspect;
+mod outcome;
 mod output;
 mod places;
 mod resources;

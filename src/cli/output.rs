@@ -1,22 +1,14 @@
-//! Printing of results and diagnostics, and the exit code.
+//! Running a command, printing of results and diagnostics, and the exit code.
 
 use super::arguments::{Arguments, Command, Printing};
+use super::outcome::{Outcome, warnings};
 use super::resources::use_threads;
 use super::{audit, check, compare, convert, export, inspect, select, simulate, trade};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
-use crate::base::error::{Error, ExitCode, Result};
+use crate::base::error::{ExitCode, Result};
 use crate::report::output_json;
 use clap::{CommandFactory, Parser};
 use std::io::Write;
-
-/// What a command found: text for stdout, the same as JSON, what is to be said of it, and whether its checks passed.
-pub(super) struct Outcome {
-    pub text: String,
-    /// The `results` of the object that `--json` prints.
-    pub json: String,
-    pub diagnostics: Vec<Diagnostic>,
-    pub passed: bool,
-}
 
 /// The arguments of this process; where there is nothing to run, help or what is wrong is printed, and the exit code given.
 ///
@@ -122,24 +114,6 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
             if code == ExitCode::Done { ExitCode::Resources } else { code }
         }
     }
-}
-
-fn warnings(diagnostics: &[Diagnostic]) -> impl Iterator<Item = &Diagnostic> {
-    diagnostics.iter().filter(|diagnostic| diagnostic.severity() == Severity::Warning)
-}
-
-/// Ends a command that is about to write, where a warning is to count as an error.
-///
-/// # Errors
-/// All `diagnostics`, with [`WarningsDenied`](Code::WarningsDenied).
-pub(super) fn refuse_warnings(printing: Printing, diagnostics: &[Diagnostic]) -> Result<()> {
-    let mut codes: Vec<&str> = warnings(diagnostics).map(|warning| warning.code().id()).collect();
-    if !printing.deny_warnings || codes.is_empty() {
-        return Ok(());
-    }
-    codes.dedup();
-    let message = format!("nothing is written: --deny-warnings, and there is {}", codes.join(", "));
-    Err(Error::from(Diagnostic::new(Code::WarningsDenied, message)).after(diagnostics.to_vec()))
 }
 
 /// Prints diagnostics to stderr: all of them, or errors only when quiet; none with `--json`, whose output has them.

@@ -1,7 +1,7 @@
 //! `flexbody select`.
 
 use super::arguments::SelectArguments;
-use super::output::{Outcome, refuse_warnings};
+use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;

@@ -1,7 +1,7 @@
 //! `flexbody simulate`.
 
 use super::arguments::SimulateArguments;
-use super::output::{Outcome, refuse_warnings};
+use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{memory_left, use_threads};
 use super::watcher::Watcher;

@@ -1,7 +1,7 @@
 //! `flexbody convert --from`: a body of another program's file.
 
 use super::arguments::{ConvertArguments, StorageName};
-use super::output::{Outcome, refuse_warnings};
+use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -29,16 +29,16 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
 
     let file = InputFile::open(path)?;
     let source = SourceFile::new("body", path, file.sha256());
-    let mut adopted =
+    let mut imported =
         import_body(&format.read(&file)?, source, units).map_err(|error| error.in_file(path))?;
     if arguments.storage == StorageName::F32 {
-        adopted.body = adopted.body.rounded_to_f32()?;
+        imported.body = imported.body.rounded_to_f32()?;
     }
-    accept(&adopted.body)?;
-    refuse_warnings(arguments.printing, &adopted.diagnostics)?;
-    flex_body_file::fill_slot(&adopted.body, &slot)?;
-    let run = RunData { diagnostics: adopted.diagnostics, ..RunData::default() };
-    let facts = Facts::new(&adopted.body, &run);
+    accept(&imported.body)?;
+    refuse_warnings(arguments.printing, &imported.diagnostics)?;
+    flex_body_file::fill_slot(&imported.body, &slot)?;
+    let run = RunData { diagnostics: imported.diagnostics, ..RunData::default() };
+    let facts = Facts::new(&imported.body, &run);
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(render(&facts, format).as_bytes())?;
     }
