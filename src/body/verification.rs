@@ -329,10 +329,10 @@ fn damping_check(
     let (matrix, ratio) =
         found.map_or_else(|| (none(), vec![0.0; nf]), |damping| (damping.matrix, damping.ratio));
     let stored = modes.modal_damping.clone().unwrap_or_else(none);
-    let of_ratio =
+    let by_ratio =
         |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
-    let of_matrix = largest_entry((&stored - &matrix).as_ref());
-    let largest = modes.eigenvalue.iter().enumerate().map(of_ratio).fold(of_matrix, larger);
+    let by_matrix = largest_entry((&stored - &matrix).as_ref());
+    let largest = modes.eigenvalue.iter().enumerate().map(by_ratio).fold(by_matrix, larger);
     let rounding = match model.damping() {
         Some(Damping::Matrix(d)) => rounding_of(d, shapes, body.storage()),
         Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes, body.storage()),

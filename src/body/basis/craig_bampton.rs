@@ -205,7 +205,7 @@ impl<'a> Parts<'a> {
     /// What became of shapes that add nothing.
     fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
         let removed = Self::removed_shapes(found);
-        let of = found.kept.len() + removed.len();
+        let all = found.kept.len() + removed.len();
         let note = if self.lacks_rigid_motion_only(found, rigid) {
             let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
@@ -218,7 +218,7 @@ impl<'a> Parts<'a> {
             let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
             let which = named(which.collect());
             let message = format!(
-                "{} of {of} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
+                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
                 removed.len()
             );
             Diagnostic::new(Code::ShapesDependent, message)
@@ -370,13 +370,13 @@ impl<'a> Parts<'a> {
 
     /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in space.
     fn vectors(&self, d: usize) -> Vec<usize> {
-        let of = |(joint, first): (&Joint, usize)| {
+        let starts_of_vectors = |(joint, first): (&Joint, usize)| {
             let (moving, all) = (joint.displacements, joint.coordinates.len());
             // In the plane a rotation is a number.
             let turning = if d == 3 { (all - moving) / 3 } else { 0 };
             (0..moving / d + turning).map(move |i| first + d * i)
         };
-        starts(self.joints).flat_map(of).collect()
+        starts(self.joints).flat_map(starts_of_vectors).collect()
     }
 }
 
