@@ -127,7 +127,7 @@ impl<'a> Recomputed<'a> {
     /// The largest difference of those invariants whose names are `kept`.
     fn difference_of(&self, kept: impl Fn(&str) -> bool) -> f64 {
         let kept = self.differences.iter().filter(|(name, _)| kept(name));
-        kept.fold(0.0f64, |m, (_, d)| if d.is_nan() { f64::INFINITY } else { m.max(*d) })
+        largest(kept.map(|(_, difference)| *difference))
     }
 
     /// What the body has of its mass, by two paths.
@@ -258,11 +258,12 @@ struct ModeErrors {
 
 /// Largest difference of the invariants in units of what their guaranteed digits allow.
 fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) -> f64 {
-    primary_differences(body.invariants(), own).iter().fold(0.0f64, |m, (name, d)| {
-        let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| *known == name);
+    let excess = |(name, difference): (String, f64)| {
+        let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| **known == name);
         let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
-        if d.is_nan() { f64::INFINITY } else { m.max(0.5 * d * scale) }
-    })
+        0.5 * difference * scale
+    };
+    largest(primary_differences(body.invariants(), own).into_iter().map(excess))
 }
 
 /// How far the Rayleigh quotient of a mode lies outside of the bounds of its eigenvalue at the most, relative. Stored modes are
@@ -328,10 +329,10 @@ fn damping_check(
     let (matrix, ratio) =
         found.map_or_else(|| (none(), vec![0.0; nf]), |damping| (damping.matrix, damping.ratio));
     let stored = modes.modal_damping.clone().unwrap_or_else(none);
-    let of_ratio =
+    let by_ratio =
         |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
-    let of_matrix = largest_entry((&stored - &matrix).as_ref());
-    let largest = modes.eigenvalue.iter().enumerate().map(of_ratio).fold(of_matrix, larger);
+    let by_matrix = largest_entry((&stored - &matrix).as_ref());
+    let largest = modes.eigenvalue.iter().enumerate().map(by_ratio).fold(by_matrix, larger);
     let rounding = match model.damping() {
         Some(Damping::Matrix(d)) => rounding_of(d, shapes, body.storage()),
         Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes, body.storage()),
@@ -365,14 +366,8 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
 /// relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
 fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
     let own = body.parts().rigid_mass();
-    let mut worst = 0.0f64;
-    for i in 0..own.nrows() {
-        for j in 0..own.ncols() {
-            let error = (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
-            worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
-        }
-    }
-    worst
+    let error = |i: usize, j: usize| (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
+    largest((0..own.nrows()).flat_map(|i| (0..own.ncols()).map(move |j| error(i, j))))
 }
 
 /// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.

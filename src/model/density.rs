@@ -74,8 +74,9 @@ impl Densities {
         }
         let count = n.min(SAMPLED);
         let sampled = (0..count).into_par_iter().map(|s| s * n / count);
-        let of = |i: usize| Some(local.mass[i] / around(body, i, diagonal_mass)?);
-        let mut densities: Vec<f64> = sampled.map(of).collect::<Vec<_>>().into_iter().flatten().collect();
+        let density = |i: usize| Some(local.mass[i] / around(body, i, diagonal_mass)?);
+        let mut densities: Vec<f64> =
+            sampled.map(density).collect::<Vec<_>>().into_iter().flatten().collect();
         let judged = densities.len();
         if judged < 4 || judged * 20 < count {
             return None;

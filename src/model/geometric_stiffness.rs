@@ -96,8 +96,8 @@ impl UnitLoad {
 
     /// The load that is called `label`; the inverse of [`UnitLoad::label`].
     pub fn from_label(label: &str) -> Option<Self> {
-        let of_kind = |kind: &&'static str| Some((*kind, label.strip_prefix(*kind)?.strip_prefix('_')?));
-        let (kind, rest) = LoadKind::NAMES.iter().find_map(of_kind)?;
+        let split = |kind: &&'static str| Some((*kind, label.strip_prefix(*kind)?.strip_prefix('_')?));
+        let (kind, rest) = LoadKind::NAMES.iter().find_map(split)?;
         let at_interface = || rest.split_once('_').filter(|(_, interface)| !interface.is_empty());
         let (kind, axis) = match kind {
             "acceleration" => (LoadKind::Acceleration, rest),

@@ -71,6 +71,74 @@ impl NodeSet {
     }
 }
 
+/// The mean rotation of nodes by their displacements alone.
+struct MeanTurning {
+    dimension: usize,
+    centre: Vector3<f64>,
+    /// From the centre to the nodes, of unit size: squares of coordinates in any unit stay in range.
+    arms: Vec<Vector3<f64>>,
+    /// Takes the sum of r x u to the rotation; zero about axes that the nodes follow no rotation about.
+    inverse: Matrix3<f64>,
+    /// Smallest moment of the arms about an axis that the nodes may turn about, and what it has to exceed.
+    moment: f64,
+    threshold: f64,
+}
+
+impl MeanTurning {
+    fn new(positions: &[[f64; 3]], dimension: usize) -> Self {
+        let (centre, length) = centre_and_length(positions);
+        let centre = Vector3::from(centre);
+        let arms: Vec<Vector3<f64>> =
+            positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
+        let inertia: Matrix3<f64> =
+            arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
+        let threshold = COLLINEAR * COLLINEAR * inertia.trace();
+        let (mut inverse, mut moment) = (Matrix3::zeros(), 0.0);
+        if threshold.is_finite() {
+            // Nodes on one line follow no rotation about it, a single node none at all.
+            inverse = inertia.pseudo_inverse(threshold).unwrap_or_else(|_| Matrix3::zeros()) / length;
+            moment = if dimension == 2 { inertia[(2, 2)] } else { inertia.symmetric_eigenvalues().min() };
+        }
+        Self { dimension, centre, arms, inverse, moment, threshold }
+    }
+
+    /// Whether the displacements tell every rotation.
+    fn is_determined(&self) -> bool {
+        self.moment > self.threshold
+    }
+
+    /// The weights of the rows in the motion of a point at `offset` from the centre; the rotation is the mean of those of the nodes
+    /// where it is told `by_rotations`.
+    fn weights(&self, all_rows: usize, offset: &Vector3<f64>, by_rotations: bool) -> Mat<f64> {
+        let (d, count) = (self.dimension, self.arms.len() as f64);
+        let axes = if d == 2 { 2..3 } else { 0..3 };
+        let turn = |axis: usize, r: &Vector3<f64>| (self.inverse * Vector3::ith(axis, 1.0)).cross(r);
+        let (first_turn, turns) = (d * self.arms.len(), axes.len());
+        let mut average = Mat::zeros(all_rows, rigid_count(d));
+        for (i, r) in self.arms.iter().enumerate() {
+            for k in 0..d {
+                average[(d * i + k, k)] = 1.0 / count;
+            }
+            for (column, axis) in axes.clone().enumerate() {
+                let weight = if by_rotations { Vector3::zeros() } else { turn(axis, r) };
+                let lever = Vector3::ith(axis, 1.0).cross(offset);
+                for k in 0..d {
+                    average[(d * i + k, d + column)] = weight[k];
+                    for along in 0..d {
+                        average[(d * i + k, along)] += lever[along] * weight[k];
+                    }
+                }
+                if by_rotations {
+                    let row = first_turn + turns * i + column;
+                    average[(row, d + column)] = 1.0 / count;
+                    (0..d).for_each(|along| average[(row, along)] = lever[along] / count);
+                }
+            }
+        }
+        average
+    }
+}
+
 /// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations along the axes, in the
 /// plane (d = 2) r = 3. Rows: the displacements of the nodes (d each), then their rotations, where they have them (three each, in the
 /// plane one).
@@ -92,55 +160,20 @@ impl InterfaceMotion {
         dimension: usize,
         reference: Option<[f64; 3]>,
     ) -> Self {
-        let (centre, length) = centre_and_length(positions);
-        let reference = reference.unwrap_or(centre);
-        let (d, count) = (dimension, positions.len() as f64);
-        let centre = Vector3::from(centre);
-        // Of unit size: squares of coordinates in any unit stay in range.
-        let arms: Vec<Vector3<f64>> =
-            positions.iter().map(|&x| (Vector3::from(x) - centre) / length).collect();
-        let inertia: Matrix3<f64> =
-            arms.iter().map(|r| Matrix3::identity() * r.norm_squared() - r * r.transpose()).sum();
-        let threshold = COLLINEAR * COLLINEAR * inertia.trace();
-        let (mut inverse, mut turning) = (Matrix3::zeros(), 0.0);
-        if threshold.is_finite() {
-            // Nodes on one line follow no rotation about it, a single node none at all.
-            inverse = inertia.pseudo_inverse(threshold).unwrap_or_else(|_| Matrix3::zeros()) / length;
-            turning = if d == 2 { inertia[(2, 2)] } else { inertia.symmetric_eigenvalues().min() };
-        }
-        let axes = if d == 2 { 2..3 } else { 0..3 };
-        // About the centre; the translation of the reference point adds the rotation times its distance.
-        let offset = Vector3::from(reference) - centre;
-        let turn = |axis: usize, r: &Vector3<f64>| (inverse * Vector3::ith(axis, 1.0)).cross(r);
-        let (count_rows, turns) = (d * positions.len(), rigid_count(d) - d);
+        let turning = MeanTurning::new(positions, dimension);
+        let reference = reference.unwrap_or(turning.centre.into());
+        let (d, turns) = (dimension, rigid_count(dimension) - dimension);
+        let count_rows = d * positions.len();
         let all_rows = count_rows + if rotations { turns * positions.len() } else { 0 };
-        let by_rotations = rotations && turning <= threshold;
-        let mut average = Mat::zeros(all_rows, rigid_count(d));
         let mut rigid = rigid_fields(positions, d, reference, 1.0);
         rigid.resize_with(all_rows, rigid_count(d), |row, column| {
             f64::from(row >= count_rows && column == d + (row - count_rows) % turns)
         });
-        for (i, r) in arms.iter().enumerate() {
-            for k in 0..d {
-                average[(d * i + k, k)] = 1.0 / count;
-            }
-            for (column, axis) in axes.clone().enumerate() {
-                let weight = if by_rotations { Vector3::zeros() } else { turn(axis, r) };
-                let lever = Vector3::ith(axis, 1.0).cross(&offset);
-                for k in 0..d {
-                    average[(d * i + k, d + column)] = weight[k];
-                    for along in 0..d {
-                        average[(d * i + k, along)] += lever[along] * weight[k];
-                    }
-                }
-                if by_rotations {
-                    let row = count_rows + turns * i + column;
-                    average[(row, d + column)] = 1.0 / count;
-                    (0..d).for_each(|along| average[(row, along)] = lever[along] / count);
-                }
-            }
-        }
-        Self { reference, rigid, average, determined: by_rotations || turning > threshold }
+        let by_rotations = rotations && turning.moment <= turning.threshold;
+        // About the centre; the translation of the reference point adds the rotation times its distance.
+        let offset = Vector3::from(reference) - turning.centre;
+        let average = turning.weights(all_rows, &offset, by_rotations);
+        Self { reference, rigid, average, determined: by_rotations || turning.is_determined() }
     }
 
     /// The reference point.

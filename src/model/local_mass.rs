@@ -54,7 +54,7 @@ impl LocalMass {
         let Assembled { nodes, rows, stiffness, .. } = body;
         let (n, d) = (nodes.len(), rows.dimension);
         let x = &nodes.positions;
-        let of_node = |i: usize| {
+        let sums = |i: usize| {
             let mut dilation = 0.0;
             for k in 0..d {
                 let (columns, values) = stiffness.row(d * i + k);
@@ -79,7 +79,7 @@ impl LocalMass {
             }
             (dilation, (mass, diagonal))
         };
-        let (dilation, (mass, diagonal)) = (0..n).into_par_iter().with_min_len(1024).map(of_node).unzip();
+        let (dilation, (mass, diagonal)) = (0..n).into_par_iter().with_min_len(1024).map(sums).unzip();
         Self { dilation, mass, diagonal }
     }
 

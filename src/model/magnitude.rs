@@ -26,14 +26,14 @@ pub(super) fn check_magnitudes(
     if [k, m, size].contains(&0.0) {
         return None; // said by name elsewhere
     }
-    let of = (&raw.stiffness.path, &raw.mass.path, &raw.nodes_path);
+    let (stiffness_file, mass_file, nodes_file) = (&raw.stiffness.path, &raw.mass.path, &raw.nodes_path);
     let quantities = [
-        ("stiffness", k, of.0),
-        ("mass", m, of.1),
-        ("length", size, of.2),
-        ("distance from the origin", far.max(size), of.2),
-        ("stiffness / mass", k / m, of.1),
-        ("mass length^2", m * size * size, of.1),
+        ("stiffness", k, stiffness_file),
+        ("mass", m, mass_file),
+        ("length", size, nodes_file),
+        ("distance from the origin", far.max(size), nodes_file),
+        ("stiffness / mass", k / m, mass_file),
+        ("mass length^2", m * size * size, mass_file),
     ];
     let fits = |value: f64| (LARGEST.recip()..=LARGEST).contains(&value);
     let (name, value, file) = quantities.into_iter().find(|&(_, value, _)| !fits(value))?;

@@ -62,6 +62,13 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
     let parts: Vec<Part> =
         chunks(n).into_par_iter().map(|nodes| reduce(m, dimension, displacements, nodes, scale)).collect();
+    let (scalar, deviation, worst) = joined(n, parts);
+    let commutes = deviation <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
+    Ok(MassForm { scalar, deviation, worst, commutes })
+}
+
+/// Ms (n x n) from its columns part by part, with the largest deviation of a block and its place.
+fn joined(n: usize, parts: Vec<Part>) -> (SymmetricMatrix, f64, (usize, usize)) {
     let entries = parts.iter().map(|part| part.row_idx.len()).sum();
     let (mut worst, mut worst_at) = (0.0f64, (0, 0));
     let mut col_ptr = Vec::with_capacity(n + 1);
@@ -79,8 +86,7 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let csc = CscMatrix::from_parts(n, n, col_ptr, row_idx, values);
     let scalar = SymmetricMatrix::new(csc)
         .expect("the mean of entries is symmetric because each of them is, to the bit");
-    let commutes = worst <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
-    Ok(MassForm { scalar, deviation: worst, worst: worst_at, commutes })
+    (scalar, worst, worst_at)
 }
 
 /// Sum of M along each direction over the rows of some nodes and the columns up to `end`, and the mean of the sums of the absolute values.

@@ -166,7 +166,7 @@ type Order<'o> = (bool, &'o dyn Fn(usize) -> usize, &'static str);
 
 /// What to do when the mass fits the stiffness in another order of its rows.
 fn other_order(body: &Assembled) -> Option<&'static str> {
-    let Assembled { nodes, rows, stiffness, mass, row_to_internal, .. } = body;
+    let Assembled { nodes, rows, row_to_internal, .. } = body;
     let n = rows.len();
     let internal = |row: usize| row_to_internal.as_ref().map_or(row, |to| to[row] as usize);
     let mut by_label: Vec<usize> = (0..n).collect();
@@ -207,18 +207,21 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
             "the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction: write both in one order",
         ),
     ];
-    let fits = |to: &dyn Fn(usize) -> usize| {
-        let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();
-        let mut tied: HashMap<usize, Vec<u32>> = HashMap::new();
-        (0..n).all(|row| {
-            let own = place[row];
-            let near =
-                tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
-            mass.row(row).0.iter().all(|&column| {
-                let other = place[column as usize];
-                other == own || near.binary_search(&(other as u32)).is_ok()
-            })
+    orders.iter().find(|(possible, to, _)| *possible && fits(body, &row_of, to)).map(|(.., help)| *help)
+}
+
+/// Whether the mass couples only what the stiffness couples when each row of its file stands for the internal row `to`; `row_of` is
+/// the row of the file that each internal row stood for.
+fn fits(body: &Assembled, row_of: &[usize], to: &dyn Fn(usize) -> usize) -> bool {
+    let Assembled { rows, stiffness, mass, .. } = body;
+    let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();
+    let mut tied: HashMap<usize, Vec<u32>> = HashMap::new();
+    (0..rows.len()).all(|row| {
+        let own = place[row];
+        let near = tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
+        mass.row(row).0.iter().all(|&column| {
+            let other = place[column as usize];
+            other == own || near.binary_search(&(other as u32)).is_ok()
         })
-    };
-    orders.iter().find(|(possible, to, _)| *possible && fits(to)).map(|(.., help)| *help)
+    })
 }

@@ -34,9 +34,9 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 }
             },
             Reference::Mean if set.coupling != Some(Coupling::Free) => {
-                let of_nodes: Vec<[f64; 3]> =
+                let positions: Vec<[f64; 3]> =
                     set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
-                set.reference = Reference::Point(centre_and_length(&of_nodes).0);
+                set.reference = Reference::Point(centre_and_length(&positions).0);
             }
             Reference::Mean | Reference::Point(_) => {}
         }

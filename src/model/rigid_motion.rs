@@ -52,24 +52,49 @@ pub(super) fn check_rigid_motion(
     worst
 }
 
-/// Other readings of the labels, each with what to do when K leaves its rigid motions free.
+/// What to do when K leaves the rigid motions free that its rows have by another reading of the labels.
 fn mislabelled(body: &Assembled, limit: f64) -> Option<&'static str> {
-    let Assembled { nodes, rows, stiffness, .. } = body;
-    let (centre, length) = centre_and_length(&nodes.positions);
-    let (n, d) = (nodes.len(), rows.dimension);
-    let free = |fields: &Mat<f64>, rotation: &dyn Fn(usize) -> bool| {
-        let sizes: Vec<f64> =
-            (0..fields.nrows()).map(|row| if rotation(row) { 1.0 / length } else { 1.0 }).collect();
-        rigid_residuals(stiffness, fields, &sizes).iter().all(|&r| r <= limit)
-    };
-    let space = rigid_fields(&nodes.positions, 3, centre, length);
-    // Motion of a node: translations, then rotations.
-    let motion = |node: usize, direction: usize, field: usize| match (direction < 3, field >= 3) {
-        (true, _) => space[(3 * node + direction, field)],
-        (false, true) => f64::from(u8::from(direction == field)) / length,
-        (false, false) => 0.0,
-    };
-    if d == 3 && rows.are_plain() {
+    let readings = Readings::new(body, limit);
+    readings.of_three_rows().or_else(|| readings.swapped())
+}
+
+/// Other readings of the labels of a body in space.
+struct Readings<'a> {
+    body: &'a Assembled,
+    /// Residual that rounding leaves of rigid motion.
+    limit: f64,
+    length: f64,
+    /// Rigid fields of the nodes in space.
+    fields: Mat<f64>,
+}
+
+impl<'a> Readings<'a> {
+    fn new(body: &'a Assembled, limit: f64) -> Self {
+        let (centre, length) = centre_and_length(&body.nodes.positions);
+        Self { body, limit, length, fields: rigid_fields(&body.nodes.positions, 3, centre, length) }
+    }
+
+    /// Whether K leaves these motions free; `rotation` says which rows are taken for rotations.
+    fn are_free(&self, fields: &Mat<f64>, rotation: impl Fn(usize) -> bool) -> bool {
+        let size = |row: usize| if rotation(row) { 1.0 / self.length } else { 1.0 };
+        let sizes: Vec<f64> = (0..fields.nrows()).map(size).collect();
+        rigid_residuals(&self.body.stiffness, fields, &sizes).iter().all(|&r| r <= self.limit)
+    }
+
+    /// What a rigid field does to a direction of a node: translations, then rotations.
+    fn motion(&self, node: usize, direction: usize, field: usize) -> f64 {
+        match (direction < 3, field >= 3) {
+            (true, _) => self.fields[(3 * node + direction, field)],
+            (false, true) => f64::from(u8::from(direction == field)) / self.length,
+            (false, false) => 0.0,
+        }
+    }
+
+    /// The three rows of each node are others than its displacements, or stand in another order.
+    fn of_three_rows(&self) -> Option<&'static str> {
+        if self.body.rows.dimension != 3 || !self.body.rows.are_plain() {
+            return None;
+        }
         // Motions that such rows cannot show vanish.
         let readings = [
             (
@@ -85,31 +110,33 @@ fn mislabelled(body: &Assembled, limit: f64) -> Option<&'static str> {
                 "rows are uz, rx, ry of a plate in bending: label them 3, 4, 5 and give the displacements in its plane as well",
             ),
         ];
+        let n = self.body.nodes.len();
         for (directions, help) in readings {
-            let fields = Mat::from_fn(3 * n, 6, |row, c| motion(row / 3, directions[row % 3], c));
-            if free(&fields, &|row| directions[row % 3] >= 3) {
+            let fields = Mat::from_fn(3 * n, 6, |row, c| self.motion(row / 3, directions[row % 3], c));
+            if self.are_free(&fields, |row| directions[row % 3] >= 3) {
                 return Some(help);
             }
         }
-        let blocked = Mat::from_fn(3 * n, 6, |row, c| space[(3 * (row % n) + row / n, c)]);
-        if free(&blocked, &|_| false) {
-            return Some("rows are those of x for all nodes, then y, then z: give a dofs table that says so");
-        }
+        let blocked = Mat::from_fn(3 * n, 6, |row, c| self.fields[(3 * (row % n) + row / n, c)]);
+        self.are_free(&blocked, |_| false)
+            .then_some("rows are those of x for all nodes, then y, then z: give a dofs table that says so")
     }
-    let rotations = rows.rotations();
-    if d == 3 && rotations.len() == 3 * n {
+
+    /// Every node has three displacements and three rotations, which are labelled as each other.
+    fn swapped(&self) -> Option<&'static str> {
+        let (rows, n) = (&self.body.rows, self.body.nodes.len());
+        if rows.dimension != 3 || rows.rotations().len() != 3 * n {
+            return None;
+        }
         let swapped = Mat::from_fn(rows.len(), 6, |row, c| match row.checked_sub(3 * n) {
             _ if rows.vertex(row) >= n => 0.0,
-            None => motion(row / 3, 3 + row % 3, c),
-            Some(turn) => motion(turn / 3, turn % 3, c),
+            None => self.motion(row / 3, 3 + row % 3, c),
+            Some(turn) => self.motion(turn / 3, turn % 3, c),
         });
-        if free(&swapped, &|row| row < 3 * n) {
-            return Some(
-                "rotations are labelled as displacements and displacements as rotations: 1, 2, 3 are ux, uy, uz and 4, 5, 6 are rx, ry, rz",
-            );
-        }
+        self.are_free(&swapped, |row| row < 3 * n).then_some(
+            "rotations are labelled as displacements and displacements as rotations: 1, 2, 3 are ux, uy, uz and 4, 5, 6 are rx, ry, rz",
+        )
     }
-    None
 }
 
 /// A mass that does not commute with rotations must still give rigid motion the inertia of a rigid body: R'MR = \[m I, -c~; c~, I0\].

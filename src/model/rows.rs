@@ -163,12 +163,12 @@ impl Rows {
         let mut number = vec![usize::MAX; root.len()];
         let mut count = 0;
         let numbered = |&c: &usize| {
-            let of = &mut number[find(&root, c)];
-            if *of == usize::MAX {
-                *of = count;
+            let own = &mut number[find(&root, c)];
+            if *own == usize::MAX {
+                *own = count;
                 count += 1;
             }
-            *of
+            *own
         };
         first.iter().map(numbered).collect()
     }

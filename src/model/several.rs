@@ -37,10 +37,10 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
         Ok(bodies) => bodies,
         Err(found) => return Err(Error::new(shared.into_iter().chain(found).collect())),
     };
-    let of = bodies.len();
+    let count = bodies.len();
     let (mut checked, mut failed) = (Vec::new(), Vec::new());
     for (i, body) in bodies.into_iter().enumerate() {
-        let number = BodyNumber { number: i + 1, of };
+        let number = BodyNumber { number: i + 1, of: count };
         match finish(body, Some(number), Vec::new()) {
             Ok(mut one) => {
                 let own = one.diagnostics.into_iter().map(|diagnostic| diagnostic.about(number));

@@ -46,19 +46,7 @@ impl Basis for CraigBampton {
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         let Task { model, settings, resume, watch } = *task;
-        if settings.accuracy == Accuracy::Certified {
-            let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
-            return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
-        }
-        // Before anything of that size is made.
-        let coordinates = model.interfaces().iter().map(|set| match set.coupling() {
-            Coupling::Free => model.dimension() * set.nodes.len(),
-            _ => rigid_count(model.dimension()),
-        });
-        let bytes = shape_bytes(model.pencil().n(), coordinates.sum());
-        if let Some(available) = settings.memory.filter(|&available| bytes > available) {
-            return Err(explain(model, EigenFailure::Memory { bytes, available }));
-        }
+        check_possible(model, settings)?;
         let joints = joints(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
         let parts = Parts::new(model, &joints, settings, watch)?;
@@ -72,23 +60,14 @@ impl Basis for CraigBampton {
         let mut notes = parts.notes(model, settings);
         notes.extend(parts.removed(&found, rigid_count(model.dimension())));
         if found.kept.is_empty() {
-            let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was asked for";
-            return Err(Diagnostic::new(Code::ShapesNone, message)
-                .with_help("ask for more modes, or raise --max-frequency")
-                .into());
+            return Err(nothing_deforms().into());
         }
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
         let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
         let span = found.vectors;
         let mut solution = modes_of_span(&problem, span.clone(), &all, watch).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
-        let shares = largest_shares(parted.as_ref()).into_iter();
-        let provenance = shares
-            .map(|(j, share)| {
-                let (kind, name) = parts.name(found.kept[j]);
-                format!("{kind}: {:.0} % {name}", 100.0 * share)
-            })
-            .collect();
+        let provenance = parts.provenance(&found.kept, parted.as_ref());
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
@@ -102,6 +81,28 @@ impl Basis for CraigBampton {
         basis.diagnostics.extend(notes);
         Ok(basis)
     }
+}
+
+/// Refuses what the basis cannot promise, and what does not fit the memory, before anything of that size is made.
+fn check_possible(model: &FeModel, settings: &ModeSettings) -> Result<()> {
+    if settings.accuracy == Accuracy::Certified {
+        let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
+        return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+    }
+    let coordinates = model.interfaces().iter().map(|set| match set.coupling() {
+        Coupling::Free => model.dimension() * set.nodes.len(),
+        _ => rigid_count(model.dimension()),
+    });
+    let bytes = shape_bytes(model.pencil().n(), coordinates.sum());
+    if let Some(available) = settings.memory.filter(|&available| bytes > available) {
+        return Err(explain(model, EigenFailure::Memory { bytes, available }));
+    }
+    Ok(())
+}
+
+fn nothing_deforms() -> Diagnostic {
+    let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was asked for";
+    Diagnostic::new(Code::ShapesNone, message).with_help("ask for more modes, or raise --max-frequency")
 }
 
 /// Fixed-interface modes and constraint modes.
@@ -202,10 +203,19 @@ impl<'a> Parts<'a> {
         removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
     }
 
+    /// The shape with the largest share in each mode; `parted` are the products of the shapes `kept` with the modes.
+    fn provenance(&self, kept: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
+        let told = |(j, share): (usize, f64)| {
+            let (kind, name) = self.name(kept[j]);
+            format!("{kind}: {:.0} % {name}", 100.0 * share)
+        };
+        largest_shares(parted).into_iter().map(told).collect()
+    }
+
     /// What became of shapes that add nothing.
     fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
         let removed = Self::removed_shapes(found);
-        let of = found.kept.len() + removed.len();
+        let all = found.kept.len() + removed.len();
         let note = if self.lacks_rigid_motion_only(found, rigid) {
             let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
@@ -218,7 +228,7 @@ impl<'a> Parts<'a> {
             let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
             let which = named(which.collect());
             let message = format!(
-                "{} of {of} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
+                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
                 removed.len()
             );
             Diagnostic::new(Code::ShapesDependent, message)
@@ -370,13 +380,13 @@ impl<'a> Parts<'a> {
 
     /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in space.
     fn vectors(&self, d: usize) -> Vec<usize> {
-        let of = |(joint, first): (&Joint, usize)| {
+        let starts_of_vectors = |(joint, first): (&Joint, usize)| {
             let (moving, all) = (joint.displacements, joint.coordinates.len());
             // In the plane a rotation is a number.
             let turning = if d == 3 { (all - moving) / 3 } else { 0 };
             (0..moving / d + turning).map(move |i| first + d * i)
         };
-        starts(self.joints).flat_map(of).collect()
+        starts(self.joints).flat_map(starts_of_vectors).collect()
     }
 }
 

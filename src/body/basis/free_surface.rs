@@ -141,8 +141,6 @@ fn describe(
     notes: &mut Vec<Diagnostic>,
 ) {
     let given = solution.eigenvalues.len();
-    let pencil = &problem.pencil;
-    let at_most = pencil.n() - problem.rigid.ncols();
     // Known from the rank of M, or because all there are were found.
     let mut finite = solution.finite_modes;
     if let Wanted::Lowest(wanted) = settings.wanted
@@ -154,23 +152,7 @@ fn describe(
         notes.push(Diagnostic::new(Code::ModesClamped, message));
         finite = finite.or(Some(given));
     }
-    let massless = (0..pencil.mass().n()).filter(|&i| pencil.mass().row(i).0.is_empty()).count();
-    let singular = match finite {
-        Some(finite) if finite < at_most => {
-            Some(format!("{finite} of {at_most} flexible modes have a finite frequency"))
-        }
-        None if massless > 0 => Some(format!(
-            "{} without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
-            if pencil.block() == 1 { "rows" } else { "nodes" },
-            at_most - pencil.block() * massless
-        )),
-        _ => None,
-    };
-    notes.extend(
-        singular.map(|what| {
-            Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {what}"))
-        }),
-    );
+    notes.extend(singular_mass_note(problem, finite));
     let below = solution.completeness.modes_below;
     if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
         let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);
@@ -190,6 +172,25 @@ fn describe(
             ),
         });
     }
+}
+
+/// A note about a mass matrix that leaves some motions without mass; `finite` modes have a frequency, where that is known.
+fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Option<Diagnostic> {
+    let pencil = &problem.pencil;
+    let at_most = pencil.n() - problem.rigid.ncols();
+    let massless = (0..pencil.mass().n()).filter(|&i| pencil.mass().row(i).0.is_empty()).count();
+    let singular = match finite {
+        Some(finite) if finite < at_most => {
+            format!("{finite} of {at_most} flexible modes have a finite frequency")
+        }
+        None if massless > 0 => format!(
+            "{} without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
+            if pencil.block() == 1 { "rows" } else { "nodes" },
+            at_most - pencil.block() * massless
+        ),
+        _ => return None,
+    };
+    Some(Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {singular}")))
 }
 
 /// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper

@@ -6,7 +6,7 @@ use crate::base::error::Result;
 use crate::base::progress::Watch;
 use crate::model::FeModel;
 use crate::numerics::eigen::{EigenProblem, EigenSolution, Resume, Wanted, energy_noise};
-use crate::numerics::linalg::gram;
+use crate::numerics::linalg::{gram, larger};
 use faer::MatRef;
 
 /// A kind of basis. A new one is one file of this room and one variant of [`BasisChoice`](super::BasisChoice).
@@ -107,48 +107,19 @@ impl ModalBasis {
         solution: EigenSolution,
         provenance: &str,
     ) -> Result<Self> {
-        if solution.eigenvalues.is_empty() {
-            let message = match (settings.wanted, solution.next_eigenvalue) {
-                (Wanted::Below(_), Some(next)) => {
-                    let hertz = model.units().frequency_of(next);
-                    format!("the first flexible mode has {hertz:.6} Hz, above the limit that was given")
-                }
-                _ => "no flexible mode has a finite frequency".to_owned(),
-            };
-            return Err(Diagnostic::new(Code::NoModes, message).into());
-        }
-        let mut diagnostics = Vec::new();
+        let Some(&first) = solution.eigenvalues.first() else {
+            return Err(no_modes(model, settings, &solution).into());
+        };
         let (pencil, rigid) = (&problem.pencil, problem.rigid);
-        let first = solution.eigenvalues.first().copied().unwrap_or(f64::INFINITY);
         let energy = gram(rigid, pencil.apply_stiffness(rigid).as_ref());
         let rigid_noise = energy.norm_l2() / first;
         if rigid_noise > RIGID_ENERGY {
-            let message = format!(
-                "rigid motion carries {:.1} % of the energy of the first mode: lambda_rigid / lambda_1 = {rigid_noise:.2e}",
-                100.0 * rigid_noise
-            );
-            return Err(Diagnostic::new(Code::RigidMotionStrained, message)
-                .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
-                .into());
+            return Err(rigid_motion_strained(rigid_noise).into());
         }
         let noise = energy_noise(pencil.stiffness(), solution.vectors.as_ref(), problem.input_error);
         let relative = noise.iter().zip(&solution.eigenvalues).map(|(noise, lambda)| noise / lambda);
         let input_noise: Vec<f64> = relative.collect();
-        let noise = input_noise.iter().fold(rigid_noise, |m, n| m.max(*n));
-        if noise > NOISE_TOLD {
-            let message = format!(
-                "the {} digits of the stiffness values leave a relative noise of {noise:.0e} in the lowest eigenvalues",
-                model.digits()
-            );
-            let diagnostic = Diagnostic::new(Code::NoiseFloor, message);
-            diagnostics.push(if model.digits() < ALL_DIGITS {
-                diagnostic
-            } else {
-                diagnostic.with_help(
-                    "double precision holds no more digits: expect no better of a body as thin or stiff as this",
-                )
-            });
-        }
+        let diagnostics = noise_note(model, input_noise.iter().copied().fold(rigid_noise, larger));
         let provenance = vec![provenance.to_owned(); solution.eigenvalues.len()];
         Ok(Self {
             solution,
@@ -158,7 +129,47 @@ impl ModalBasis {
             truncation: Vec::new(),
             coordinates: None,
             fixed_interface: None,
-            diagnostics,
+            diagnostics: diagnostics.into_iter().collect(),
         })
     }
+}
+
+/// Why there is not a single mode.
+fn no_modes(model: &FeModel, settings: &ModeSettings, solution: &EigenSolution) -> Diagnostic {
+    let message = match (settings.wanted, solution.next_eigenvalue) {
+        (Wanted::Below(_), Some(next)) => {
+            let hertz = model.units().frequency_of(next);
+            format!("the first flexible mode has {hertz:.6} Hz, above the limit that was given")
+        }
+        _ => "no flexible mode has a finite frequency".to_owned(),
+    };
+    Diagnostic::new(Code::NoModes, message)
+}
+
+fn rigid_motion_strained(rigid_noise: f64) -> Diagnostic {
+    let message = format!(
+        "rigid motion carries {:.1} % of the energy of the first mode: lambda_rigid / lambda_1 = {rigid_noise:.2e}",
+        100.0 * rigid_noise
+    );
+    Diagnostic::new(Code::RigidMotionStrained, message)
+        .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
+}
+
+/// What the digits of the input leave of the eigenvalues, where that is worth a word.
+fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
+    if noise <= NOISE_TOLD {
+        return None;
+    }
+    let message = format!(
+        "the {} digits of the stiffness values leave a relative noise of {noise:.0e} in the lowest eigenvalues",
+        model.digits()
+    );
+    let diagnostic = Diagnostic::new(Code::NoiseFloor, message);
+    Some(if model.digits() < ALL_DIGITS {
+        diagnostic
+    } else {
+        diagnostic.with_help(
+            "double precision holds no more digits: expect no better of a body as thin or stiff as this",
+        )
+    })
 }

@@ -300,12 +300,12 @@ impl<'a> Responses<'a> {
         let error = |part: f64, j: usize| {
             if self.deforms[j] { (part.max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
         };
-        let of_load = |(j, name): (usize, &String)| Truncation {
+        let truncation = |(j, name): (usize, &String)| Truncation {
             load: name.clone(),
             before: error(self.energy_beside[j], j),
             after: error(rest[j], j),
         };
-        self.loads.names.iter().enumerate().map(of_load).collect()
+        self.loads.names.iter().enumerate().map(truncation).collect()
     }
 }
 
@@ -333,7 +333,7 @@ impl Added {
     /// What each mode is made of: a free mode, or mostly the response to a load. `parts` (span x modes) are the products of the
     /// modes with the vectors of the span, `free` of which are free modes.
     fn provenance(&self, loads: &NamedLoads, parts: MatRef<'_, f64>, free: usize) -> Vec<String> {
-        let of_mode = |p: usize| {
+        let origin = |p: usize| {
             let share = |c: usize| parts[(c, p)].powi(2);
             if (0..free).map(share).sum::<f64>() > 0.5 {
                 return "free mode".to_owned();
@@ -343,7 +343,7 @@ impl Added {
             let name = &loads.names[self.kept[largest - free]];
             format!("{}: {:.0} % {name}", loads.what, 100.0 * share(largest))
         };
-        (0..parts.ncols()).map(of_mode).collect()
+        (0..parts.ncols()).map(origin).collect()
     }
 
     /// What the user should know of the loads that are left out.

@@ -106,9 +106,9 @@ impl FlexBody {
     /// D (nf x nf): the modal damping or, where there is none, diag(2 zeta_j omega_j). Unit: 1/time.
     pub fn damping(&self) -> Mat<f64> {
         let modes = &self.parts.modes;
-        let of_ratio = |j: usize| 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt();
+        let by_ratio = |j: usize| 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt();
         modes.modal_damping.clone().unwrap_or_else(|| {
-            Mat::from_fn(self.n_modes(), self.n_modes(), |i, j| if i == j { of_ratio(j) } else { 0.0 })
+            Mat::from_fn(self.n_modes(), self.n_modes(), |i, j| if i == j { by_ratio(j) } else { 0.0 })
         })
     }
 

@@ -46,8 +46,8 @@ impl Parts {
         let size = damping.norm_max();
         // A ratio is never negative: what is below zero on the diagonal is rounding.
         let difference = |(j, lambda): (usize, &f64)| {
-            let of_ratio = 2.0 * self.modes.damping_ratio[j] * lambda.sqrt();
-            let difference = (of_ratio - damping[(j, j)].max(0.0)).abs();
+            let by_ratio = 2.0 * self.modes.damping_ratio[j] * lambda.sqrt();
+            let difference = (by_ratio - damping[(j, j)].max(0.0)).abs();
             if difference == 0.0 { 0.0 } else { difference / size }
         };
         let value = largest(self.modes.eigenvalue.iter().enumerate().map(difference));

@@ -87,20 +87,20 @@ impl Change {
     }
 
     fn certificate(self, given: &Certificate) -> Certificate {
-        let of_time = |values: &[f64]| values.iter().map(|v| v * self.eigenvalue()).collect();
+        let eigenvalues = |values: &[f64]| values.iter().map(|v| v * self.eigenvalue()).collect();
         Certificate {
             shift: given.shift * self.eigenvalue(),
             guarantee: given.guarantee.as_ref().map(|guarantee| Guarantee {
                 shift_below: guarantee.shift_below * self.eigenvalue(),
-                eigenvalue_lower: of_time(&guarantee.eigenvalue_lower),
-                eigenvalue_upper: of_time(&guarantee.eigenvalue_upper),
+                eigenvalue_lower: eigenvalues(&guarantee.eigenvalue_lower),
+                eigenvalue_upper: eigenvalues(&guarantee.eigenvalue_upper),
                 ..guarantee.clone()
             }),
             fixed_interface: given.fixed_interface.as_ref().map(|fixed| FixedInterface {
                 shift: fixed.shift * self.eigenvalue(),
                 next: fixed.next.map(|next| next * self.eigenvalue()),
-                free_estimate: of_time(&fixed.free_estimate),
-                free_lower: of_time(&fixed.free_lower),
+                free_estimate: eigenvalues(&fixed.free_estimate),
+                free_lower: eigenvalues(&fixed.free_lower),
                 ..*fixed
             }),
             ..given.clone()

@@ -3,7 +3,7 @@
 use super::{InterfaceCoordinates, Parts};
 use crate::body::invariants::IdentityCheck;
 use crate::model::{rigid_count, rigid_fields};
-use crate::numerics::linalg::{combine, gram};
+use crate::numerics::linalg::{combine, gram, largest};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
@@ -22,10 +22,7 @@ impl Parts {
         let nf = root.len();
         let worst = |f: &dyn Fn(usize, usize) -> f64, rows: usize, columns: usize| {
             let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-            places.fold(0.0f64, |m, (i, j)| {
-                let value = f(i, j).abs();
-                if value.is_nan() { f64::INFINITY } else { m.max(value) }
-            })
+            largest(places.map(|(i, j)| f(i, j).abs()))
         };
         let identity = |i: usize, j: usize| f64::from(i == j);
         let mut checks = vec![

@@ -1,7 +1,7 @@
 //! The size that each entry of the invariants can have at most: the scale of every comparison.
 
 use super::Invariants;
-use crate::numerics::linalg::larger;
+use crate::numerics::linalg::largest;
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -131,59 +131,88 @@ pub(super) fn scaled(difference: f64, bound: f64) -> f64 {
 pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)> {
     let nf = a.n_modes();
     assert_eq!(nf, b.n_modes(), "modes of the two bodies");
-    let bound = CauchySchwarz::of(a);
+    let pair =
+        Pair { a, b, bound: CauchySchwarz::of(a), general: a.general.is_some() || b.general.is_some() };
     let groups = a.groups.and(b.groups);
-    let axes = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
-    let modes = || (0..nf).flat_map(|p| (0..nf).map(move |q| (p, q)));
-    let first = |k: usize| scaled(a.first_moment[k] - b.first_moment[k], bound.first_moment(k));
-    let general = a.general.is_some() || b.general.is_some();
-    // J and Ibar then stand for I0, W1 and C2, and have the bounds of these.
-    let of_j = |k: usize, l: usize| match general {
-        false => bound.second_moment(k, l),
-        true if k == l => bound.largest_moment(),
-        true => bound.inertia(k, l),
-    };
-    let of_ibar = |k: usize, l: usize, p: usize| match general {
-        false => bound.ibar(k, p),
-        true if k == l => bound.largest_moment().sqrt() * bound.mode(p),
-        true => bound.c2(3 - k - l, p),
-    };
-    let second = |(k, l)| scaled(a.second_moment[(k, l)] - b.second_moment[(k, l)], of_j(k, l));
-    let c1 = |k: usize, p: usize| scaled(a.c1[(k, p)] - b.c1[(k, p)], bound.c1(p));
-    let ibar = |(k, l): (usize, usize), p: usize| scaled(a.ibar[k][l][p] - b.ibar[k][l][p], of_ibar(k, l, p));
-    let s = |(k, l): (usize, usize), (p, q)| scaled(a.s[k][l][(p, q)] - b.s[k][l][(p, q)], bound.s(p, q));
-    let largest_stiffness = (0..nf).fold(0.0, |m: f64, p| m.max(a.modal_stiffness[(p, p)].abs()));
-    let stiffness = |p: usize| a.modal_stiffness[(p, p)].abs().max(f64::EPSILON * largest_stiffness);
-    let k_ff = |(p, q)| {
-        scaled(a.modal_stiffness[(p, q)] - b.modal_stiffness[(p, q)], (stiffness(p) * stiffness(q)).sqrt())
-    };
-    let entries = |x: Mat<f64>, y: Mat<f64>, bound: &dyn Fn(usize, usize) -> f64| {
-        let all = (0..x.nrows()).flat_map(|i| (0..x.ncols()).map(move |j| (i, j)));
-        all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))).fold(0.0, larger)
-    };
+    let bound = &pair.bound;
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
-    let w3 = || Some(("W3", entries(a.w3()?, b.w3()?, &by_modes)));
-    let modal_mass = || ("modal_mass", entries(a.modal_mass(), b.modal_mass(), &by_modes));
     let mut table = vec![
         ("mass", scaled(a.mass - b.mass, a.mass.abs())),
-        ("first_moment", (0..3).map(first).fold(0.0, larger)),
-        ("second_moment", axes().map(second).fold(0.0, larger)),
-        ("C1", (0..3).flat_map(|k| (0..nf).map(move |p| c1(k, p))).fold(0.0, larger)),
+        ("first_moment", pair.first_moment()),
+        ("second_moment", pair.second_moment()),
+        ("C1", entries(&a.c1, &b.c1, |_, p| bound.c1(p))),
         match groups.w1 {
-            true => ("Ibar", axes().flat_map(|kl| (0..nf).map(move |p| ibar(kl, p))).fold(0.0, larger)),
-            false => ("C2", entries(a.c2(), b.c2(), &|k, p| bound.c2(k, p))),
+            true => ("Ibar", pair.ibar()),
+            false => ("C2", entries(&a.c2(), &b.c2(), |k, p| bound.c2(k, p))),
         },
     ];
     if groups.w2 {
-        table.push(("S", axes().flat_map(|kl| modes().map(move |pq| s(kl, pq))).fold(0.0, larger)));
+        let block = |(k, l): (usize, usize)| entries(&a.s[k][l], &b.s[k][l], by_modes);
+        table.push(("S", largest(axes().map(block))));
     }
-    table.push(("modal_stiffness", modes().map(k_ff).fold(0.0, larger)));
-    if general {
-        table.push(("W0", entries(a.w0(), b.w0(), &|_, column| bound.c1(column % nf))));
+    table.push(("modal_stiffness", pair.modal_stiffness()));
+    if pair.general {
+        table.push(("W0", entries(&a.w0(), &b.w0(), |_, column| bound.c1(column % nf))));
     }
-    if general || !groups.w2 {
-        table.extend(w3());
-        table.push(modal_mass());
+    if pair.general || !groups.w2 {
+        table.extend(a.w3().zip(b.w3()).map(|(own, other)| ("W3", entries(&own, &other, by_modes))));
+        table.push(("modal_mass", entries(&a.modal_mass(), &b.modal_mass(), by_modes)));
     }
     table.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// Pairs of axes.
+fn axes() -> impl Iterator<Item = (usize, usize)> {
+    (0..3).flat_map(|k| (0..3).map(move |l| (k, l)))
+}
+
+/// Largest difference of the entries of two matrices, relative to their bounds.
+fn entries(x: &Mat<f64>, y: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f64 {
+    let all = (0..x.nrows()).flat_map(|i| (0..x.ncols()).map(move |j| (i, j)));
+    largest(all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))))
+}
+
+/// Two bodies, and the bounds of the first.
+struct Pair<'a> {
+    a: &'a Invariants,
+    b: &'a Invariants,
+    bound: CauchySchwarz,
+    /// Whether one has a mass that does not commute with rotations: J and Ibar then stand for I0, W1 and C2, and have the
+    /// bounds of these.
+    general: bool,
+}
+
+impl Pair<'_> {
+    fn first_moment(&self) -> f64 {
+        let difference = self.a.first_moment - self.b.first_moment;
+        largest((0..3).map(|k| scaled(difference[k], self.bound.first_moment(k))))
+    }
+
+    fn second_moment(&self) -> f64 {
+        let bound = |k: usize, l: usize| match self.general {
+            false => self.bound.second_moment(k, l),
+            true if k == l => self.bound.largest_moment(),
+            true => self.bound.inertia(k, l),
+        };
+        let difference = self.a.second_moment - self.b.second_moment;
+        largest(axes().map(|(k, l)| scaled(difference[(k, l)], bound(k, l))))
+    }
+
+    fn ibar(&self) -> f64 {
+        let bound = |k: usize, l: usize, p: usize| match self.general {
+            false => self.bound.ibar(k, p),
+            true if k == l => self.bound.largest_moment().sqrt() * self.bound.mode(p),
+            true => self.bound.c2(3 - k - l, p),
+        };
+        let (a, b) = (&self.a.ibar, &self.b.ibar);
+        let places = axes().flat_map(|(k, l)| (0..self.a.n_modes()).map(move |p| (k, l, p)));
+        largest(places.map(|(k, l, p)| scaled(a[k][l][p] - b[k][l][p], bound(k, l, p))))
+    }
+
+    fn modal_stiffness(&self) -> f64 {
+        let (a, b) = (&self.a.modal_stiffness, &self.b.modal_stiffness);
+        let largest_stiffness = (0..a.ncols()).fold(0.0, |m: f64, p| m.max(a[(p, p)].abs()));
+        let size = |p: usize| a[(p, p)].abs().max(f64::EPSILON * largest_stiffness);
+        entries(a, b, |p, q| (size(p) * size(q)).sqrt())
+    }
 }

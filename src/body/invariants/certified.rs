@@ -6,10 +6,9 @@
 use super::condense::{CHUNK, Columns, MAX_GROUPS, fill_symmetric, from_gram, group_length};
 use super::derived::CYCLIC;
 use super::{CauchySchwarz, Invariants};
-use crate::numerics::linalg::larger;
 use crate::numerics::linalg::{
     CompensatedBlock, DoubleDouble, LANES, SymmetricMatrix, accumulate, accumulate_pair, gram_compensated,
-    multiply_compensated, sum_length, with_fma,
+    larger, multiply_compensated, sum_length, with_fma,
 };
 use faer::{Mat, MatMut, MatRef};
 use nalgebra::Matrix3;
@@ -224,71 +223,105 @@ fn modal_stiffness(
 /// -log10 of the worst error of each of [`DIGITS`] relative to its scale; `errors` holds a bound for each entry.
 fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
     let nf = value.n_modes();
-    let bound = CauchySchwarz::of(value);
-    let over = |rows: usize, columns: usize, f: &dyn Fn(usize, usize) -> (f64, f64)| {
-        let mut largest = 0.0;
-        for i in 0..rows {
-            for j in 0..columns {
-                let (error, scale) = f(i, j);
-                largest = larger(largest, if error == 0.0 { 0.0 } else { error / scale });
-            }
-        }
-        largest
-    };
-    let (e, j, k_ff) = (errors, &errors.second_moment, &value.modal_stiffness);
-    // What is formed in f64 from rounded data inherits their errors and adds the rounding of its own sums.
-    let sum = |errors: f64, magnitudes: f64| ROOM * (errors + 2.0 * U * magnitudes);
-    let moment = |k: usize| {
-        let (_, a, b) = CYCLIC[k];
-        sum(j[(a, a)] + j[(b, b)], value.second_moment[(a, a)] + value.second_moment[(b, b)])
-    };
-    let ibar = |a: (usize, usize), b: (usize, usize), p: usize| {
-        let magnitude = |(k, l): (usize, usize)| value.ibar[k][l][p].abs();
-        sum(e.ibar[a.0][a.1][p] + e.ibar[b.0][b.1][p], magnitude(a) + magnitude(b))
-    };
-    let s = |terms: &[(usize, usize)], p: usize, q: usize| {
-        let total = |m: &Invariants| terms.iter().map(|&(k, l)| m.s[k][l][(p, q)].abs()).sum::<f64>();
-        sum(total(e), total(value))
-    };
-    let w1 = |k: usize, column: usize| {
-        let (l, p) = (column / nf, column % nf);
-        let (_, a, b) = CYCLIC[k];
-        let error = if k == l { 2.0 * ibar((a, a), (b, b), p) } else { ibar((k, l), (l, k), p) };
-        (error, bound.w1(k, l, p))
-    };
-    let w2 = |row: usize, column: usize| {
-        let (k, p, l, q) = (row / nf, row % nf, column / nf, column % nf);
-        let (_, a, b) = CYCLIC[k];
-        let error = if k == l { s(&[(a, a), (b, b)], p, q) } else { e.s[l][k][(p, q)] };
-        (error, bound.s(p, q))
-    };
-    let w3 = |row: usize, q: usize| {
-        let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
-        (s(&[(l, m), (m, l)], p, q), bound.s(p, q))
-    };
-    let stiffness =
-        |p: usize, q: usize| (e.modal_stiffness[(p, q)], (k_ff[(p, p)].abs() * k_ff[(q, q)].abs()).sqrt());
+    let entries = EntryErrors { value, errors, bound: CauchySchwarz::of(value), nf };
+    let EntryErrors { errors: e, bound, .. } = &entries;
+    let j = &e.second_moment;
     let ratios = [
-        over(1, 1, &|_, _| (e.mass, value.mass.abs())),
-        over(3, 1, &|k, _| (e.first_moment[k], bound.first_moment(k))),
-        over(3, 3, &|k, l| (j[(k, l)], bound.second_moment(k, l))),
-        over(3, nf, &|k, p| (e.c1[(k, p)], bound.c1(p))),
-        over(9, nf, &|kl, p| (e.ibar[kl / 3][kl % 3][p], bound.ibar(kl / 3, p))),
-        over(9 * nf, nf, &|row, q| {
+        worst_ratio(1, 1, |_, _| (e.mass, value.mass.abs())),
+        worst_ratio(3, 1, |k, _| (e.first_moment[k], bound.first_moment(k))),
+        worst_ratio(3, 3, |k, l| (j[(k, l)], bound.second_moment(k, l))),
+        worst_ratio(3, nf, |k, p| (e.c1[(k, p)], bound.c1(p))),
+        worst_ratio(9, nf, |kl, p| (e.ibar[kl / 3][kl % 3][p], bound.ibar(kl / 3, p))),
+        worst_ratio(9 * nf, nf, |row, q| {
             let (kl, p) = (row / nf, row % nf);
             (e.s[kl / 3][kl % 3][(p, q)], bound.s(p, q))
         }),
-        over(nf, nf, &stiffness),
-        over(3, 3, &|k, l| (if k == l { moment(k) } else { j[(k, l)] }, bound.inertia(k, l))),
-        over(3, 3 * nf, &w1),
-        over(3 * nf, 3 * nf, &w2),
-        over(3 * nf, nf, &w3),
-        over(3, nf, &|k, p| {
-            let (_, l, m) = CYCLIC[k];
-            (ibar((l, m), (m, l), p), bound.c2(k, p))
-        }),
-        over(nf, nf, &|p, q| (s(&[(0, 0), (1, 1), (2, 2)], p, q), bound.s(p, q))),
+        worst_ratio(nf, nf, |p, q| entries.stiffness(p, q)),
+        worst_ratio(3, 3, |k, l| entries.inertia(k, l)),
+        worst_ratio(3, 3 * nf, |k, column| entries.w1(k, column)),
+        worst_ratio(3 * nf, 3 * nf, |row, column| entries.w2(row, column)),
+        worst_ratio(3 * nf, nf, |row, q| entries.w3(row, q)),
+        worst_ratio(3, nf, |k, p| entries.c2(k, p)),
+        worst_ratio(nf, nf, |p, q| (entries.s(&[(0, 0), (1, 1), (2, 2)], p, q), bound.s(p, q))),
     ];
     // No f64 carries more than sixteen digits, whatever the bound says of a zero.
     ratios.map(|ratio| if ratio.is_nan() { 0.0 } else { (-ratio.log10()).clamp(0.0, 16.0) })
+}
+
+/// The largest error of the entries of a matrix relative to their scales; an error of zero needs none.
+fn worst_ratio(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> (f64, f64)) -> f64 {
+    let mut largest = 0.0;
+    for i in 0..rows {
+        for j in 0..columns {
+            let (error, scale) = entry(i, j);
+            largest = larger(largest, if error == 0.0 { 0.0 } else { error / scale });
+        }
+    }
+    largest
+}
+
+/// Errors of entries that are formed in f64 from the primary data, each with its scale.
+struct EntryErrors<'a> {
+    value: &'a Invariants,
+    errors: &'a Invariants,
+    bound: CauchySchwarz,
+    nf: usize,
+}
+
+/// What is formed in f64 from rounded data inherits their errors and adds the rounding of its own sums.
+fn error_of_sum(errors: f64, magnitudes: f64) -> f64 {
+    ROOM * (errors + 2.0 * U * magnitudes)
+}
+
+impl EntryErrors<'_> {
+    /// Of a sum or difference of two entries of Ibar.
+    fn ibar(&self, a: (usize, usize), b: (usize, usize), p: usize) -> f64 {
+        let error = |(k, l): (usize, usize)| self.errors.ibar[k][l][p];
+        let magnitude = |(k, l): (usize, usize)| self.value.ibar[k][l][p].abs();
+        error_of_sum(error(a) + error(b), magnitude(a) + magnitude(b))
+    }
+
+    /// Of a sum or difference of entries of blocks of S.
+    fn s(&self, terms: &[(usize, usize)], p: usize, q: usize) -> f64 {
+        let total = |m: &Invariants| terms.iter().map(|&(k, l)| m.s[k][l][(p, q)].abs()).sum::<f64>();
+        error_of_sum(total(self.errors), total(self.value))
+    }
+
+    fn stiffness(&self, p: usize, q: usize) -> (f64, f64) {
+        let k_ff = &self.value.modal_stiffness;
+        let scale = (k_ff[(p, p)].abs() * k_ff[(q, q)].abs()).sqrt();
+        (self.errors.modal_stiffness[(p, q)], scale)
+    }
+
+    fn inertia(&self, k: usize, l: usize) -> (f64, f64) {
+        let (j, value) = (&self.errors.second_moment, &self.value.second_moment);
+        let (_, a, b) = CYCLIC[k];
+        let moment = || error_of_sum(j[(a, a)] + j[(b, b)], value[(a, a)] + value[(b, b)]);
+        (if k == l { moment() } else { j[(k, l)] }, self.bound.inertia(k, l))
+    }
+
+    fn w1(&self, k: usize, column: usize) -> (f64, f64) {
+        let (l, p) = (column / self.nf, column % self.nf);
+        let (_, a, b) = CYCLIC[k];
+        let error = if k == l { 2.0 * self.ibar((a, a), (b, b), p) } else { self.ibar((k, l), (l, k), p) };
+        (error, self.bound.w1(k, l, p))
+    }
+
+    fn w2(&self, row: usize, column: usize) -> (f64, f64) {
+        let nf = self.nf;
+        let (k, p, l, q) = (row / nf, row % nf, column / nf, column % nf);
+        let (_, a, b) = CYCLIC[k];
+        let error = if k == l { self.s(&[(a, a), (b, b)], p, q) } else { self.errors.s[l][k][(p, q)] };
+        (error, self.bound.s(p, q))
+    }
+
+    fn w3(&self, row: usize, q: usize) -> (f64, f64) {
+        let ((_, l, m), p) = (CYCLIC[row / self.nf], row % self.nf);
+        (self.s(&[(l, m), (m, l)], p, q), self.bound.s(p, q))
+    }
+
+    fn c2(&self, k: usize, p: usize) -> (f64, f64) {
+        let (_, l, m) = CYCLIC[k];
+        (self.ibar((l, m), (m, l), p), self.bound.c2(k, p))
+    }
 }

@@ -104,7 +104,6 @@ pub fn condense(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    assert!(mass.n() >= positions.len(), "a row of Ms for every position");
     condense_with(mass, positions, shapes, modal_stiffness)
 }
 
@@ -115,14 +114,9 @@ pub(super) fn condense_with<M: NodalMass + ?Sized>(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    let nf = shapes.ncols();
-    assert_eq!(shapes.nrows(), 3 * mass.count(), "rows of the shapes: three per row of Ms");
-    assert_eq!(
-        (modal_stiffness.nrows(), modal_stiffness.ncols()),
-        (nf, nf),
-        "modal stiffness: one row per mode"
-    );
-    let gram = weighted_gram(mass, Columns { positions, shapes });
+    let columns = Columns { positions, shapes };
+    columns.assert_sizes(mass, modal_stiffness.as_ref());
+    let gram = weighted_gram(mass, columns);
     from_gram(gram.as_ref(), modal_stiffness)
 }
 
@@ -171,6 +165,15 @@ pub(super) struct Columns<'a> {
 }
 
 impl Columns<'_> {
+    /// # Panics
+    /// When the sizes of mass, positions, shapes and modal stiffness disagree.
+    pub fn assert_sizes<M: NodalMass + ?Sized>(&self, mass: &M, modal_stiffness: MatRef<'_, f64>) {
+        let nf = self.shapes.ncols();
+        assert!(mass.count() >= self.positions.len(), "a row of Ms for every position");
+        assert_eq!(self.shapes.nrows(), 3 * mass.count(), "rows of the shapes: three per row of Ms");
+        assert_eq!(modal_stiffness.shape(), (nf, nf), "modal stiffness: one row per mode");
+    }
+
     pub fn count(&self) -> usize {
         4 + 3 * self.shapes.ncols()
     }
@@ -257,6 +260,24 @@ pub(super) fn group_length(n: usize) -> usize {
     CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
 }
 
+/// The sum of what each group of the `n` nodes contributes to a matrix of this size, in the order of the groups.
+pub(super) fn sum_of_groups(
+    n: usize,
+    (rows, columns): (usize, usize),
+    contribution: impl Fn(Range<usize>) -> Mat<f64> + Sync,
+) -> Mat<f64> {
+    let group = group_length(n);
+    let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
+        .into_par_iter()
+        .map(|g| contribution(g * group..((g + 1) * group).min(n)))
+        .collect();
+    let mut total = Mat::<f64>::zeros(rows, columns);
+    for part in &partial {
+        total += part;
+    }
+    total
+}
+
 /// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the panel.
 fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Range<usize>) -> Mat<f64> {
     let n = columns.rows();
@@ -269,39 +290,29 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Rang
     let x = x.get();
     let x_lanes = x.as_chunks::<LANE>().0;
     let arch = Arch::new();
-    let group = group_length(n);
-    let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
-        .into_par_iter()
-        .map(|g| {
-            let mut product = Aligned::zeros(CHUNK * width);
-            let mut earlier = Aligned::zeros(CHUNK * before);
-            let mut sum = Mat::<f64>::zeros(before + width, width);
-            let nodes = g * group..((g + 1) * group).min(n);
-            for first in nodes.clone().step_by(CHUNK) {
-                let rows = CHUNK.min(nodes.end - first);
-                let product = &mut product.get_mut()[..rows * width];
-                let targets = product.as_chunks_mut::<LANE>().0;
-                arch.dispatch(|| mass_times(mass, first, x_lanes, lanes, targets));
-                // Rows of nodes are columns of the transpose.
-                let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
-                let product = transposed(product, width).transpose();
-                let (top, bottom) = sum.as_mut().split_at_row_mut(before);
-                if before > 0 {
-                    let earlier = &mut earlier.get_mut()[..rows * before];
-                    columns.by_node(first, 0..before, before, earlier);
-                    matmul(top, Accum::Add, transposed(earlier, before), product, 1.0, Par::Seq);
-                }
-                let own = transposed(&x[first * width..][..rows * width], width);
-                matmul(bottom, Accum::Add, own, product, 1.0, Par::Seq);
+    sum_of_groups(n, (before + width, width), |nodes| {
+        let mut product = Aligned::zeros(CHUNK * width);
+        let mut earlier = Aligned::zeros(CHUNK * before);
+        let mut sum = Mat::<f64>::zeros(before + width, width);
+        for first in nodes.clone().step_by(CHUNK) {
+            let rows = CHUNK.min(nodes.end - first);
+            let product = &mut product.get_mut()[..rows * width];
+            let targets = product.as_chunks_mut::<LANE>().0;
+            arch.dispatch(|| mass_times(mass, first, x_lanes, lanes, targets));
+            // Rows of nodes are columns of the transpose.
+            let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
+            let product = transposed(product, width).transpose();
+            let (top, bottom) = sum.as_mut().split_at_row_mut(before);
+            if before > 0 {
+                let earlier = &mut earlier.get_mut()[..rows * before];
+                columns.by_node(first, 0..before, before, earlier);
+                matmul(top, Accum::Add, transposed(earlier, before), product, 1.0, Par::Seq);
             }
-            sum
-        })
-        .collect();
-    let mut total = Mat::<f64>::zeros(before + width, width);
-    for part in &partial {
-        total += part;
-    }
-    total
+            let own = transposed(&x[first * width..][..rows * width], width);
+            matmul(bottom, Accum::Add, own, product, 1.0, Par::Seq);
+        }
+        sum
+    })
 }
 
 /// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for.

@@ -1,6 +1,8 @@
 //! The condensation without S: what a body has that holds neither W2 nor W3, from the products of M with rigid motion alone.
 
-use super::condense::{Aligned, CHUNK, Columns, LANE, Lane, NodalMass, group_length, mass_times, rigid_part};
+use super::condense::{
+    Aligned, CHUNK, Columns, LANE, Lane, NodalMass, mass_times, rigid_part, sum_of_groups,
+};
 use super::{Groups, Invariants, LumpedMasses, s_of_modal_mass};
 use crate::numerics::linalg::{SymmetricMatrix, gram};
 use faer::linalg::matmul::matmul;
@@ -19,7 +21,6 @@ pub fn condense_linear(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    assert!(mass.n() >= positions.len(), "a row of Ms for every position");
     let nf = shapes.ncols();
     of_rigid_products(mass, Columns { positions, shapes }, modal_stiffness, &Mat::identity(nf, nf))
 }
@@ -50,12 +51,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
     modal_mass: &Mat<f64>,
 ) -> Invariants {
     let nf = columns.shapes.ncols();
-    assert_eq!(columns.shapes.nrows(), 3 * mass.count(), "rows of the shapes: three per row of Ms");
-    assert_eq!(
-        (modal_stiffness.nrows(), modal_stiffness.ncols()),
-        (nf, nf),
-        "modal stiffness: one row per mode"
-    );
+    columns.assert_sizes(mass, modal_stiffness.as_ref());
     let products = rigid_products(mass, columns);
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
     // J is symmetric but for rounding: one half of it counts.
@@ -82,33 +78,23 @@ fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>) -> Mat<
         columns.by_node(chunk * CHUNK, 0..4, LANE, rows.as_flattened_mut());
     });
     let arch = Arch::new();
-    let group = group_length(n);
-    let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
-        .into_par_iter()
-        .map(|g| {
-            let mut own = Aligned::zeros(CHUNK * count);
-            let mut product = [[0.0; LANE]; CHUNK];
-            let mut sum = Mat::<f64>::zeros(count, LANE);
-            let nodes = g * group..((g + 1) * group).min(n);
-            for first in nodes.clone().step_by(CHUNK) {
-                let rows = CHUNK.min(nodes.end - first);
-                let product = &mut product[..rows];
-                arch.dispatch(|| mass_times(mass, first, &x, 1, product));
-                let own = &mut own.get_mut()[..rows * count];
-                columns.by_node(first, 0..count, count, own);
-                // Rows of nodes are columns of the transpose.
-                let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
-                let product = transposed(product.as_flattened(), LANE).transpose();
-                matmul(&mut sum, Accum::Add, transposed(own, count), product, 1.0, Par::Seq);
-            }
-            sum
-        })
-        .collect();
-    let mut total = Mat::<f64>::zeros(count, LANE);
-    for part in &partial {
-        total += part;
-    }
-    total
+    sum_of_groups(n, (count, LANE), |nodes| {
+        let mut own = Aligned::zeros(CHUNK * count);
+        let mut product = [[0.0; LANE]; CHUNK];
+        let mut sum = Mat::<f64>::zeros(count, LANE);
+        for first in nodes.clone().step_by(CHUNK) {
+            let rows = CHUNK.min(nodes.end - first);
+            let product = &mut product[..rows];
+            arch.dispatch(|| mass_times(mass, first, &x, 1, product));
+            let own = &mut own.get_mut()[..rows * count];
+            columns.by_node(first, 0..count, count, own);
+            // Rows of nodes are columns of the transpose.
+            let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
+            let product = transposed(product.as_flattened(), LANE).transpose();
+            matmul(&mut sum, Accum::Add, transposed(own, count), product, 1.0, Par::Seq);
+        }
+        sum
+    })
 }
 
 #[cfg(test)]

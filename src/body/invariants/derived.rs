@@ -108,13 +108,13 @@ impl Invariants {
     /// rotations. `None` where the body does not hold it.
     pub fn w3(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
-        let of_s = |row: usize, q: usize| {
+        let difference = |row: usize, q: usize| {
             let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
             self.s[l][m][(p, q)] - self.s[m][l][(p, q)]
         };
         self.groups.w3.then(|| match &self.general {
             Some(general) => general.w3.clone(),
-            None => Mat::from_fn(3 * nf, nf, of_s),
+            None => Mat::from_fn(3 * nf, nf, difference),
         })
     }
 

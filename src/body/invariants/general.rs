@@ -52,14 +52,8 @@ pub fn condense_general(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    let (n, nf) = (mass.n(), shapes.ncols());
-    assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
-    let columns = Columns { motion, shapes };
-    let products = Products { gram: columns.gram(mass), rigid: columns.rigid(), nf };
-    match columns.rigid() {
-        3 => products.in_plane(modal_stiffness),
-        _ => products.in_space(modal_stiffness),
-    }
+    let columns = Columns::new(mass, motion, shapes);
+    columns.products(columns.gram(mass)).invariants(modal_stiffness)
 }
 
 /// The same for modes that are mass-normalised, without W2 and W3: the columns \[Phi_t, B_x\] alone are multiplied by M, and m_ff = I is
@@ -73,14 +67,8 @@ pub fn condense_general_linear(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    let (n, nf) = (mass.n(), shapes.ncols());
-    assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
-    let columns = Columns { motion, shapes };
-    let products = Products { gram: columns.rigid_gram(mass), rigid: columns.rigid(), nf };
-    let whole = match columns.rigid() {
-        3 => products.in_plane(modal_stiffness),
-        _ => products.in_space(modal_stiffness),
-    };
+    let columns = Columns::new(mass, motion, shapes);
+    let whole = columns.products(columns.rigid_gram(mass)).invariants(modal_stiffness);
     whole.with_groups(Groups { w1: true, ..Groups::NONE })
 }
 
@@ -90,7 +78,19 @@ struct Columns<'a> {
     shapes: MatRef<'a, f64>,
 }
 
-impl Columns<'_> {
+impl<'a> Columns<'a> {
+    /// # Panics
+    /// When mass, motion and shapes have not the same rows.
+    fn new(mass: &SymmetricMatrix, motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
+        let n = mass.n();
+        assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
+        Self { motion, shapes }
+    }
+
+    fn products(&self, gram: Mat<f64>) -> Products {
+        Products { gram, rigid: self.rigid(), nf: self.shapes.ncols() }
+    }
+
     fn rigid(&self) -> usize {
         self.motion.fields.ncols()
     }
@@ -193,9 +193,21 @@ impl Products {
         Mat::from_fn(self.nf, self.nf, |i, j| self.gram[(self.mode(i), self.mode(j))])
     }
 
+    fn invariants(&self, modal_stiffness: Mat<f64>) -> Invariants {
+        match self.rigid {
+            3 => self.in_plane(modal_stiffness),
+            _ => self.in_space(modal_stiffness),
+        }
+    }
+
+    /// m, c and J of rigid motion.
+    fn rigid_inertia(&self) -> (f64, Vector3<f64>, Matrix3<f64>) {
+        rigid_inertia(self.gram.as_ref().submatrix(0, 0, self.rigid, self.rigid))
+    }
+
     fn in_space(&self, modal_stiffness: Mat<f64>) -> Invariants {
         let (g, nf) = (&self.gram, self.nf);
-        let (mass, first_moment, second_moment) = rigid_inertia(g.as_ref().submatrix(0, 0, 6, 6));
+        let (mass, first_moment, second_moment) = self.rigid_inertia();
         let ibar: Vec<Matrix3<f64>> = (0..nf)
             .map(|j| {
                 let half = Matrix3::from_fn(|k, b| g[(3 + k, self.turned(b, j))]);
@@ -219,7 +231,7 @@ impl Products {
             first_moment,
             second_moment,
             c1: self.c1(),
-            ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect())),
+            ibar: by_axes(&ibar),
             s,
             modal_stiffness,
             general: Some(GeneralTerms {
@@ -234,7 +246,7 @@ impl Products {
 
     fn in_plane(&self, modal_stiffness: Mat<f64>) -> Invariants {
         let (g, nf) = (&self.gram, self.nf);
-        let (mass, first_moment, second_moment) = rigid_inertia(g.as_ref().submatrix(0, 0, 3, 3));
+        let (mass, first_moment, second_moment) = self.rigid_inertia();
         let ibar: Vec<Matrix3<f64>> =
             (0..nf).map(|j| plane_ibar(g[(2, self.turned(0, j))], g[(2, self.mode(j))])).collect();
         let w2 = |i: usize, j: usize| g[(self.turned(0, i), self.turned(0, j))];
@@ -245,7 +257,7 @@ impl Products {
             first_moment,
             second_moment,
             c1: self.c1(),
-            ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect())),
+            ibar: by_axes(&ibar),
             s: [[half(), zero(), zero()], [zero(), half(), zero()], [zero(), zero(), zero()]],
             modal_stiffness,
             general: Some(GeneralTerms {
@@ -269,6 +281,11 @@ impl Products {
         let d = if self.rigid == 3 { 2 } else { 3 };
         Mat::from_fn(3, self.nf, |k, j| if k < d { self.gram[(k, self.mode(j))] } else { 0.0 })
     }
+}
+
+/// Ibar of all modes, axis by axis.
+fn by_axes(ibar: &[Matrix3<f64>]) -> [[Vec<f64>; 3]; 3] {
+    [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect()))
 }
 
 /// m, c and J of R'MR = \[m I, -c~; c~, I0\] for unit translations and unit rotations R; of a plane body \[m I, (-c_y, c_x)'; ., I0_zz\]

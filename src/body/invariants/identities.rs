@@ -65,22 +65,32 @@ pub struct Expected<'a> {
 /// groups of the kinetic energy that the body does not hold is not among them.
 pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityCheck> {
     let bound = CauchySchwarz::of(body);
-    let (check, groups) = (IdentityCheck::new, body.groups);
+    let check = IdentityCheck::new;
     let mut checks = vec![
         check("finite", "no NaN, no infinity", terms::not_finite(body), 0.0),
         check("mass_positive", "m > 0", if body.mass > 0.0 { 0.0 } else { 1.0 }, 0.0),
         check("second_moment_symmetric", "J = J'", terms::second_moment_asymmetry(body, &bound), ROUNDING),
     ];
     checks.extend(rigid_identities(body));
+    checks.extend(gram_identities(body, &bound));
+    checks.extend(mode_identities(body, expected, &bound));
+    checks.extend(frame_identities(body, expected));
+    checks
+}
+
+/// What products of rigid motion and modes must be, whatever the modes are.
+fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
+    let (check, groups) = (IdentityCheck::new, body.groups);
+    let mut checks = Vec::new();
     if groups.w2 || groups.w3 {
-        checks.push(check("s_transposed", "S_lk = S_kl'", terms::s_asymmetry(body, &bound), ROUNDING));
+        checks.push(check("s_transposed", "S_lk = S_kl'", terms::s_asymmetry(body, bound), ROUNDING));
     }
     checks.extend([
-        check("c1_bounded", "|C1_kp| <= sqrt(m) |psi_p|", terms::c1_ratio(body, &bound) - 1.0, ROUNDING),
+        check("c1_bounded", "|C1_kp| <= sqrt(m) |psi_p|", terms::c1_ratio(body, bound) - 1.0, ROUNDING),
         check(
             "motion_gram_psd",
             "[rigid Psi]' M [rigid Psi] positive semidefinite",
-            terms::motion_gram_negative(body, &bound),
+            terms::motion_gram_negative(body, bound),
             ROUNDING,
         ),
     ]);
@@ -88,25 +98,28 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
         Some((w2, w3)) => checks.push(check(
             "velocity_gram_psd",
             "[Phi_t B Psi]' M [Phi_t B Psi] positive semidefinite",
-            terms::velocity_gram_negative(body, &w2, &w3, &bound),
+            terms::velocity_gram_negative(body, &w2, &w3, bound),
             ROUNDING,
         )),
         None if body.general.is_some() => {}
-        None => checks.extend(scalar_identities(body, &bound)),
+        None => checks.extend(scalar_identities(body, bound)),
     }
+    checks
+}
+
+/// What holds for modes that are mass-normalised, orthogonal to rigid motion, or eigenvectors.
+fn mode_identities(body: &Invariants, expected: &Expected<'_>, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
+    let check = IdentityCheck::new;
+    let mut checks = Vec::new();
     if expected.mass_normalised {
-        checks.push(check(
-            "modal_mass_identity",
-            "S11 + S22 + S33 = I",
-            terms::modal_mass_deviation(body),
-            MODAL,
-        ));
+        let value = terms::modal_mass_deviation(body);
+        checks.push(check("modal_mass_identity", "S11 + S22 + S33 = I", value, MODAL));
     }
     if expected.free_surface {
-        checks.push(check("c1_zero", "C1 = 0", terms::c1_ratio(body, &bound), MODAL));
-        checks.push(check("c2_zero", "C2 = 0", terms::c2_ratio(body, &bound), MODAL));
-        if groups.w1 {
-            let value = terms::ibar_asymmetry(body, &bound);
+        checks.push(check("c1_zero", "C1 = 0", terms::c1_ratio(body, bound), MODAL));
+        checks.push(check("c2_zero", "C2 = 0", terms::c2_ratio(body, bound), MODAL));
+        if body.groups.w1 {
+            let value = terms::ibar_asymmetry(body, bound);
             checks.push(check("ibar_symmetric", "Ibar_kl = Ibar_lk", value, MODAL));
         }
     }
@@ -116,6 +129,13 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
         let limit = MODAL + 10.0 * expected.eigenvalue_noise + expected.eigenvalue_rounding;
         checks.push(check("modal_stiffness_diagonal", "Psi' K Psi = diag(lambda)", value, limit));
     }
+    checks
+}
+
+/// What the choice of the body frame promises.
+fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityCheck> {
+    let check = IdentityCheck::new;
+    let mut checks = Vec::new();
     if expected.frame != BodyFrame::Model {
         let radius = (body.second_moment.trace() / body.mass).sqrt();
         let value = scaled(body.first_moment.norm(), body.mass * radius);
@@ -123,12 +143,8 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
         checks.push(check("first_moment_zero", "c = 0: origin at the centre of mass", value, limit));
     }
     if expected.frame == BodyFrame::Principal {
-        checks.push(check(
-            "inertia_diagonal",
-            "I0 diagonal: principal axes",
-            terms::products_of_inertia(body),
-            PRINCIPAL,
-        ));
+        let value = terms::products_of_inertia(body);
+        checks.push(check("inertia_diagonal", "I0 diagonal: principal axes", value, PRINCIPAL));
     }
     checks
 }
@@ -235,8 +251,8 @@ pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCh
     group("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &own.w2, &stored.w2, &by_modes);
     group("w3_of_s", "W3_k = S_lm - S_ml", &own.w3, &stored.w3, &by_modes);
     if let Some((w2, w3)) = stored.w2.as_ref().zip(stored.w3.as_ref()).filter(|_| body.general.is_none()) {
-        let of_w2 = terms::w3_of_w2(w2, nf);
-        checks.push(check("w3_of_w2", "W3_k = W2_lm - W2_ml", &of_w2, w3, &by_modes));
+        let expected = terms::w3_of_w2(w2, nf);
+        checks.push(check("w3_of_w2", "W3_k = W2_lm - W2_ml", &expected, w3, &by_modes));
     }
     checks
 }

@@ -68,8 +68,8 @@ impl Invariants {
         let Numbered { i5, i6, i8, i9, .. } = numbered;
         let groups = Groups { w2: i9.is_some(), w3: i5.is_some(), ..numbered.groups };
         let ibar = |k: usize, l: usize| {
-            let of_mode = |i8: &Matrix3<f64>| if k == l { 0.5 * i8.trace() } else { 0.0 } - i8[(l, k)];
-            i8.iter().map(of_mode).collect()
+            let entry = |i8: &Matrix3<f64>| if k == l { 0.5 * i8.trace() } else { 0.0 } - i8[(l, k)];
+            i8.iter().map(entry).collect()
         };
         let s = match i9 {
             None => s_of_modal_mass(nf, Some(i6), i5.as_ref()),

@@ -14,7 +14,7 @@ use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::solution::EigenvalueBounds;
 use crate::numerics::linalg::{
-    Analysis, Cholesky, CompensatedBlock, DoubleDouble, LANES, Pencil, Solve, gram_compensated,
+    Analysis, Cholesky, CompensatedBlock, DoubleDouble, LANES, Pencil, Solve, gram_compensated, largest,
     multiply_compensated, small_pencil_eigenvalues, sum_length,
 };
 use faer::{Mat, MatRef};
@@ -369,10 +369,8 @@ impl Slack {
         let row = |i: usize, entry: &dyn Fn(usize) -> f64| {
             (0..count).map(|j| entry(j) * scale[i] * scale[j]).sum::<f64>()
         };
-        let off = (0..count)
-            .map(|i| row(i, &|j| if i == j { 0.0 } else { matrix[i][j].hi.abs() }))
-            .fold(0.0, f64::max);
-        let slack = (0..count).map(|i| row(i, &|j| error[i][j])).fold(0.0, f64::max);
+        let off = largest((0..count).map(|i| row(i, &|j| if i == j { 0.0 } else { matrix[i][j].hi.abs() })));
+        let slack = largest((0..count).map(|i| row(i, &|j| error[i][j])));
         // The smallest eigenvalue of the scaled matrix is at least 1 - off.
         (off < 0.5 && slack < 0.25).then(|| Self { scale, relative: ROOM * slack / (1.0 - off) })
     }

@@ -198,8 +198,8 @@ impl Gauss {
         }
         for (oscillator, inverse) in &self.oscillators {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
-            let of = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
-            let (lacks, mut lacks_p) = (of(&self.rates, x), of(&self.rates, p));
+            let entry = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);
+            let (lacks, mut lacks_p) = (entry(&self.rates, x), entry(&self.rates, p));
             for (lacks_p, weights) in lacks_p.iter_mut().zip(&self.tableau.weights) {
                 *lacks_p -= oscillator.stiffness * h * product(weights, &lacks);
             }

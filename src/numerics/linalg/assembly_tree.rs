@@ -232,7 +232,7 @@ impl Supernode {
         let n = columns.order.len();
         let (children_at, children) = children_of(&columns.parent);
         let mut supernodes: Vec<Self> = Vec::new();
-        let mut of_column = vec![NONE; n];
+        let mut supernode_of = vec![NONE; n];
         let mut seen = vec![NONE; n];
         for j in 0..n {
             let mut rows: Vec<u32> = Vec::new();
@@ -251,22 +251,22 @@ impl Supernode {
             }
             let below = &children[children_at[j] as usize..children_at[j + 1] as usize];
             for &child in below {
-                supernodes[of_column[child as usize] as usize].rows.iter().for_each(|&row| add(row));
+                supernodes[supernode_of[child as usize] as usize].rows.iter().for_each(|&row| add(row));
             }
             if let &[only] = below {
-                let index = of_column[only as usize];
+                let index = supernode_of[only as usize];
                 let supernode = &mut supernodes[index as usize];
                 if supernode.rows.len() == rows.len() + 1 {
                     supernode.columns.push(j as u32);
                     supernode.rows = rows;
-                    of_column[j] = index;
+                    supernode_of[j] = index;
                     continue;
                 }
             }
             for &child in below {
-                supernodes[of_column[child as usize] as usize].parent = supernodes.len() as u32;
+                supernodes[supernode_of[child as usize] as usize].parent = supernodes.len() as u32;
             }
-            of_column[j] = supernodes.len() as u32;
+            supernode_of[j] = supernodes.len() as u32;
             rows.shrink_to_fit();
             supernodes.push(Self { columns: vec![j as u32], rows, parent: NONE, zeros: 0.0 });
         }
