@@ -1,6 +1,6 @@
 //! NumPy's format of one array, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
-use super::shapes::Array;
+use super::array::Array;
 use crate::base::diagnostic::{Code, Diagnostic};
 
 const MAGIC: &[u8] = b"\x93NUMPY";

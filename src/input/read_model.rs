@@ -3,7 +3,8 @@
 use super::bytes::InputFile;
 use super::compression::Compression;
 use super::model_files::{InterfaceNodes, MatrixLocation, ModelFiles};
-use super::reader::{MatrixRole, MatrixSource, reader_for};
+use super::reader::{MatrixRole, MatrixSource};
+use super::readers::reader_for;
 use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};

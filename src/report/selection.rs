@@ -1,7 +1,7 @@
 //! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
 
 use super::Format;
-use super::html::{diagnostics_table, escape, page, section, table, terms};
+use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;

@@ -2,8 +2,8 @@
 
 use super::Format;
 use super::facts::UnitFacts;
-use super::html::{diagnostics_table, escape, page, section, terms};
 use super::line_chart::{Line, STYLES, line_chart};
+use super::markup::{diagnostics_table, escape, page, section, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;

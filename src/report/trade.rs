@@ -1,7 +1,7 @@
 //! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
 
 use super::Format;
-use super::html::{diagnostics_table, escape, page, section, table, terms};
+use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{bytes, counted, duration, plain, significant};
 use super::render::json;
 use super::run_data::RunData;
