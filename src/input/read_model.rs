@@ -211,9 +211,9 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
 }
 
 fn sources(files: &ModelFiles, fingerprints: &[(&Path, String)]) -> Vec<SourceFile> {
-    let of = |(role, path): (&str, &Path)| {
+    let source = |(role, path): (&str, &Path)| {
         let (_, sha256) = fingerprints.iter().find(|(known, _)| *known == path)?;
         Some(SourceFile::new(role, path, sha256.clone()))
     };
-    roles(files).into_iter().filter_map(of).collect()
+    roles(files).into_iter().filter_map(source).collect()
 }

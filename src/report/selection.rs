@@ -366,7 +366,7 @@ impl<'a> SelectionFacts<'a> {
             .iter()
             .chain(&self.chosen)
             .map(|trial| {
-                let of =
+                let error_cell =
                     |error: fn(&OutputErrors) -> Option<f64>| number(trial.errors.as_ref().and_then(error));
                 let verdict = match (trial.passed, trial.remark) {
                     (true, _) => "within".to_owned(),
@@ -378,10 +378,10 @@ impl<'a> SelectionFacts<'a> {
                     trial.modes.to_string(),
                     trial.tier.to_string(),
                     trial.multiplications.to_string(),
-                    of(|errors| Some(errors.attitude)),
-                    of(|errors| errors.deflection),
-                    of(|errors| errors.stress),
-                    of(|errors| errors.reaction),
+                    error_cell(|errors| Some(errors.attitude)),
+                    error_cell(|errors| errors.deflection),
+                    error_cell(|errors| errors.stress),
+                    error_cell(|errors| errors.reaction),
                     verdict,
                 ]
             })

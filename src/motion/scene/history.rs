@@ -181,7 +181,8 @@ mod tests {
         for history in histories {
             for i in 0..60 {
                 let (time, step) = (-0.513 + 0.07 * f64::from(i), 1e-5);
-                let slope_of = |of: &dyn Fn(f64) -> f64| (of(time + step) - of(time - step)) / (2.0 * step);
+                let slope_of =
+                    |value: &dyn Fn(f64) -> f64| (value(time + step) - value(time - step)) / (2.0 * step);
                 let near = |slope: f64, rate: f64| {
                     assert!((slope - rate).abs() < 1e-6, "{history:?} at {time}: {slope}, {rate}");
                 };

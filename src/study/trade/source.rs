@@ -112,8 +112,8 @@ impl Source {
             stiffness.as_ref().map_or_else(|| DVector::zeros(modes.len()), |factor| factor.solve(&sides))
         };
         let (q, qd) = (part(&start.q), part(&start.qd));
-        let of = |mode: usize| ModeStart { mode, amplitude: q[mode], rate: qd[mode] };
-        own.initial.modes = (0..modes.len()).map(of).collect();
+        let start_of = |mode: usize| ModeStart { mode, amplitude: q[mode], rate: qd[mode] };
+        own.initial.modes = (0..modes.len()).map(start_of).collect();
         own
     }
 
