@@ -97,7 +97,7 @@ fn parse(text: &[u8]) -> Option<Header<'_>> {
     Some(Header { descr: descr?, fortran: fortran?, shape: shape? }).filter(|_| all)
 }
 
-/// What is left of the text.
+/// The rest of a text that is read.
 struct Cursor<'a>(&'a str);
 
 impl<'a> Cursor<'a> {

@@ -5,7 +5,7 @@ use super::compression::Compression;
 use crate::base::error::Result;
 use crate::model::RawMatrix;
 
-/// What a matrix is in the model. Files that hold several matrices tell them apart by it.
+/// The role of a matrix in the model. Files that hold several matrices tell them apart by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MatrixRole {
     /// K.
@@ -50,11 +50,11 @@ impl MatrixRole {
 pub struct MatrixSource<'a> {
     /// The file.
     pub file: &'a InputFile,
-    /// How its bytes are packed.
+    /// Compression of the file.
     pub compression: Compression,
     /// Group within the file, when the user named one.
     pub group: Option<&'a str>,
-    /// What the matrix is in the model.
+    /// Role of the matrix in the model.
     pub role: MatrixRole,
 }
 

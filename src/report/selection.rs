@@ -65,7 +65,7 @@ struct TermFacts<'a> {
 #[derive(Debug, Clone, Serialize)]
 struct ModesFacts<'a> {
     of: usize,
-    /// Numbers from 1.
+    /// Numbers of the modes that are kept, from 1.
     kept: Vec<usize>,
     reason: &'a str,
     static_responses: Vec<ResponseFacts<'a>>,

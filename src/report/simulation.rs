@@ -44,7 +44,7 @@ pub struct SimulationFacts<'a> {
     gravity: Option<[f64; 3]>,
     /// What carries the body, and its natural frequencies so.
     carried: Option<CarriedFacts<'a>>,
-    /// What the origin of the frame is.
+    /// Description of the origin of the frame.
     frame_origin: String,
     largest_deflection: f64,
     points: Vec<PointFacts<'a>>,

@@ -10,7 +10,7 @@ use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Resume, Wanted};
 use crate::study::selection::{Selection, largest_eigenvalue, rule_out, select};
 
-/// How a body is made for a scene.
+/// Settings of a conversion for a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tailoring {
     /// Settings of the conversion: what there is to select from.

@@ -43,7 +43,7 @@ impl Array {
     }
 }
 
-/// What the file holds of a body.
+/// Sizes, terms and arrays of a body as the file holds them.
 pub(crate) struct Content {
     /// T.
     pub translations: usize,

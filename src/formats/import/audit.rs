@@ -12,7 +12,7 @@ use faer::Mat;
 /// units; frames may stand for a part of a body only.
 const GYRATION: (f64, f64) = (0.02, 5.0);
 
-/// What an audit found.
+/// Facts and checks of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Audit {
     /// Name of the format.
@@ -36,12 +36,12 @@ pub struct Audit {
 }
 
 impl Audit {
-    /// What is wrong.
+    /// The diagnostics of the checks that failed.
     pub fn findings(&self) -> Vec<Diagnostic> {
         self.checks.iter().filter_map(AuditCheck::finding).collect()
     }
 
-    /// Whether nothing is.
+    /// Whether every check passed.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(AuditCheck::passed)
     }
@@ -256,7 +256,7 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     ]
 }
 
-/// What the modes are.
+/// Whether the modes are mass-normalised free-surface modes, in words.
 fn kind_of_modes(invariants: &Invariants) -> String {
     match is_free_surface(invariants) {
         None => "modes are mass-normalised free-surface modes".to_owned(),

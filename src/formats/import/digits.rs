@@ -5,7 +5,7 @@
 pub(crate) struct Digits {
     /// Most decimals of numbers without an exponent, where there are such.
     fixed: Option<u32>,
-    /// Whether there are numbers with one.
+    /// Whether there are numbers with an exponent.
     exponents: bool,
     /// Most significant digits of any number.
     significant: u32,

@@ -111,7 +111,7 @@ impl FreeSurface {
         Ok(Self { rigid: solve_upper(&lower, &whitened), modes, dropped })
     }
 
-    /// What is to be said.
+    /// The note that the modes were changed: those of the file miss the identities of free-surface modes by `missed`.
     pub(crate) fn note(&self, missed: f64) -> Diagnostic {
         let mut message = format!(
             "modes of the file are no mass-normalised free-surface modes (by {missed:.1e}): they were made such"

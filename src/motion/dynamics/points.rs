@@ -131,7 +131,7 @@ impl BodyPoint {
         })
     }
 
-    /// Whether it has an orientation.
+    /// Whether the point has an orientation.
     pub fn turns(&self) -> bool {
         self.rotation.is_some()
     }

@@ -34,7 +34,7 @@ pub(super) fn longest_step(scene: &Scene, duration: f64) -> f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Effort {
     steps: f64,
-    /// What makes them so many.
+    /// The reason for their number, for messages.
     because: String,
 }
 

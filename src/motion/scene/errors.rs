@@ -71,13 +71,13 @@ impl OutputErrors {
 pub struct ErrorHistory {
     /// Where the motion was looked at.
     pub time: Vec<f64>,
-    /// Of the attitude.
+    /// Errors of the attitude.
     pub attitude: Vec<f64>,
-    /// Of deflections.
+    /// Errors of the deflections.
     pub deflection: Option<Vec<f64>>,
-    /// Of the elastic energy.
+    /// Errors of the elastic energy.
     pub stress: Option<Vec<f64>>,
-    /// Of force and torque.
+    /// Errors of force and torque.
     pub reaction: Option<Vec<f64>>,
 }
 
@@ -219,7 +219,7 @@ impl<'r> Measure<'r> {
         self.body
     }
 
-    /// Its motion.
+    /// The motion of the reference.
     pub fn trace(&self) -> &'r Trace {
         self.trace
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 /// A value as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum History {
-    /// The same at all times.
+    /// One value at all times.
     Constant(f64),
     /// Straight lines between points with ascending times; constant before the first and after the last.
     Table {
@@ -32,7 +32,7 @@ pub enum History {
         to: f64,
         /// When it begins.
         start: f64,
-        /// How long it takes.
+        /// Duration of the ramp.
         duration: f64,
     },
 }

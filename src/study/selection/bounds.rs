@@ -21,7 +21,7 @@ pub struct ModalLoad {
     pub force: f64,
     /// |Lambda^(-1/2) Q|.
     pub energy: f64,
-    /// What it is multiplied by.
+    /// The function of time that the direction is multiplied by.
     pub factor: Variation,
 }
 
@@ -53,7 +53,7 @@ pub struct LoadSizes {
 /// The motion of a body of given rotation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driven {
-    /// Its rotation.
+    /// Rotation of the frame.
     pub rotation: Rotation,
     /// Loads on the modes.
     pub loads: Vec<ModalLoad>,

@@ -141,7 +141,7 @@ impl<'m> NodalReference<'m> {
     }
 }
 
-/// What acts on the body.
+/// Gravity and loads of a scene on the nodes.
 struct Acting<'s> {
     scene: &'s Scene,
     /// Loads with the nodes that they act at.
@@ -168,7 +168,7 @@ impl Acting<'_> {
     }
 }
 
-/// What is kept of the motion, at the instants of another one.
+/// Displacements, attitude and energies of the motion, at the instants of another one.
 struct Observed<'e> {
     evaluation: NodalEvaluation<'e>,
     motion: &'e Trace,

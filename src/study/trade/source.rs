@@ -42,7 +42,7 @@ impl Source {
         Some(self)
     }
 
-    /// The same with its bodies in the frame of a scene.
+    /// This source with its bodies in the frame of a scene.
     ///
     /// # Errors
     /// Those of [`Stage::new`].
@@ -55,7 +55,7 @@ impl Source {
         Ok(Self { body: FlexBody::new(parts)?, lumped, ..self.clone() })
     }
 
-    /// What it is.
+    /// Name of the source in reports.
     pub fn name(&self) -> &str {
         &self.name
     }

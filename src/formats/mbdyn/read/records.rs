@@ -30,7 +30,7 @@ pub(crate) struct Records {
     pub(crate) stiffening: Vec<(usize, Vec<f64>)>,
     /// Whether the file says that record groups 9 and 18 need not agree.
     pub(crate) general: bool,
-    /// Whether the last line is there.
+    /// Whether the line that ends a file is there.
     pub(crate) ended: bool,
     pub(crate) digits: Digits,
     /// What MBDyn skips, and the record group before it; none before the first.

@@ -15,7 +15,7 @@ pub(crate) enum Blocks {
 }
 
 impl Blocks {
-    /// Both.
+    /// Both orders.
     const ALL: [Self; 2] = [Self::Component, Self::Mode];
 
     /// `component-blocked`, `mode-blocked`.

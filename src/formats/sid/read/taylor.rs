@@ -27,7 +27,7 @@ pub(crate) struct Taylor {
     pub(crate) inferred: bool,
     m0: Vec<Entry>,
     m1: Vec<Entry>,
-    /// How its entries are written.
+    /// Digits of the entries.
     pub(crate) digits: Digits,
 }
 
