@@ -182,8 +182,10 @@ impl Deck {
         }
         // K psi_j = lambda_j M psi_j. Rigid motion strains nothing: what is antisymmetric is rounding, and so is C1.
         let strained = |set: usize, axis: usize, j: usize| {
-            let of = |k: usize| 0.5 * (invariants.ibar[k][axis][j] + invariants.ibar[axis][k][j]);
-            let symmetric = if set == 3 { -(0..3).map(of).sum::<f64>() } else { of(set) };
+            let symmetric_along =
+                |k: usize| 0.5 * (invariants.ibar[k][axis][j] + invariants.ibar[axis][k][j]);
+            let symmetric =
+                if set == 3 { -(0..3).map(symmetric_along).sum::<f64>() } else { symmetric_along(set) };
             invariants.modal_stiffness[(j, j)] * symmetric
         };
         for (a, b) in (0..3).flat_map(|a| [0, 1, 2].map(|b| (a, b))) {

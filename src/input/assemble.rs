@@ -21,7 +21,7 @@ pub(super) struct Entry {
 /// What the entries of a file stand for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Storage {
-    /// All of them.
+    /// All entries of the matrix.
     Full,
     /// One triangle of a symmetric matrix: every off-diagonal entry stands for two.
     Triangle,
@@ -85,7 +85,7 @@ pub(super) fn assemble(
 ///
 /// # Errors
 /// As [`assemble`].
-pub(super) fn assemble_columns(columns: Columns, path: &Path) -> Result<RawMatrix, Diagnostic> {
+pub(super) fn assemble_columns(columns: ColumnEntries, path: &Path) -> Result<RawMatrix, Diagnostic> {
     let digits = significant_digits(columns.values.len(), 17, |k| columns.values[k]);
     finish(columns.counts.len() - 1, columns.compress(), digits, path)
 }
@@ -168,14 +168,14 @@ pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
 }
 
 /// Entries that come column by column, in any order within a column, without zeros.
-pub(super) struct Columns {
+pub(super) struct ColumnEntries {
     /// At j + 1: the number of entries of column j.
     counts: Vec<usize>,
     row_idx: Vec<u32>,
     values: Vec<f64>,
 }
 
-impl Columns {
+impl ColumnEntries {
     /// None yet, of `n` columns; about `entries` will come.
     pub(super) fn with_room(n: usize, entries: usize) -> Self {
         let (mut row_idx, mut values) = (Vec::new(), Vec::new());
@@ -391,7 +391,7 @@ mod tests {
         let mut ordered: Vec<Entry> = list.into_iter().filter(|e| e.value != 0.0).collect();
         ordered.sort_by_key(|e| e.col);
         let columns = || {
-            let mut columns = Columns::with_room(n, ordered.len());
+            let mut columns = ColumnEntries::with_room(n, ordered.len());
             ordered.iter().for_each(|&e| columns.push(e));
             columns
         };

@@ -49,7 +49,7 @@ impl InputFile {
         &self.path
     }
 
-    /// Its bytes, at least one.
+    /// Bytes of the file, at least one.
     pub fn bytes(&self) -> &[u8] {
         &self.map
     }

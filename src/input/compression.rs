@@ -16,7 +16,7 @@ pub enum Compression {
 }
 
 impl Compression {
-    /// What the first bytes say.
+    /// The compression that the first bytes tell.
     pub(super) fn of(bytes: &[u8]) -> Self {
         if bytes.starts_with(&[0x1f, 0x8b]) {
             Self::Gzip

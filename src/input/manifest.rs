@@ -141,8 +141,8 @@ impl Walk<'_> {
                 return None;
             }
         };
-        let of = |which: &str, default: &str| if which == key { name.clone() } else { default.to_owned() };
-        if UnitSystem::parse(&of("length", "m"), &of("mass", "kg"), &of("time", "s")).is_err() {
+        let unit = |which: &str, default: &str| if which == key { name.clone() } else { default.to_owned() };
+        if UnitSystem::parse(&unit("length", "m"), &unit("mass", "kg"), &unit("time", "s")).is_err() {
             self.complain(Code::ManifestUnit, value.span(), format!("unit of {key} `{name}` is not known"));
             return None;
         }

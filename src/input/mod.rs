@@ -1,6 +1,7 @@
 //! Reading: manifest, matrices, tables of nodes and degrees of freedom. One file per matrix format behind
 //! [`Reader`] and [`READERS`]; the contract users see is `docs/input.md`.
 
+mod array;
 mod assemble;
 mod bytes;
 mod compression;
@@ -16,6 +17,7 @@ mod model_files;
 mod npy;
 mod read_model;
 mod reader;
+mod readers;
 mod shapes;
 mod table;
 mod tables;
@@ -26,6 +28,7 @@ pub use compression::Compression;
 pub use manifest::read_manifest;
 pub use model_files::{InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, parse_units};
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
-pub use reader::{HEAD, MatrixRole, MatrixSource, READERS, Reader};
+pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
+pub use readers::READERS;
 pub use shapes::read_shapes;
 pub(crate) use walk::{Table, Value, Walk, integer, read_toml, real};

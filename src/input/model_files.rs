@@ -43,11 +43,11 @@ pub struct ModelFiles {
 pub struct InterfaceSource {
     /// Name, unique within the model.
     pub name: String,
-    /// Its nodes.
+    /// Nodes of the interface.
     pub nodes: InterfaceNodes,
     /// How it is coupled to its reference point, where that is said.
     pub coupling: Option<Coupling>,
-    /// Its reference point.
+    /// Reference point of the interface.
     pub reference: Reference,
 }
 

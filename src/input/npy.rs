@@ -1,6 +1,6 @@
 //! NumPy's format of one array, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
-use super::shapes::Array;
+use super::array::Array;
 use crate::base::diagnostic::{Code, Diagnostic};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -97,7 +97,7 @@ fn parse(text: &[u8]) -> Option<Header<'_>> {
     Some(Header { descr: descr?, fortran: fortran?, shape: shape? }).filter(|_| all)
 }
 
-/// What is left of the text.
+/// The rest of a text that is read.
 struct Cursor<'a>(&'a str);
 
 impl<'a> Cursor<'a> {

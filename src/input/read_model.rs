@@ -3,7 +3,8 @@
 use super::bytes::InputFile;
 use super::compression::Compression;
 use super::model_files::{InterfaceNodes, MatrixLocation, ModelFiles};
-use super::reader::{MatrixRole, MatrixSource, reader_for};
+use super::reader::{MatrixRole, MatrixSource};
+use super::readers::reader_for;
 use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
@@ -210,9 +211,9 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
 }
 
 fn sources(files: &ModelFiles, fingerprints: &[(&Path, String)]) -> Vec<SourceFile> {
-    let of = |(role, path): (&str, &Path)| {
+    let source = |(role, path): (&str, &Path)| {
         let (_, sha256) = fingerprints.iter().find(|(known, _)| *known == path)?;
         Some(SourceFile::new(role, path, sha256.clone()))
     };
-    roles(files).into_iter().filter_map(of).collect()
+    roles(files).into_iter().filter_map(source).collect()
 }

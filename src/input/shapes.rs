@@ -1,5 +1,6 @@
 //! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by content.
 
+use super::array::Array;
 use super::bytes::InputFile;
 use super::compression::Compression;
 use super::hdf5::Hdf5;
@@ -12,19 +13,6 @@ use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
 use crate::model::RawShapes;
 use faer::Mat;
-
-/// A dense array as its file has it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Array {
-    pub rows: usize,
-    pub cols: usize,
-    /// Whether the values of a row, or of a column, follow each other.
-    pub row_major: bool,
-    /// As many as rows x cols.
-    pub values: Vec<f64>,
-    /// Significant decimal digits that they carry at the most.
-    pub digits: u8,
-}
 
 /// Reads shapes or loads for matrices with `n` rows: an array n x k, or k x n where k is not n too. `role` names the file
 /// in the provenance.

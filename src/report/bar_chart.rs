@@ -1,7 +1,7 @@
 //! Errors of lumped masses as bars on a logarithmic axis: inline SVG, readable without colour.
 
-use super::html::escape;
 use super::lumped::{ErrorNorm, LumpedFacts, distinct};
+use super::markup::escape;
 use super::numbers::percent;
 use std::collections::HashMap;
 

@@ -242,7 +242,7 @@ impl BodyComparison {
         self.same_nodes
     }
 
-    /// What limits the comparison.
+    /// Notes on what limits the comparison.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

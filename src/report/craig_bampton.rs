@@ -19,7 +19,7 @@ pub(super) struct CraigBamptonFacts {
     pub shift_hz: Option<f64>,
     /// First fixed-interface mode that is left out; `None`: not computed.
     pub next_hz: Option<f64>,
-    /// Of the fixed-interface modes.
+    /// Worst residual of the fixed-interface modes.
     pub worst_residual: f64,
     /// Frequencies of the free body as estimated (nf): upper bounds.
     pub free_hz: Vec<f64>,

@@ -247,7 +247,7 @@ impl Facts {
     }
 }
 
-/// Largest residual of what is to be an eigenvector.
+/// Largest residual of the modes that are meant to be eigenvectors.
 fn worst_residual(body: &FlexBody) -> f64 {
     if let Some(fixed) = &body.certificate().fixed_interface {
         return fixed.residual;

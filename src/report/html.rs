@@ -2,16 +2,15 @@
 
 use super::Facts;
 use super::bar_chart::bar_chart;
+use super::facts::ModeFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, softening_in_words};
-use super::guarantee::cut;
+use super::guarantee::{GuaranteeFacts, cut};
 use super::lumped::distinct;
-use super::numbers::{bytes, counted, duration, percent, plain, significant};
-use crate::base::diagnostic::{Diagnostic, Severity};
+use super::markup::{diagnostics_table, escape, page, section, table, terms, texts};
+use super::numbers::{bytes, counted, duration, percent, significant};
 use crate::body::flex_body::Truncation;
 use crate::body::invariants::ERROR_NORMS;
 use std::collections::HashMap;
-
-const STYLE: &str = include_str!("report.css");
 
 pub(super) fn render(facts: &Facts) -> String {
     let mut html = String::new();
@@ -24,70 +23,6 @@ pub(super) fn render(facts: &Facts) -> String {
     run(&mut html, facts);
     origin(&mut html, facts);
     page(&facts.model.name, "Flexible body report", &facts.generator, &html)
-}
-
-/// A whole page about `name`; `content` is markup.
-pub(super) fn page(name: &str, kind: &str, generator: &str, content: &str) -> String {
-    let (name, generator) = (escape(name), escape(generator));
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name}: {}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p class=\"quiet\">{kind}, {generator}</p>\n</header>\n<main>\n{content}</main>\n</body>\n</html>\n",
-        kind.to_lowercase()
-    )
-}
-
-/// Text for element content and quoted attributes.
-pub(super) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in plain(text).chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            c => escaped.push(c),
-        }
-    }
-    escaped
-}
-
-pub(super) fn section(html: &mut String, title: &str) {
-    html.push_str(&format!("<h2>{title}</h2>\n"));
-}
-
-/// A list of terms; the values are markup.
-pub(super) fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a str, String)>) {
-    html.push_str("<dl>\n");
-    for (term, value) in items {
-        html.push_str(&format!("<dt>{}</dt><dd>{value}</dd>\n", escape(term)));
-    }
-    html.push_str("</dl>\n");
-}
-
-/// A table: head cells, then rows whose first cell is their head; cells are markup, `text` columns are left-aligned.
-pub(super) fn table(html: &mut String, caption: &str, head: &[String], text: &[usize], rows: &[Vec<String>]) {
-    let class = |column: usize| if text.contains(&column) { " class=\"text\"" } else { "" };
-    html.push_str(&format!("<div class=\"scroll\"><table>\n<caption>{caption}</caption>\n<thead><tr>"));
-    for (i, cell) in head.iter().enumerate() {
-        html.push_str(&format!("<th scope=\"col\"{}>{cell}</th>", class(i)));
-    }
-    html.push_str("</tr></thead>\n<tbody>\n");
-    for row in rows {
-        html.push_str("<tr>");
-        for (i, cell) in row.iter().enumerate() {
-            if i == 0 {
-                html.push_str(&format!("<th scope=\"row\">{cell}</th>"));
-            } else {
-                html.push_str(&format!("<td{}>{cell}</td>", class(i)));
-            }
-        }
-        html.push_str("</tr>\n");
-    }
-    html.push_str("</tbody>\n</table></div>\n");
-}
-
-fn texts<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
 }
 
 fn verdict(html: &mut String, facts: &Facts) {
@@ -216,6 +151,31 @@ fn proof(facts: &Facts) -> Vec<(&'static str, String)> {
 }
 
 fn modes(html: &mut String, facts: &Facts) {
+    completeness(html, facts);
+    frequencies(html, facts);
+    let modes = &facts.modes;
+    if !modes.truncation.is_empty() {
+        let row = |t: &Truncation| vec![escape(&t.load), significant(t.before, 3), significant(t.after, 3)];
+        let rows: Vec<_> = modes.truncation.iter().map(row).collect();
+        let caption = "Static responses: what the modes lack, in the norm of K";
+        table(html, caption, &texts(["Load", "Free modes alone", "With residual vectors"]), &[0], &rows);
+    }
+    if !modes.geometric_stiffness.is_empty() {
+        let row = |g: &GeometricStiffnessFacts| vec![escape(&g.load), significant(g.relative_norm, 3)];
+        let rows: Vec<_> = modes.geometric_stiffness.iter().map(row).collect();
+        let caption = "Geometric stiffness: largest part by which one unit of the load changes the stiffness of a motion";
+        table(html, caption, &texts(["Load (body axes)", "Part"]), &[0], &rows);
+    }
+    if let Some(guarantee) = &facts.guarantee {
+        let row = |(name, digits): &(&str, f64)| vec![escape(name), cut(*digits)];
+        let rows: Vec<_> = guarantee.invariant_digits.iter().map(row).collect();
+        let caption = "Guaranteed digits of the invariants, worst entry relative to its Cauchy-Schwarz bound";
+        table(html, caption, &texts(["Invariant", "Digits"]), &[0], &rows);
+    }
+}
+
+/// What is known of the modes as a whole.
+fn completeness(html: &mut String, facts: &Facts) {
     let (modes, c) = (&facts.modes, &facts.completeness);
     section(html, "Completeness of the modes");
     let mut items = proof(facts);
@@ -235,30 +195,59 @@ fn modes(html: &mut String, facts: &Facts) {
     let decided = facts.terms.iter().filter(|term| !term.kept || term.decision.is_some());
     items.extend(decided.map(|term| ("Kinetic energy", escape(&term.in_words()))));
     terms(html, items);
+}
+
+/// The table of the modes.
+fn frequencies(html: &mut String, facts: &Facts) {
     section(html, "Frequencies");
-    // Without damping a column of zeros would say nothing.
-    let damped = modes.damping_ratio.iter().any(|&d| d != 0.0);
-    let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(&facts.model.units.time));
-    let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue]);
-    let craig_bampton = modes.craig_bampton.as_ref();
-    head.extend(match craig_bampton {
-        Some(_) => texts(["Free body (Hz)", "Too high by about", "At most"]),
-        None => texts(["Residual"]),
-    });
-    head.extend(damped.then(|| "Damping ratio".to_owned()));
-    let origins = !modes.origins().is_empty();
-    head.extend(origins.then(|| "Origin".to_owned()));
-    let guarantee = facts.guarantee.as_ref();
-    head.extend(
-        guarantee.iter().flat_map(|_| texts(["Lower bound", "Upper bound", "Digits", "Shape error"])),
-    );
-    let row = |j: usize| {
+    let columns = ModeColumns {
+        modes: &facts.modes,
+        guarantee: facts.guarantee.as_ref(),
+        // Without damping a column of zeros would say nothing.
+        damped: facts.modes.damping_ratio.iter().any(|&d| d != 0.0),
+        origins: !facts.modes.origins().is_empty(),
+    };
+    let rows: Vec<_> = (0..facts.modes.count).map(|j| columns.row(j)).collect();
+    let caption = match facts.modes.craig_bampton {
+        Some(_) => {
+            "Modes of the reduced body, ascending, and the frequencies of the free body as estimated from what the basis lacks"
+        }
+        None => "Flexible modes, ascending",
+    };
+    table(html, caption, &columns.head(&facts.model.units.time), &[], &rows);
+}
+
+/// The columns that the table of the modes has.
+struct ModeColumns<'f> {
+    modes: &'f ModeFacts,
+    guarantee: Option<&'f GuaranteeFacts>,
+    damped: bool,
+    origins: bool,
+}
+
+impl ModeColumns<'_> {
+    fn head(&self, time: &str) -> Vec<String> {
+        let eigenvalue = format!("Eigenvalue (1/{}\u{b2})", escape(time));
+        let mut head = texts(["Mode", "Frequency (Hz)", &eigenvalue]);
+        head.extend(match self.modes.craig_bampton {
+            Some(_) => texts(["Free body (Hz)", "Too high by about", "At most"]),
+            None => texts(["Residual"]),
+        });
+        head.extend(self.damped.then(|| "Damping ratio".to_owned()));
+        head.extend(self.origins.then(|| "Origin".to_owned()));
+        let bounds = ["Lower bound", "Upper bound", "Digits", "Shape error"];
+        head.extend(self.guarantee.iter().flat_map(|_| texts(bounds)));
+        head
+    }
+
+    fn row(&self, j: usize) -> Vec<String> {
+        let modes = self.modes;
         let mut cells = vec![
             (j + 1).to_string(),
             significant(modes.frequency_hz[j], 8),
             significant(modes.eigenvalue[j], 8),
         ];
-        cells.extend(match craig_bampton {
+        cells.extend(match &modes.craig_bampton {
             Some(own) => vec![
                 significant(own.free_hz[j], 8),
                 percent(own.too_high[j]),
@@ -266,9 +255,9 @@ fn modes(html: &mut String, facts: &Facts) {
             ],
             None => vec![modes.residual_in_words(j)],
         });
-        cells.extend(damped.then(|| significant(modes.damping_ratio[j], 4)));
-        cells.extend(origins.then(|| escape(&modes.provenance[j])));
-        cells.extend(guarantee.iter().flat_map(|g| {
+        cells.extend(self.damped.then(|| significant(modes.damping_ratio[j], 4)));
+        cells.extend(self.origins.then(|| escape(&modes.provenance[j])));
+        cells.extend(self.guarantee.iter().flat_map(|g| {
             [
                 significant(g.eigenvalue_lower[j], 17),
                 significant(g.eigenvalue_upper[j], 17),
@@ -277,32 +266,6 @@ fn modes(html: &mut String, facts: &Facts) {
             ]
         }));
         cells
-    };
-    let rows: Vec<_> = (0..modes.count).map(row).collect();
-    let caption = match craig_bampton {
-        Some(_) => {
-            "Modes of the reduced body, ascending, and the frequencies of the free body as estimated from what the basis lacks"
-        }
-        None => "Flexible modes, ascending",
-    };
-    table(html, caption, &head, &[], &rows);
-    if !modes.truncation.is_empty() {
-        let row = |t: &Truncation| vec![escape(&t.load), significant(t.before, 3), significant(t.after, 3)];
-        let rows: Vec<_> = modes.truncation.iter().map(row).collect();
-        let caption = "Static responses: what the modes lack, in the norm of K";
-        table(html, caption, &texts(["Load", "Free modes alone", "With residual vectors"]), &[0], &rows);
-    }
-    if !modes.geometric_stiffness.is_empty() {
-        let row = |g: &GeometricStiffnessFacts| vec![escape(&g.load), significant(g.relative_norm, 3)];
-        let rows: Vec<_> = modes.geometric_stiffness.iter().map(row).collect();
-        let caption = "Geometric stiffness: largest part by which one unit of the load changes the stiffness of a motion";
-        table(html, caption, &texts(["Load (body axes)", "Part"]), &[0], &rows);
-    }
-    if let Some(guarantee) = guarantee {
-        let row = |(name, digits): &(&str, f64)| vec![escape(name), cut(*digits)];
-        let rows: Vec<_> = guarantee.invariant_digits.iter().map(row).collect();
-        let caption = "Guaranteed digits of the invariants, worst entry relative to its Cauchy-Schwarz bound";
-        table(html, caption, &texts(["Invariant", "Digits"]), &[0], &rows);
     }
 }
 
@@ -394,39 +357,6 @@ fn lumped_modes(html: &mut String, facts: &Facts) {
         "Frequencies in ascending order; invariants after alignment of the subspaces",
         &texts(head),
         &[0, 4],
-        &rows,
-    );
-}
-
-pub(super) fn diagnostics_table(html: &mut String, found: &[Diagnostic]) {
-    section(html, "Diagnostics");
-    if found.is_empty() {
-        html.push_str("<p>None.</p>\n");
-        return;
-    }
-    let rows: Vec<_> = found
-        .iter()
-        .map(|d| {
-            let severity = match d.severity() {
-                Severity::Error => "<span class=\"error\">error</span>",
-                Severity::Warning => "<span class=\"warning\">warning</span>",
-                Severity::Note => "note",
-            };
-            let line = d.line().map_or_else(String::new, |line| format!(", line {line}"));
-            let place = d.file().map_or_else(String::new, |f| format!(" ({}{line})", f.display()));
-            vec![
-                d.code().id().to_owned(),
-                severity.to_owned(),
-                escape(&format!("{}{place}", d.message())),
-                escape(d.help()),
-            ]
-        })
-        .collect();
-    table(
-        html,
-        "In the order in which they were found",
-        &texts(["Code", "Severity", "Finding", "Help"]),
-        &[0, 1, 2, 3],
         &rows,
     );
 }

@@ -1,6 +1,6 @@
 //! Quantities over time as lines: inline SVG, readable without colour.
 
-use super::html::escape;
+use super::markup::escape;
 use super::numbers::significant;
 
 /// Places on the drawing, in its own units.

@@ -14,6 +14,7 @@ mod html;
 mod identities;
 mod line_chart;
 mod lumped;
+mod markup;
 mod mass_properties;
 mod numbers;
 mod output;

@@ -4,7 +4,7 @@ use super::{Facts, html, text};
 use serde::Serialize;
 use std::path::Path;
 
-/// How a report is written.
+/// Formats of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// For programs: `schemas/report.schema.json`; floats round-trip.

@@ -1,7 +1,7 @@
 //! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
 
 use super::Format;
-use super::html::{diagnostics_table, escape, page, section, table, terms};
+use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;
@@ -65,7 +65,7 @@ struct TermFacts<'a> {
 #[derive(Debug, Clone, Serialize)]
 struct ModesFacts<'a> {
     of: usize,
-    /// Numbers from 1.
+    /// Numbers of the modes that are kept, from 1.
     kept: Vec<usize>,
     reason: &'a str,
     static_responses: Vec<ResponseFacts<'a>>,
@@ -366,7 +366,7 @@ impl<'a> SelectionFacts<'a> {
             .iter()
             .chain(&self.chosen)
             .map(|trial| {
-                let of =
+                let error_cell =
                     |error: fn(&OutputErrors) -> Option<f64>| number(trial.errors.as_ref().and_then(error));
                 let verdict = match (trial.passed, trial.remark) {
                     (true, _) => "within".to_owned(),
@@ -378,10 +378,10 @@ impl<'a> SelectionFacts<'a> {
                     trial.modes.to_string(),
                     trial.tier.to_string(),
                     trial.multiplications.to_string(),
-                    of(|errors| Some(errors.attitude)),
-                    of(|errors| errors.deflection),
-                    of(|errors| errors.stress),
-                    of(|errors| errors.reaction),
+                    error_cell(|errors| Some(errors.attitude)),
+                    error_cell(|errors| errors.deflection),
+                    error_cell(|errors| errors.stress),
+                    error_cell(|errors| errors.reaction),
                     verdict,
                 ]
             })

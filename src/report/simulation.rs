@@ -2,8 +2,8 @@
 
 use super::Format;
 use super::facts::UnitFacts;
-use super::html::{diagnostics_table, escape, page, section, terms};
 use super::line_chart::{Line, STYLES, line_chart};
+use super::markup::{diagnostics_table, escape, page, section, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;
@@ -44,7 +44,7 @@ pub struct SimulationFacts<'a> {
     gravity: Option<[f64; 3]>,
     /// What carries the body, and its natural frequencies so.
     carried: Option<CarriedFacts<'a>>,
-    /// What the origin of the frame is.
+    /// Description of the origin of the frame.
     frame_origin: String,
     largest_deflection: f64,
     points: Vec<PointFacts<'a>>,
@@ -90,8 +90,8 @@ impl<'a> SimulationFacts<'a> {
         let Drift { energy, linear, angular } = recording.drift();
         let Work { steps, rejected, rates } = recording.work;
         let energies = |balance: Option<&Balance>| {
-            let of = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
-            EnergyFacts { kinetic: of(|b| b.kinetic), elastic: of(|b| b.elastic), work: of(|b| b.work) }
+            let part = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
+            EnergyFacts { kinetic: part(|b| b.kinetic), elastic: part(|b| b.elastic), work: part(|b| b.work) }
         };
         let extremes = &recording.extremes;
         let setting = &recording.setting;
@@ -345,11 +345,11 @@ impl<'a> SimulationFacts<'a> {
             (0..3).map(|k| line(["x", "y", "z"][k], vectors.iter().map(|v| v[k]).collect())).collect()
         };
         let energy = self.unit(1, 2, -2);
-        let of = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
+        let along = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
         let internal = vec![
-            line("kinetic, no flight", of(|b| b.kinetic - b.flight)),
-            line("elastic", of(|b| b.elastic)),
-            line("work", of(|b| b.work)),
+            line("kinetic, no flight", along(|b| b.kinetic - b.flight)),
+            line("elastic", along(|b| b.elastic)),
+            line("work", along(|b| b.work)),
         ];
         chart("Energy", internal, energy.clone());
         let first = balances.first().map_or(0.0, |b| b.kinetic + b.elastic);
@@ -387,11 +387,11 @@ impl<'a> SimulationFacts<'a> {
         let peak = |j: usize| states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
         let mut modes: Vec<(usize, f64)> = (0..nf).map(|j| (j, peak(j))).collect();
         modes.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let of_mode = |&(j, _): &(usize, f64)| Line {
+        let line = |&(j, _): &(usize, f64)| Line {
             name: format!("mode {}", j + 1),
             values: states.iter().map(|state| state.q[j]).collect(),
         };
-        modes.iter().take(STYLES).map(of_mode).collect()
+        modes.iter().take(STYLES).map(line).collect()
     }
 }
 

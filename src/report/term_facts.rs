@@ -24,7 +24,7 @@ pub(super) struct DecisionFacts {
 }
 
 impl TermFacts {
-    /// Of every group.
+    /// The facts of every group.
     pub fn of(body: &FlexBody) -> Vec<Self> {
         let facts = |group: Group| Self {
             group: group.name(),

@@ -1,7 +1,7 @@
 //! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
 
 use super::Format;
-use super::html::{diagnostics_table, escape, page, section, table, terms};
+use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{bytes, counted, duration, plain, significant};
 use super::render::json;
 use super::run_data::RunData;
@@ -280,7 +280,7 @@ impl<'a> TradeFacts<'a> {
             let measured = self.rows[number - 1].measured.as_ref()?;
             Some((measured.multiplications as f64, measured.worst))
         };
-        let of_kind = |kind: Kind| {
+        let series = |kind: Kind| {
             let rows = self.rows.iter().filter(move |row| row.kind == kind);
             let named = rows.filter_map(|row| {
                 let (cost, error) = point(row.number)?;
@@ -297,7 +297,7 @@ impl<'a> TradeFacts<'a> {
             most: self.allowed_multiplications.map(|most| most as f64),
             floor: NO_ERROR,
         };
-        scatter_chart(&chart, &Kind::ALL.map(of_kind))
+        scatter_chart(&chart, &Kind::ALL.map(series))
     }
 
     fn table(&self, html: &mut String, caption: &str, rows: &[&RowFacts<'a>]) {
@@ -360,10 +360,10 @@ fn verdict(trade: &Trade, rows: &[RowFacts<'_>]) -> String {
         }
         _ => String::new(),
     };
-    let of = |row: usize| rows[row].measured.as_ref().map(|measured| (&rows[row], measured));
+    let measured_row = |row: usize| rows[row].measured.as_ref().map(|measured| (&rows[row], measured));
     let first = rows.first().and_then(|row| row.measured.as_ref()).map_or(0, |m| m.multiplications);
     match trade.recommended {
-        Recommendation::Cheapest(row) => of(row).map_or_else(String::new, |(row, measured)| {
+        Recommendation::Cheapest(row) => measured_row(row).map_or_else(String::new, |(row, measured)| {
             let cheaper = significant(first as f64 / measured.multiplications as f64, 3);
             let own = if row.number == 1 {
                 "nothing cheaper than the whole body holds every tolerance".to_owned()
@@ -375,7 +375,7 @@ fn verdict(trade: &Trade, rows: &[RowFacts<'_>]) -> String {
             };
             own + &growth(measured)
         }),
-        Recommendation::MostAccurate(row) => of(row).map_or_else(String::new, |(row, measured)| {
+        Recommendation::MostAccurate(row) => measured_row(row).map_or_else(String::new, |(row, measured)| {
             let ratio = significant(measured.worst, 3);
             let own = format!(
                 "{} is the most accurate for the allowed cost: {ratio} of the tolerance at the worst",
@@ -424,7 +424,7 @@ pub fn trade_csv(trade: &Trade) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
         let errors = m.map(|m| m.errors);
-        let count = |of: fn(&MeasuredFacts) -> u64| m.map_or_else(String::new, |m| of(m).to_string());
+        let count = |number: fn(&MeasuredFacts) -> u64| m.map_or_else(String::new, |m| number(m).to_string());
         let cells = [
             facts.number.to_string(),
             text(facts.source),

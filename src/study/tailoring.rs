@@ -12,7 +12,7 @@ use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Resume, Wanted};
 use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
 
-/// How a body is made for a scene.
+/// Settings of a conversion for a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tailoring {
     /// Settings of the conversion: what there is to select from.
@@ -33,8 +33,8 @@ impl Tailoring {
         resume: Resume<'_>,
         watch: Watch<'_>,
     ) -> Result<Conversion> {
-        let of_band = self.settings_of_band(scene);
-        let modal = self.find_modes(of_band.as_ref(), model, resume, watch)?;
+        let band_settings = self.settings_of_band(scene);
+        let modal = self.find_modes(band_settings.as_ref(), model, resume, watch)?;
         let condensed = modal.condense();
         modal.finish(condensed, watch)
     }
@@ -50,13 +50,15 @@ impl Tailoring {
     /// The modes that the band of a scene wants; those of the settings without a band, and for a body that is stiff in it.
     fn find_modes<'m>(
         &'m self,
-        of_band: Option<&'m ConvertSettings>,
+        band_settings: Option<&'m ConvertSettings>,
         model: &'m FeModel,
         resume: Resume<'_>,
         watch: Watch<'_>,
     ) -> Result<ModalModel<'m>> {
-        let Some(of_band) = of_band else { return ModalModel::find(model, &self.settings, resume, watch) };
-        match ModalModel::find(model, of_band, resume, watch) {
+        let Some(band_settings) = band_settings else {
+            return ModalModel::find(model, &self.settings, resume, watch);
+        };
+        match ModalModel::find(model, band_settings, resume, watch) {
             Err(error) if error.has(Code::NoModes) => {
                 ModalModel::find(model, &self.settings, Resume::default(), watch)
             }
@@ -103,8 +105,8 @@ pub fn convert_for_scene(
     watch: Watch<'_>,
 ) -> Result<(Conversion, Selection)> {
     let memory = tailoring.settings.modes.memory;
-    let of_band = tailoring.settings_of_band(scene);
-    let modal = tailoring.find_modes(of_band.as_ref(), model, resume, watch)?;
+    let band_settings = tailoring.settings_of_band(scene);
+    let modal = tailoring.find_modes(band_settings.as_ref(), model, resume, watch)?;
     // Rigid motion alone is multiplied by M before the scene has said which groups it may need.
     let linear = modal.condense_linear();
     let terms = rule_out(&modal.body(&linear)?, scene, memory)?;

@@ -43,7 +43,7 @@ impl Array {
     }
 }
 
-/// What the file holds of a body.
+/// Sizes, terms and arrays of a body as the file holds them.
 pub(crate) struct Content {
     /// T.
     pub translations: usize,
@@ -74,22 +74,22 @@ impl Content {
         let frames = frames(body, points);
         let mut places = Places::new(body, &frames, translations, axes);
         let arrays = ARRAYS.iter().map(|array| {
-            let of_equations = |matrix: &Option<Mat<f64>>| Some(Array::padded(matrix.as_ref()?, unit));
+            let padded = |matrix: &Option<Mat<f64>>| Some(Array::padded(matrix.as_ref()?, unit));
             let Constants { modal_mass, .. } = &constants;
             match array.name {
                 "rigid" => Some(Array::plain(constants.rigid.len(), Numbers::Real(constants.rigid.clone()))),
                 "linear" => Some(Array::padded(&constants.linear, unit)),
-                "w2" => of_equations(&constants.w2),
-                "w3" => of_equations(&constants.w3),
-                "w3_skew" => of_equations(&constants.w3_skew),
-                "acceleration" => of_equations(&constants.acceleration),
-                "modal_mass" => of_equations(&modal_mass.as_ref().map(|(matrix, _)| matrix.clone())),
+                "w2" => padded(&constants.w2),
+                "w3" => padded(&constants.w3),
+                "w3_skew" => padded(&constants.w3_skew),
+                "acceleration" => padded(&constants.acceleration),
+                "modal_mass" => padded(&modal_mass.as_ref().map(|(matrix, _)| matrix.clone())),
                 "modal_mass_factor" => {
                     let lower = modal_mass.as_ref().and_then(|(_, factor)| factor.as_ref());
-                    of_equations(&lower.map(|lower| lower.transpose().to_owned()))
+                    padded(&lower.map(|lower| lower.transpose().to_owned()))
                 }
                 "stiffness" => Some(Array::padded(&constants.stiffness, unit)),
-                "damping" => of_equations(&constants.damping),
+                "damping" => padded(&constants.damping),
                 name => places.take(name),
             }
         });
@@ -123,7 +123,7 @@ impl Places {
             rotation: Vec::new(),
             second: Vec::new(),
         };
-        let of = |rows: &Mat<f64>, k: usize| (0..nf).map(|j| rows[(k, j)]).collect::<Vec<f64>>();
+        let row = |rows: &Mat<f64>, k: usize| (0..nf).map(|j| rows[(k, j)]).collect::<Vec<f64>>();
         for frame in frames {
             let turned = places.rotation.len() / (nf * axes);
             let first = places.second.len() / (nf * nf);
@@ -141,9 +141,9 @@ impl Places {
                 components,
             ]);
             places.position.extend(&frame.position[..translations]);
-            (0..translations).for_each(|k| places.translation.extend(of(&frame.translation, k)));
+            (0..translations).for_each(|k| places.translation.extend(row(&frame.translation, k)));
             if let Some(rotation) = &frame.rotation {
-                (3 - axes..3).for_each(|k| places.rotation.extend(of(rotation, k)));
+                (3 - axes..3).for_each(|k| places.rotation.extend(row(rotation, k)));
             }
         }
         places

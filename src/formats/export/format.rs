@@ -9,7 +9,7 @@ pub trait ExportFormat: Sync {
     /// Name on the command line.
     fn name(&self) -> &'static str;
 
-    /// What reads it, in a few words.
+    /// Programs that read the format, in a few words.
     fn reader(&self) -> &'static str;
 
     /// Variants of the format, the usual one first; empty where there is a single one.

@@ -57,7 +57,7 @@ impl Hdf5Contents {
 }
 
 impl Hdf5Entry {
-    /// The same with a text attribute.
+    /// This entry with one more text attribute.
     pub(crate) fn with(mut self, attribute: &'static str, text: impl Into<String>) -> Self {
         self.attributes.push((attribute, text.into()));
         self

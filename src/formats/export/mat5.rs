@@ -2,7 +2,7 @@
 
 use faer::Mat;
 
-/// What a variable holds.
+/// Contents of a variable.
 pub(crate) enum Mat5Value<'a> {
     /// 64-bit floats.
     Matrix(&'a Mat<f64>),

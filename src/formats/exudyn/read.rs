@@ -261,12 +261,12 @@ impl Given {
     }
 
     fn phi_missed(&self, at: impl Fn(usize, usize) -> usize) -> f64 {
-        let of_mode = |j: usize| {
+        let missed_by_mode = |j: usize| {
             let skew = Vector3::from_fn(|a, _| self.phi_psi[(a, j)]).cross_matrix();
             let entry = |a: usize, b: usize| (self.phi_psi_tilde[(a, at(b, j))] - skew[(a, b)]).abs();
             let missed = (0..9).map(|ab| entry(ab / 3, ab % 3)).fold(0.0, worst);
             relative(missed, (self.mass * self.modal_mass[(j, j)]).abs().sqrt())
         };
-        (0..self.nf()).map(of_mode).fold(0.0, worst)
+        (0..self.nf()).map(missed_by_mode).fold(0.0, worst)
     }
 }

@@ -159,7 +159,7 @@ impl Take<'_> {
         })
     }
 
-    /// Both counts or none.
+    /// Number of the body and count of bodies: the file has both or neither.
     fn number(&mut self) -> Option<BodyNumber> {
         let paths = ["/source@body_number", "/source@bodies"];
         let there = paths.map(|path| self.scan.values.contains_key(path));

@@ -24,7 +24,7 @@ pub struct NamedArray {
     pub symbol: &'static str,
     /// With the unit names of the body: `kg^(1/2) m`.
     pub units: String,
-    /// What it is.
+    /// Description of the array.
     pub description: &'static str,
     /// Extents.
     pub shape: Vec<usize>,

@@ -215,11 +215,11 @@ fn of_group(held: TermGroup) -> Value {
     };
     let groups = || TABLE.iter().filter(|group| group.entries().any(|item| item.of == Some(held)));
     let all = |inner: &dyn Fn(&[&str]) -> Value| -> Value {
-        let of = |group: &Group| {
+        let schema = |group: &Group| {
             let items = group.entries().filter(|item| item.of == Some(held));
             within(group.path, "datasets", inner(&items.map(|item| item.name).collect::<Vec<_>>()))
         };
-        json!({ "allOf": groups().map(of).collect::<Vec<_>>() })
+        json!({ "allOf": groups().map(schema).collect::<Vec<_>>() })
     };
     let none = |names: &[&str]| {
         let never: Map<String, Value> = names.iter().map(|name| ((*name).to_owned(), json!(false))).collect();

@@ -21,7 +21,7 @@ use std::path::Path;
 /// A damaged file can break every entry of every scheme: enough to see the pattern.
 const MOST_PROBLEMS: usize = 200;
 
-/// What was found.
+/// The contents of a file that fit the table, and the problems of the rest.
 pub(super) struct Scan {
     file: std::path::PathBuf,
     /// Values by path, e.g. `/modes/residual` or `/source@model` for attributes.

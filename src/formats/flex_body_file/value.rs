@@ -138,12 +138,12 @@ mod tests {
     #[test]
     fn units_are_spelt_with_the_names_of_the_body() {
         let system = UnitSystem::parse("mm", "tonne", "0.5").expect("known units");
-        let of = |mass_halves, length, time| Units::Of { mass_halves, length, time }.concrete(&system);
-        assert_eq!(of(2, 2, 0), "tonne mm^2");
-        assert_eq!(of(1, 1, 0), "tonne^(1/2) mm");
-        assert_eq!(of(-1, 0, 0), "tonne^(-1/2)");
-        assert_eq!(of(4, 0, 1), "tonne^2 (0.5 s)");
-        assert_eq!(of(0, 0, -2), "(0.5 s)^-2");
+        let spelt = |mass_halves, length, time| Units::Of { mass_halves, length, time }.concrete(&system);
+        assert_eq!(spelt(2, 2, 0), "tonne mm^2");
+        assert_eq!(spelt(1, 1, 0), "tonne^(1/2) mm");
+        assert_eq!(spelt(-1, 0, 0), "tonne^(-1/2)");
+        assert_eq!(spelt(4, 0, 1), "tonne^2 (0.5 s)");
+        assert_eq!(spelt(0, 0, -2), "(0.5 s)^-2");
         assert_eq!((Units::One.concrete(&system), Units::Hertz.concrete(&system)), ("1".into(), "Hz".into()));
         assert_eq!(Units::Of { mass_halves: 1, length: 1, time: -2 }.symbolic(), "mass^(1/2) length time^-2");
     }

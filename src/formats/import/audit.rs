@@ -12,7 +12,7 @@ use faer::Mat;
 /// units; frames may stand for a part of a body only.
 const GYRATION: (f64, f64) = (0.02, 5.0);
 
-/// What an audit found.
+/// Facts and checks of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Audit {
     /// Name of the format.
@@ -36,12 +36,12 @@ pub struct Audit {
 }
 
 impl Audit {
-    /// What is wrong.
+    /// The diagnostics of the checks that failed.
     pub fn findings(&self) -> Vec<Diagnostic> {
         self.checks.iter().filter_map(AuditCheck::finding).collect()
     }
 
-    /// Whether nothing is.
+    /// Whether every check passed.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(AuditCheck::passed)
     }
@@ -55,8 +55,8 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
         Invariants::from_numbered(&body.inertia, body.modal_stiffness.clone(), tolerance.max(DIGITS));
     let mut checks = file.checks.clone();
     let mut notes = file.notes.clone();
-    let of_any_body = identities(&invariants, &ANY_BODY);
-    if let Some(cause) = of_any_body.iter().find(|check| is_cause_of_others(check)) {
+    let identities_of_any_body = identities(&invariants, &ANY_BODY);
+    if let Some(cause) = identities_of_any_body.iter().find(|check| is_cause_of_others(check)) {
         // What follows from it would only repeat it.
         checks.retain(|check| check.value.is_finite());
         checks.push(of_identity(cause.clone()));
@@ -64,7 +64,7 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
     } else {
         // Of a mass that does not commute with rotations no file tells W0, which this one needs.
         let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
-        checks.extend(of_any_body.into_iter().filter(told).map(of_identity));
+        checks.extend(identities_of_any_body.into_iter().filter(told).map(of_identity));
         checks.push(turns(body));
         checks.extend(modal_checks(&invariants));
         checks.extend(size(body));
@@ -73,7 +73,7 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
     for check in checks.iter_mut().filter(|check| is_identity(check.code)) {
         check.limit = check.limit.max(tolerance);
     }
-    let of_mode = |j: usize| {
+    let frequency = |j: usize| {
         let (k, m) = (body.modal_stiffness[(j, j)], body.inertia.i6[(j, j)]);
         (k / m).sqrt() / std::f64::consts::TAU
     };
@@ -84,7 +84,7 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
         mass: body.inertia.i1,
         n_modes: body.n_modes(),
         n_frames: body.frames.len(),
-        frequencies: (0..body.n_modes()).map(of_mode).collect(),
+        frequencies: (0..body.n_modes()).map(frequency).collect(),
         notes,
         checks,
     }
@@ -256,7 +256,7 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     ]
 }
 
-/// What the modes are.
+/// Whether the modes are mass-normalised free-surface modes, in words.
 fn kind_of_modes(invariants: &Invariants) -> String {
     match is_free_surface(invariants) {
         None => "modes are mass-normalised free-surface modes".to_owned(),

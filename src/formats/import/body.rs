@@ -30,7 +30,7 @@ pub struct ImportedBody {
 /// A node or frame of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedFrame {
-    /// What the file calls it.
+    /// Label in the file.
     pub label: String,
     /// Name of the interface that it is, where the file says so.
     pub interface: Option<String>,

@@ -5,7 +5,7 @@
 pub(crate) struct Digits {
     /// Most decimals of numbers without an exponent, where there are such.
     fixed: Option<u32>,
-    /// Whether there are numbers with one.
+    /// Whether there are numbers with an exponent.
     exponents: bool,
     /// Most significant digits of any number.
     significant: u32,
@@ -71,17 +71,17 @@ mod tests {
 
     #[test]
     fn half_a_unit_of_the_last_digit() {
-        let of = |texts: &[&str]| {
+        let seen_in = |texts: &[&str]| {
             let mut digits = Digits::default();
             texts.iter().for_each(|text| digits.see(text));
             digits
         };
-        let six = of(&["0.123456", "1.5", "-12.000001"]);
+        let six = seen_in(&["0.123456", "1.5", "-12.000001"]);
         assert!((six.rounding(3.0) - 5e-7).abs() < 1e-20);
-        let scientific = of(&["1.23456D+03", "-0.00D+00"]);
+        let scientific = seen_in(&["1.23456D+03", "-0.00D+00"]);
         assert!((scientific.rounding(1.0) - 5e-6).abs() < 1e-18);
-        let full = of(&["7", "1e-05", "0.12345678901234567"]);
+        let full = seen_in(&["7", "1e-05", "0.12345678901234567"]);
         assert!(full.rounding(7.0) < 1e-15);
-        assert!(full.are_few() && !of(&["1.5"; FEW]).are_few() && of(&["0.0"; FEW]).are_few());
+        assert!(full.are_few() && !seen_in(&["1.5"; FEW]).are_few() && seen_in(&["0.0"; FEW]).are_few());
     }
 }

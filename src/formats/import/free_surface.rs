@@ -68,8 +68,8 @@ impl FreeSurface {
         };
         let nf = invariants.n_modes();
         let mass = invariants.mass_matrix();
-        let of_rigid = mass.as_ref().submatrix(0, 0, 6, 6).to_owned();
-        let Some(lower) = dense_cholesky(of_rigid) else {
+        let rigid = mass.as_ref().submatrix(0, 0, 6, 6).to_owned();
+        let Some(lower) = dense_cholesky(rigid) else {
             return refuse("the mass matrix of rigid motion is not positive definite");
         };
         let whitened = solve_lower(&lower, &mass.as_ref().submatrix(0, 6, 6, nf).to_owned());
@@ -98,20 +98,20 @@ impl FreeSurface {
         let Some(eigen) = eigen.filter(|eigen| eigen.values.first().is_some_and(|first| *first > 0.0)) else {
             return refuse("the stiffness of the modes is not positive definite beside their mass");
         };
-        let of_kept = solve_upper(&factor, &eigen.vectors);
+        let kept_modes = solve_upper(&factor, &eigen.vectors);
         let mut modes = Mat::zeros(nf, kept.len());
         for j in 0..kept.len() {
             // The largest part of each new mode keeps its sign.
             let largest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
-            let sign = of_kept.col(j).iter().fold(0.0, largest).signum();
+            let sign = kept_modes.col(j).iter().fold(0.0, largest).signum();
             for (i, &row) in kept.iter().enumerate() {
-                modes[(row, j)] = sign * of_kept[(i, j)];
+                modes[(row, j)] = sign * kept_modes[(i, j)];
             }
         }
         Ok(Self { rigid: solve_upper(&lower, &whitened), modes, dropped })
     }
 
-    /// What is to be said.
+    /// The note that the modes were changed: those of the file miss the identities of free-surface modes by `missed`.
     pub(crate) fn note(&self, missed: f64) -> Diagnostic {
         let mut message = format!(
             "modes of the file are no mass-normalised free-surface modes (by {missed:.1e}): they were made such"

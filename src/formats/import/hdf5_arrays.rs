@@ -66,7 +66,7 @@ impl Hdf5Arrays {
         self.missing(&[name]).is_empty()
     }
 
-    /// What is wrong with a dataset.
+    /// The error that says what is wrong with a dataset.
     pub(crate) fn refuse(&self, name: &str, what: &str) -> Error {
         Diagnostic::new(Code::ForeignUnreadable, format!("`{name}`: {what}")).in_file(&self.path).into()
     }

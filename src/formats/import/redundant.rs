@@ -40,10 +40,10 @@ impl<'n> Redundant<'n> {
     pub(crate) fn i4_of_i8(&self) -> f64 {
         let told = self.told;
         let missed = |j: usize| {
-            let of_axis = |(a, b, c): (usize, usize, usize)| {
+            let missed_along = |(a, b, c): (usize, usize, usize)| {
                 told.i4[(c, j)] - (told.i8[j][(a, b)] - told.i8[j][(b, a)])
             };
-            CYCLIC.map(of_axis).into_iter().map(f64::abs).fold(0.0, worst)
+            CYCLIC.map(missed_along).into_iter().map(f64::abs).fold(0.0, worst)
         };
         (0..self.nf()).map(|j| relative(missed(j), self.extent * self.modes[j])).fold(0.0, worst)
     }
@@ -63,9 +63,9 @@ impl<'n> Redundant<'n> {
         let nf = self.nf();
         self.of_pairs(|j, k| {
             let at = |a: usize, b: usize| i9[(a * nf + j, b * nf + k)];
-            let of_axis =
+            let missed_along =
                 |(a, b, c): (usize, usize, usize)| (i5[(c * nf + j, k)] - (at(b, a) - at(a, b))).abs();
-            CYCLIC.map(of_axis).into_iter().fold(0.0, worst)
+            CYCLIC.map(missed_along).into_iter().fold(0.0, worst)
         })
     }
 

@@ -47,13 +47,13 @@ fn digits(records: &Records) -> AuditCheck {
 
 /// What MBDyn skips without a word. A matrix of another size than the header says is then read wrong.
 fn surplus(records: &Records) -> AuditCheck {
-    let of_group = |(group, surplus): &(Option<usize>, Surplus)| {
+    let in_words = |(group, surplus): &(Option<usize>, Surplus)| {
         let zeros = if surplus.zero { ", all zero" } else { "" };
         let place =
             group.map_or("before record group 1".to_owned(), |group| format!("after record group {group}"));
         format!("{} words{zeros}, in line {} {place}", surplus.words, surplus.line)
     };
-    let all: Vec<String> = records.skipped.iter().map(of_group).collect();
+    let all: Vec<String> = records.skipped.iter().map(in_words).collect();
     AuditCheck {
         name: "no_more_than_the_header_says",
         formula: "number of words beyond those of the header",

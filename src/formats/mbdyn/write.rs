@@ -138,10 +138,10 @@ fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
         LoadKind::AngularAcceleration => 7,
         LoadKind::Acceleration => 10,
         LoadKind::Force(at) | LoadKind::Moment(at) => {
-            let of_interface = |place: &ExportFrame| place.name.as_ref() == Some(at);
-            let index = places.iter().position(of_interface)?;
+            let is_there = |place: &ExportFrame| place.name.as_ref() == Some(at);
+            let index = places.iter().position(is_there)?;
             // A load at several nodes is none of theirs.
-            if places[index + 1..].iter().any(of_interface) {
+            if places[index + 1..].iter().any(is_there) {
                 return None;
             }
             LOADS_OF_MOTION + 1 + 6 * index + if matches!(load.kind, LoadKind::Moment(_)) { 3 } else { 0 }

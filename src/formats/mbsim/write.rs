@@ -58,11 +58,11 @@ fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
     }
     let modal_mass = invariants.modal_mass();
     let nf = body.n_modes();
-    let of_w2 = |a: usize, j: usize, k: usize| if invariants.groups.w2 { s(a)[(j, k)] } else { 0.0 };
+    let held = |a: usize, j: usize, k: usize| if invariants.groups.w2 { s(a)[(j, k)] } else { 0.0 };
     [0, 1, 2].map(|a| {
         Mat::from_fn(nf, nf, |j, k| {
-            let sum: f64 = (0..3).map(|c| of_w2(c, j, k)).sum();
-            of_w2(a, j, k) + (modal_mass[(j, k)] - sum) / 3.0
+            let sum: f64 = (0..3).map(|c| held(c, j, k)).sum();
+            held(a, j, k) + (modal_mass[(j, k)] - sum) / 3.0
         })
     })
 }

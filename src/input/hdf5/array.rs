@@ -5,7 +5,7 @@ use super::values::{Found, Numbers};
 use super::{DEPTH, GROUPS, layout};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
-use crate::input::shapes::Array;
+use crate::input::array::Array;
 use hdf5_metno::{File, Group};
 
 /// Reads the dataset `name`, or the only array of the file.

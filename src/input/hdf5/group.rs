@@ -2,7 +2,7 @@
 //! anndata, MATLAB and PETSc (`docs/input.md`).
 
 use super::super::assemble::{
-    Columns, Entry, Sides, Storage, assemble, assemble_columns, check_size, push, undeclared_triangle,
+    ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, check_size, push, undeclared_triangle,
 };
 use super::members::{Members, POINTERS};
 use super::values::{Found, Vector, integers_of, text_of, truth_of};
@@ -78,9 +78,9 @@ struct Parsed {
     single_precision: bool,
 }
 
-/// What a group stores.
+/// The entries of a matrix, in the order in which its group stores them.
 enum Entries {
-    Columns(Columns),
+    Columns(ColumnEntries),
     Listed(Vec<Vec<Entry>>),
 }
 
@@ -125,7 +125,7 @@ impl GroupReader<'_> {
             ]);
         }
         // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to say.
-        let mut columns = Columns::with_room(n, entries);
+        let mut columns = ColumnEntries::with_room(n, entries);
         let mut major = 0usize;
         let place = |k: usize, [index]: [i64; 1]| {
             while pointer_values[major + 1] <= k as i64 {

@@ -6,7 +6,7 @@ use super::text::Blocks;
 use super::{Compression, broken, written_digits};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
-use crate::input::shapes::Array;
+use crate::input::array::Array;
 
 /// Values whose written digits are counted.
 const COUNTED: usize = 4096;

@@ -11,7 +11,7 @@ pub(super) enum Symmetry {
     General,
 }
 
-/// What the head of the file says.
+/// Sizes and symmetry that the head of the file states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header {
     pub integer: bool,

@@ -27,8 +27,8 @@ impl EquationsOfMotion {
         let (nf, r, a, t) = (self.nf, self.rigid.len(), self.axes.len(), self.translations());
         let panels = |panels: &Option<Panels>| panels.as_ref().map_or(0, |panels| panels.padded_rows() * nf);
         let there = |panels: &Option<Panels>, count: usize| if panels.is_some() { count * nf } else { 0 };
-        let of_w1 = if self.terms().w1 { PAIRS.len() * nf } else { 0 };
-        let linear = 2 * self.linear_panels.padded_rows() * nf + (3 + 9) * nf + of_w1;
+        let w1 = if self.terms().w1 { PAIRS.len() * nf } else { 0 };
+        let linear = 2 * self.linear_panels.padded_rows() * nf + (3 + 9) * nf + w1;
         let w2 = panels(&self.w2) + there(&self.w2, 3 * self.pairs.len());
         let w3 = 2 * panels(&self.w3) + there(&self.w3, 2 * a) + panels(&self.w3_skew);
         let accelerated = 2 * panels(&self.accelerated) + there(&self.accelerated, 5 * t);

@@ -68,7 +68,7 @@ pub struct EquationsOfMotion {
     pub(super) inertia: Matrix3<f64>,
     /// What is linear in q ([`LINEAR`] x nf, row-major): W0 (row 3 k + b), W1 ([`PAIRS`]), C1, C2.
     pub(super) linear: Vec<f64>,
-    /// The same for products.
+    /// The same matrix, laid out for products.
     pub(super) linear_panels: Panels,
     /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`, less geometric stiffness for spin: T sees no more of W2.
     pub(super) w2: Option<Panels>,

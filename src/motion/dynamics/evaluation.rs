@@ -120,7 +120,7 @@ impl<'a> Evaluation<'a> {
         });
     }
 
-    /// What depends on q alone.
+    /// Sets everything that depends on q alone.
     #[inline(always)] // compiled once per instruction set
     pub(super) fn deform(&mut self) {
         let body = self.equations;
@@ -159,7 +159,7 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// What depends on the velocities, after [`Evaluation::deform`].
+    /// Sets everything that depends on the velocities too, after [`Evaluation::deform`].
     #[inline(always)] // compiled once per instruction set
     pub(super) fn move_on(&mut self) {
         let c1_rate_qd = self.set_lever_and_inertia_rates();

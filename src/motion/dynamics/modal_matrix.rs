@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 /// K_ff, D or m_ff (nf x nf).
 #[derive(Debug, Clone)]
 pub(super) enum ModalMatrix {
-    /// Its diagonal.
+    /// The diagonal of a diagonal matrix.
     Diagonal(Vec<f64>),
     /// Row-major.
     Full { n: usize, entries: Vec<f64> },

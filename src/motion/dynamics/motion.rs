@@ -12,7 +12,7 @@ const LEAST_DEFORMATION: f64 = 1e-6;
 /// The scale of vibration is at least this part of that of the whole internal motion.
 const LEAST_VIBRATION: f64 = 1e-3;
 
-/// What acts on a body from outside.
+/// Forces on a body from outside, and motion that is prescribed.
 pub trait Surroundings {
     /// Adds the generalised forces (F, tau, Q) in body axes at the state of `evaluation` ([`EquationsOfMotion`]).
     fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]);
@@ -58,7 +58,7 @@ pub struct Motion<'a> {
     rates: Vec<f64>,
 }
 
-/// What motion is measured against.
+/// Mass, length and rates of a body, which its motion is measured against.
 #[derive(Debug, Clone)]
 struct Size {
     mass: f64,

@@ -28,8 +28,8 @@ impl PointMotion {
     fn with_geometric_stiffness(mut self, body: &FlexBody, kind: &LoadKind) -> Self {
         if let Some(entry) = geometric_stiffness(body, kind) {
             let matrix = |k: usize| Mat::from_fn(self.nf, self.nf, |i, j| entry(k, i, j));
-            let of_axis = |&k: &usize| (k, ModalMatrix::new(matrix(k).as_ref(), 0.0));
-            self.second = kind.of_dimension(body.dimension()).iter().map(of_axis).collect();
+            let stiffness = |&k: &usize| (k, ModalMatrix::new(matrix(k).as_ref(), 0.0));
+            self.second = kind.of_dimension(body.dimension()).iter().map(stiffness).collect();
         }
         self
     }
@@ -103,12 +103,12 @@ impl BodyPoint {
     /// When the index is not below the number of nodes.
     pub fn node(body: &FlexBody, node: usize) -> Self {
         let (modes, nf) = (body.modes(), body.n_modes());
-        let of = |shape: &Mat<f64>| PointMotion::new(nf, |k, j| shape[(3 * node + k, j)]);
+        let motion = |shape: &Mat<f64>| PointMotion::new(nf, |k, j| shape[(3 * node + k, j)]);
         // Nodes without rotations have zeros in their place.
-        let rotation = modes.rotation.as_ref().map(of).filter(|rows| rows.rows.iter().any(|v| *v != 0.0));
+        let rotation = modes.rotation.as_ref().map(motion).filter(|rows| rows.rows.iter().any(|v| *v != 0.0));
         Self {
             position: Vector3::from(body.nodes().positions[node]),
-            translation: of(&modes.shape),
+            translation: motion(&modes.shape),
             rotation,
         }
     }
@@ -131,7 +131,7 @@ impl BodyPoint {
         })
     }
 
-    /// Whether it has an orientation.
+    /// Whether the point has an orientation.
     pub fn turns(&self) -> bool {
         self.rotation.is_some()
     }
@@ -262,9 +262,9 @@ impl BodyPoint {
         jacobian.check(body);
         let (map, slope) = (turn.map(), turn.map_derivative(torque));
         for i in 0..body.nf {
-            let of_row = slope.tr_mul(&rotation.column(i, q));
+            let slope_of_mode = slope.tr_mul(&rotation.column(i, q));
             for (j, entry) in jacobian.modal_row(body, i).iter_mut().enumerate() {
-                *entry += of_row.dot(&rotation.column(j, q));
+                *entry += slope_of_mode.dot(&rotation.column(j, q));
             }
         }
         self.add_second(evaluation, rotation, &(map * torque), jacobian);

@@ -5,12 +5,12 @@ use crate::base::provenance::SourceFile;
 use crate::motion::dynamics::Terms;
 use nalgebra::Vector3;
 
-/// What a body is to do.
+/// A scene: start, loads and prescribed motion of a body, and how that is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Name.
     pub name: String,
-    /// How it is simulated.
+    /// Duration, instants and method of the simulation.
     pub run: Run,
     /// The state at time zero.
     pub initial: Initial,
@@ -24,7 +24,7 @@ pub struct Scene {
     pub carried: Option<Carried>,
     /// Places whose paths are recorded.
     pub watched: Vec<Point>,
-    /// What is demanded of the body.
+    /// Demands on a body that is made for the scene.
     pub requirements: Requirements,
     /// The file that it was read from.
     pub source: Option<SourceFile>,
@@ -83,7 +83,7 @@ impl Scene {
     }
 }
 
-/// How a scene is simulated.
+/// Duration, instants and method of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// From time zero to this; `None` where nothing is to be simulated.
@@ -147,7 +147,7 @@ pub struct ModeStart {
     pub mode: usize,
     /// Modal coordinate.
     pub amplitude: f64,
-    /// Its rate.
+    /// Rate of the modal coordinate.
     pub rate: f64,
 }
 
@@ -200,7 +200,7 @@ pub struct Spin {
 /// An interface, or a node with rotations, whose motion is prescribed; the rest of the body hangs from it. Without motion it is held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
-    /// What is carried.
+    /// The interface or node that carries the body.
     pub by: Point,
     /// Rotation about an axis.
     pub spin: Option<CarriedSpin>,
@@ -242,7 +242,7 @@ pub enum Drive {
 }
 
 impl Drive {
-    /// What is given.
+    /// The history of the way, the velocity or the acceleration, whichever is given.
     pub fn history(&self) -> &History {
         match self {
             Self::Displacement(history) | Self::Velocity(history) | Self::Acceleration(history) => history,

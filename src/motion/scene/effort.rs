@@ -34,7 +34,7 @@ pub(super) fn longest_step(scene: &Scene, duration: f64) -> f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Effort {
     steps: f64,
-    /// What makes them so many.
+    /// The reason for their number, for messages.
     because: String,
 }
 
@@ -45,22 +45,25 @@ impl Effort {
     /// FB551 where the step is given and longer than half a period of a load.
     pub fn plan(body: &FlexBody, scene: &Scene, duration: f64) -> Result<(Scheme, Self)> {
         let fastest_mode = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt() / TAU;
-        let of_history = fastest_history(scene);
-        let of_load = format!("a load or spin oscillates {of_history:.3e} times per time");
-        let of_mode = format!("the fastest mode oscillates {fastest_mode:.3e} times per time");
+        let fastest_load = fastest_history(scene);
+        let load_in_words = format!("a load or spin oscillates {fastest_load:.3e} times per time");
+        let mode_in_words = format!("the fastest mode oscillates {fastest_mode:.3e} times per time");
         match scene.run.scheme {
             Scheme::Adaptive { .. } => {
                 let for_modes = duration * fastest_mode * TAU / STABLE;
-                let for_histories = duration * of_history * STEPS_PER_OSCILLATION;
-                let (steps, because) =
-                    if for_histories > for_modes { (for_histories, of_load) } else { (for_modes, of_mode) };
+                let for_histories = duration * fastest_load * STEPS_PER_OSCILLATION;
+                let (steps, because) = if for_histories > for_modes {
+                    (for_histories, load_in_words)
+                } else {
+                    (for_modes, mode_in_words)
+                };
                 Ok((scene.run.scheme, Self { steps, because }))
             }
             Scheme::Conserving { order, step: Some(step) } => {
                 let step = step.min(duration);
-                if step * of_history * STEPS_PER_OSCILLATION > 1.0 {
-                    let message = format!("{of_load}: steps of {step:e} pass over it");
-                    let longest = 1.0 / (STEPS_PER_PERIOD * of_history);
+                if step * fastest_load * STEPS_PER_OSCILLATION > 1.0 {
+                    let message = format!("{load_in_words}: steps of {step:e} pass over it");
+                    let longest = 1.0 / (STEPS_PER_PERIOD * fastest_load);
                     let help = format!("give a `step` of {longest:.3e} or less, or none");
                     return Err(Diagnostic::new(Code::StepPassesOver, message).with_help(help).into());
                 }
@@ -68,9 +71,9 @@ impl Effort {
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))
             }
             Scheme::Conserving { order, step: None } => {
-                let (fastest, because) = match of_history > fastest_mode {
-                    true => (of_history, of_load),
-                    false => (fastest_mode, of_mode),
+                let (fastest, because) = match fastest_load > fastest_mode {
+                    true => (fastest_load, load_in_words),
+                    false => (fastest_mode, mode_in_words),
                 };
                 let step = (1.0 / (STEPS_PER_PERIOD * fastest)).min(duration);
                 Ok((Scheme::Conserving { order, step: Some(step) }, Self { steps: duration / step, because }))

@@ -2,7 +2,7 @@
 
 use super::lively::{LivelyNodes, along_axes, longest};
 use super::peak::Peak;
-use super::{Tolerance, Trace};
+use super::{Tolerance, Trace, larger, not_negative};
 use crate::body::flex_body::FlexBody;
 use crate::motion::dynamics::EulerParameters;
 use faer::MatRef;
@@ -43,7 +43,7 @@ impl OutputErrors {
             ratio(self.stress, tolerance.stress),
             ratio(self.reaction, tolerance.reaction),
         ];
-        largest(ratios.iter())
+        ratios.into_iter().fold(0.0, larger)
     }
 
     /// The output whose error is largest beside its tolerance: its name, the error, and the tolerance.
@@ -71,51 +71,46 @@ impl OutputErrors {
 pub struct ErrorHistory {
     /// Where the motion was looked at.
     pub time: Vec<f64>,
-    /// Of the attitude.
+    /// Errors of the attitude.
     pub attitude: Vec<f64>,
-    /// Of deflections.
+    /// Errors of the deflections.
     pub deflection: Option<Vec<f64>>,
-    /// Of the elastic energy.
+    /// Errors of the elastic energy.
     pub stress: Option<Vec<f64>>,
-    /// Of force and torque.
+    /// Errors of force and torque.
     pub reaction: Option<Vec<f64>>,
 }
 
 impl ErrorHistory {
     /// The largest errors, also between the places where the motion was looked at.
     pub fn largest(&self) -> OutputErrors {
-        let of = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
+        let peak = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
         OutputErrors {
-            attitude: of(&self.attitude),
-            deflection: self.deflection.as_deref().map(of),
-            stress: self.stress.as_deref().map(of),
-            reaction: self.reaction.as_deref().map(of),
+            attitude: peak(&self.attitude),
+            deflection: self.deflection.as_deref().map(peak),
+            stress: self.stress.as_deref().map(peak),
+            reaction: self.reaction.as_deref().map(peak),
         }
     }
 
     /// The largest error in the second half of the run relative to that in the first half, of the output where this is most; about 1
     /// for errors that stay bounded, 2 and more for a phase that runs away. `None` without an error in the first half.
     pub fn growth(&self) -> Option<f64> {
-        let of = |history: &Vec<f64>| {
+        let growth = |history: &Vec<f64>| {
             let (before, after) = self.halves(history);
             (before > 0.0).then_some(after / before)
         };
         let others = [&self.deflection, &self.stress, &self.reaction];
         let all = others.into_iter().flatten().chain([&self.attitude]);
-        all.filter_map(of).reduce(f64::max)
+        all.filter_map(growth).reduce(f64::max)
     }
 
     /// The largest of `values` along the motion in the first half of the run, and in the second.
     pub fn halves(&self, values: &[f64]) -> (f64, f64) {
         let end = self.time.last().copied().unwrap_or(0.0);
         let (first, second) = values.split_at(self.time.partition_point(|&time| time <= 0.5 * end));
-        (largest(first.iter()), largest(second.iter()))
+        (first.iter().copied().fold(0.0, larger), second.iter().copied().fold(0.0, larger))
     }
-}
-
-/// The largest of values that are not negative; not a number where one of them is not.
-fn largest<'v>(values: impl Iterator<Item = &'v f64>) -> f64 {
-    values.fold(0.0, |most, &value| if value > most || value.is_nan() { value } else { most })
 }
 
 /// How far apart the deformations of two motions are, along the motion.
@@ -138,8 +133,7 @@ impl ErrorHistory {
     pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
         assert!(reference.time == candidate.time, "motions that were looked at in the same places");
         let (mass, radius) = reference.size;
-        let largest_of = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let peak_of = |values: &mut dyn Iterator<Item = f64>| Peak::of(&reference.time, values).value;
+        let peak = |values: &mut dyn Iterator<Item = f64>| Peak::of(&reference.time, values).value;
         let (motion, spin) = (reference.extremes.internal, reference.extremes.spin);
         let relative = |values: Vec<f64>, scale: f64, none: f64| {
             (scale > none).then(|| values.into_iter().map(|value| value / scale).collect::<Vec<_>>())
@@ -151,28 +145,28 @@ impl ErrorHistory {
             (apart.deflection.clone(), apart.largest_deflection)
         } else {
             let pairs = || reference.deflections.iter().zip(&candidate.deflections);
-            let at = |i: usize| largest_of(&mut pairs().map(|(a, b)| (a[i] - b[i]).norm()));
+            let at = |i: usize| pairs().map(|(a, b)| (a[i] - b[i]).norm()).fold(0.0, larger);
             let paths = reference.deflections.iter();
-            let largest = paths.map(|path| peak_of(&mut path.iter().map(|d| d.norm())));
-            ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, f64::max))
+            let largest = paths.map(|path| peak(&mut path.iter().map(|d| d.norm())));
+            ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, larger))
         };
-        let energy = peak_of(&mut reference.elastic.iter().map(|energy| energy.max(0.0).sqrt()));
+        let energy = peak(&mut reference.elastic.iter().map(|energy| energy.max(0.0).sqrt()));
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
         let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
-            let of = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
+            let difference = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
                 let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
-                let largest = peak_of(&mut a.iter().map(|a| part(a).norm()));
+                let largest = peak(&mut a.iter().map(|a| part(a).norm()));
                 // Forces that are rounding are no forces, however small the least that counts.
                 let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
                 (largest > NO_TORQUE * motion / lever)
                     .then(|| relative(differences, largest.max(least), 0.0))
                     .flatten()
             };
-            let force = of(|both| both.0, radius);
-            let torque = of(|both| both.1, 1.0);
+            let force = difference(|both| both.0, radius);
+            let torque = difference(|both| both.1, 1.0);
             match (force, torque) {
                 (Some(force), Some(torque)) => {
-                    Some(force.into_iter().zip(torque).map(|(a, b)| a.max(b)).collect())
+                    Some(force.into_iter().zip(torque).map(|(a, b)| larger(a, b)).collect())
                 }
                 (force, torque) => force.or(torque),
             }
@@ -225,7 +219,7 @@ impl<'r> Measure<'r> {
         self.body
     }
 
-    /// Its motion.
+    /// The motion of the reference.
     pub fn trace(&self) -> &'r Trace {
         self.trace
     }
@@ -255,7 +249,7 @@ impl<'r> Measure<'r> {
         let apart = self.apart(candidate, |reference, own| {
             let q = DVector::from_column_slice(own);
             let difference = &modes.map * &q - DVector::from_column_slice(reference);
-            let outside = (&modes.outside * &q).dot(&q).max(0.0);
+            let outside = not_negative((&modes.outside * &q).dot(&q));
             let displacements = rows.displacements(own).zip(self.rows.displacements(reference));
             let deflection = longest(displacements.map(|(own, reference)| own - reference));
             (0.5 * (quadratic(energy.as_ref(), difference.as_slice()) + outside), deflection)
@@ -263,8 +257,9 @@ impl<'r> Measure<'r> {
         ErrorHistory::new(self.trace, candidate, &apart)
     }
 
-    fn apart(&self, candidate: &Trace, of: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
-        let (energy, deflection) = self.trace.q.iter().zip(&candidate.q).map(|(a, b)| of(a, b)).unzip();
+    fn apart(&self, candidate: &Trace, difference: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
+        let (energy, deflection) =
+            self.trace.q.iter().zip(&candidate.q).map(|(a, b)| difference(a, b)).unzip();
         Apart { energy, deflection, largest_deflection: self.largest_deflection }
     }
 }
@@ -294,13 +289,13 @@ impl<'c> OtherModes<'c> {
         if !same || (shared.nrows(), shared.ncols()) != (nc, nr) {
             return None;
         }
-        let of = |body: &FlexBody| {
+        let stiffness = |body: &FlexBody| {
             let k = &body.invariants().modal_stiffness;
             DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
         };
         let transposed = DMatrix::from_fn(nr, nc, |i, j| shared[(j, i)]);
-        let map = of(reference).cholesky()?.solve(&transposed);
-        let outside = of(candidate) - transposed.tr_mul(&map);
+        let map = stiffness(reference).cholesky()?.solve(&transposed);
+        let outside = stiffness(candidate) - transposed.tr_mul(&map);
         Some(Self { body: candidate, map, outside })
     }
 }
@@ -309,5 +304,5 @@ impl<'c> OtherModes<'c> {
 fn quadratic(a: MatRef<'_, f64>, x: &[f64]) -> f64 {
     let column =
         |(j, xj): (usize, &f64)| xj * x.iter().enumerate().map(|(i, xi)| a[(i, j)] * xi).sum::<f64>();
-    x.iter().enumerate().map(column).sum::<f64>().max(0.0)
+    not_negative(x.iter().enumerate().map(column).sum::<f64>())
 }

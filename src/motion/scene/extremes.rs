@@ -1,5 +1,6 @@
 //! The largest of everything over a continuous motion.
 
+use super::larger::{larger, not_negative};
 use super::lively::{LivelyNodes, longest_of_all};
 use super::peak::Peak;
 use crate::body::flex_body::FlexBody;
@@ -202,7 +203,7 @@ impl Differences {
     fn see(&mut self, now: &Balance) {
         let first = *self.first.get_or_insert(*now);
         let total = |balance: &Balance| balance.kinetic + balance.elastic;
-        let raise = |most: &mut f64, value: f64| *most = most.max(value);
+        let raise = |most: &mut f64, value: f64| *most = larger(*most, value);
         raise(&mut self.energy, (total(now) - total(&first) - now.work).abs());
         raise(&mut self.linear, (now.linear - first.linear - now.impulse).norm());
         raise(&mut self.angular, (now.angular - first.angular - now.angular_impulse).norm());
@@ -216,7 +217,7 @@ impl Differences {
         let energy = internal.max(self.work).max(least_energy);
         let momentum = (2.0 * mass * energy).sqrt();
         // A body at rest, or one that only flies, has no energy that rounding could be relative to.
-        let difference = (self.energy - ROUNDINGS * f64::EPSILON * self.total).max(0.0);
+        let difference = not_negative(self.energy - ROUNDINGS * f64::EPSILON * self.total);
         Drift {
             energy: difference / energy,
             linear: self.linear / self.most_linear.max(momentum),

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 /// A value as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum History {
-    /// The same at all times.
+    /// One value at all times.
     Constant(f64),
     /// Straight lines between points with ascending times; constant before the first and after the last.
     Table {
@@ -32,7 +32,7 @@ pub enum History {
         to: f64,
         /// When it begins.
         start: f64,
-        /// How long it takes.
+        /// Duration of the ramp.
         duration: f64,
     },
 }
@@ -181,7 +181,8 @@ mod tests {
         for history in histories {
             for i in 0..60 {
                 let (time, step) = (-0.513 + 0.07 * f64::from(i), 1e-5);
-                let slope_of = |of: &dyn Fn(f64) -> f64| (of(time + step) - of(time - step)) / (2.0 * step);
+                let slope_of =
+                    |value: &dyn Fn(f64) -> f64| (value(time + step) - value(time - step)) / (2.0 * step);
                 let near = |slope: f64, rate: f64| {
                     assert!((slope - rate).abs() < 1e-6, "{history:?} at {time}: {slope}, {rate}");
                 };

@@ -1,5 +1,6 @@
 //! The nodes that move most: enough to know how far a body is deflected.
 
+use super::larger::larger;
 use crate::body::flex_body::FlexBody;
 use faer::MatRef;
 use nalgebra::Vector3;
@@ -31,11 +32,11 @@ impl LivelyNodes {
     /// Displacements of the nodes.
     pub fn displacements<'s>(&'s self, q: &'s [f64]) -> impl Iterator<Item = Vector3<f64>> + 's {
         let product = move |row: &[f64]| row.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
-        let of_node = move |rows: &[f64]| {
+        let displacement = move |rows: &[f64]| {
             let mut rows = rows.chunks_exact(q.len());
             Vector3::from_fn(|_, _| rows.next().map_or(0.0, product))
         };
-        self.rows.chunks_exact(3 * self.nf.max(1)).map(of_node)
+        self.rows.chunks_exact(3 * self.nf.max(1)).map(displacement)
     }
 
     /// The longest displacement.
@@ -65,7 +66,7 @@ fn distinct(mut nodes: Vec<usize>) -> Vec<usize> {
 
 /// The longest of displacements.
 pub(super) fn longest(displacements: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    displacements.map(|d| d.norm()).fold(0.0, f64::max)
+    displacements.map(|d| d.norm()).fold(0.0, larger)
 }
 
 /// The longest displacement of any node of `body` with the modal coordinates `q`.

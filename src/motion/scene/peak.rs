@@ -12,7 +12,7 @@ const UNEVEN: f64 = 8.0;
 pub struct Peak {
     /// The largest value.
     pub value: f64,
-    /// Its time.
+    /// Time of the largest value.
     pub time: f64,
     /// Times and squares of the last two instants, the earlier first.
     last: [Option<(f64, f64)>; 2],

@@ -44,7 +44,7 @@ pub(super) struct Finished {
 /// Force and torque about the origin of the frame, axes of the body, that a prescribed motion takes.
 pub(super) type Reaction = (Vector3<f64>, Vector3<f64>);
 
-/// Why an integration ends early.
+/// Reasons for an integration to end early.
 pub(super) enum Stop {
     Failed(Failure),
     /// There is no memory for more of the motion than until then.

@@ -50,7 +50,7 @@ fn translation(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option
         walk.wrong(span.clone(), "key `direction` is missing in [carried.translation]".to_owned());
     }
     let direction = direction(walk, table, "direction");
-    /// What a history drives.
+    /// Makes a drive of a history.
     type Driven = fn(History) -> Drive;
     let kinds: [(&str, Driven); 3] = [
         ("displacement", Drive::Displacement),

@@ -21,13 +21,13 @@ pub struct Recording {
     pub states: Vec<Configuration>,
     /// Energies, momenta, work and impulses at every instant.
     pub balances: Vec<Balance>,
-    /// What the numbers mean.
+    /// The frame that the numbers refer to, and what the body is exposed to.
     pub setting: Setting,
     /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes; none without.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
     /// Paths of the watched points.
     pub paths: Vec<Path>,
-    /// What the integration did.
+    /// Steps and evaluations of the integration.
     pub work: Work,
     /// The largest of everything, also between the instants.
     pub extremes: Extremes,
@@ -38,7 +38,7 @@ pub struct Recording {
 /// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model and turn with the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// What carries the body.
+    /// Name of the interface or node that carries the body.
     pub carrier: Option<String>,
     /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the reference point of what carries it.
     pub origin: Vector3<f64>,
@@ -49,7 +49,7 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Of a body in its stage.
+    /// The setting of a body that is on its stage.
     pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
         let start = RotationVector(scene.initial.rotation).axes();
         let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
@@ -98,7 +98,7 @@ impl Resolution {
 /// The path of a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
-    /// What the scene calls it.
+    /// Name of the point in the scene.
     pub name: String,
     /// Place at every instant, world axes.
     pub place: Vec<Vector3<f64>>,

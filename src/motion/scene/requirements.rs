@@ -10,7 +10,7 @@ pub struct Requirements {
     pub motion: MotionRange,
     /// How the body is joined to others.
     pub attachment: Attachment,
-    /// What the body may suffer.
+    /// Largest deflections, stresses and modal amplitudes.
     pub limits: Limits,
     /// Highest frequency of interest, oscillations per time.
     pub band: Option<f64>,
@@ -88,7 +88,7 @@ impl AttachmentKind {
     }
 }
 
-/// What a body may suffer; from it follow the largest modal amplitudes.
+/// Largest deflections and stresses of a body; from them follow the largest modal amplitudes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
     /// Largest deflection of a node.

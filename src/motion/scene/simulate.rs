@@ -21,7 +21,7 @@ const BYTES: f64 = 8.0 + 25.0;
 /// Numbers of an instant besides modes and watched points.
 const NUMBERS: usize = 44;
 
-/// The motion of `body` in `scene` at the instants that it writes, and what has to be said about it.
+/// The motion of `body` in `scene` at the instants that it writes, with warnings and notes about it.
 ///
 /// * `memory`: bytes that there are for the recording and tables of it; `None` where it is not known.
 /// * `watch`: hears which part of the duration is done.
@@ -93,7 +93,7 @@ fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Resul
     refuse_beyond(memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
 }
 
-/// What has to be said about a motion with these extremes.
+/// Warnings about a motion with these extremes: where it leaves the range in which the model holds.
 pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Vec<Diagnostic> {
     let (mut found, unit) = (Vec::new(), body.units().time.name());
     let deflection = extremes.deflection;

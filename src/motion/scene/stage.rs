@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-6;
 /// Coupling of acceleration and modes below this part of its bound is rounding.
 const UNCOUPLED: f64 = 1e-8;
 
-/// A scene for a body in its frame, and what has to be said about the two.
+/// A body in the frame of a scene, that scene, and warnings and notes about the two.
 #[derive(Debug, Clone)]
 pub struct Stage<'a> {
     /// The body, in the frame of the scene.
@@ -63,7 +63,7 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// What a point is as a carrier.
+/// The carrier of a body that hangs from `point`.
 fn carrier(point: &Point) -> Carrier {
     match point {
         Point::Node(number) => Carrier::Node(*number),

@@ -9,7 +9,7 @@ use crate::motion::dynamics::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-/// What acts on a body in a scene.
+/// Gravity, loads and prescribed motion of a scene.
 pub(super) struct SceneForces<'a> {
     gravity: Option<Vector3<f64>>,
     loads: Vec<(BodyPoint, &'a Load)>,

@@ -35,7 +35,7 @@ pub struct Trace {
     pub start: Configuration,
     /// The largest of everything.
     pub extremes: Extremes,
-    /// What the integration did.
+    /// Steps and evaluations of the integration.
     pub work: Work,
     /// Mass of the body, and its radius of gyration about the centre of mass, sqrt(tr(I) / 2m).
     pub size: (f64, f64),
@@ -59,7 +59,7 @@ impl Trace {
     }
 }
 
-/// The continuous motion of `body` in `scene`, and what has to be said about it.
+/// The continuous motion of `body` in `scene`, with warnings and notes about it.
 ///
 /// * `memory`, `watch`: as for [`simulate`](super::simulate).
 ///

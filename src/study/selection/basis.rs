@@ -13,7 +13,7 @@ pub struct WantedResponses {
 }
 
 impl WantedResponses {
-    /// Of `scene`.
+    /// The responses that `scene` wants.
     pub fn of(scene: &Scene) -> Self {
         let motion = scene.requirements.motion.angular_velocity.is_some_and(|range| range.length() > 0.0);
         let turns = scene.initial.angular_velocity.norm() > 0.0;

@@ -21,7 +21,7 @@ pub struct ModalLoad {
     pub force: f64,
     /// |Lambda^(-1/2) Q|.
     pub energy: f64,
-    /// What it is multiplied by.
+    /// The function of time that the direction is multiplied by.
     pub factor: Variation,
 }
 
@@ -53,7 +53,7 @@ pub struct LoadSizes {
 /// The motion of a body of given rotation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driven {
-    /// Its rotation.
+    /// Rotation of the frame.
     pub rotation: Rotation,
     /// Loads on the modes.
     pub loads: Vec<ModalLoad>,
@@ -208,13 +208,13 @@ impl Driven {
         }
         if dropped.w3 {
             // 2 G(w) q', and G(w') q.
-            let of_rate = norms.coupling / norms.first;
+            let per_rate = norms.coupling / norms.first;
             let moved = product(r.largest * r.duration, own.acceleration) + r.variation * own.rate;
             let force = 2.0 * norms.coupling * r.largest * own.rate;
-            push(force, force / norms.first, 2.0 * of_rate * moved);
+            push(force, force / norms.first, 2.0 * per_rate * moved);
             let moved = product(r.jerk, own.coordinate) + r.variation * own.rate;
             let force = norms.coupling * r.acceleration * own.coordinate;
-            push(force, force / norms.first, of_rate * moved);
+            push(force, force / norms.first, per_rate * moved);
         }
         loads
     }

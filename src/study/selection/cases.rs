@@ -117,13 +117,13 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             let TrialRuns { body, scene, situation, .. } = runs;
             let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
             let has_axis = driven.rotation.axis.is_some();
-            let of_run = scene.spin.is_some() && scene.run.duration.is_some() && has_axis;
+            let follows_run = scene.spin.is_some() && scene.run.duration.is_some() && has_axis;
             let held = body.invariants().groups;
             let is_cheap = kept == Groups::NONE || kept == only_w1 && held.w1;
-            if of_run && !is_cheap {
+            if follows_run && !is_cheap {
                 return Ok(Vec::new());
             }
-            let run = if of_run { runs.fine_motion(kept)? } else { None };
+            let run = if follows_run { runs.fine_motion(kept)? } else { None };
             let tiers = norms.iter();
             Ok(tiers.map(|norms| runs.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
         });

@@ -4,7 +4,7 @@ use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
 use super::norms::Norms;
 use crate::body::flex_body::{FlexBody, Groups};
 use crate::motion::dynamics::{Configuration, EquationsOfMotion, Evaluation, Terms};
-use crate::motion::scene::{Recording, Scene};
+use crate::motion::scene::{Recording, Scene, larger};
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -307,9 +307,4 @@ fn norm(x: &[f64]) -> f64 {
 /// |Lambda^(1/2) x|.
 fn weighted(x: &[f64], root: &[f64]) -> f64 {
     x.iter().zip(root).map(|(x, root)| (x * root).powi(2)).sum::<f64>().sqrt()
-}
-
-/// The larger, or the one that is no number: a bound must not lose it.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

@@ -9,7 +9,7 @@ use crate::motion::scene::{Measure, Tolerance};
 /// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are kept.
 const PART_OF_TERMS: f64 = 0.5;
 
-/// What is decided so far.
+/// Terms and modes that are chosen so far.
 pub(super) struct Choice {
     pub groups: Groups,
     pub modes: Vec<usize>,
@@ -128,7 +128,7 @@ impl Search<'_> {
     }
 
     /// The most accurate model of at most `most` multiplications: for every set of groups as many modes as that allows.
-    /// Whether there is one.
+    /// False where every model takes more.
     pub fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<bool> {
         let ranked = self.ranked(choice);
         let mut best: Option<(f64, Groups, Vec<usize>)> = None;

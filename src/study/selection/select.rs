@@ -42,7 +42,7 @@ pub struct Selection {
     pub shares: Vec<ModeShare>,
     /// What the selected modes lack of the static responses to the loads.
     pub participations: Vec<Participation>,
-    /// Why these modes.
+    /// The reason for these modes.
     pub mode_reason: String,
     /// The selected model, measured against all that the body holds; none where nothing was integrated.
     pub chosen: Option<Trial>,
@@ -52,7 +52,7 @@ pub struct Selection {
     pub guideline: &'static str,
     /// The cost that the scene allows, where that decides.
     pub most_multiplications: Option<usize>,
-    /// What has to be said.
+    /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 

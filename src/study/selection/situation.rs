@@ -22,7 +22,7 @@ const ROUNDING: f64 = 1e-8;
 /// A number that decisions follow from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Input {
-    /// What it is.
+    /// Name of the number.
     pub name: &'static str,
     /// Its value, in the units of the body.
     pub value: f64,
@@ -30,14 +30,14 @@ pub struct Input {
     pub source: String,
 }
 
-/// What a scene means for a body.
+/// Sizes of the motion that a scene means for a body: rates, amplitudes, duration.
 #[derive(Debug, Clone)]
 pub struct Situation {
     /// Largest angular velocity of the frame.
     pub spin: Input,
     /// Largest angular acceleration.
     pub acceleration: Input,
-    /// How long it lasts.
+    /// Duration of the motion.
     pub duration: Input,
     /// Largest |q|.
     pub amplitude: Input,

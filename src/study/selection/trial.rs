@@ -58,7 +58,7 @@ pub struct TrialRuns<'a> {
     pub body: &'a FlexBody,
     /// The scene.
     pub scene: &'a Scene,
-    /// What it means for the body.
+    /// The sizes of motion that the scene means for the body.
     pub situation: &'a Situation,
     /// Where its loads act.
     pub loads: &'a [BodyPoint],
@@ -304,7 +304,7 @@ impl TrialRuns<'_> {
     }
 }
 
-/// What a mode does in a scene.
+/// The part of a mode in the motion of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeShare {
     /// Largest |q|.

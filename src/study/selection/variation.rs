@@ -149,9 +149,9 @@ mod tests {
         let sampled = |value: &dyn Fn(f64) -> (f64, f64)| {
             let samples: Vec<(f64, f64)> =
                 (0..=count).map(|i| value(duration * f64::from(i) / f64::from(count))).collect();
-            let largest = |of: &dyn Fn(&(f64, f64)) -> f64| samples.iter().map(of).fold(0.0, f64::max);
-            let total = |of: &dyn Fn(&(f64, f64)) -> f64| {
-                samples.windows(2).map(|pair| (of(&pair[1]) - of(&pair[0])).abs()).sum::<f64>()
+            let largest = |size: &dyn Fn(&(f64, f64)) -> f64| samples.iter().map(size).fold(0.0, f64::max);
+            let total = |size: &dyn Fn(&(f64, f64)) -> f64| {
+                samples.windows(2).map(|pair| (size(&pair[1]) - size(&pair[0])).abs()).sum::<f64>()
             };
             Variation {
                 start: samples[0].0.abs(),

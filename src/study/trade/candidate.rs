@@ -23,10 +23,10 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, in the order of plots.
+    /// All kinds, in the order of plots.
     pub const ALL: [Kind; 4] = [Self::Modes, Self::Groups, Self::Lumped, Self::Single];
 
-    /// What a reader reads.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Modes => "all groups",
@@ -57,7 +57,7 @@ impl Candidate {
         Self { source, modes: (0..nf).collect(), groups: Groups::ALL, lumped: None, storage: Storage::F64 }
     }
 
-    /// What sets it apart.
+    /// The kind: in what it differs from the whole body of its source.
     pub fn kind(&self) -> Kind {
         match self {
             Self { lumped: Some(_), .. } => Kind::Lumped,

@@ -10,7 +10,9 @@ use crate::motion::dynamics::{
     EulerParameters, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
     ReferenceConditions,
 };
-use crate::motion::scene::{Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace};
+use crate::motion::scene::{
+    Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace, larger, not_negative,
+};
 use crate::numerics::integration::{Explicit, Failure, Method, Work, integrate};
 use crate::numerics::linalg::{combine, multiply};
 use faer::Mat;
@@ -131,7 +133,7 @@ impl<'m> NodalReference<'m> {
                 let pairs = difference.col_as_slice(i).iter().zip(forces.col_as_slice(i));
                 0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
             };
-            energy.extend((0..count).map(|i| product(i).max(0.0)));
+            energy.extend((0..count).map(|i| not_negative(product(i))));
             deflection.extend((0..count).map(|i| longest(self.model, difference.col_as_slice(i))));
         }
         let apart = Apart { energy, deflection, largest_deflection: self.largest_deflection };
@@ -139,7 +141,7 @@ impl<'m> NodalReference<'m> {
     }
 }
 
-/// What acts on the body.
+/// Gravity and loads of a scene on the nodes.
 struct Acting<'s> {
     scene: &'s Scene,
     /// Loads with the nodes that they act at.
@@ -166,7 +168,7 @@ impl Acting<'_> {
     }
 }
 
-/// What is kept of the motion, at the instants of another one.
+/// Displacements, attitude and energies of the motion, at the instants of another one.
 struct Observed<'e> {
     evaluation: NodalEvaluation<'e>,
     motion: &'e Trace,
@@ -263,7 +265,7 @@ fn entries_of(model: &FeModel) -> f64 {
 fn longest(model: &FeModel, u: &[f64]) -> f64 {
     let d = model.dimension();
     let squares = u[..d * model.nodes().len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());
-    squares.fold(0.0, f64::max).sqrt()
+    squares.fold(0.0, larger).sqrt()
 }
 
 /// Displacements and rotations of the nodes in body axes, as modes have them: a column for every instant.

@@ -1,4 +1,4 @@
-//! A candidate and what was found of it.
+//! A candidate with its errors, cost and times.
 
 use super::Candidate;
 use crate::base::diagnostic::Diagnostic;
@@ -8,15 +8,15 @@ use crate::numerics::integration::Work;
 /// Times of a candidate. Unit: s.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Times {
-    /// To make the body that it is of, where that is known.
+    /// Time to make the body that it is of, where that is known.
     pub preprocessing: Option<f64>,
-    /// Of one evaluation of the equations.
+    /// Time of one evaluation of the equations.
     pub evaluation: f64,
-    /// Of the simulation.
+    /// Time of the simulation.
     pub integration: f64,
 }
 
-/// What was found of a candidate.
+/// Errors, cost and times of a candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Largest errors, with the steps of the reference.
@@ -35,19 +35,19 @@ pub struct Measured {
     pub times: Times,
 }
 
-/// Why there is nothing of a candidate.
+/// The diagnostic for a candidate that could not be measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failed(pub Diagnostic);
 
-/// A candidate and what was found.
+/// A candidate and its measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// What it is.
+    /// Modes, groups and precision of the body.
     pub candidate: Candidate,
-    /// What it is made of.
+    /// Name of the source that it is made of.
     pub source: String,
     /// Frequency of its last mode in hertz.
     pub last_frequency_hz: f64,
-    /// What was measured.
+    /// The measurement, or the reason why there is none.
     pub outcome: std::result::Result<Measured, Failed>,
 }

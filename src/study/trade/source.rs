@@ -42,7 +42,7 @@ impl Source {
         Some(self)
     }
 
-    /// The same with its bodies in the frame of a scene.
+    /// This source with its bodies in the frame of a scene.
     ///
     /// # Errors
     /// Those of [`Stage::new`].
@@ -55,7 +55,7 @@ impl Source {
         Ok(Self { body: FlexBody::new(parts)?, lumped, ..self.clone() })
     }
 
-    /// What it is.
+    /// Name of the source in reports.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -112,8 +112,8 @@ impl Source {
             stiffness.as_ref().map_or_else(|| DVector::zeros(modes.len()), |factor| factor.solve(&sides))
         };
         let (q, qd) = (part(&start.q), part(&start.qd));
-        let of = |mode: usize| ModeStart { mode, amplitude: q[mode], rate: qd[mode] };
-        own.initial.modes = (0..modes.len()).map(of).collect();
+        let start_of = |mode: usize| ModeStart { mode, amplitude: q[mode], rate: qd[mode] };
+        own.initial.modes = (0..modes.len()).map(start_of).collect();
         own
     }
 

@@ -14,7 +14,7 @@ use crate::motion::scene::{Measure, Scene, Stage, Tolerance, Trace, ends_a_run, 
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What errors are measured against.
+/// The motion that errors are measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReferenceKind {
@@ -34,7 +34,7 @@ impl ReferenceKind {
     }
 }
 
-/// How a study is made.
+/// Settings of a study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Integrations whose median time counts; of those that take long, fewer.
@@ -50,9 +50,9 @@ pub struct Trade {
     pub scene: String,
     /// Name of the body's model.
     pub body: String,
-    /// What errors are measured against.
+    /// The motion that errors are measured against.
     pub reference: ReferenceKind,
-    /// What the tolerances are.
+    /// Tolerances of the scene.
     pub tolerance: Tolerance,
     /// Multiplications that the scene allows instead.
     pub allowed: Option<usize>,
@@ -62,7 +62,7 @@ pub struct Trade {
     pub front: Vec<usize>,
     /// The row to take.
     pub recommended: Recommendation,
-    /// What has to be said about the motion of the reference.
+    /// Warnings and notes about the motion of the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct Records {
     pub(crate) stiffening: Vec<(usize, Vec<f64>)>,
     /// Whether the file says that record groups 9 and 18 need not agree.
     pub(crate) general: bool,
-    /// Whether the last line is there.
+    /// Whether the line that ends a file is there.
     pub(crate) ended: bool,
     pub(crate) digits: Digits,
     /// What MBDyn skips, and the record group before it; none before the first.
@@ -183,12 +183,12 @@ impl Records {
 
     fn shapes(&mut self, rejected: usize, words: &mut Words<'_>) -> Result<()> {
         const WHAT: &str = "record group 8";
-        let of_mode = self.n_nodes.saturating_mul(6);
+        let numbers_per_mode = self.n_nodes.saturating_mul(6);
         for mode in 0..rejected.saturating_add(self.n_modes) {
             words
                 .take_title()
                 .map_err(|line| words.refuse_at(line, format!("{WHAT}: mode {} has no title", mode + 1)))?;
-            let values = words.numbers(of_mode, WHAT)?;
+            let values = words.numbers(numbers_per_mode, WHAT)?;
             if mode >= rejected {
                 self.shapes.extend(values);
             }

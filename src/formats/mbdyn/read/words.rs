@@ -14,7 +14,7 @@ pub(crate) struct Words<'t> {
     lines: Vec<&'t str>,
     /// Index of the line that is read.
     line: usize,
-    /// What is left of it.
+    /// The rest of the line that is read.
     rest: &'t str,
     /// Digits of the numbers of record groups that no program writes short on purpose.
     pub(crate) digits: Digits,
@@ -132,7 +132,7 @@ impl<'t> Words<'t> {
         found
     }
 
-    /// The same up to the end of the line.
+    /// Words where none are expected, up to the end of the line.
     pub(crate) fn surplus_of_line(&mut self) -> Surplus {
         let line = self.at();
         Surplus::of(line, self.take_line().unwrap_or(""))
@@ -158,9 +158,9 @@ pub(crate) struct Surplus {
     /// Line of the first.
     pub(crate) line: usize,
     pub(crate) words: usize,
-    /// Whether all of them are zeros.
+    /// Whether all of the words are zeros.
     pub(crate) zero: bool,
-    /// Whether all of them are numbers.
+    /// Whether all of the words are numbers.
     pub(crate) numbers: bool,
 }
 

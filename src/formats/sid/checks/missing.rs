@@ -104,7 +104,7 @@ impl Missing {
         }
     }
 
-    /// Whether all of these are there.
+    /// Whether none of the arrays `names` is missing.
     pub(crate) fn none_of(&self, names: &[&str]) -> bool {
         names.iter().all(|name| !self.arrays.contains(name))
     }

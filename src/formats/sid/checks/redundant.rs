@@ -54,7 +54,7 @@ struct Identities<'a> {
     missing: Missing,
 }
 
-/// What Oe1 says.
+/// The checks of Oe1, and what they say of the masses behind the arrays.
 struct LinearCentrifugal {
     checks: Vec<AuditCheck>,
     /// Whether Oe1 belongs to another mass than Me, where it should not.

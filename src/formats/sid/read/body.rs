@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// Parts of Cr1 and of Oe1 that are rounding, relative to their largest entry.
 const ROUNDING: f64 = 1e-10;
 
-/// What the first line declares.
+/// Facts of the body that the first line declares.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Declared {
     pub(crate) name: String,

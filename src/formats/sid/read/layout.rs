@@ -15,7 +15,7 @@ pub(crate) enum Blocks {
 }
 
 impl Blocks {
-    /// Both.
+    /// Both orders.
     const ALL: [Self; 2] = [Self::Component, Self::Mode];
 
     /// `component-blocked`, `mode-blocked`.
@@ -40,12 +40,12 @@ impl Blocks {
 
     /// max |sym(Gr_k) - J1_k| and max |skew(Gr_k) + Cr0_k~|.
     pub(crate) fn gr_misfit(self, arrays: &Arrays) -> [f64; 2] {
-        let of_mode = |k: usize| {
+        let misfit = |k: usize| {
             let gr = self.gr(arrays, k);
             let (even, odd) = (0.5 * (gr + gr.transpose()), 0.5 * (gr - gr.transpose()));
             [(even - arrays.j1(k)).amax(), (odd + arrays.cr0(k).cross_matrix()).amax()]
         };
-        (0..arrays.nq).map(of_mode).fold([0.0; 2], |most, now| [most[0].max(now[0]), most[1].max(now[1])])
+        (0..arrays.nq).map(misfit).fold([0.0; 2], |most, now| [most[0].max(now[0]), most[1].max(now[1])])
     }
 
     /// max |Ge(k; l, a) - (Cr1(k, l, a) - Cr1(l, k, a))|.
@@ -114,8 +114,8 @@ pub(crate) struct Layout {
 impl Layout {
     pub(crate) fn detect(listed: &Listed<'_>, arrays: &Arrays) -> Self {
         let (name, reason) = declared(listed);
-        let of_name = |name: &str| DIALECTS.into_iter().find(|(known, ..)| *known == name);
-        let declared = name.and_then(of_name);
+        let dialect_named = |name: &str| DIALECTS.into_iter().find(|(known, ..)| *known == name);
+        let declared = name.and_then(dialect_named);
         let found = [
             fitting(|blocks| {
                 let [even, odd] = blocks.gr_misfit(arrays);

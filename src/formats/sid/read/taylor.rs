@@ -27,7 +27,7 @@ pub(crate) struct Taylor {
     pub(crate) inferred: bool,
     m0: Vec<Entry>,
     m1: Vec<Entry>,
-    /// How its entries are written.
+    /// Digits of the entries.
     pub(crate) digits: Digits,
 }
 
@@ -76,15 +76,15 @@ impl Taylor {
             digits.see(text);
             [&mut m0, &mut m1][order].push(Entry { index, line: line.number, value });
         }
-        let of = |at: usize| {
+        let size = |at: usize| {
             let message = format!("`{name}` has no `{}`", SIZES[at]);
             sizes[at].ok_or_else(|| lines.unreadable(head.number, message))
         };
         let object = Self {
             line: head.number,
-            nrow: of(1)?,
-            ncol: of(2)?,
-            nq: of(3)?,
+            nrow: size(1)?,
+            ncol: size(2)?,
+            nq: size(3)?,
             structure: sizes[5].unwrap_or_else(|| inferred_structure(&name, &m0, &m1)),
             inferred: sizes[5].is_none(),
             name: name.clone(),
@@ -92,7 +92,7 @@ impl Taylor {
             m1,
             digits,
         };
-        let order = of(0)?;
+        let order = size(0)?;
         let wrong = if order > 1 || sizes[4].is_some_and(|nqn| nqn > 0) {
             Some("is of an order above 1")
         } else if order == 0 && !object.m1.is_empty() {

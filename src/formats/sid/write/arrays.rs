@@ -17,12 +17,12 @@ const INERTIA: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1
 /// (K + K') / 2 of the components of a kind of load, `None` where not one is given.
 fn stiffness(body: &FlexBody, kind: &LoadKind) -> Option<Vec<Mat<f64>>> {
     let (nf, entry) = (body.n_modes(), geometric_stiffness(body, kind)?);
-    let of = |component: usize| Mat::from_fn(nf, nf, |i, j| entry(component, i, j));
-    Some((0..kind.components().len()).map(of).collect())
+    let symmetric_part = |component: usize| Mat::from_fn(nf, nf, |i, j| entry(component, i, j));
+    Some((0..kind.components().len()).map(symmetric_part).collect())
 }
 
-fn per_mode(nf: usize, of_mode: impl FnMut(usize) -> Mat<f64>) -> Vec<Mat<f64>> {
-    (0..nf).map(of_mode).collect()
+fn per_mode(nf: usize, matrix: impl FnMut(usize) -> Mat<f64>) -> Vec<Mat<f64>> {
+    (0..nf).map(matrix).collect()
 }
 
 /// J as the dialect has it.
@@ -35,13 +35,13 @@ fn inertia(dialect: &Dialect, i: &Matrix3<f64>) -> Mat<f64> {
     }
 }
 
-/// Columns of Gr or Ge in the order of the dialect: `of(axis, mode)`.
-fn blocks(nrow: usize, nf: usize, order: Blocks, of: impl Fn(usize, usize, usize) -> f64) -> Mat<f64> {
+/// Columns of Gr or Ge in the order of the dialect: `entry(row, axis, mode)`.
+fn blocks(nrow: usize, nf: usize, order: Blocks, entry: impl Fn(usize, usize, usize) -> f64) -> Mat<f64> {
     let mut all = Mat::zeros(nrow, 3 * nf);
     for row in 0..nrow {
         for a in 0..3 {
             for k in 0..nf {
-                all[(row, order.column(a, k, nf))] = of(row, a, k);
+                all[(row, order.column(a, k, nf))] = entry(row, a, k);
             }
         }
     }
@@ -57,7 +57,7 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
     let nf = body.n_modes();
     let [acceleration, turn, spin] = [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin]
         .map(|kind| stiffness(body, &kind));
-    let of = |k: &Option<Vec<Mat<f64>>>, component: usize, i: usize, j: usize| {
+    let stiffness_entry = |k: &Option<Vec<Mat<f64>>>, component: usize, i: usize, j: usize| {
         k.as_ref().map_or(0.0, |k| k[component][(i, j)])
     };
     let i5 = |a: usize, l: usize, k: usize| i5.as_ref().map_or(0.0, |i5| i5[(a * nf + l, k)]);
@@ -68,7 +68,7 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
             let sum = i9[(a * nf + k, b * nf + l)] + i9[(a * nf + l, b * nf + k)];
             if a == b { 0.5 * sum } else { sum }
         };
-        i9.as_ref().map_or(0.0, both) + of(&spin, pair, k, l)
+        i9.as_ref().map_or(0.0, both) + stiffness_entry(&spin, pair, k, l)
     };
     let oe0 = |k: usize, pair: usize| {
         let (a, b) = LoadKind::SPIN[pair];
@@ -95,7 +95,7 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
         Taylor::linear(
             "Cr",
             Mat::from_fn(nf, 3, |k, a| i4[(a, k)]),
-            per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| i5(a, l, k) + of(&turn, a, k, l))),
+            per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| i5(a, l, k) + stiffness_entry(&turn, a, k, l))),
         ),
         Taylor::symmetric("Me", i6),
         Taylor::constant("Gr", blocks(3, nf, dialect.gr, |row, a, k| 2.0 * i8[k][(row, a)])),
@@ -125,8 +125,8 @@ impl Place {
         let ExportFrame { position, translation, rotation, .. } = &self.frame;
         let nf = translation.ncols();
         let second = |stiff: &Option<Vec<Mat<f64>>>| {
-            let of_mode = |stiff: &Vec<Mat<f64>>, l: usize| Mat::from_fn(3, nf, |a, k| -stiff[a][(k, l)]);
-            stiff.as_ref().map(|stiff| per_mode(nf, |l| of_mode(stiff, l)))
+            let of_one_mode = |stiff: &Vec<Mat<f64>>, l: usize| Mat::from_fn(3, nf, |a, k| -stiff[a][(k, l)]);
+            stiff.as_ref().map(|stiff| per_mode(nf, |l| of_one_mode(stiff, l)))
         };
         let phi = Taylor { m1: second(&self.force), ..Taylor::constant("phi", translation.clone()) };
         let psi = match rotation {
@@ -171,11 +171,11 @@ pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -
             .interfaces()
             .iter()
             .find(|one| Some(&one.name) == frame.name.as_ref() && one.reference == Some(frame.position));
-        let of = |kind: fn(String) -> LoadKind| {
+        let stiffness_for = |kind: fn(String) -> LoadKind| {
             interface.and_then(|interface| stiffness(body, &kind(interface.name.clone())))
         };
-        let moment = if frame.rotation.is_some() { of(LoadKind::Moment) } else { None };
-        Place { force: of(LoadKind::Force), moment, frame }
+        let moment = if frame.rotation.is_some() { stiffness_for(LoadKind::Moment) } else { None };
+        Place { force: stiffness_for(LoadKind::Force), moment, frame }
     };
     frames(body, points).into_iter().map(place).collect()
 }

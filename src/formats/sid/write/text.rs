@@ -4,7 +4,7 @@ use super::dialect::Dialect;
 use faer::Mat;
 use std::fmt::Write;
 
-/// Why `write!` cannot fail here.
+/// The reason why `write!` cannot fail here.
 const TO_A_STRING: &str = "writing to a String cannot fail";
 
 /// How the entries of an object are to be understood.

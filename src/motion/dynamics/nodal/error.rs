@@ -20,7 +20,7 @@ pub enum NodalError {
     HeldWithoutMass(DofLabel),
     /// Degrees of freedom are held, and M has null vectors that no single row shows.
     HeldMassSingular {
-        /// Number of these null vectors.
+        /// Number of null vectors that no single row shows.
         null_vectors: usize,
     },
     /// M is not positive semidefinite, or so nearly singular that its null vectors cannot be told.

@@ -264,7 +264,7 @@ impl<'e> NodalEvaluation<'e> {
     }
 }
 
-/// Both in one.
+/// A linear and an angular part as one vector.
 fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
     Vector6::from_iterator(linear.iter().chain(angular).copied())
 }

@@ -15,8 +15,8 @@ impl NodalEvaluation<'_> {
         let mass = &body.rigid_mass;
         // R'M R = [m I, -c~; c~, I0]: of a plane body it has only the last column of c~.
         let mut moment = Vector3::new(mass[(1, 5)], -mass[(0, 5)], mass[(0, 4)]);
-        let of_u = NodalEquations::sums(&body.mass_rigid, &self.u);
-        moment += of_u.fixed_rows::<3>(0);
+        let displaced = NodalEquations::sums(&body.mass_rigid, &self.u);
+        moment += displaced.fixed_rows::<3>(0);
         self.force += own * mass[(0, 0)];
         self.torque += moment.cross(&own);
         let mut linear = Vector6::zeros();
