@@ -2,7 +2,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::body::convert::{BodyModes, Place, modal_damping, modal_geometric_stiffness, rigid_mass};
+use crate::body::convert::{BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, rigid_mass};
 use crate::body::flex_body::{FlexBody, Guarantee, Storage};
 use crate::body::invariants::{
     BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
@@ -87,7 +87,7 @@ fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
 struct Recomputed<'a> {
     body: &'a FlexBody,
     model: &'a FeModel,
-    place: Place,
+    place: NodesInFrame,
     modes: BodyModes,
     /// K and M times the modes.
     kx: Mat<f64>,
@@ -101,7 +101,7 @@ struct Recomputed<'a> {
 impl<'a> Recomputed<'a> {
     fn new(body: &'a FlexBody, model: &'a FeModel) -> Result<Self> {
         check_comparable(body, model)?;
-        let place = Place::new(model, *body.frame());
+        let place = NodesInFrame::new(model, *body.frame());
         let Some(modes) = BodyModes::of_body(model, body) else {
             let message = "the rows of the body's modes are not those of the model";
             return Err(Diagnostic::new(Code::BodyIncomparable, message).into());

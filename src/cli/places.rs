@@ -61,9 +61,9 @@ pub(super) fn refuse_replacing<'p>(
     inputs: impl Iterator<Item = &'p PathBuf>,
     outputs: impl Iterator<Item = &'p PathBuf>,
 ) -> Result<()> {
-    let mut taken: Vec<Place> = inputs.map(|path| Place::of(path)).collect();
+    let mut taken: Vec<FileIdentity> = inputs.map(|path| FileIdentity::of(path)).collect();
     for output in outputs {
-        let path = Place::of(output);
+        let path = FileIdentity::of(output);
         if taken.iter().any(|other| other.is_same(&path)) {
             let message = format!("output {} is an input or another output of this run", output.display());
             return Err(Diagnostic::new(Code::Usage, message).with_help("choose another output name").into());
@@ -74,13 +74,13 @@ pub(super) fn refuse_replacing<'p>(
 }
 
 /// What a path stands for, however it is spelt.
-struct Place {
+struct FileIdentity {
     path: PathBuf,
     /// Device and number of an existing file: the same for all of its names.
     file: Option<(u64, u64)>,
 }
 
-impl Place {
+impl FileIdentity {
     fn of(path: &Path) -> Self {
         let followed = followed(path).unwrap_or_else(|_| path.to_path_buf());
         // A file that does not exist yet has a folder that does.

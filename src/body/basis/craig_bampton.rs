@@ -7,10 +7,10 @@
 //! pencil (T'KT, T'MT): the search, its proof of completeness and its residuals are those of any other.
 
 use super::failure::explain;
-use super::free_estimate::{FreeEstimate, Lacking, free_estimate};
+use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
 use super::free_surface::{quadratic_estimate, single_precision_note};
 use super::interface_coordinates::InterfaceCoordinates;
-use super::joints::{Joint, check_prescribable, hold, joints};
+use super::interface_rows::{CoupledInterface, check_prescribable, coupled_interfaces, hold};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::rigid_modes::rigid_modes;
@@ -47,7 +47,7 @@ impl Basis for CraigBampton {
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         let Task { model, settings, resume, watch } = *task;
         check_possible(model, settings)?;
-        let joints = joints(model, "interface coordinates")?;
+        let joints = coupled_interfaces(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
         let parts = Parts::new(model, &joints, settings, watch)?;
         let rigid = rigid_modes(model, &model.pencil())?;
@@ -107,7 +107,7 @@ fn nothing_deforms() -> Diagnostic {
 
 /// Fixed-interface modes and constraint modes.
 struct Parts<'a> {
-    joints: &'a [Joint],
+    joints: &'a [CoupledInterface],
     names: Vec<String>,
     elimination: Elimination,
     reduced: ReducedPencil,
@@ -116,11 +116,16 @@ struct Parts<'a> {
     /// D + T Y (N x c): the body for unit interface coordinates, nothing loaded but the interfaces, (T'KT) Y = -T'K D.
     constraint: Mat<f64>,
     /// What the basis lacks of the responses to the inertia of the constraint modes.
-    lacking: Lacking,
+    lacking: MissingResponses,
 }
 
 impl<'a> Parts<'a> {
-    fn new(model: &FeModel, joints: &'a [Joint], settings: &ModeSettings, watch: Watch<'_>) -> Result<Self> {
+    fn new(
+        model: &FeModel,
+        joints: &'a [CoupledInterface],
+        settings: &ModeSettings,
+        watch: Watch<'_>,
+    ) -> Result<Self> {
         watch(Event::Phase("interfaces"));
         let pencil = model.pencil();
         let failed = |failure| explain(model, failure);
@@ -380,7 +385,7 @@ impl<'a> Parts<'a> {
 
     /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in space.
     fn vectors(&self, d: usize) -> Vec<usize> {
-        let starts_of_vectors = |(joint, first): (&Joint, usize)| {
+        let starts_of_vectors = |(joint, first): (&CoupledInterface, usize)| {
             let (moving, all) = (joint.displacements, joint.coordinates.len());
             // In the plane a rotation is a number.
             let turning = if d == 3 { (all - moving) / 3 } else { 0 };
@@ -416,7 +421,7 @@ fn fixed_modes(
 }
 
 /// G and H of the responses y to the inertia of the constraint modes, without their part along the fixed-interface modes.
-fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> Lacking {
+fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> MissingResponses {
     let pencil = &problem.pencil;
     let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
     for _ in 0..2 {
@@ -427,7 +432,7 @@ fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolu
         let a = gram(response.as_ref(), products.as_ref());
         Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))
     };
-    Lacking {
+    MissingResponses {
         whole,
         stiffness: symmetric(pencil.apply_stiffness(response.as_ref())),
         mass: symmetric(pencil.apply_mass(response.as_ref())),
@@ -437,7 +442,11 @@ fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolu
 /// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi + (R - Psi Q) Q^+ with their
 /// coordinates Q = C'R: K annihilates them only as well as its digits allow, and a slender body magnifies that. The
 /// coordinates of the shapes stay what they are.
-fn restore_rigid_motion(joints: &[Joint], rigid: MatRef<'_, f64>, constraint: &mut Mat<f64>) -> Option<()> {
+fn restore_rigid_motion(
+    joints: &[CoupledInterface],
+    rigid: MatRef<'_, f64>,
+    constraint: &mut Mat<f64>,
+) -> Option<()> {
     let q = coordinates_of(joints, rigid);
     let scale: Vec<f64> = (0..q.nrows()).map(|i| q.row(i).norm_l2()).collect();
     // Coordinates of one size: rotations are in other units than displacements.
@@ -462,7 +471,7 @@ fn restore_rigid_motion(joints: &[Joint], rigid: MatRef<'_, f64>, constraint: &m
 }
 
 /// C'u: the interface coordinates of displacements (N x k).
-fn coordinates_of(joints: &[Joint], u: MatRef<'_, f64>) -> Mat<f64> {
+fn coordinates_of(joints: &[CoupledInterface], u: MatRef<'_, f64>) -> Mat<f64> {
     let blocks = joints.iter().map(|joint| gram(joint.measure(), joint.gather(u).as_ref()));
     let blocks: Vec<Mat<f64>> = blocks.collect();
     let rows: Vec<_> = blocks.iter().flat_map(|block| block.row_iter()).collect();
@@ -470,7 +479,7 @@ fn coordinates_of(joints: &[Joint], u: MatRef<'_, f64>) -> Mat<f64> {
 }
 
 /// The joints, each with its first coordinate.
-fn starts(joints: &[Joint]) -> impl Iterator<Item = (&Joint, usize)> {
+fn starts(joints: &[CoupledInterface]) -> impl Iterator<Item = (&CoupledInterface, usize)> {
     joints.iter().scan(0, |next, joint| {
         let first = *next;
         *next += joint.coordinates.len();

@@ -22,7 +22,7 @@ const PROBLEMS: usize = 64;
 
 /// What the basis lacks of the static responses to the inertia of the interface motions (c of them).
 #[derive(Debug, Clone)]
-pub(super) struct Lacking {
+pub(super) struct MissingResponses {
     /// Energies y'K y of the whole responses, before what the basis has of them was taken out (c).
     pub whole: Vec<f64>,
     /// G = y'K y (c x c).
@@ -49,7 +49,7 @@ pub(super) fn free_estimate(
     theta: &[f64],
     rigid: MatRef<'_, f64>,
     q: MatRef<'_, f64>,
-    lacking: &Lacking,
+    lacking: &MissingResponses,
     cut: Option<f64>,
 ) -> Option<FreeEstimate> {
     let mut estimate = corrected(theta, rigid, q, lacking)?;
@@ -78,7 +78,7 @@ fn corrected(
     theta: &[f64],
     rigid: MatRef<'_, f64>,
     q: MatRef<'_, f64>,
-    lacking: &Lacking,
+    lacking: &MissingResponses,
 ) -> Option<Vec<f64>> {
     let (nf, c) = (theta.len(), lacking.stiffness.nrows());
     // Responses of one size, then corrections K-orthonormal.
@@ -151,7 +151,7 @@ mod tests {
         let q = Mat::from_fn(1, 1, |_, _| -0.5 * s / norm);
         // b of the unit interface motion (1, 1, 1) along the mode that is left out.
         let coupled = 2.0 * left[0] + left[1];
-        let lacking = Lacking {
+        let lacking = MissingResponses {
             whole: vec![coupled * coupled / b],
             stiffness: Mat::from_fn(1, 1, |_, _| coupled * coupled / b),
             mass: Mat::from_fn(1, 1, |_, _| coupled * coupled / (b * b)),
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(unknown.lower, [0.0]);
         // Rounding of a response that the basis has is no correction.
         let noise = |size: f64| Mat::from_fn(1, 1, |_, _| 1e-30 * size);
-        let nothing = Lacking { whole: vec![1.0], stiffness: noise(1.0), mass: noise(1.0 / a) };
+        let nothing = MissingResponses { whole: vec![1.0], stiffness: noise(1.0), mass: noise(1.0 / a) };
         let found = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &nothing, Some(b)).expect("finite");
         assert_eq!((found.estimate, found.lower), (vec![theta], vec![theta]));
     }

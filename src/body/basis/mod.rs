@@ -10,7 +10,7 @@ mod free_estimate;
 mod free_surface;
 mod imported;
 mod interface_coordinates;
-mod joints;
+mod interface_rows;
 mod modal_basis;
 mod pseudo_free_surface;
 mod residual_vectors;

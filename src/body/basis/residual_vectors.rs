@@ -2,7 +2,7 @@
 
 use super::columns::columns;
 use super::failure::explain;
-use super::joints::{AXES, Joint, joints};
+use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::modal_basis::ModalBasis;
 use super::pseudo_free_surface::independent;
 use super::{ModeSettings, Truncation};
@@ -131,8 +131,8 @@ fn centre_of_mass(problem: &EigenProblem<'_>, model: &FeModel) -> [f64; 3] {
 
 /// The load on each coordinate of every interface.
 fn interfaces(model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
-    let joints = joints(model, "interface loads")?;
-    let one = |joint: &Joint, j: usize| {
+    let joints = coupled_interfaces(model, "interface loads")?;
+    let one = |joint: &CoupledInterface, j: usize| {
         let mut load = Mat::zeros(model.pencil().n(), 1);
         joint.scatter(joint.measure().subcols(j, 1), &mut load, 0);
         (format!("{} {}", joint.name, joint.loads[j]), load)

@@ -11,12 +11,12 @@ use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
 /// The body frame and the node positions in it.
-pub(crate) struct Place {
+pub(crate) struct NodesInFrame {
     pub frame: Frame,
     pub positions: Vec<[f64; 3]>,
 }
 
-impl Place {
+impl NodesInFrame {
     pub fn new(model: &FeModel, frame: Frame) -> Self {
         Self { frame, positions: frame.to_body(&model.nodes().positions) }
     }
@@ -53,7 +53,7 @@ pub(crate) struct BodyModes {
 impl BodyModes {
     /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest magnitude is
     /// positive, rotations of nodes times the size of the body.
-    pub fn new(model: &FeModel, place: &Place, vectors: &Mat<f64>) -> Self {
+    pub fn new(model: &FeModel, place: &NodesInFrame, vectors: &Mat<f64>) -> Self {
         let rows = model.rows();
         let (nodes, nf) = (model.nodes().len(), vectors.ncols());
         let mut displacements =
@@ -111,12 +111,17 @@ impl BodyModes {
     }
 
     /// The invariants, by the formulas that the mass of `model` allows.
-    pub fn condensed(&self, model: &FeModel, place: &Place, modal_stiffness: Mat<f64>) -> Invariants {
+    pub fn condensed(&self, model: &FeModel, place: &NodesInFrame, modal_stiffness: Mat<f64>) -> Invariants {
         self.by(model, place, modal_stiffness, condense, condense_general)
     }
 
     /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
-    pub fn condensed_linear(&self, model: &FeModel, place: &Place, modal_stiffness: Mat<f64>) -> Invariants {
+    pub fn condensed_linear(
+        &self,
+        model: &FeModel,
+        place: &NodesInFrame,
+        modal_stiffness: Mat<f64>,
+    ) -> Invariants {
         self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
     }
 
@@ -135,7 +140,7 @@ impl BodyModes {
     fn by(
         &self,
         model: &FeModel,
-        place: &Place,
+        place: &NodesInFrame,
         modal_stiffness: Mat<f64>,
         solid: impl Fn(&SymmetricMatrix, &[[f64; 3]], MatRef<'_, f64>, Mat<f64>) -> Invariants,
         general: impl Fn(&SymmetricMatrix, &RigidMotion<'_>, MatRef<'_, f64>, Mat<f64>) -> Invariants,

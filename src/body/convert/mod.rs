@@ -18,7 +18,7 @@ mod modal_model;
 mod remarks;
 mod settings;
 
-pub(crate) use body_modes::{BodyModes, Place, rigid_mass};
+pub(crate) use body_modes::{BodyModes, NodesInFrame, rigid_mass};
 pub use condensation::Condensation;
 pub use conversion::{Conversion, convert, convert_resuming};
 pub(crate) use damping::modal_damping;

@@ -1,6 +1,6 @@
 //! A model with its modes, in the frame of its body: the first stage of a conversion.
 
-use super::{BodyModes, ConvertSettings, Place, rigid_mass};
+use super::{BodyModes, ConvertSettings, NodesInFrame, rigid_mass};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
@@ -24,7 +24,7 @@ pub struct ModalModel<'m> {
     /// The modes in model axes, with what is known of each.
     pub(super) found: ModalBasis,
     pub(super) mass_properties: MassProperties,
-    pub(super) place: Place,
+    pub(super) place: NodesInFrame,
     pub(super) modes: BodyModes,
     /// Psi' K Psi.
     pub(super) modal_stiffness: Mat<f64>,
@@ -53,7 +53,7 @@ impl<'m> ModalModel<'m> {
         let found = settings.basis.basis().modes(&task)?;
         watch(Event::Phase("invariants"));
         let (frame, mass_properties) = body_frame(model, settings.frame)?;
-        let place = Place::new(model, frame);
+        let place = NodesInFrame::new(model, frame);
         let modes = BodyModes::new(model, &place, &found.solution.vectors);
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };

@@ -46,7 +46,7 @@ impl std::fmt::Display for Carrier {
 }
 
 /// Where a body is carried, and how that place moves in every mode.
-struct Place {
+struct CarriedPoint {
     /// Reference point, body frame.
     reference: Vector3<f64>,
     /// Translations, then rotations (6 x nf), body axes.
@@ -76,7 +76,7 @@ impl FlexBody {
             return Ok(self.clone());
         }
         let body = self.in_model_axes(at.reference)?;
-        let Place { motion, .. } = body.place_of(carrier)?;
+        let CarriedPoint { motion, .. } = body.place_of(carrier)?;
         let mut parts = body.into_parts();
         let taken = |node: usize, k: usize, j: usize| {
             let x = parts.nodes.positions[node];
@@ -215,7 +215,7 @@ impl FlexBody {
         })
     }
 
-    fn place_of(&self, carrier: &Carrier) -> Result<Place> {
+    fn place_of(&self, carrier: &Carrier) -> Result<CarriedPoint> {
         let unknown = |message: String| Err(Diagnostic::new(Code::SceneBody, message).into());
         match carrier {
             Carrier::Node(number) => {
@@ -231,7 +231,7 @@ impl FlexBody {
                     )));
                 };
                 let motion = stacked(&at(&self.modes().shape), &rotation);
-                Ok(Place { reference: Vector3::from(self.nodes().positions[node]), motion })
+                Ok(CarriedPoint { reference: Vector3::from(self.nodes().positions[node]), motion })
             }
             Carrier::Interface(name) => {
                 let Some(interface) = self.interfaces().iter().find(|interface| interface.name == *name)
@@ -253,7 +253,7 @@ impl FlexBody {
                     )));
                 };
                 let motion = stacked(&rows.translation, &rotation);
-                Ok(Place { reference: Vector3::from(reference), motion })
+                Ok(CarriedPoint { reference: Vector3::from(reference), motion })
             }
         }
     }

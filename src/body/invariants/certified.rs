@@ -3,7 +3,7 @@
 //! The guarantee is about the numbers that a flex-body file holds: nodes, modes and axes as stored, M and K as given.
 //! What separates these modes from the exact ones is another matter (`/modes/shape_error`).
 
-use super::condense::{CHUNK, Columns, MAX_GROUPS, fill_symmetric, from_gram, group_length};
+use super::condense::{CHUNK, MAX_GROUPS, SolidColumns, fill_symmetric, from_gram, group_length};
 use super::derived::CYCLIC;
 use super::{CauchySchwarz, Invariants};
 use crate::numerics::linalg::{
@@ -71,7 +71,7 @@ pub fn condense_certified(
         shapes.nrows() == 3 * mass.n() && (stiffness.n() == shapes.nrows() || stiffness.n() == 2 * mass.n()),
         "rows of shapes: three per row of Ms; of the stiffness three or two"
     );
-    let (gram, gram_error) = mass_gram(mass, Columns { positions, shapes });
+    let (gram, gram_error) = mass_gram(mass, SolidColumns { positions, shapes });
     let (modal, modal_error) = modal_stiffness(stiffness, axes, shapes);
     let invariants = from_gram(gram.as_ref(), modal);
     let errors = from_gram(gram_error.as_ref(), modal_error);
@@ -80,7 +80,7 @@ pub fn condense_certified(
 }
 
 /// X' Ms X and a bound of the error of each entry.
-fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64>) {
+fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Mat<f64>) {
     let (n, count) = (mass.n(), columns.count());
     let mut gram = Mat::<f64>::zeros(count, count);
     for start in (0..count).step_by(WIDTH) {
@@ -103,7 +103,7 @@ fn mass_gram(mass: &SymmetricMatrix, columns: Columns<'_>) -> (Mat<f64>, Mat<f64
 }
 
 /// Node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
-fn by_node(columns: Columns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
+fn by_node(columns: SolidColumns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
     let mut rows = vec![[0.0; WIDTH]; columns.rows()];
     rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
         columns.by_node(CHUNK * chunk, block.clone(), WIDTH, rows.as_flattened_mut());
@@ -112,7 +112,7 @@ fn by_node(columns: Columns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
 }
 
 /// Column-wise copy of the rows `nodes` into the columns of `target`.
-fn by_column(columns: Columns<'_>, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
+fn by_column(columns: SolidColumns<'_>, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
     for column in 0..target.ncols() {
         for (row, i) in nodes.clone().enumerate() {
             target[(row, column)] = columns.get(i, column);
@@ -123,7 +123,7 @@ fn by_column(columns: Columns<'_>, nodes: Range<usize>, mut target: MatMut<'_, f
 /// Columns 0..block.end of X against Ms X[block]: block.end rows.
 fn gram_block(
     mass: &SymmetricMatrix,
-    columns: Columns<'_>,
+    columns: SolidColumns<'_>,
     block: Range<usize>,
 ) -> Vec<[DoubleDouble; WIDTH]> {
     let (n, n_left) = (mass.n(), block.end);

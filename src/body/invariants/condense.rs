@@ -114,13 +114,13 @@ pub(super) fn condense_with<M: NodalMass + ?Sized>(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    let columns = Columns { positions, shapes };
+    let columns = SolidColumns { positions, shapes };
     columns.assert_sizes(mass, modal_stiffness.as_ref());
     let gram = weighted_gram(mass, columns);
     from_gram(gram.as_ref(), modal_stiffness)
 }
 
-/// The primary data from the Gram matrix of [`Columns`].
+/// The primary data from the Gram matrix of [`SolidColumns`].
 pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Invariants {
     let nf = modal_stiffness.ncols();
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
@@ -144,7 +144,7 @@ pub(super) fn condense_rigid<M: NodalMass + ?Sized>(
     positions: &[[f64; 3]],
 ) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let no_modes = Mat::<f64>::zeros(3 * mass.count(), 0);
-    rigid_part(weighted_gram(mass, Columns { positions, shapes: no_modes.as_ref() }).as_ref())
+    rigid_part(weighted_gram(mass, SolidColumns { positions, shapes: no_modes.as_ref() }).as_ref())
 }
 
 pub(super) fn rigid_part(gram: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
@@ -159,12 +159,12 @@ fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
 
 /// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]; 1, x, y, z are zero beyond the positions.
 #[derive(Clone, Copy)]
-pub(super) struct Columns<'a> {
+pub(super) struct SolidColumns<'a> {
     pub positions: &'a [[f64; 3]],
     pub shapes: MatRef<'a, f64>,
 }
 
-impl Columns<'_> {
+impl SolidColumns<'_> {
     /// # Panics
     /// When the sizes of mass, positions, shapes and modal stiffness disagree.
     pub fn assert_sizes<M: NodalMass + ?Sized>(&self, mass: &M, modal_stiffness: MatRef<'_, f64>) {
@@ -229,7 +229,7 @@ impl Aligned {
 }
 
 /// X' Ms X, exactly symmetric.
-fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>) -> Mat<f64> {
+fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let n_columns = columns.count();
     let mut gram = Mat::<f64>::zeros(n_columns, n_columns);
     for start in (0..n_columns).step_by(PANEL) {
@@ -279,7 +279,7 @@ pub(super) fn sum_of_groups(
 }
 
 /// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the panel.
-fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>, panel: Range<usize>) -> Mat<f64> {
+fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel: Range<usize>) -> Mat<f64> {
     let n = columns.rows();
     let lanes = panel.len().div_ceil(LANE);
     let (before, width) = (panel.start, lanes * LANE);

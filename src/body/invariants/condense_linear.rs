@@ -1,7 +1,7 @@
 //! The condensation without S: what a body has that holds neither W2 nor W3, from the products of M with rigid motion alone.
 
 use super::condense::{
-    Aligned, CHUNK, Columns, LANE, Lane, NodalMass, mass_times, rigid_part, sum_of_groups,
+    Aligned, CHUNK, LANE, Lane, NodalMass, SolidColumns, mass_times, rigid_part, sum_of_groups,
 };
 use super::{Groups, Invariants, LumpedMasses, s_of_modal_mass};
 use crate::numerics::linalg::{SymmetricMatrix, gram};
@@ -22,7 +22,7 @@ pub fn condense_linear(
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
     let nf = shapes.ncols();
-    of_rigid_products(mass, Columns { positions, shapes }, modal_stiffness, &Mat::identity(nf, nf))
+    of_rigid_products(mass, SolidColumns { positions, shapes }, modal_stiffness, &Mat::identity(nf, nf))
 }
 
 /// [`condense_lumped`](super::condense_lumped) without W2 and W3. m_ff, of which lumped masses make no identity, is there.
@@ -41,12 +41,12 @@ pub fn condense_lumped_linear(
     let product = gram(shapes, weighted.as_ref());
     let modal_mass =
         Mat::from_fn(shapes.ncols(), shapes.ncols(), |p, q| 0.5 * (product[(p, q)] + product[(q, p)]));
-    of_rigid_products(m, Columns { positions, shapes }, modal_stiffness, &modal_mass)
+    of_rigid_products(m, SolidColumns { positions, shapes }, modal_stiffness, &modal_mass)
 }
 
 fn of_rigid_products<M: NodalMass + ?Sized>(
     mass: &M,
-    columns: Columns<'_>,
+    columns: SolidColumns<'_>,
     modal_stiffness: Mat<f64>,
     modal_mass: &Mat<f64>,
 ) -> Invariants {
@@ -71,7 +71,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
 }
 
 /// X' Ms [1, x, y, z], in the partition of the whole condensation; columns beyond the fourth mean nothing.
-fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: Columns<'_>) -> Mat<f64> {
+fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let (n, count) = (columns.rows(), columns.count());
     let mut x: Vec<Lane> = vec![[0.0; LANE]; n];
     x.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
@@ -130,7 +130,7 @@ mod tests {
         let mass = Counted(matrix, AtomicUsize::new(0));
         let positions: Vec<[f64; 3]> = (0..n).map(|i| [0, 7, 11].map(|k| wave(i + k))).collect();
         let shapes = Mat::from_fn(3 * n, nf, |row, p| wave(row * (p + 2)));
-        let columns = Columns { positions: &positions, shapes: shapes.as_ref() };
+        let columns = SolidColumns { positions: &positions, shapes: shapes.as_ref() };
         let stiffness = || Mat::zeros(nf, nf);
         let linear = of_rigid_products(&mass, columns, stiffness(), &Mat::identity(nf, nf));
         assert_eq!(mass.1.swap(0, Ordering::Relaxed), n, "one lane holds four columns");

@@ -52,7 +52,7 @@ pub fn condense_general(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    let columns = Columns::new(mass, motion, shapes);
+    let columns = GeneralColumns::new(mass, motion, shapes);
     columns.products(columns.gram(mass)).invariants(modal_stiffness)
 }
 
@@ -67,18 +67,18 @@ pub fn condense_general_linear(
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
 ) -> Invariants {
-    let columns = Columns::new(mass, motion, shapes);
+    let columns = GeneralColumns::new(mass, motion, shapes);
     let whole = columns.products(columns.rigid_gram(mass)).invariants(modal_stiffness);
     whole.with_groups(Groups { w1: true, ..Groups::NONE })
 }
 
 /// X = [Phi_t, B_x, B_j e_b for each axis b and mode j, Psi].
-struct Columns<'a> {
+struct GeneralColumns<'a> {
     motion: &'a RigidMotion<'a>,
     shapes: MatRef<'a, f64>,
 }
 
-impl<'a> Columns<'a> {
+impl<'a> GeneralColumns<'a> {
     /// # Panics
     /// When mass, motion and shapes have not the same rows.
     fn new(mass: &SymmetricMatrix, motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
@@ -171,7 +171,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// The Gram matrix of [`Columns`], of [`condense_general_linear`] without what W2 and W3 are made of.
+/// The Gram matrix of [`GeneralColumns`], of [`condense_general_linear`] without what W2 and W3 are made of.
 struct Products {
     gram: Mat<f64>,
     rigid: usize,

@@ -1,7 +1,7 @@
 //! The C99 header of a body: the committed template with its sizes on top, under names of its own.
 
 use super::arrays::Content;
-use super::layout::{ARRAYS, CHECKED_FROM, HEADER, Place, VERSION, fixed_header, header_offset};
+use super::layout::{ARRAYS, ArrayPosition, CHECKED_FROM, HEADER, VERSION, fixed_header, header_offset};
 use crate::body::flex_body::FlexBody;
 use std::fmt::Write;
 
@@ -27,7 +27,7 @@ pub(crate) fn expected(content: &Content, body: &FlexBody, precision: usize) -> 
 pub(crate) fn header(
     body: &FlexBody,
     content: &Content,
-    places: &[Option<Place>],
+    places: &[Option<ArrayPosition>],
     precision: usize,
     size: usize,
 ) -> String {
@@ -59,7 +59,7 @@ pub(crate) fn header(
     let entries: Vec<String> = places
         .iter()
         .map(|place| {
-            let [offset, rows, columns, stride] = Place::entry(place.as_ref());
+            let [offset, rows, columns, stride] = ArrayPosition::entry(place.as_ref());
             format!("{offset}u, {rows}u, {columns}u, {stride}u")
         })
         .collect();
@@ -95,7 +95,7 @@ pub(crate) fn header(
 /// Header entries that the code looks at one by one.
 const EXAMINED: &[&str] = &["byte_order", "version", "size", "checksum", "precision"];
 
-fn place<'p>(places: &'p [Option<Place>], name: &str) -> Option<&'p Place> {
+fn place<'p>(places: &'p [Option<ArrayPosition>], name: &str) -> Option<&'p ArrayPosition> {
     let at = ARRAYS.iter().position(|array| array.name == name)?;
     places[at].as_ref()
 }

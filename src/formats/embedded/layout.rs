@@ -139,14 +139,14 @@ const PARTS: &[(&str, &str)] = &[
 ];
 
 /// Where an array stands.
-pub(crate) struct Place {
+pub(crate) struct ArrayPosition {
     pub offset: usize,
     pub rows: usize,
     pub columns: usize,
     pub stride: usize,
 }
 
-impl Place {
+impl ArrayPosition {
     /// The entry of the table.
     pub fn entry(place: Option<&Self>) -> [u32; 4] {
         // A file has less than 4 GiB, as the writer makes sure.

@@ -3,7 +3,7 @@
 use super::arrays::{Array, Content, Numbers, loads};
 use super::header::{expected, header};
 use super::layout::{
-    ALIGNMENT, ARRAYS, BYTE_ORDER, CHECKED_FROM, MAGIC, Place, VERSION, fixed_header, header_bytes,
+    ALIGNMENT, ARRAYS, ArrayPosition, BYTE_ORDER, CHECKED_FROM, MAGIC, VERSION, fixed_header, header_bytes,
     header_offset,
 };
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -55,7 +55,11 @@ impl ExportFormat for Embedded {
     }
 }
 
-fn bytes(body: &FlexBody, content: &Content, precision: usize) -> Result<(Vec<u8>, Vec<Option<Place>>)> {
+fn bytes(
+    body: &FlexBody,
+    content: &Content,
+    precision: usize,
+) -> Result<(Vec<u8>, Vec<Option<ArrayPosition>>)> {
     let mut file = vec![0; header_bytes()];
     let mut places = Vec::new();
     for (described, array) in ARRAYS.iter().zip(&content.arrays) {
@@ -63,7 +67,7 @@ fn bytes(body: &FlexBody, content: &Content, precision: usize) -> Result<(Vec<u8
             places.push(None);
             continue;
         };
-        places.push(Some(Place {
+        places.push(Some(ArrayPosition {
             offset: file.len(),
             rows: array.rows,
             columns: array.columns,
@@ -90,8 +94,11 @@ fn bytes(body: &FlexBody, content: &Content, precision: usize) -> Result<(Vec<u8
     for (name, unit) in [("length", &units.length), ("mass", &units.mass), ("time", &units.time)] {
         put(name, &unit.to_si().to_le_bytes());
     }
-    let table: Vec<u8> =
-        places.iter().flat_map(|place| Place::entry(place.as_ref())).flat_map(u32::to_le_bytes).collect();
+    let table: Vec<u8> = places
+        .iter()
+        .flat_map(|place| ArrayPosition::entry(place.as_ref()))
+        .flat_map(u32::to_le_bytes)
+        .collect();
     file[fixed_header()..][..table.len()].copy_from_slice(&table);
     let mut checksum = Crc::new();
     checksum.update(&file[CHECKED_FROM..]);

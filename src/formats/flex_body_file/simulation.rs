@@ -31,12 +31,12 @@ pub fn fill_simulation(recording: &Recording, units: &UnitSystem, slot: &OutputS
 }
 
 /// A group and what describes the numbers in it.
-struct Place<'a> {
+struct DescribedGroup<'a> {
     group: hdf5::Group,
     units: &'a UnitSystem,
 }
 
-impl Place<'_> {
+impl DescribedGroup<'_> {
     /// A dataset with a row for every instant.
     fn put(
         &self,
@@ -74,7 +74,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     writer.origin()?;
     writer.method()?;
     writer.summary()?;
-    let top = Place { group: writer.file.as_group()?, units };
+    let top = DescribedGroup { group: writer.file.as_group()?, units };
     top.put("time", unit(0, 0, 1), "instants", writer.instants(), &recording.time)?;
     writer.frame()?;
     writer.modes()?;
@@ -94,8 +94,8 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn group(&self, name: &str) -> hdf5::Result<Place<'_>> {
-        Ok(Place { group: make(&self.file, name)?, units: self.units })
+    fn group(&self, name: &str) -> hdf5::Result<DescribedGroup<'_>> {
+        Ok(DescribedGroup { group: make(&self.file, name)?, units: self.units })
     }
 
     fn instants(&self) -> usize {
@@ -223,7 +223,8 @@ impl Writer<'_> {
         }
         let points = self.group("points")?;
         for path in &self.recording.paths {
-            let point = Place { group: make(&points.group, &names::encode(&path.name))?, units: self.units };
+            let point =
+                DescribedGroup { group: make(&points.group, &names::encode(&path.name))?, units: self.units };
             point.vectors("place", unit(0, 1, 0), "place, world axes", path.place.iter())?;
             let description = "deflection from the undeformed body, axes of the model, turning with the body";
             point.vectors("deflection", unit(0, 1, 0), description, path.deflection.iter())?;

@@ -54,13 +54,13 @@ pub struct AssemblyTree {
 impl AssemblyTree {
     /// Structure of the factor of a matrix with this graph, eliminated in `order` up to postordering.
     pub fn new(graph: &Graph, order: &[u32], block: usize) -> Self {
-        let columns = Columns::new(graph, order);
+        let columns = EliminationTree::new(graph, order);
         let fundamental = Supernode::fundamental(graph, &columns);
         Self::assemble(&columns, amalgamate(fundamental, block))
     }
 
     /// Numbers the supernodes in postorder and their columns with them.
-    fn assemble(columns: &Columns, supernodes: Vec<Supernode>) -> Self {
+    fn assemble(columns: &EliminationTree, supernodes: Vec<Supernode>) -> Self {
         let count = supernodes.len();
         let vertices = columns.order.len();
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); count];
@@ -171,14 +171,14 @@ impl AssemblyTree {
 }
 
 /// The elimination tree of single columns, renumbered in postorder.
-struct Columns {
+struct EliminationTree {
     /// Vertex at each position.
     order: Vec<u32>,
     position: Vec<u32>,
     parent: Vec<u32>,
 }
 
-impl Columns {
+impl EliminationTree {
     fn new(graph: &Graph, order: &[u32]) -> Self {
         let n = graph.len();
         let mut position = vec![0u32; n];
@@ -228,7 +228,7 @@ struct Supernode {
 
 impl Supernode {
     /// Maximal runs of columns, each the only child of the next and with the same structure.
-    fn fundamental(graph: &Graph, columns: &Columns) -> Vec<Self> {
+    fn fundamental(graph: &Graph, columns: &EliminationTree) -> Vec<Self> {
         let n = columns.order.len();
         let (children_at, children) = children_of(&columns.parent);
         let mut supernodes: Vec<Self> = Vec::new();

@@ -113,13 +113,13 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
 }
 
 /// A frame with the stiffness of a unit force and a unit moment there.
-pub(crate) struct Place {
+pub(crate) struct FrameArrays {
     pub(crate) frame: ExportFrame,
     force: Option<Vec<Mat<f64>>>,
     moment: Option<Vec<Mat<f64>>>,
 }
 
-impl Place {
+impl FrameArrays {
     /// origin, phi, psi and AP. The motion of second order (7.5) is phi1 and psi1.
     pub(crate) fn objects(&self) -> Vec<Taylor> {
         let ExportFrame { position, translation, rotation, .. } = &self.frame;
@@ -165,7 +165,7 @@ impl Place {
 }
 
 /// The frames of the file. Stiffness of forces at an interface belongs to its reference point.
-pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -> Vec<Place> {
+pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -> Vec<FrameArrays> {
     let place = |frame: ExportFrame| {
         let interface = body
             .interfaces()
@@ -175,7 +175,7 @@ pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -
             interface.and_then(|interface| stiffness(body, &kind(interface.name.clone())))
         };
         let moment = if frame.rotation.is_some() { stiffness_for(LoadKind::Moment) } else { None };
-        Place { force: stiffness_for(LoadKind::Force), moment, frame }
+        FrameArrays { force: stiffness_for(LoadKind::Force), moment, frame }
     };
     frames(body, points).into_iter().map(place).collect()
 }

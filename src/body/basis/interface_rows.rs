@@ -12,7 +12,7 @@ use std::collections::HashMap;
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// An interface with r coordinates: the motion of its reference point, or, without one, all displacements of its nodes.
-pub(super) struct Joint {
+pub(super) struct CoupledInterface {
     pub name: String,
     pub coupling: Coupling,
     /// Indices of its nodes.
@@ -37,7 +37,7 @@ pub(super) struct Joint {
     holds: bool,
 }
 
-impl Joint {
+impl CoupledInterface {
     fn new(model: &FeModel, set: &NodeSet, places: &HashMap<i64, usize>) -> Self {
         let members = Members::new(model, set, places);
         match set.coupling() {
@@ -178,7 +178,7 @@ fn along_axes(dimension: usize, along: &str, about: &str) -> Vec<String> {
 ///
 /// # Errors
 /// [`InterfaceNode`](Code::InterfaceNode) when there is none; `what` needs one, as in `interface loads`.
-pub(super) fn joints(model: &FeModel, what: &str) -> Result<Vec<Joint>> {
+pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<CoupledInterface>> {
     if model.interfaces().is_empty() {
         let message = format!("the model has no interfaces, so there are no {what}");
         return Err(Diagnostic::new(Code::InterfaceNode, message)
@@ -186,14 +186,14 @@ pub(super) fn joints(model: &FeModel, what: &str) -> Result<Vec<Joint>> {
             .into());
     }
     let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
-    Ok(model.interfaces().iter().map(|set| Joint::new(model, set, &places)).collect())
+    Ok(model.interfaces().iter().map(|set| CoupledInterface::new(model, set, &places)).collect())
 }
 
 /// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are zero.
 ///
 /// # Errors
 /// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that are found.
-pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()> {
+pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -> Result<()> {
     let (table, d) = (model.nodes(), model.dimension());
     let mut found = Vec::new();
     let (place, least) = if d == 2 {
@@ -252,10 +252,10 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[Joint]) -> Result<()
 /// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not fit.
 pub(super) fn hold(
     n: usize,
-    joints: &[Joint],
+    joints: &[CoupledInterface],
     memory: Option<u64>,
 ) -> std::result::Result<Elimination, EigenFailure> {
-    let averaging = |joint: &&Joint| joint.coupling == Coupling::Averaging;
+    let averaging = |joint: &&CoupledInterface| joint.coupling == Coupling::Averaging;
     // In K and in M. Bytes of an entry: in both matrices, one of them twice while it is made symmetric.
     let entries: u64 = joints.iter().filter(averaging).map(|joint| (joint.rows.len() as u64).pow(2)).sum();
     let bytes = 48 * entries;
@@ -268,7 +268,7 @@ pub(super) fn hold(
 }
 
 /// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of the size of one.
-fn without_mean(joint: &Joint) -> Dependents {
+fn without_mean(joint: &CoupledInterface) -> Dependents {
     let measure = joint.centred.as_ref();
     let (rows, r) = (measure.nrows(), measure.ncols());
     // Rows of one size: rotations are in other units than displacements.
