@@ -194,35 +194,51 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
 /// # Errors
 /// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that are found.
 pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -> Result<()> {
-    let (table, d) = (model.nodes(), model.dimension());
-    let mut found = Vec::new();
-    let (place, least) = if d == 2 {
+    let mut found: Vec<Diagnostic> =
+        joints.iter().filter(|joint| !joint.determined).map(|joint| undetermined(model, joint)).collect();
+    found.extend(shared_nodes(model, joints));
+    if found.is_empty() {
+        found.extend(body_not_held(model, joints));
+    }
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// Where nodes must not lie that are to determine every rotation, and how many of them do.
+fn determining(dimension: usize) -> (&'static str, &'static str) {
+    if dimension == 2 {
         ("one point", "two nodes")
     } else {
         ("one line", "three nodes that do not lie on one line")
-    };
-    for joint in joints.iter().filter(|joint| !joint.determined) {
-        if joint.coupling == Coupling::Free {
-            let message =
-                format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
-            let help = "give it nodes with all rotations, nodes with none, or another coupling";
-            found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
-            continue;
-        }
-        let message = format!(
-            "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
-            joint.name,
-            joint.nodes.len()
-        );
-        let help = format!("give the interface {least}, or coupling = \"free\"");
-        found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
     }
+}
+
+/// The nodes of a joint do not determine its coordinates.
+fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
+    if joint.coupling == Coupling::Free {
+        let message =
+            format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
+        let help = "give it nodes with all rotations, nodes with none, or another coupling";
+        return Diagnostic::new(Code::InterfaceCoupling, message).with_help(help);
+    }
+    let (place, least) = determining(model.dimension());
+    let message = format!(
+        "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
+        joint.name,
+        joint.nodes.len()
+    );
+    let help = format!("give the interface {least}, or coupling = \"free\"");
+    Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
+}
+
+/// Nodes that belong to several joints.
+fn shared_nodes(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
     let mut owner: HashMap<usize, &str> = HashMap::new();
     for joint in joints {
         let shared: Vec<(i64, &str)> = joint
             .nodes
             .iter()
-            .filter_map(|&i| owner.insert(i, &joint.name).map(|other| (table.ids[i], other)))
+            .filter_map(|&i| owner.insert(i, &joint.name).map(|other| (model.nodes().ids[i], other)))
             .collect();
         if let Some((node, other)) = shared.first() {
             let message = format!(
@@ -233,16 +249,21 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -
             found.push(Diagnostic::new(Code::InterfaceShared, message));
         }
     }
+    found
+}
+
+/// All joints together leave the body free to turn.
+fn body_not_held(model: &FeModel, joints: &[CoupledInterface]) -> Option<Diagnostic> {
+    let d = model.dimension();
     let held: Vec<[f64; 3]> =
-        joints.iter().flat_map(|joint| &joint.nodes).map(|&i| table.positions[i]).collect();
-    let together = || InterfaceMotion::new(&held, false, d, None).is_determined();
-    if found.is_empty() && !joints.iter().any(|joint| joint.holds) && !together() {
-        let message =
-            format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
-        let help = format!("the interfaces together need {least}");
-        found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
+        joints.iter().flat_map(|joint| &joint.nodes).map(|&i| model.nodes().positions[i]).collect();
+    if joints.iter().any(|joint| joint.holds) || InterfaceMotion::new(&held, false, d, None).is_determined() {
+        return None;
     }
-    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+    let (place, least) = determining(d);
+    let message = format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
+    let help = format!("the interfaces together need {least}");
+    Some(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help))
 }
 
 /// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of averaging ones have no

@@ -4,8 +4,7 @@ use super::cauchy_schwarz::scaled;
 use super::dense::{entries, spectral_norm, symmetric_eigenvalues};
 use super::derived::{CYCLIC, inertia_of};
 use super::{CauchySchwarz, Invariants};
-use crate::numerics::linalg::dense_cholesky;
-use crate::numerics::linalg::larger;
+use crate::numerics::linalg::{dense_cholesky, larger};
 use faer::Mat;
 use nalgebra::Matrix3;
 

@@ -72,6 +72,23 @@ fn seconds(n: usize, wanted: usize, factor: u64, dense: bool) -> f64 {
     (search + 20.0 * rows * modes * modes) / PACE
 }
 
+/// What a search needs, by the dense path or with a factor of this precision, and what is made of its modes.
+fn search_bytes(
+    problem: &EigenProblem<'_>,
+    peaks: &Peaks,
+    wanted: usize,
+    dense: bool,
+    precision: Precision,
+) -> u64 {
+    let (n, size) = (problem.pencil.n(), precision.bytes());
+    let found = if dense {
+        dense_bytes(n, wanted)
+    } else {
+        (size * peaks.cholesky).max(size * peaks.factor + vectors(problem, wanted, precision))
+    };
+    found.max(made_of_them(n, wanted))
+}
+
 /// What an inertia count of `inertia` numbers needs, with the modes and their products.
 fn count_bytes(problem: &EigenProblem<'_>, inertia: u64, modes: usize) -> u64 {
     8 * (inertia + (3 * modes * problem.pencil.n()) as u64)
@@ -91,19 +108,11 @@ impl Plan {
     ) -> Result<Self, EigenFailure> {
         let n = problem.pencil.n();
         let seconds = seconds(n, wanted, analysis.factor_len() as u64, dense);
-        let Peaks { factor, cholesky, inertia } = analysis.peaks(rayon::current_num_threads());
+        let peaks = analysis.peaks(rayon::current_num_threads());
         let available = settings.memory.unwrap_or(u64::MAX);
-        let search = |precision: Precision| {
-            let size = precision.bytes();
-            let found = if dense {
-                dense_bytes(n, wanted)
-            } else {
-                (size * cholesky).max(size * factor + vectors(problem, wanted, precision))
-            };
-            found.max(made_of_them(n, wanted))
-        };
+        let search = |precision: Precision| search_bytes(problem, &peaks, wanted, dense, precision);
         // The factor is given back before the count.
-        let count = count_bytes(problem, inertia, wanted);
+        let count = count_bytes(problem, peaks.inertia, wanted);
         let certified = settings.accuracy == Accuracy::Certified;
         let precision = match settings.factor {
             _ if certified => Precision::Double,
@@ -112,13 +121,11 @@ impl Plan {
             FactorChoice::Auto if analysis.flops() > settings.single_pays => Precision::Single,
             FactorChoice::Auto => Precision::Double,
         };
-        let needed = if certified {
+        let mut needed = search(precision);
+        if certified {
             // The bounds factor a matrix of their own, beside the modes.
-            let copy = 12 * problem.pencil.stiffness().as_csc().nnz() as u64;
-            search(precision).max(count) + copy
-        } else {
-            search(precision)
-        };
+            needed = needed.max(count) + 12 * problem.pencil.stiffness().as_csc().nnz() as u64;
+        }
         if resident(needed) > available {
             return Err(EigenFailure::Memory { bytes: resident(needed), available });
         }
@@ -130,7 +137,7 @@ impl Plan {
         Ok(Self {
             precision,
             bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
-            factor_bytes: precision.bytes() * factor,
+            factor_bytes: precision.bytes() * peaks.factor,
             flops: analysis.flops(),
             seconds,
             single_failed: false,
