@@ -29,10 +29,10 @@ const INDEPENDENT: f64 = 1e-8;
 /// product with K, a solve with a factor of M made here, and a few dot products: some thousand rows are comfortable.
 ///
 /// ```
-/// # fn check(model: &flexbody::model::FeModel, body: &flexbody::flex_body::FlexBody, start: &flexbody::dynamics::Configuration)
+/// # fn check(model: &flexbody::model::FeModel, body: &flexbody::body::flex_body::FlexBody, start: &flexbody::motion::dynamics::Configuration)
 /// # -> Result<(), Box<dyn std::error::Error>> {
-/// use flexbody::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
-/// use flexbody::integration::{Explicit, Failure, Method, integrate};
+/// use flexbody::motion::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
+/// use flexbody::numerics::integration::{Explicit, Failure, Method, integrate};
 /// let equations = NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes)?;
 /// let modes = NodalModes::new(&equations, body).ok_or("modes of another model")?;
 /// let mut state = equations.state(&modes.lift(start))?;
