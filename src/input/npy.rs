@@ -11,37 +11,12 @@ pub(super) fn recognises(head: &[u8]) -> bool {
 
 /// An array of real numbers with one or two extents.
 pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
-    let syntax = |what: String| {
-        Diagnostic::new(Code::MatrixSyntax, what).with_help("write the array again by numpy.save")
-    };
-    let number = |range: std::ops::Range<usize>| {
-        let bytes = bytes.get(range)?;
-        Some(bytes.iter().rev().fold(0usize, |number, &byte| number << 8 | usize::from(byte)))
-    };
-    let version = bytes.get(6).copied().unwrap_or(0);
-    let (start, length) = match version {
-        1 => (10, number(8..10)),
-        2 | 3 => (12, number(8..12)),
-        _ => return Err(syntax(format!("NumPy format has version {version}, expected 1 to 3"))),
-    };
-    let header = length.and_then(|length| bytes.get(start..)?.get(..length));
-    let header = header.ok_or_else(|| syntax("file ends inside its header".into()))?;
-    let data = &bytes[start + header.len()..];
+    let (header, data) = split(bytes)?;
     let text = header.escape_ascii().to_string();
     let shown = text.get(..100).unwrap_or(&text).trim_end();
     let Header { descr, fortran, shape } =
         parse(header).ok_or_else(|| syntax(format!("header is not understood: `{shown}`")))?;
-    let (size, decode): (usize, fn(&[u8]) -> f64) = match descr {
-        "<f8" => (8, |b| f64::from_le_bytes(b.try_into().expect("eight bytes"))),
-        ">f8" => (8, |b| f64::from_be_bytes(b.try_into().expect("eight bytes"))),
-        "<f4" => (4, |b| f64::from(f32::from_le_bytes(b.try_into().expect("four bytes")))),
-        ">f4" => (4, |b| f64::from(f32::from_be_bytes(b.try_into().expect("four bytes")))),
-        other => {
-            let message = format!("array has the type `{}`, expected f8 or f4", other.escape_default());
-            return Err(Diagnostic::new(Code::MatrixKind, message)
-                .with_help("write real numbers: numpy.save(file, array.astype(float))"));
-        }
-    };
+    let (size, decode) = number_type(descr)?;
     let (rows, cols) = match *shape.as_slice() {
         [rows] => (rows, 1),
         [rows, cols] => (rows, cols),
@@ -59,6 +34,45 @@ pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
     }
     let values = data.chunks_exact(size).map(decode).collect();
     Ok(Array { rows, cols, row_major: !fortran, values, digits: if size == 4 { 7 } else { 17 } })
+}
+
+fn syntax(what: String) -> Diagnostic {
+    Diagnostic::new(Code::MatrixSyntax, what).with_help("write the array again by numpy.save")
+}
+
+/// The header and the numbers behind it.
+fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Diagnostic> {
+    let number = |range: std::ops::Range<usize>| {
+        let bytes = bytes.get(range)?;
+        Some(bytes.iter().rev().fold(0usize, |number, &byte| number << 8 | usize::from(byte)))
+    };
+    let version = bytes.get(6).copied().unwrap_or(0);
+    let (start, length) = match version {
+        1 => (10, number(8..10)),
+        2 | 3 => (12, number(8..12)),
+        _ => return Err(syntax(format!("NumPy format has version {version}, expected 1 to 3"))),
+    };
+    let header = length.and_then(|length| bytes.get(start..)?.get(..length));
+    let header = header.ok_or_else(|| syntax("file ends inside its header".into()))?;
+    Ok((header, &bytes[start + header.len()..]))
+}
+
+/// Decodes the bytes of one number.
+type Decode = fn(&[u8]) -> f64;
+
+/// Bytes of a number of the type that the header names, and how they are decoded.
+fn number_type(descr: &str) -> Result<(usize, Decode), Diagnostic> {
+    Ok(match descr {
+        "<f8" => (8, |b| f64::from_le_bytes(b.try_into().expect("eight bytes"))),
+        ">f8" => (8, |b| f64::from_be_bytes(b.try_into().expect("eight bytes"))),
+        "<f4" => (4, |b| f64::from(f32::from_le_bytes(b.try_into().expect("four bytes")))),
+        ">f4" => (4, |b| f64::from(f32::from_be_bytes(b.try_into().expect("four bytes")))),
+        other => {
+            let message = format!("array has the type `{}`, expected f8 or f4", other.escape_default());
+            return Err(Diagnostic::new(Code::MatrixKind, message)
+                .with_help("write real numbers: numpy.save(file, array.astype(float))"));
+        }
+    })
 }
 
 struct Header<'a> {

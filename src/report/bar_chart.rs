@@ -1,9 +1,8 @@
 //! Errors of lumped masses as bars on a logarithmic axis: inline SVG, readable without colour.
 
-use super::lumped::{ErrorNorm, LumpedFacts, distinct};
+use super::lumped::{LumpedFacts, distinct};
 use super::markup::escape;
 use super::numbers::percent;
-use std::collections::HashMap;
 
 /// Power of ten at the left end: errors below 0.0001 % are of no consequence and have no bar.
 const LOWEST: i32 = -6;
@@ -26,39 +25,57 @@ pub(super) fn bar_chart(lumped: &[LumpedFacts]) -> String {
     }
     let values = lumped.iter().flat_map(|l| &l.errors.worst_by_invariant).map(|norm| norm.value);
     let largest = values.filter(|v| v.is_finite()).fold(1.0, f64::max);
-    let highest = (largest.log10().ceil() as i32).clamp(0, 300);
-    let place = |decade: f64| LABEL + PLOT * (decade - f64::from(LOWEST)) / f64::from(highest - LOWEST);
-
-    let worst: Vec<HashMap<&str, &ErrorNorm>> = lumped
-        .iter()
-        .map(|l| l.errors.worst_by_invariant.iter().map(|norm| (norm.invariant.as_str(), norm)).collect())
-        .collect();
+    let bars = Bars { lumped, highest: (largest.log10().ceil() as i32).clamp(0, 300) };
     let row = lumped.len() as f64 * BAR + GAP;
     let (width, height) = (LABEL + PLOT + VALUES, TOP + invariants.len() as f64 * row);
     let mut svg = format!(
         "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"Bar chart of the worst relative error of each invariant; the numbers are in the table below.\">\n"
     );
-    let step = usize::try_from((highest - LOWEST) / 8 + 1).unwrap_or(1);
-    for decade in (LOWEST..=highest).step_by(step) {
-        let x = place(f64::from(decade));
-        svg.push_str(&format!(
-            "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{height}\"/><text class=\"tick\" x=\"{x:.1}\" y=\"14\" text-anchor=\"middle\">{}</text>\n",
-            percent(10f64.powi(decade))
-        ));
-    }
+    bars.draw_decades(&mut svg, height);
     for (i, invariant) in invariants.iter().enumerate() {
-        let top = TOP + i as f64 * row + 0.5 * GAP;
+        bars.draw_invariant(&mut svg, TOP + i as f64 * row + 0.5 * GAP, row, invariant);
+    }
+    svg.push_str("</svg>\n");
+    svg
+}
+
+/// Bars over decades of errors, up to the highest.
+struct Bars<'l> {
+    lumped: &'l [LumpedFacts],
+    highest: i32,
+}
+
+impl Bars<'_> {
+    fn place(&self, decade: f64) -> f64 {
+        LABEL + PLOT * (decade - f64::from(LOWEST)) / f64::from(self.highest - LOWEST)
+    }
+
+    fn draw_decades(&self, svg: &mut String, height: f64) {
+        let step = usize::try_from((self.highest - LOWEST) / 8 + 1).unwrap_or(1);
+        for decade in (LOWEST..=self.highest).step_by(step) {
+            let x = self.place(f64::from(decade));
+            svg.push_str(&format!(
+                "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{height}\"/><text class=\"tick\" x=\"{x:.1}\" y=\"14\" text-anchor=\"middle\">{}</text>\n",
+                percent(10f64.powi(decade))
+            ));
+        }
+    }
+
+    /// The name of an invariant and the bars of all schemes, from `top` on.
+    fn draw_invariant(&self, svg: &mut String, top: f64, row: f64, invariant: &str) {
         let middle = top + 0.5 * (row - GAP) + 4.0;
         let name = escape(&shortened(invariant));
         svg.push_str(&format!(
             "<text x=\"{:.1}\" y=\"{middle:.1}\" text-anchor=\"end\">{name}</text>\n",
             LABEL - 8.0
         ));
-        for (j, scheme) in lumped.iter().enumerate() {
-            let Some(norm) = worst[j].get(invariant) else { continue };
+        for (j, scheme) in self.lumped.iter().enumerate() {
+            // The last of a name counts, as in a table by names.
+            let mut norms = scheme.errors.worst_by_invariant.iter().rev();
+            let Some(norm) = norms.find(|norm| norm.invariant == *invariant) else { continue };
             let y = top + j as f64 * BAR;
-            let decade = norm.value.abs().log10().clamp(f64::from(LOWEST), f64::from(highest));
-            let end = if decade.is_nan() { LABEL } else { place(decade) };
+            let decade = norm.value.abs().log10().clamp(f64::from(LOWEST), f64::from(self.highest));
+            let end = if decade.is_nan() { LABEL } else { self.place(decade) };
             svg.push_str(&format!(
                 "<rect class=\"s{}\" x=\"{LABEL}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">{} <tspan class=\"tick\">{}</tspan></text>\n",
                 j % COLOURS,
@@ -71,8 +88,6 @@ pub(super) fn bar_chart(lumped: &[LumpedFacts]) -> String {
             ));
         }
     }
-    svg.push_str("</svg>\n");
-    svg
 }
 
 /// A name that fits beside the bars.

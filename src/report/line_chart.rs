@@ -25,56 +25,90 @@ pub(super) struct Line {
 
 /// Lines over `time`, with the unit of each axis; empty without a finite value.
 pub(super) fn line_chart(title: &str, time: &[f64], lines: &[Line], time_unit: &str, unit: &str) -> String {
-    let finite = || lines.iter().flat_map(|line| &line.values).copied().filter(|v| v.is_finite());
-    let (mut low, mut high) =
-        (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
-    let (Some(&start), Some(&end)) = (time.first(), time.last()) else { return String::new() };
-    if low > high || start >= end {
-        return String::new();
-    }
-    if low == high {
-        let margin = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
-        (low, high) = (low - margin, high + margin);
-    }
-    let step = round_step((high - low) / INTERVALS);
-    let (first, last) = ((low / step).floor(), (high / step).ceil());
-    let (low, high) = (first * step, last * step);
-    let x = |t: f64| LEFT + WIDTH * (t - start) / (end - start);
-    let y = |v: f64| TOP + HEIGHT * (1.0 - (v - low) / (high - low));
-
+    let Some(scales) = Scales::over(time, lines) else { return String::new() };
     let (width, height) = (LEFT + WIDTH + NAMES, TOP + HEIGHT + BOTTOM);
     let title = escape(title);
     let mut svg = format!(
         "<figure><figcaption>{title} [{}]</figcaption>\n<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title} over time\">\n",
         escape(unit)
     );
-    let mut at = first;
-    while at <= last {
-        let level = y(at * step);
-        svg.push_str(&format!(
-            "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{level:.1}\" y2=\"{level:.1}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\n",
-            LEFT + WIDTH, LEFT - 6.0, level + 4.0, significant(at * step, 4)
-        ));
-        at += 1.0;
-    }
-    for part in 0..=4 {
-        let t = start + (end - start) * f64::from(part) / 4.0;
-        let label = if part == 4 {
-            format!("{} {}", significant(t, 4), escape(time_unit))
-        } else {
-            significant(t, 4)
-        };
-        svg.push_str(&format!(
-            "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>\n",
-            x(t),
-            TOP + HEIGHT + 18.0
-        ));
-    }
+    scales.draw_levels(&mut svg);
+    scales.draw_times(&mut svg, time_unit);
     for (i, line) in lines.iter().enumerate() {
-        let points: Vec<String> = gathered(time, &line.values)
-            .into_iter()
-            .map(|(t, v)| format!("{:.1},{:.1}", x(t), y(v)))
-            .collect();
+        scales.draw_line(&mut svg, time, i, line);
+    }
+    svg.push_str("</svg></figure>\n");
+    svg
+}
+
+/// The ranges of the axes.
+struct Scales {
+    start: f64,
+    end: f64,
+    /// Distance of the lines of the grid, and the numbers of the first and the last of them.
+    step: f64,
+    first: f64,
+    last: f64,
+}
+
+impl Scales {
+    /// `None` without a finite value or an interval of time.
+    fn over(time: &[f64], lines: &[Line]) -> Option<Self> {
+        let finite = || lines.iter().flat_map(|line| &line.values).copied().filter(|v| v.is_finite());
+        let (mut low, mut high) =
+            (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+        let (&start, &end) = (time.first()?, time.last()?);
+        if low > high || start >= end {
+            return None;
+        }
+        if low == high {
+            let margin = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
+            (low, high) = (low - margin, high + margin);
+        }
+        let step = round_step((high - low) / INTERVALS);
+        Some(Self { start, end, step, first: (low / step).floor(), last: (high / step).ceil() })
+    }
+
+    fn x(&self, time: f64) -> f64 {
+        LEFT + WIDTH * (time - self.start) / (self.end - self.start)
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        let (low, high) = (self.first * self.step, self.last * self.step);
+        TOP + HEIGHT * (1.0 - (value - low) / (high - low))
+    }
+
+    /// Lines of the grid with their values.
+    fn draw_levels(&self, svg: &mut String) {
+        let mut at = self.first;
+        while at <= self.last {
+            let level = self.y(at * self.step);
+            svg.push_str(&format!(
+                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{level:.1}\" y2=\"{level:.1}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\n",
+                LEFT + WIDTH, LEFT - 6.0, level + 4.0, significant(at * self.step, 4)
+            ));
+            at += 1.0;
+        }
+    }
+
+    /// Times below the drawing, the last with the unit.
+    fn draw_times(&self, svg: &mut String, unit: &str) {
+        for part in 0..=4 {
+            let t = self.start + (self.end - self.start) * f64::from(part) / 4.0;
+            let label =
+                if part == 4 { format!("{} {}", significant(t, 4), escape(unit)) } else { significant(t, 4) };
+            svg.push_str(&format!(
+                "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>\n",
+                self.x(t),
+                TOP + HEIGHT + 18.0
+            ));
+        }
+    }
+
+    /// Line number `i` and its name beside the drawing.
+    fn draw_line(&self, svg: &mut String, time: &[f64], i: usize, line: &Line) {
+        let point = |(t, v): (f64, f64)| format!("{:.1},{:.1}", self.x(t), self.y(v));
+        let points: Vec<String> = gathered(time, &line.values).into_iter().map(point).collect();
         let style = i % STYLES;
         let (from, level) = (LEFT + WIDTH + 10.0, TOP + 12.0 + 18.0 * i as f64);
         svg.push_str(&format!(
@@ -82,8 +116,6 @@ pub(super) fn line_chart(title: &str, time: &[f64], lines: &[Line], time_unit: &
             points.join(" "), from + 22.0, from + 28.0, level + 4.0, escape(&line.name)
         ));
     }
-    svg.push_str("</svg></figure>\n");
-    svg
 }
 
 /// The smallest and the largest value of every column, in their order.

@@ -71,60 +71,99 @@ pub(super) fn scatter_chart(chart: &Chart<'_>, series: &[Series<'_>]) -> String 
     // The tolerance is always seen.
     let errors = series.iter().flat_map(|s| s.points.iter().map(|p| raised(p.2))).chain([1.0]);
     let (Some(across), Some(up)) = (Axis::over(costs), Axis::over(errors)) else { return String::new() };
-    let x = |cost: f64| LEFT + WIDTH * across.at(cost);
-    let y = |error: f64| TOP + HEIGHT * (1.0 - up.at(raised(error)));
-
     let (width, height) = (LEFT + WIDTH + NAMES, TOP + HEIGHT + BOTTOM);
     let title = escape(chart.title);
-    let mut svg = format!(
+    let mut plot = Plot { chart, across, up, svg: String::new() };
+    plot.svg.push_str(&format!(
         "<figure><figcaption>{title}</figcaption>\n<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">\n"
-    );
-    for error in up.labels() {
-        let level = y(error);
-        svg.push_str(&format!(
-            "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{level:.1}\" y2=\"{level:.1}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\n",
-            LEFT + WIDTH, LEFT - 6.0, level + 4.0, significant(error, 2)
-        ));
-    }
-    for cost in across.labels() {
-        let place = x(cost);
-        svg.push_str(&format!(
-            "<line class=\"grid\" x1=\"{place:.1}\" x2=\"{place:.1}\" y1=\"{TOP}\" y2=\"{:.1}\"/><text class=\"tick\" x=\"{place:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\n",
-            TOP + HEIGHT, TOP + HEIGHT + 18.0, significant(cost, 2)
-        ));
-    }
-    svg.push_str(&format!(
-        "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text><text class=\"tick\" transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-        LEFT + 0.5 * WIDTH, TOP + HEIGHT + 40.0, escape(chart.x), TOP + 0.5 * HEIGHT, escape(chart.y)
     ));
-    let level = y(1.0);
-    svg.push_str(&format!(
-        "<polyline class=\"l1\" points=\"{LEFT},{level:.1} {:.1},{level:.1}\"/>\n",
-        LEFT + WIDTH
-    ));
-    if let Some(most) = chart.most {
-        let place = x(most);
-        svg.push_str(&format!(
-            "<polyline class=\"l1\" points=\"{place:.1},{TOP} {place:.1},{:.1}\"/>\n",
-            TOP + HEIGHT
+    plot.grid();
+    plot.limits();
+    plot.front();
+    plot.marks(series);
+    plot.ring();
+    legend(&mut plot.svg, series, chart.ring.is_some());
+    plot.svg.push_str("</svg></figure>\n");
+    plot.svg
+}
+
+/// A chart that is drawn.
+struct Plot<'c> {
+    chart: &'c Chart<'c>,
+    across: Axis,
+    up: Axis,
+    svg: String,
+}
+
+impl Plot<'_> {
+    fn x(&self, cost: f64) -> f64 {
+        LEFT + WIDTH * self.across.at(cost)
+    }
+
+    fn y(&self, error: f64) -> f64 {
+        TOP + HEIGHT * (1.0 - self.up.at(error.max(self.chart.floor)))
+    }
+
+    /// Lines of the grid with their numbers, and the names of the axes.
+    fn grid(&mut self) {
+        for error in self.up.labels() {
+            let level = self.y(error);
+            self.svg.push_str(&format!(
+                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{level:.1}\" y2=\"{level:.1}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\n",
+                LEFT + WIDTH, LEFT - 6.0, level + 4.0, significant(error, 2)
+            ));
+        }
+        for cost in self.across.labels() {
+            let place = self.x(cost);
+            self.svg.push_str(&format!(
+                "<line class=\"grid\" x1=\"{place:.1}\" x2=\"{place:.1}\" y1=\"{TOP}\" y2=\"{:.1}\"/><text class=\"tick\" x=\"{place:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\n",
+                TOP + HEIGHT, TOP + HEIGHT + 18.0, significant(cost, 2)
+            ));
+        }
+        self.svg.push_str(&format!(
+            "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text><text class=\"tick\" transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+            LEFT + 0.5 * WIDTH, TOP + HEIGHT + 40.0, escape(self.chart.x), TOP + 0.5 * HEIGHT, escape(self.chart.y)
         ));
     }
-    let corners: Vec<String> = chart.front.iter().map(|&(c, e)| format!("{:.1},{:.1}", x(c), y(e))).collect();
-    svg.push_str(&format!("<polyline class=\"l0\" points=\"{}\"/>\n", corners.join(" ")));
-    for (style, of) in series.iter().enumerate() {
-        for (name, cost, error) in &of.points {
-            svg.push_str(&mark(style, x(*cost), y(*error), name));
+
+    /// The tolerance, and the cost that is allowed.
+    fn limits(&mut self) {
+        let level = self.y(1.0);
+        self.svg.push_str(&format!(
+            "<polyline class=\"l1\" points=\"{LEFT},{level:.1} {:.1},{level:.1}\"/>\n",
+            LEFT + WIDTH
+        ));
+        if let Some(most) = self.chart.most {
+            let place = self.x(most);
+            self.svg.push_str(&format!(
+                "<polyline class=\"l1\" points=\"{place:.1},{TOP} {place:.1},{:.1}\"/>\n",
+                TOP + HEIGHT
+            ));
         }
     }
-    if let Some((cost, error)) = chart.ring {
-        svg.push_str(&format!(
-            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"9\" style=\"fill: none; stroke: var(--ink, #1a1d21); stroke-width: 2\"/>\n",
-            x(cost), y(error)
+
+    fn front(&mut self) {
+        let corner = |&(cost, error): &(f64, f64)| format!("{:.1},{:.1}", self.x(cost), self.y(error));
+        let corners: Vec<String> = self.chart.front.iter().map(corner).collect();
+        self.svg.push_str(&format!("<polyline class=\"l0\" points=\"{}\"/>\n", corners.join(" ")));
+    }
+
+    fn marks(&mut self, series: &[Series<'_>]) {
+        for (style, one) in series.iter().enumerate() {
+            for (name, cost, error) in &one.points {
+                let mark = mark(style, self.x(*cost), self.y(*error), name);
+                self.svg.push_str(&mark);
+            }
+        }
+    }
+
+    fn ring(&mut self) {
+        let Some((cost, error)) = self.chart.ring else { return };
+        let (x, y) = (self.x(cost), self.y(error));
+        self.svg.push_str(&format!(
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"9\" style=\"fill: none; stroke: var(--ink, #1a1d21); stroke-width: 2\"/>\n"
         ));
     }
-    legend(&mut svg, series, chart.ring.is_some());
-    svg.push_str("</svg></figure>\n");
-    svg
 }
 
 fn legend(svg: &mut String, series: &[Series<'_>], ring: bool) {

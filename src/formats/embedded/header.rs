@@ -31,65 +31,93 @@ pub(crate) fn header(
     precision: usize,
     size: usize,
 ) -> String {
-    let own = plain(&body.source().name);
-    let mut sizes = String::new();
-    let mut define = |name: &str, value: &dyn std::fmt::Display| {
-        writeln!(sizes, "#define FLEXBODY_{name} {value}").expect("strings take all text");
-    };
-    define("LAYOUT", &VERSION);
-    define("BYTES", &format_args!("{size}u"));
-    define("PRECISION", &precision);
-    define("MODES", &body.n_modes());
-    define("TRANSLATIONS", &content.translations);
-    define("AXES", &content.axes);
-    define("FRAMES", &content.frames.len());
-    let columns = |name: &str| place(places, name).map_or(0, |place| place.columns);
-    define("ROTATIONS", &(columns("frame_rotation") / content.axes));
-    define("SECONDS", &(columns("frame_second") / body.n_modes()));
-    define("HAS_W1", &(content.terms & 1));
-    for (array, place) in ARRAYS.iter().zip(places) {
-        let name = array.name.to_uppercase();
-        define(&format!("HAS_{name}"), &u8::from(place.is_some()));
-        if let Some(place) = place {
-            define(&format!("OFFSET_{name}"), &format_args!("{}u", place.offset));
-            define(&format!("COLUMNS_{name}"), &place.columns);
-            define(&format!("STRIDE_{name}"), &place.stride);
-        }
-    }
-    let entries: Vec<String> = places
-        .iter()
-        .map(|place| {
-            let [offset, rows, columns, stride] = ArrayPosition::entry(place.as_ref());
-            format!("{offset}u, {rows}u, {columns}u, {stride}u")
-        })
-        .collect();
-    define("TABLE", &entries.join(", \\\n    "));
-    let values: Vec<String> =
-        expected(content, body, precision).iter().map(|value| format!("{value}u")).collect();
-    define("HEADER", &values.join(", "));
-    for (name, ..) in HEADER.iter().filter(|(name, ..)| EXAMINED.contains(name)) {
-        define(&format!("AT_{}", name.to_uppercase()), &header_offset(name));
-    }
-    define("AT_TABLE", &fixed_header());
-    define("CHECKED_FROM", &CHECKED_FROM);
+    let mut sizes = Defines(String::new());
+    sizes.body(body, content, places, precision, size);
+    sizes.arrays(places);
+    sizes.file(&expected(content, body, precision));
     let real = if precision == 8 { "double" } else { "float" };
-    sizes += &format!("\ntypedef {real} flexbody_real;\n{}", frame_names(content));
-
-    let units = body.units();
-    let summary = format!(
-        "Body `{own}`: {} modes, units {}, {}, {}.",
-        body.n_modes(),
-        plain(units.length.name()),
-        plain(units.mass.name()),
-        plain(units.time.name())
-    );
-    let text = TEMPLATE.replace("/* SIZES */", sizes.trim_end()).replace("SUMMARY", &summary);
+    sizes.0 += &format!("\ntypedef {real} flexbody_real;\n{}", frame_names(content));
+    let text = TEMPLATE.replace("/* SIZES */", sizes.0.trim_end()).replace("SUMMARY", &summary(body));
     let own = identifier(&body.source().name);
     if own.is_empty() {
         return text;
     }
     text.replace("flexbody_", &format!("flexbody_{own}_"))
         .replace("FLEXBODY_", &format!("FLEXBODY_{}_", own.to_uppercase()))
+}
+
+/// Name, modes and units of the body, for a comment.
+fn summary(body: &FlexBody) -> String {
+    let units = body.units();
+    format!(
+        "Body `{}`: {} modes, units {}, {}, {}.",
+        plain(&body.source().name),
+        body.n_modes(),
+        plain(units.length.name()),
+        plain(units.mass.name()),
+        plain(units.time.name())
+    )
+}
+
+/// The constants of a body as lines of C.
+struct Defines(String);
+
+impl Defines {
+    fn put(&mut self, name: &str, value: &dyn std::fmt::Display) {
+        writeln!(self.0, "#define FLEXBODY_{name} {value}").expect("strings take all text");
+    }
+
+    /// Sizes of the file and of the body.
+    fn body(
+        &mut self,
+        body: &FlexBody,
+        content: &Content,
+        places: &[Option<ArrayPosition>],
+        precision: usize,
+        size: usize,
+    ) {
+        let columns = |name: &str| place(places, name).map_or(0, |place| place.columns);
+        self.put("LAYOUT", &VERSION);
+        self.put("BYTES", &format_args!("{size}u"));
+        self.put("PRECISION", &precision);
+        self.put("MODES", &body.n_modes());
+        self.put("TRANSLATIONS", &content.translations);
+        self.put("AXES", &content.axes);
+        self.put("FRAMES", &content.frames.len());
+        self.put("ROTATIONS", &(columns("frame_rotation") / content.axes));
+        self.put("SECONDS", &(columns("frame_second") / body.n_modes()));
+        self.put("HAS_W1", &(content.terms & 1));
+    }
+
+    /// Places of the arrays, one by one and as the table of the file.
+    fn arrays(&mut self, places: &[Option<ArrayPosition>]) {
+        for (array, place) in ARRAYS.iter().zip(places) {
+            let name = array.name.to_uppercase();
+            self.put(&format!("HAS_{name}"), &u8::from(place.is_some()));
+            if let Some(place) = place {
+                self.put(&format!("OFFSET_{name}"), &format_args!("{}u", place.offset));
+                self.put(&format!("COLUMNS_{name}"), &place.columns);
+                self.put(&format!("STRIDE_{name}"), &place.stride);
+            }
+        }
+        let entry = |place: &Option<ArrayPosition>| {
+            let [offset, rows, columns, stride] = ArrayPosition::entry(place.as_ref());
+            format!("{offset}u, {rows}u, {columns}u, {stride}u")
+        };
+        let entries: Vec<String> = places.iter().map(entry).collect();
+        self.put("TABLE", &entries.join(", \\\n    "));
+    }
+
+    /// What the code looks for in the file, and where.
+    fn file(&mut self, expected: &[u32]) {
+        let values: Vec<String> = expected.iter().map(|value| format!("{value}u")).collect();
+        self.put("HEADER", &values.join(", "));
+        for (name, ..) in HEADER.iter().filter(|(name, ..)| EXAMINED.contains(name)) {
+            self.put(&format!("AT_{}", name.to_uppercase()), &header_offset(name));
+        }
+        self.put("AT_TABLE", &fixed_header());
+        self.put("CHECKED_FROM", &CHECKED_FROM);
+    }
 }
 
 /// Header entries that the code looks at one by one.

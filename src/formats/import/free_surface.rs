@@ -62,10 +62,6 @@ impl FreeSurface {
     /// # Errors
     /// [`ForeignIncomplete`](Code::ForeignIncomplete).
     pub(crate) fn new(invariants: &Invariants) -> Result<Self> {
-        let refuse = |message: &str| {
-            let help = "flexbody audit says what is wrong with the file; write it anew";
-            Err(Diagnostic::new(Code::ForeignIncomplete, message).with_help(help).into())
-        };
         let nf = invariants.n_modes();
         let mass = invariants.mass_matrix();
         let rigid = mass.as_ref().submatrix(0, 0, 6, 6).to_owned();
@@ -85,29 +81,7 @@ impl FreeSurface {
         let (dropped, kept): (Vec<usize>, Vec<usize>) =
             (0..nf).partition(|&j| left(j, j) <= RIGID * mass[(6 + j, 6 + j)]);
         let elastic = Mat::from_fn(kept.len(), kept.len(), |i, j| left(kept[i], kept[j]));
-        let Some(factor) = dense_cholesky(elastic).filter(|_| !kept.is_empty()) else {
-            return refuse(
-                "modes are rigid motions or depend on each other: their mass matrix is not positive definite",
-            );
-        };
-        let stiffness =
-            Mat::from_fn(kept.len(), kept.len(), |i, j| invariants.modal_stiffness[(kept[i], kept[j])]);
-        let half = solve_lower(&factor, &stiffness);
-        let small = solve_lower(&factor, &half.transpose().to_owned());
-        let eigen = symmetric_eigen(small.as_ref());
-        let Some(eigen) = eigen.filter(|eigen| eigen.values.first().is_some_and(|first| *first > 0.0)) else {
-            return refuse("the stiffness of the modes is not positive definite beside their mass");
-        };
-        let kept_modes = solve_upper(&factor, &eigen.vectors);
-        let mut modes = Mat::zeros(nf, kept.len());
-        for j in 0..kept.len() {
-            // The largest part of each new mode keeps its sign.
-            let largest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
-            let sign = kept_modes.col(j).iter().fold(0.0, largest).signum();
-            for (i, &row) in kept.iter().enumerate() {
-                modes[(row, j)] = sign * kept_modes[(i, j)];
-            }
-        }
+        let modes = eigenmodes(invariants, elastic, &kept)?;
         Ok(Self { rigid: solve_upper(&lower, &whitened), modes, dropped })
     }
 
@@ -174,4 +148,37 @@ impl FreeSurface {
         }
         new.with_groups(old.groups)
     }
+}
+
+fn refuse<T>(message: &str) -> Result<T> {
+    let help = "flexbody audit says what is wrong with the file; write it anew";
+    Err(Diagnostic::new(Code::ForeignIncomplete, message).with_help(help).into())
+}
+
+/// X (nf x nf'): the eigenmodes of the stiffness of the modes `kept`, with their mass `elastic` beside rigid motion.
+fn eigenmodes(invariants: &Invariants, elastic: Mat<f64>, kept: &[usize]) -> Result<Mat<f64>> {
+    let Some(factor) = dense_cholesky(elastic).filter(|_| !kept.is_empty()) else {
+        return refuse(
+            "modes are rigid motions or depend on each other: their mass matrix is not positive definite",
+        );
+    };
+    let stiffness =
+        Mat::from_fn(kept.len(), kept.len(), |i, j| invariants.modal_stiffness[(kept[i], kept[j])]);
+    let half = solve_lower(&factor, &stiffness);
+    let small = solve_lower(&factor, &half.transpose().to_owned());
+    let eigen = symmetric_eigen(small.as_ref());
+    let Some(eigen) = eigen.filter(|eigen| eigen.values.first().is_some_and(|first| *first > 0.0)) else {
+        return refuse("the stiffness of the modes is not positive definite beside their mass");
+    };
+    let kept_modes = solve_upper(&factor, &eigen.vectors);
+    let mut modes = Mat::zeros(invariants.n_modes(), kept.len());
+    for j in 0..kept.len() {
+        // The largest part of each new mode keeps its sign.
+        let largest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+        let sign = kept_modes.col(j).iter().fold(0.0, largest).signum();
+        for (i, &row) in kept.iter().enumerate() {
+            modes[(row, j)] = sign * kept_modes[(i, j)];
+        }
+    }
+    Ok(modes)
 }

@@ -175,6 +175,12 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
         lumped.limit = limit;
         all.push(lumped);
     }
+    find_column_order(records, read, &mut all);
+    all
+}
+
+/// Tells groups that stand column by column from wrong ones: their identities hold in that order.
+fn find_column_order(records: &Records, read: &Read, checks: &mut [AuditCheck]) {
     let columns = by_columns(records, &read.body.inertia);
     let redundant = Redundant::new(&columns);
     let seen_by = [
@@ -186,6 +192,5 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
     ];
     let meaning =
         "groups 14 to 18 stand column by column, as the manual calls them; MBDyn reads them row by row";
-    in_other_order(&mut all, &seen_by, meaning);
-    all
+    in_other_order(checks, &seen_by, meaning);
 }

@@ -44,8 +44,8 @@ pub(super) const LINEAR: usize = 21;
 /// q'K^omega(omega) q / 2 from T (theory 7.4).
 ///
 /// ```
-/// # fn check(body: &flexbody::flex_body::FlexBody) {
-/// use flexbody::dynamics::{EquationsOfMotion, Evaluation, Terms};
+/// # fn check(body: &flexbody::body::flex_body::FlexBody) {
+/// use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 /// let equations = EquationsOfMotion::new(body, Terms::ALL);
 /// let mut evaluation = Evaluation::new(&equations);
 /// let (q, nu) = (vec![0.0; equations.n_modes()], vec![0.1; equations.n_velocities()]);

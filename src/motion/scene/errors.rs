@@ -132,52 +132,58 @@ impl ErrorHistory {
     /// When the motions were not looked at in the same places.
     pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
         assert!(reference.time == candidate.time, "motions that were looked at in the same places");
-        let (mass, radius) = reference.size;
-        let peak = |values: &mut dyn Iterator<Item = f64>| Peak::of(&reference.time, values).value;
-        let (motion, spin) = (reference.extremes.internal, reference.extremes.spin);
-        let relative = |values: Vec<f64>, scale: f64, none: f64| {
-            (scale > none).then(|| values.into_iter().map(|value| value / scale).collect::<Vec<_>>())
-        };
-
         let attitudes = reference.attitude.iter().zip(&candidate.attitude);
-        let attitude = attitudes.map(|(a, b)| angle(a, b)).collect();
-        let (deflection, scale) = if reference.deflections.is_empty() {
-            (apart.deflection.clone(), apart.largest_deflection)
-        } else {
-            let pairs = || reference.deflections.iter().zip(&candidate.deflections);
-            let at = |i: usize| pairs().map(|(a, b)| (a[i] - b[i]).norm()).fold(0.0, larger);
-            let paths = reference.deflections.iter();
-            let largest = paths.map(|path| peak(&mut path.iter().map(|d| d.norm())));
-            ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, larger))
-        };
-        let energy = peak(&mut reference.elastic.iter().map(|energy| energy.max(0.0).sqrt()));
+        let (deflection, scale) = deflections(reference, candidate, apart);
+        let roots = reference.elastic.iter().map(|energy| energy.max(0.0).sqrt());
+        let energy = Peak::of(&reference.time, roots).value;
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
-        let reaction = reference.reactions.as_ref().zip(candidate.reactions.as_ref()).and_then(|(a, b)| {
-            let difference = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
-                let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
-                let largest = peak(&mut a.iter().map(|a| part(a).norm()));
-                // Forces that are rounding are no forces, however small the least that counts.
-                let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
-                (largest > NO_TORQUE * motion / lever)
-                    .then(|| relative(differences, largest.max(least), 0.0))
-                    .flatten()
-            };
-            let force = difference(|both| both.0, radius);
-            let torque = difference(|both| both.1, 1.0);
-            match (force, torque) {
-                (Some(force), Some(torque)) => {
-                    Some(force.into_iter().zip(torque).map(|(a, b)| larger(a, b)).collect())
-                }
-                (force, torque) => force.or(torque),
-            }
-        });
         Self {
             time: reference.time.clone(),
-            attitude,
-            deflection: relative(deflection, scale.max(reference.resolution.deflection), 0.0),
-            stress: relative(stress, energy.max(reference.resolution.root_energy), 0.0),
-            reaction,
+            attitude: attitudes.map(|(a, b)| angle(a, b)).collect(),
+            deflection: relative(deflection, scale.max(reference.resolution.deflection)),
+            stress: relative(stress, energy.max(reference.resolution.root_energy)),
+            reaction: reactions(reference, candidate),
         }
+    }
+}
+
+/// `values` relative to `scale`; nothing without a scale.
+fn relative(values: Vec<f64>, scale: f64) -> Option<Vec<f64>> {
+    (scale > 0.0).then(|| values.into_iter().map(|value| value / scale).collect())
+}
+
+/// Differences of deflections along the motion, and the largest deflection of the reference: of the watched points, without any of the nodes
+/// that `apart` looked at.
+fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>, f64) {
+    if reference.deflections.is_empty() {
+        return (apart.deflection.clone(), apart.largest_deflection);
+    }
+    let pairs = || reference.deflections.iter().zip(&candidate.deflections);
+    let at = |i: usize| pairs().map(|(a, b)| (a[i] - b[i]).norm()).fold(0.0, larger);
+    let paths = reference.deflections.iter();
+    let largest = paths.map(|path| Peak::of(&reference.time, path.iter().map(|d| d.norm())).value);
+    ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, larger))
+}
+
+/// Errors of the force and the torque that prescribed motion takes, the larger of both.
+fn reactions(reference: &Trace, candidate: &Trace) -> Option<Vec<f64>> {
+    let (a, b) = (reference.reactions.as_ref()?, candidate.reactions.as_ref()?);
+    let (mass, radius) = reference.size;
+    let (motion, spin) = (reference.extremes.internal, reference.extremes.spin);
+    let difference = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
+        let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
+        let largest = Peak::of(&reference.time, a.iter().map(|a| part(a).norm())).value;
+        // Forces that are rounding are no forces, however small the least that counts.
+        let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
+        (largest > NO_TORQUE * motion / lever).then(|| relative(differences, largest.max(least))).flatten()
+    };
+    let force = difference(|both| both.0, radius);
+    let torque = difference(|both| both.1, 1.0);
+    match (force, torque) {
+        (Some(force), Some(torque)) => {
+            Some(force.into_iter().zip(torque).map(|(a, b)| larger(a, b)).collect())
+        }
+        (force, torque) => force.or(torque),
     }
 }
 

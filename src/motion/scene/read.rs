@@ -124,37 +124,11 @@ fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Sch
     match method.as_str() {
         "adaptive" => {
             refuse(&["order", "step"]);
-            let tolerance = match table.contains_key("tolerance") {
-                true => positive(walk, table, "tolerance", span)?,
-                false => TOLERANCE,
-            };
-            if !TOLERANCES.contains(&tolerance) {
-                let message = format!(
-                    "`tolerance` is {tolerance}, expected {} to {}",
-                    TOLERANCES.start, TOLERANCES.end
-                );
-                walk.wrong(place_of(table, "tolerance", span), message);
-                return None;
-            }
-            Some(Scheme::Adaptive { tolerance })
+            adaptive(walk, table, span)
         }
         "conserving" => {
             refuse(&["tolerance"]);
-            let order = match table.get("order") {
-                None => 4,
-                Some(value) => match integer(value) {
-                    Some(order @ (2 | 4 | 6)) => order as usize,
-                    _ => {
-                        walk.mistyped("order", value, "2, 4 or 6");
-                        return None;
-                    }
-                },
-            };
-            let step = match table.contains_key("step") {
-                true => Some(positive(walk, table, "step", span)?),
-                false => None,
-            };
-            Some(Scheme::Conserving { order, step })
+            conserving(walk, table, span)
         }
         other => {
             let message = format!("`method` is `{other}`, expected `adaptive` or `conserving`");
@@ -162,6 +136,38 @@ fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Sch
             None
         }
     }
+}
+
+fn adaptive(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+    let tolerance = match table.contains_key("tolerance") {
+        true => positive(walk, table, "tolerance", span)?,
+        false => TOLERANCE,
+    };
+    if !TOLERANCES.contains(&tolerance) {
+        let message =
+            format!("`tolerance` is {tolerance}, expected {} to {}", TOLERANCES.start, TOLERANCES.end);
+        walk.wrong(place_of(table, "tolerance", span), message);
+        return None;
+    }
+    Some(Scheme::Adaptive { tolerance })
+}
+
+fn conserving(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+    let order = match table.get("order") {
+        None => 4,
+        Some(value) => match integer(value) {
+            Some(order @ (2 | 4 | 6)) => order as usize,
+            _ => {
+                walk.mistyped("order", value, "2, 4 or 6");
+                return None;
+            }
+        },
+    };
+    let step = match table.contains_key("step") {
+        true => Some(positive(walk, table, "step", span)?),
+        false => None,
+    };
+    Some(Scheme::Conserving { order, step })
 }
 
 fn terms(walk: &mut Walk<'_>, value: &Value) -> Option<Terms> {

@@ -8,7 +8,7 @@ use crate::base::error::Result;
 use crate::base::memory::refuse_beyond;
 use crate::body::flex_body::FlexBody;
 use crate::model::LoadKind;
-use crate::motion::dynamics::{Evaluation, Motion};
+use crate::motion::dynamics::{BodyPoint, Evaluation, Motion};
 use crate::numerics::integration::{Failure, Sight, Work};
 use nalgebra::Vector3;
 
@@ -42,46 +42,73 @@ pub fn simulate(
     refuse_too_much(body, scene, memory)?;
     let outputs = scene.run.outputs;
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
-    let mut recording = Recording {
-        scene: scene.name.clone(),
-        body: body.source().name.clone(),
-        scheme: run.scheme,
-        time: Vec::with_capacity(time.len()),
-        states: Vec::with_capacity(time.len()),
-        balances: Vec::with_capacity(time.len()),
-        reactions: scene.prescribes().then(Vec::new),
-        setting: Setting::new(body, scene),
-        paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
-        work: Work::default(),
-        extremes: Extremes::default(),
-    };
-    let undeformed = Evaluation::new(&run.equations);
-    let rest: Vec<Vector3<f64>> = run.watched.iter().map(|point| point.place(&undeformed)).collect();
+    let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
     let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if sight != Sight::Instant {
             watch(time / run.duration);
             return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
         }
-        let now = motion.evaluate(time, state)?;
-        recording.time.push(time);
-        recording.states.push(now.configuration());
-        recording.balances.push(now.balance());
-        if let Some(reactions) = &mut recording.reactions {
-            reactions.push(now.reaction());
-        }
-        for ((path, point), rest) in recording.paths.iter_mut().zip(&run.watched).zip(&rest) {
-            let at = point.place(now.evaluation());
-            path.place.push(now.place().origin + now.place().axes * at);
-            path.deflection.push(at - rest);
-        }
-        Ok::<(), Failure>(())
+        recorder.record(time, state, motion)
     };
     let finished = run.integrate(&time, PARTS, record)?;
+    let mut recording = recorder.recording;
     recording.work = finished.work;
     recording.extremes = survey.extremes(finished.size, finished.least_energy);
     let found = [stage.found, remarks(body, scene, &recording.extremes)].concat();
     Ok((recording, found))
+}
+
+/// A recording that is filled instant by instant.
+struct Recorder<'r> {
+    recording: Recording,
+    watched: &'r [BodyPoint],
+    /// Places of the watched points in the undeformed body.
+    rest: Vec<Vector3<f64>>,
+}
+
+impl<'r> Recorder<'r> {
+    fn new(body: &FlexBody, scene: &Scene, run: &'r Prepared<'_>, instants: usize) -> Self {
+        let undeformed = Evaluation::new(&run.equations);
+        Self {
+            recording: Recording {
+                scene: scene.name.clone(),
+                body: body.source().name.clone(),
+                scheme: run.scheme,
+                time: Vec::with_capacity(instants),
+                states: Vec::with_capacity(instants),
+                balances: Vec::with_capacity(instants),
+                reactions: scene.prescribes().then(Vec::new),
+                setting: Setting::new(body, scene),
+                paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
+                work: Work::default(),
+                extremes: Extremes::default(),
+            },
+            watched: &run.watched,
+            rest: run.watched.iter().map(|point| point.place(&undeformed)).collect(),
+        }
+    }
+
+    fn record(
+        &mut self,
+        time: f64,
+        state: &[f64],
+        motion: &mut Motion<'_>,
+    ) -> std::result::Result<(), Failure> {
+        let now = motion.evaluate(time, state)?;
+        self.recording.time.push(time);
+        self.recording.states.push(now.configuration());
+        self.recording.balances.push(now.balance());
+        if let Some(reactions) = &mut self.recording.reactions {
+            reactions.push(now.reaction());
+        }
+        for ((path, point), rest) in self.recording.paths.iter_mut().zip(self.watched).zip(&self.rest) {
+            let at = point.place(now.evaluation());
+            path.place.push(now.place().origin + now.place().axes * at);
+            path.deflection.push(at - rest);
+        }
+        Ok(())
+    }
 }
 
 /// # Errors

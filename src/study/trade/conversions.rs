@@ -24,55 +24,16 @@ pub fn conversions(
     longest: Option<f64>,
     watch: Watch<'_>,
 ) -> Result<(Vec<Source>, Vec<Diagnostic>)> {
-    let mut loads = vec![Loads::Centrifugal];
-    if !model.interfaces().is_empty() {
-        loads.push(Loads::Interfaces);
-    }
-    let made = |count: usize,
-                residual: bool,
-                accuracy: Accuracy,
-                lumped: Vec<Lumping>|
-     -> Result<(Source, Vec<Diagnostic>)> {
-        let residual_vectors = if residual { loads.clone() } else { Vec::new() };
-        let settings = ConvertSettings {
-            modes: ModeSettings {
-                wanted: Wanted::Lowest(count),
-                accuracy,
-                memory,
-                longest,
-                ..ModeSettings::default()
-            },
-            basis: BasisChoice::Free(FreeSurface { residual_vectors }),
-            lumped,
-            ..ConvertSettings::default()
-        };
-        let start = Instant::now();
-        let conversion = convert(model, &settings, watch)?;
-        let seconds = start.elapsed().as_secs_f64();
-        let mut name = format!("{count} free mode{}", if count == 1 { "" } else { "s" });
-        if residual {
-            name.push_str(", residual vectors");
-        }
-        if accuracy != Accuracy::Standard {
-            name.push_str(&format!(", {}", accuracy.name()));
-        }
-        Ok((Source::new(name, conversion.body, Some(seconds))?, conversion.diagnostics))
-    };
-    let lumped = ConvertSettings::default().lumped;
-    let (reference, diagnostics) = made(modes.saturating_mul(2), true, Accuracy::Standard, lumped)?;
-    let mut wanted = vec![(modes, false, Accuracy::Fast), (modes, false, Accuracy::Certified)];
-    for part in [1, 2, 4] {
-        let count = (modes / part).max(1);
-        wanted.extend([true, false].map(|residual| (count, residual, Accuracy::Standard)));
-    }
+    let making = Making::new(model, memory, longest, watch);
+    let reference = Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard };
+    let (reference, diagnostics) = making.make(&reference, ConvertSettings::default().lumped)?;
     let mut sources = vec![reference];
-    for (at, &(count, residual, accuracy)) in wanted.iter().enumerate() {
-        if wanted[..at].contains(&(count, residual, accuracy)) {
-            continue;
-        }
-        let source = match made(count, residual, accuracy, Vec::new()) {
+    for wish in wishes(modes) {
+        let source = match making.make(&wish, Vec::new()) {
             Ok((source, _)) => source,
-            Err(error) if accuracy == Accuracy::Certified && error.diagnostics()[0].code() == Code::Usage => {
+            Err(error)
+                if wish.accuracy == Accuracy::Certified && error.diagnostics()[0].code() == Code::Usage =>
+            {
                 continue;
             }
             Err(error) => return Err(error),
@@ -81,4 +42,84 @@ pub fn conversions(
         sources.push(beside.expect("bodies that were made of the model"));
     }
     Ok((sources, diagnostics))
+}
+
+/// A body that is wanted.
+#[derive(Clone, PartialEq)]
+struct Wish {
+    /// Number of free modes.
+    count: usize,
+    /// Whether it has residual vectors.
+    residual: bool,
+    accuracy: Accuracy,
+}
+
+impl Wish {
+    fn in_words(&self) -> String {
+        let mut name = format!("{} free mode{}", self.count, if self.count == 1 { "" } else { "s" });
+        if self.residual {
+            name.push_str(", residual vectors");
+        }
+        if self.accuracy != Accuracy::Standard {
+            name.push_str(&format!(", {}", self.accuracy.name()));
+        }
+        name
+    }
+}
+
+/// The bodies beside the reference, each once.
+fn wishes(modes: usize) -> Vec<Wish> {
+    let other = |accuracy| Wish { count: modes, residual: false, accuracy };
+    let mut wishes = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
+    for part in [1, 2, 4] {
+        let count = (modes / part).max(1);
+        for residual in [true, false] {
+            let wish = Wish { count, residual, accuracy: Accuracy::Standard };
+            if !wishes.contains(&wish) {
+                wishes.push(wish);
+            }
+        }
+    }
+    wishes
+}
+
+/// What all conversions of a study have in common.
+struct Making<'m> {
+    model: &'m FeModel,
+    /// Loads of the residual vectors.
+    loads: Vec<Loads>,
+    memory: Option<u64>,
+    longest: Option<f64>,
+    watch: Watch<'m>,
+}
+
+impl<'m> Making<'m> {
+    fn new(model: &'m FeModel, memory: Option<u64>, longest: Option<f64>, watch: Watch<'m>) -> Self {
+        let mut loads = vec![Loads::Centrifugal];
+        if !model.interfaces().is_empty() {
+            loads.push(Loads::Interfaces);
+        }
+        Self { model, loads, memory, longest, watch }
+    }
+
+    /// Converts the model, and takes the time of it.
+    fn make(&self, wish: &Wish, lumped: Vec<Lumping>) -> Result<(Source, Vec<Diagnostic>)> {
+        let residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
+        let settings = ConvertSettings {
+            modes: ModeSettings {
+                wanted: Wanted::Lowest(wish.count),
+                accuracy: wish.accuracy,
+                memory: self.memory,
+                longest: self.longest,
+                ..ModeSettings::default()
+            },
+            basis: BasisChoice::Free(FreeSurface { residual_vectors }),
+            lumped,
+            ..ConvertSettings::default()
+        };
+        let start = Instant::now();
+        let conversion = convert(self.model, &settings, self.watch)?;
+        let seconds = start.elapsed().as_secs_f64();
+        Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
+    }
 }

@@ -16,6 +16,7 @@ const GENERAL_MASS: &str = "** GENERAL MASS";
 const REQUIRED: [usize; 8] = [1, 2, 5, 6, 7, 8, 9, 10];
 
 /// Contents of a file.
+#[derive(Default)]
 pub(crate) struct Records {
     /// The word before the counts, which MBDyn ignores.
     pub(crate) revision: String,
@@ -44,48 +45,17 @@ impl Records {
             Words::new(file.path(), "").refuse_at(line, "the file is no text")
         })?;
         let mut words = Words::new(file.path(), text);
-        let mut records = Self {
-            revision: String::new(),
-            n_nodes: 0,
-            n_modes: 0,
-            labels: Vec::new(),
-            shapes: Vec::new(),
-            numbers: BTreeMap::new(),
-            stiffening: Vec::new(),
-            general: false,
-            ended: false,
-            digits: Digits::default(),
-            skipped: Vec::new(),
-        };
+        let mut records = Self::default();
         let mut seen: Vec<usize> = Vec::new();
         let mut rejected = 0;
-        loop {
+        while !records.ended {
             let line = words.at();
             let Some(text) = words.take_line() else { break };
-            if text.starts_with(END) {
-                records.ended = true;
-                break;
-            }
-            records.general |= text.starts_with(GENERAL_MASS);
             let Some(title) = text.strip_prefix(GROUP) else {
-                if !text.starts_with("**") {
-                    records.skip(seen.last().copied(), Surplus::of(line, text));
-                }
+                records.comment(line, text, seen.last().copied());
                 continue;
             };
-            let digits = title.trim_start();
-            let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
-            let Ok(group) = digits[..end].parse::<usize>() else {
-                return Err(words.refuse_at(line, "a record group without a number"));
-            };
-            if seen.contains(&group) {
-                return Err(words.refuse_at(line, format!("record group {group} stands in the file twice")));
-            }
-            if seen.is_empty() && group != 1 {
-                return Err(
-                    words.refuse_at(line, format!("record group {group} stands before record group 1"))
-                );
-            }
+            let group = group_number(title, &seen).map_err(|what| words.refuse_at(line, what))?;
             seen.push(group);
             if group == 1 {
                 rejected = records.header(&mut words)?;
@@ -101,6 +71,15 @@ impl Records {
         }
         records.digits = words.digits;
         Ok(records)
+    }
+
+    /// Takes a line between record groups, the last of which is `group`.
+    fn comment(&mut self, line: usize, text: &str, group: Option<usize>) {
+        self.ended = text.starts_with(END);
+        self.general |= text.starts_with(GENERAL_MASS);
+        if !text.starts_with("**") {
+            self.skip(group, Surplus::of(line, text));
+        }
     }
 
     /// Takes note of words where none are expected.
@@ -221,4 +200,20 @@ impl Records {
     pub(crate) fn position(&self, node: usize) -> [f64; 3] {
         [5, 6, 7].map(|group| self.get(group).map_or(f64::NAN, |values| values[node]))
     }
+}
+
+/// The number in the title of a record group, where it may stand after those that were `seen`.
+fn group_number(title: &str, seen: &[usize]) -> std::result::Result<usize, String> {
+    let digits = title.trim_start();
+    let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+    let Ok(group) = digits[..end].parse::<usize>() else {
+        return Err("a record group without a number".to_owned());
+    };
+    if seen.contains(&group) {
+        return Err(format!("record group {group} stands in the file twice"));
+    }
+    if seen.is_empty() && group != 1 {
+        return Err(format!("record group {group} stands before record group 1"));
+    }
+    Ok(group)
 }

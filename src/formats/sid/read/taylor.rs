@@ -53,29 +53,8 @@ const SIZES: [&str; 6] = ["order", "nrow", "ncol", "nq", "nqn", "structure"];
 impl Taylor {
     /// Reads up to `end NAME`.
     pub(crate) fn read(lines: &mut Lines<'_>, head: &Line<'_>) -> Result<Self, Diagnostic> {
-        let (name, end) = (head.key.clone(), format!("end {}", head.key));
-        let mut sizes: [Option<usize>; 6] = [None; 6];
-        let (mut m0, mut m1) = (Vec::new(), Vec::new());
-        let mut digits = Digits::default();
-        loop {
-            let line = lines.next(&name)?;
-            if line.key == end {
-                break;
-            }
-            if let Some(at) = SIZES.iter().position(|size| *size == line.key) {
-                if sizes[at].replace(lines.count(&line)?).is_some() {
-                    return Err(lines.unreadable(line.number, format!("`{}` is given twice", line.key)));
-                }
-                continue;
-            }
-            let Some((order, index)) = place(&line.key) else {
-                let message = format!("`{}` in `{name}`, expected a size, an entry or `{end}`", line.key);
-                return Err(lines.unreadable(line.number, message));
-            };
-            let (value, text) = lines.number(&line)?;
-            digits.see(text);
-            [&mut m0, &mut m1][order].push(Entry { index, line: line.number, value });
-        }
+        let name = head.key.clone();
+        let Listing { sizes, m0, m1, digits } = Listing::read(lines, &name)?;
         let size = |at: usize| {
             let message = format!("`{name}` has no `{}`", SIZES[at]);
             sizes[at].ok_or_else(|| lines.unreadable(head.number, message))
@@ -92,19 +71,22 @@ impl Taylor {
             m1,
             digits,
         };
-        let order = size(0)?;
-        let wrong = if order > 1 || sizes[4].is_some_and(|nqn| nqn > 0) {
+        match object.wrong(size(0)?, sizes[4]) {
+            Some(wrong) => Err(lines.unreadable(head.number, format!("`{name}` {wrong}"))),
+            None => Ok(object),
+        }
+    }
+
+    /// Why an object with this `order` and `nqn` cannot be read.
+    fn wrong(&self, order: usize, nqn: Option<usize>) -> Option<&'static str> {
+        if order > 1 || nqn.is_some_and(|nqn| nqn > 0) {
             Some("is of an order above 1")
-        } else if order == 0 && !object.m1.is_empty() {
+        } else if order == 0 && !self.m1.is_empty() {
             Some("is of order 0, but has entries `m1`")
-        } else if object.structure > 4 {
+        } else if self.structure > 4 {
             Some("has a `structure` other than 0 to 4")
         } else {
             None
-        };
-        match wrong {
-            Some(wrong) => Err(lines.unreadable(head.number, format!("`{name}` {wrong}"))),
-            None => Ok(object),
         }
     }
 
@@ -150,28 +132,42 @@ impl Taylor {
             let message = format!("`{name}` has nq = {}, the body {nq} modes", self.nq);
             return Err(lines.unreadable(self.line, message));
         }
-        for (order, entries) in [&self.m0, &self.m1].into_iter().enumerate() {
-            let mut places: Vec<([usize; 3], usize)> =
-                entries.iter().map(|entry| (entry.index, entry.line)).collect();
-            for &(index, line) in &places {
-                let (column, mode) = if order == 0 { (index[1], 0) } else { modes.split(index) };
-                if index[0] >= self.nrow || column >= self.ncol || mode >= nq {
-                    let message = format!(
-                        "entry of `{name}` outside of its {} x {} numbers for {nq} modes",
-                        self.nrow, self.ncol
-                    );
-                    return Err(lines.unreadable(line, message));
-                }
-                if order == 0 && self.structure == 1 && index[0] != column {
-                    let message = format!("entry of `{name}` beside the diagonal, its `structure` is 1");
-                    return Err(lines.unreadable(line, message));
-                }
+        for order in 0..2 {
+            self.check_entries(lines, order, nq, modes)?;
+        }
+        Ok(())
+    }
+
+    /// Checks that the indices of M0 or M1 are within its sizes, and each there once.
+    fn check_entries(
+        &self,
+        lines: &Lines<'_>,
+        order: usize,
+        nq: usize,
+        modes: ModeIndex,
+    ) -> Result<(), Diagnostic> {
+        let name = &self.name;
+        let entries = [&self.m0, &self.m1][order];
+        let mut places: Vec<([usize; 3], usize)> =
+            entries.iter().map(|entry| (entry.index, entry.line)).collect();
+        for &(index, line) in &places {
+            let (column, mode) = if order == 0 { (index[1], 0) } else { modes.split(index) };
+            if index[0] >= self.nrow || column >= self.ncol || mode >= nq {
+                let message = format!(
+                    "entry of `{name}` outside of its {} x {} numbers for {nq} modes",
+                    self.nrow, self.ncol
+                );
+                return Err(lines.unreadable(line, message));
             }
-            places.sort_unstable();
-            if let Some(pair) = places.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-                let message = format!("entry of `{name}` again, it is in line {} already", pair[0].1);
-                return Err(lines.unreadable(pair[1].1, message));
+            if order == 0 && self.structure == 1 && index[0] != column {
+                let message = format!("entry of `{name}` beside the diagonal, its `structure` is 1");
+                return Err(lines.unreadable(line, message));
             }
+        }
+        places.sort_unstable();
+        if let Some(pair) = places.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let message = format!("entry of `{name}` again, it is in line {} already", pair[0].1);
+            return Err(lines.unreadable(pair[1].1, message));
         }
         Ok(())
     }
@@ -222,6 +218,42 @@ impl Taylor {
                     a[(j, i)] = a[(i, j)];
                 }
             }
+        }
+    }
+}
+
+/// The lines of an object.
+#[derive(Default)]
+struct Listing {
+    /// In the order of [`SIZES`].
+    sizes: [Option<usize>; 6],
+    m0: Vec<Entry>,
+    m1: Vec<Entry>,
+    digits: Digits,
+}
+
+impl Listing {
+    fn read(lines: &mut Lines<'_>, name: &str) -> Result<Self, Diagnostic> {
+        let end = format!("end {name}");
+        let mut listing = Self::default();
+        loop {
+            let line = lines.next(name)?;
+            if line.key == end {
+                return Ok(listing);
+            }
+            if let Some(at) = SIZES.iter().position(|size| *size == line.key) {
+                if listing.sizes[at].replace(lines.count(&line)?).is_some() {
+                    return Err(lines.unreadable(line.number, format!("`{}` is given twice", line.key)));
+                }
+                continue;
+            }
+            let Some((order, index)) = place(&line.key) else {
+                let message = format!("`{}` in `{name}`, expected a size, an entry or `{end}`", line.key);
+                return Err(lines.unreadable(line.number, message));
+            };
+            let (value, text) = lines.number(&line)?;
+            listing.digits.see(text);
+            [&mut listing.m0, &mut listing.m1][order].push(Entry { index, line: line.number, value });
         }
     }
 }

@@ -125,8 +125,9 @@ impl FrameArrays {
         let ExportFrame { position, translation, rotation, .. } = &self.frame;
         let nf = translation.ncols();
         let second = |stiff: &Option<Vec<Mat<f64>>>| {
-            let of_one_mode = |stiff: &Vec<Mat<f64>>, l: usize| Mat::from_fn(3, nf, |a, k| -stiff[a][(k, l)]);
-            stiff.as_ref().map(|stiff| per_mode(nf, |l| of_one_mode(stiff, l)))
+            let second_order =
+                |stiff: &Vec<Mat<f64>>, l: usize| Mat::from_fn(3, nf, |a, k| -stiff[a][(k, l)]);
+            stiff.as_ref().map(|stiff| per_mode(nf, |l| second_order(stiff, l)))
         };
         let phi = Taylor { m1: second(&self.force), ..Taylor::constant("phi", translation.clone()) };
         let psi = match rotation {

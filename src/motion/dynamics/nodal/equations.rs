@@ -29,10 +29,10 @@ const INDEPENDENT: f64 = 1e-8;
 /// product with K, a solve with a factor of M made here, and a few dot products: some thousand rows are comfortable.
 ///
 /// ```
-/// # fn check(model: &flexbody::model::FeModel, body: &flexbody::flex_body::FlexBody, start: &flexbody::dynamics::Configuration)
+/// # fn check(model: &flexbody::model::FeModel, body: &flexbody::body::flex_body::FlexBody, start: &flexbody::motion::dynamics::Configuration)
 /// # -> Result<(), Box<dyn std::error::Error>> {
-/// use flexbody::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
-/// use flexbody::integration::{Explicit, Failure, Method, integrate};
+/// use flexbody::motion::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
+/// use flexbody::numerics::integration::{Explicit, Failure, Method, integrate};
 /// let equations = NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes)?;
 /// let modes = NodalModes::new(&equations, body).ok_or("modes of another model")?;
 /// let mut state = equations.state(&modes.lift(start))?;
@@ -67,6 +67,22 @@ pub struct NodalEquations<'m> {
     pub(super) massless: Massless,
 }
 
+/// R and M R: rigid motions of the frame at the rows of the model, zero for those that a plane body does not have.
+fn rigid_motions(model: &FeModel, frame: &Frame, moving: &[usize]) -> (Motions, Motions) {
+    let (pencil, n) = (model.pencil(), model.rows().len());
+    let fields = model.rigid_fields(frame.origin.into(), 1.0);
+    let (mut rigid, mut mass_rigid) = (vec![[0.0; 6]; n], vec![[0.0; 6]; n]);
+    let mut product = vec![0.0; n];
+    for (column, &motion) in moving.iter().enumerate() {
+        let field = fields.col_as_slice(column);
+        multiply_vector(pencil.mass(), pencil.block(), field, &mut product);
+        for row in 0..n {
+            (rigid[row][motion], mass_rigid[row][motion]) = (field[row], product[row]);
+        }
+    }
+    (rigid, mass_rigid)
+}
+
 impl<'m> NodalEquations<'m> {
     /// The equations of `model` in a frame that coincides with `frame` before deformation.
     ///
@@ -85,18 +101,8 @@ impl<'m> NodalEquations<'m> {
             return Err(NodalError::DampingOfModes);
         }
         let moving: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
-        let (pencil, n) = (model.pencil(), model.rows().len());
-        let fields = model.rigid_fields(frame.origin.into(), 1.0);
-        let (mut rigid, mut mass_rigid) = (vec![[0.0; 6]; n], vec![[0.0; 6]; n]);
-        let mut product = vec![0.0; n];
-        for (column, &motion) in moving.iter().enumerate() {
-            let field = fields.col_as_slice(column);
-            multiply_vector(pencil.mass(), pencil.block(), field, &mut product);
-            for row in 0..n {
-                (rigid[row][motion], mass_rigid[row][motion]) = (field[row], product[row]);
-            }
-        }
-        let factor = SparseLdl::new(pencil.mass(), NULL_PIVOT).ok_or(NodalError::MassIndefinite)?;
+        let (rigid, mass_rigid) = rigid_motions(model, frame, moving);
+        let factor = SparseLdl::new(model.pencil().mass(), NULL_PIVOT).ok_or(NodalError::MassIndefinite)?;
         let massless = Massless::new(model, &factor)?;
         let columns = conditions.columns(model, moving, &mass_rigid)?;
         if matches!(conditions, ReferenceConditions::Held(_)) && massless.n_vectors() > 0 {

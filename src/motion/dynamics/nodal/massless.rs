@@ -36,26 +36,42 @@ pub(super) struct Room {
     coefficients: DVector<f64>,
 }
 
+/// Whether M has nothing in a row.
+fn is_empty(model: &FeModel, row: usize) -> bool {
+    let pencil = model.pencil();
+    pencil.mass().row(row / pencil.block()).0.is_empty()
+}
+
+/// Refuses a null vector z that has a mass: `product` is M z, `diagonal` that of M.
+fn refuse_mass(product: &[f64], z: &[f64], diagonal: &[f64]) -> Result<(), NodalError> {
+    let mass: f64 = product.iter().zip(z).map(|(m, z)| m * z).sum();
+    let scale: f64 = diagonal.iter().zip(z).map(|(d, z)| d * z * z).sum();
+    if mass.is_nan() || mass.abs() > NULL_MASS * scale {
+        return Err(NodalError::MassIndefinite);
+    }
+    Ok(())
+}
+
+/// The factor of Z'K Z for null vectors Z and their products K Z, of `n` rows each.
+fn null_stiffness(vectors: &[f64], weighted: &[f64], n: usize) -> Result<Cholesky<f64, Dyn>, NodalError> {
+    let k = vectors.len() / n;
+    let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let energy = DMatrix::from_fn(k, k, |i, j| product(&vectors[i * n..][..n], &weighted[j * n..][..n]));
+    let energy = 0.5 * (&energy + energy.transpose());
+    energy.cholesky().ok_or(NodalError::MasslessUnheld)
+}
+
 impl Massless {
     /// Finds the null space of the mass that `factor` is of.
     pub fn new(model: &FeModel, factor: &SparseLdl) -> Result<Self, NodalError> {
         let (pencil, stiffness) = (model.pencil(), model.stiffness());
         let (n, block) = (pencil.n(), pencil.block());
-        let is_empty = |row: usize| pencil.mass().row(row / block).0.is_empty();
-        let rows: Vec<usize> = (0..n).filter(|&row| is_empty(row)).collect();
-        let own = (!rows.is_empty()).then(|| SparseLdl::new(&stiffness.principal(&rows), 0.0));
-        let own = match own {
-            Some(None) => return Err(NodalError::MasslessUnheld),
-            Some(Some(own)) if !own.null_rows().is_empty() => return Err(NodalError::MasslessUnheld),
-            own => own.flatten(),
-        };
-        let mut massless = Self { rows, own, vectors: Vec::new(), weighted: Vec::new(), factor: None };
-
+        let mut massless = Self::of_empty_rows(model)?;
         let starts: Vec<usize> = factor
             .null_rows()
             .iter()
             .flat_map(|&vertex| (0..block).map(move |k| vertex * block + k))
-            .filter(|&row| !is_empty(row))
+            .filter(|&row| !is_empty(model, row))
             .collect();
         let k = starts.len();
         if n * k > DENSE {
@@ -71,23 +87,27 @@ impl Massless {
             let size = z.iter().fold(0.0f64, |m, z| m.max(z.abs()));
             z.iter_mut().for_each(|z| *z /= size);
             multiply_vector(pencil.mass(), block, z, &mut scratch);
-            let mass: f64 = scratch.iter().zip(&*z).map(|(m, z)| m * z).sum();
-            let scale: f64 = diagonal.iter().zip(&*z).map(|(d, z)| d * z * z).sum();
-            if mass.is_nan() || mass.abs() > NULL_MASS * scale {
-                return Err(NodalError::MassIndefinite);
-            }
+            refuse_mass(&scratch, z, &diagonal)?;
             massless.project(stiffness, z, &mut room);
             multiply_vector(stiffness, 1, z, kz);
         }
         if k > 0 {
-            let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-            let energy =
-                DMatrix::from_fn(k, k, |i, j| product(&vectors[i * n..][..n], &weighted[j * n..][..n]));
-            let energy = 0.5 * (&energy + energy.transpose());
-            massless.factor = Some(energy.cholesky().ok_or(NodalError::MasslessUnheld)?);
+            massless.factor = Some(null_stiffness(&vectors, &weighted, n)?);
         }
         (massless.vectors, massless.weighted) = (vectors, weighted);
         Ok(massless)
+    }
+
+    /// The rows that M leaves empty, which K must hold, without null vectors yet.
+    fn of_empty_rows(model: &FeModel) -> Result<Self, NodalError> {
+        let rows: Vec<usize> = (0..model.pencil().n()).filter(|&row| is_empty(model, row)).collect();
+        let own = (!rows.is_empty()).then(|| SparseLdl::new(&model.stiffness().principal(&rows), 0.0));
+        let own = match own {
+            Some(None) => return Err(NodalError::MasslessUnheld),
+            Some(Some(own)) if !own.null_rows().is_empty() => return Err(NodalError::MasslessUnheld),
+            own => own.flatten(),
+        };
+        Ok(Self { rows, own, vectors: Vec::new(), weighted: Vec::new(), factor: None })
     }
 
     /// Whether M has an inverse.

@@ -61,7 +61,8 @@ impl NodalEquations<'_> {
         let taken = self.take_rigid(&mut u);
         let largest = u.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         let moved = taken.fixed_rows::<3>(0).amax().max(taken.fixed_rows::<3>(3).amax() * self.length);
-        if moved > ROUNDING * largest {
+        // The sizes ignore what is no number, which is no displacement.
+        if taken.iter().any(|part| part.is_nan()) || moved > ROUNDING * largest {
             return Err(NodalError::ConditionsViolated { part: moved / largest });
         }
         let attitude = attitude.normalised();
