@@ -39,7 +39,8 @@ impl FlexBody {
     /// Reads a flex-body file.
     ///
     /// # Errors
-    /// FB701 to FB713: no such file, another format, damaged, changed, or of a newer version.
+    /// FB101 and FB106 when it cannot be read; FB701 to FB703 when it is another file, of a newer format, or breaks its schema; FB712 when
+    /// it was changed since it was written.
     #[cfg(feature = "hdf5")]
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         crate::formats::flex_body_file::read(path).map(Self)

@@ -153,7 +153,8 @@ impl Model {
     /// Computes modes and invariants: the body passes every check that `flexbody check` makes.
     ///
     /// # Errors
-    /// FB501 to FB549 where the modes cannot be trusted (not converged, not complete, a mechanism), FB714 where an identity does not hold.
+    /// FB501 to FB506 where the modes cannot be trusted (not converged, not complete, a mechanism), FB512 where there are none, FB514 where
+    /// the damping feeds energy to them, FB601 where the memory does not suffice; FB714 where an identity does not hold.
     pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
         let settings = options.settings(self, None)?;
         let conversion = convert(&self.checked, &settings, SILENT)?;

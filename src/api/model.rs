@@ -84,7 +84,7 @@ impl Model {
     /// Reads the model of a manifest (`model.toml`, docs/input.md).
     ///
     /// # Errors
-    /// FB101 to FB444, as `flexbody convert`: all of a stage together.
+    /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all of a stage together.
     pub fn read(manifest: impl AsRef<Path>) -> Result<Self> {
         let files = read_manifest(manifest)?;
         Self::checked(read_model(&files)?, files.residual_vectors)
@@ -180,7 +180,7 @@ impl ModelBuilder {
     /// Checks the model.
     ///
     /// # Errors
-    /// FB301 to FB444: what is wrong with matrices, nodes and interfaces, all of a stage together.
+    /// FB305 to FB439: what is wrong with matrices, nodes and interfaces, all of a stage together.
     pub fn build(self) -> Result<Model> {
         Model::checked(self.raw, Vec::new())
     }
