@@ -418,7 +418,7 @@ fn files_make_no_circle() {
 }
 
 /// The longest function that is not seen as one thought any more.
-const LONGEST_FUNCTION: usize = 85;
+const LONGEST_FUNCTION: usize = 70;
 
 #[test]
 fn functions_stay_short() {
@@ -520,8 +520,8 @@ mod rules {
     fn see_paths_in_every_spelling() {
         for source in [
             "use crate::input::Reader;",
-            "use crate::{error::Error, input};",
-            "use crate::{error::{Error, Result}, input::{a::b}};",
+            "use crate::{base::Error, input};",
+            "use crate::{base::{Error, Result}, input::{a::b}};",
             "fn f() { crate::input::read(); }",
             "fn f() { vec![crate::input::A] }",
             "impl From<crate::input::A> for B {}",
