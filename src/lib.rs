@@ -84,7 +84,7 @@
 //!     println!("{loss}");
 //! }
 //! let unknown = body.export("msc", &path).expect_err("no such format");
-//! println!("{}: {}", unknown.diagnostics()[0].code(), unknown.diagnostics()[0].message());
+//! println!("{}: {}", unknown.diagnostics()[0].code().id(), unknown.diagnostics()[0].message());
 //! # Ok(())
 //! # }
 //! ```

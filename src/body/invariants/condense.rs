@@ -84,8 +84,8 @@ impl NodalMass for [f64] {
 ///
 /// ```
 /// use faer::{Mat, mat};
-/// use flexbody::invariants::condense;
-/// use flexbody::linalg::{CscMatrix, SymmetricMatrix};
+/// use flexbody::body::invariants::condense;
+/// use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 ///
 /// // A bar of mass 6 along x from -1 to 1, one linear element, and its stretch as the only mode.
 /// let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 2.0)];

@@ -44,9 +44,9 @@ pub(super) const LINEAR: usize = 21;
 /// q'K^omega(omega) q / 2 from T (theory 7.4).
 ///
 /// ```
-/// # fn check(body: &flexbody::body::flex_body::FlexBody) {
-/// use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
-/// let equations = EquationsOfMotion::new(body, Terms::ALL);
+/// # fn check(body: &flexbody::FlexBody) {
+/// use flexbody::dynamics::Evaluation;
+/// let equations = body.equations_of_motion();
 /// let mut evaluation = Evaluation::new(&equations);
 /// let (q, nu) = (vec![0.0; equations.n_modes()], vec![0.1; equations.n_velocities()]);
 /// evaluation.set(&q, &nu);
