@@ -126,28 +126,9 @@ fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene 
     scene
 }
 
-/// Refuses a start or a prescribed rotation beyond what [motion] allows.
+/// Refuses a start or a prescribed rotation beyond what [motion] allows; `axes` are those of the body in the model.
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
-    let along_range = |vector: &Vector3<f64>, given: Axes| {
-        let in_model = match given {
-            Axes::Body => axes * vector,
-            Axes::World => RotationVector(scene.initial.rotation).axes().tr_mul(vector),
-            Axes::Model => *vector,
-        };
-        if motion.axes == Axes::Body { axes.tr_mul(&in_model) } else { in_model }
-    };
-    let beyond = |range: &Option<Range>, vector: Vector3<f64>| match range {
-        None => false,
-        Some(Range::Any(length)) => vector.norm() > length * (1.0 + ROUNDING),
-        Some(Range::Axes(components)) => {
-            let slack = ROUNDING * (vector.norm() + components.norm());
-            (0..3).any(|k| vector[k].abs() > components[k] + slack)
-        }
-    };
-    let given = scene.spin.as_ref().map(|spin| (spin.axis, spin.axes, &spin.rate, "[spin]"));
-    let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
-    let carried = carried.map(|spin| (spin.axis, spin.axes, &spin.rate, "[carried.spin]"));
     let mut found = Vec::new();
     let mut refuse = |what: &str, key: &str| {
         let message = format!("{what} is beyond `{key}` of [motion]");
@@ -155,27 +136,52 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
             "[motion] has the largest rotation that the body ever has, that of the scene included",
         ));
     };
+    let given = scene.spin.as_ref().map(|spin| (spin.axis, spin.axes, &spin.rate, "[spin]"));
+    let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+    let carried = carried.map(|spin| (spin.axis, spin.axes, &spin.rate, "[carried.spin]"));
     match given.or(carried) {
         Some((axis, kind, rate, table)) => {
             let end = scene.run.duration.unwrap_or(f64::INFINITY);
             let (velocity, acceleration) = rate.largest_until(end);
-            let axis = along_range(&axis, kind);
-            if beyond(&motion.angular_velocity, axis * velocity) {
+            let axis = along_range(scene, axes, &axis, kind);
+            if is_beyond(&motion.angular_velocity, axis * velocity) {
                 refuse(&format!("the rate {velocity} of {table}"), "angular_velocity");
             }
-            if beyond(&motion.angular_acceleration, axis * acceleration) {
+            if is_beyond(&motion.angular_acceleration, axis * acceleration) {
                 refuse(&format!("the acceleration {acceleration} of {table}"), "angular_acceleration");
             }
         }
         None => {
             let initial = &scene.initial;
-            let start = along_range(&initial.angular_velocity, initial.axes);
-            if beyond(&motion.angular_velocity, start) {
+            let start = along_range(scene, axes, &initial.angular_velocity, initial.axes);
+            if is_beyond(&motion.angular_velocity, start) {
                 refuse("`angular_velocity` of [initial]", "angular_velocity");
             }
         }
     }
     if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// A vector that is `given` along some axes, along those of the ranges in [motion].
+fn along_range(scene: &Scene, axes: &Matrix3<f64>, vector: &Vector3<f64>, given: Axes) -> Vector3<f64> {
+    let in_model = match given {
+        Axes::Body => axes * vector,
+        Axes::World => RotationVector(scene.initial.rotation).axes().tr_mul(vector),
+        Axes::Model => *vector,
+    };
+    if scene.requirements.motion.axes == Axes::Body { axes.tr_mul(&in_model) } else { in_model }
+}
+
+/// Whether a vector leaves a range by more than rounding.
+fn is_beyond(range: &Option<Range>, vector: Vector3<f64>) -> bool {
+    match range {
+        None => false,
+        Some(Range::Any(length)) => vector.norm() > length * (1.0 + ROUNDING),
+        Some(Range::Axes(components)) => {
+            let slack = ROUNDING * (vector.norm() + components.norm());
+            (0..3).any(|k| vector[k].abs() > components[k] + slack)
+        }
+    }
 }
 
 /// Warnings about loads that do nothing.

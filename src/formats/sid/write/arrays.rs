@@ -53,35 +53,15 @@ fn blocks(nrow: usize, nf: usize, order: Blocks, entry: impl Fn(usize, usize, us
 /// The elastic forces (7.3) of theory section 7 are in Ct(q) (a - g), Cr(q) alpha and Oe(q) of the spin products; with them the rows of
 /// translation and rotation get the same Ct(q), Cr(q) as (7.4) has.
 pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
-    let Numbered { i2, i3, i4, i5, i6, i7, i8, i9, .. } = body.invariants().numbered();
-    let nf = body.n_modes();
-    let [acceleration, turn, spin] = [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin]
-        .map(|kind| stiffness(body, &kind));
-    let stiffness_entry = |k: &Option<Vec<Mat<f64>>>, component: usize, i: usize, j: usize| {
-        k.as_ref().map_or(0.0, |k| k[component][(i, j)])
-    };
-    let i5 = |a: usize, l: usize, k: usize| i5.as_ref().map_or(0.0, |i5| i5[(a * nf + l, k)]);
-    let w1: Vec<Matrix3<f64>> = i8.iter().map(|i8| i8 + i8.transpose()).collect();
-    let centrifugal = |k: usize, l: usize, pair: usize| {
-        let (a, b) = LoadKind::SPIN[pair];
-        let both = |i9: &Mat<f64>| {
-            let sum = i9[(a * nf + k, b * nf + l)] + i9[(a * nf + l, b * nf + k)];
-            if a == b { 0.5 * sum } else { sum }
-        };
-        i9.as_ref().map_or(0.0, both) + stiffness_entry(&spin, pair, k, l)
-    };
-    let oe0 = |k: usize, pair: usize| {
-        let (a, b) = LoadKind::SPIN[pair];
-        if a == b { -0.5 * w1[k][(a, a)] } else { -w1[k][(a, b)] }
-    };
-    let mut ct = Taylor::constant("Ct", Mat::from_fn(nf, 3, |k, a| i3[(a, k)]));
-    ct.m1 = acceleration.as_ref().map(|stiff| per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| stiff[a][(k, l)])));
+    let terms = Terms::new(body);
+    let Terms { numbered, nf, w1, .. } = &terms;
+    let nf = *nf;
     let [first_moment, inertia_name] = dialect.moments;
     vec![
         Taylor::linear(
             first_moment,
-            Mat::from_fn(3, 1, |a, _| i2[a]),
-            per_mode(nf, |k| Mat::from_fn(3, 1, |a, _| i3[(a, k)])),
+            Mat::from_fn(3, 1, |a, _| numbered.i2[a]),
+            per_mode(nf, |k| Mat::from_fn(3, 1, |a, _| numbered.i3[(a, k)])),
         ),
         Taylor {
             structure: if dialect.square_inertia {
@@ -89,27 +69,101 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
             } else {
                 super::text::Structure::Full
             },
-            ..Taylor::linear(inertia_name, inertia(dialect, &i7), per_mode(nf, |k| inertia(dialect, &w1[k])))
+            ..Taylor::linear(
+                inertia_name,
+                inertia(dialect, &numbered.i7),
+                per_mode(nf, |k| inertia(dialect, &w1[k])),
+            )
         },
-        ct,
-        Taylor::linear(
-            "Cr",
-            Mat::from_fn(nf, 3, |k, a| i4[(a, k)]),
-            per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| i5(a, l, k) + stiffness_entry(&turn, a, k, l))),
-        ),
-        Taylor::symmetric("Me", i6),
-        Taylor::constant("Gr", blocks(3, nf, dialect.gr, |row, a, k| 2.0 * i8[k][(row, a)])),
+        terms.ct(),
+        terms.cr(),
+        Taylor::symmetric("Me", numbered.i6.clone()),
+        Taylor::constant("Gr", blocks(3, nf, dialect.gr, |row, a, k| 2.0 * numbered.i8[k][(row, a)])),
         // The Coriolis force takes the skew part only, which is all of a solid.
-        Taylor::constant("Ge", blocks(nf, nf, dialect.ge, |k, a, l| i5(a, l, k) - i5(a, k, l))),
-        Taylor::linear(
-            "Oe",
-            Mat::from_fn(nf, 6, oe0),
-            per_mode(nf, |l| Mat::from_fn(nf, 6, |k, pair| centrifugal(k, l, pair))),
-        ),
+        Taylor::constant("Ge", blocks(nf, nf, dialect.ge, |k, a, l| terms.w3(a, l, k) - terms.w3(a, k, l))),
+        terms.oe(),
         Taylor::zero("ksigma", nf, 1),
         Taylor::symmetric("Ke", body.invariants().modal_stiffness.clone()),
         if is_damped(body) { Taylor::symmetric("De", body.damping()) } else { Taylor::zero("De", nf, nf) },
     ]
+}
+
+/// The terms of a body that the arrays are made of.
+struct Terms {
+    numbered: Numbered,
+    nf: usize,
+    /// I8 + I8' of every mode.
+    w1: Vec<Matrix3<f64>>,
+    /// Geometric stiffness for acceleration, angular acceleration and spin.
+    acceleration: Option<Vec<Mat<f64>>>,
+    turn: Option<Vec<Mat<f64>>>,
+    spin: Option<Vec<Mat<f64>>>,
+}
+
+impl Terms {
+    fn new(body: &FlexBody) -> Self {
+        let numbered = body.invariants().numbered();
+        Self {
+            nf: body.n_modes(),
+            w1: numbered.i8.iter().map(|i8| i8 + i8.transpose()).collect(),
+            numbered,
+            acceleration: stiffness(body, &LoadKind::Acceleration),
+            turn: stiffness(body, &LoadKind::AngularAcceleration),
+            spin: stiffness(body, &LoadKind::Spin),
+        }
+    }
+
+    /// Entry (l, k) of the block of I5 of an axis, zero without W3.
+    fn w3(&self, a: usize, l: usize, k: usize) -> f64 {
+        self.numbered.i5.as_ref().map_or(0.0, |i5| i5[(a * self.nf + l, k)])
+    }
+
+    fn ct(&self) -> Taylor {
+        let nf = self.nf;
+        let mut ct = Taylor::constant("Ct", Mat::from_fn(nf, 3, |k, a| self.numbered.i3[(a, k)]));
+        let linear = |stiff: &Vec<Mat<f64>>| per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| stiff[a][(k, l)]));
+        ct.m1 = self.acceleration.as_ref().map(linear);
+        ct
+    }
+
+    fn cr(&self) -> Taylor {
+        let nf = self.nf;
+        let turned = |a: usize, k: usize, l: usize| entry(self.turn.as_ref(), a, k, l);
+        Taylor::linear(
+            "Cr",
+            Mat::from_fn(nf, 3, |k, a| self.numbered.i4[(a, k)]),
+            per_mode(nf, |l| Mat::from_fn(nf, 3, |k, a| self.w3(a, l, k) + turned(a, k, l))),
+        )
+    }
+
+    fn oe(&self) -> Taylor {
+        let nf = self.nf;
+        let constant = |k: usize, pair: usize| {
+            let (a, b) = LoadKind::SPIN[pair];
+            if a == b { -0.5 * self.w1[k][(a, a)] } else { -self.w1[k][(a, b)] }
+        };
+        Taylor::linear(
+            "Oe",
+            Mat::from_fn(nf, 6, constant),
+            per_mode(nf, |l| Mat::from_fn(nf, 6, |k, pair| self.centrifugal(k, l, pair))),
+        )
+    }
+
+    /// Entry of Oe1 for a pair of axes: W2, with geometric stiffness for spin.
+    fn centrifugal(&self, k: usize, l: usize, pair: usize) -> f64 {
+        let nf = self.nf;
+        let (a, b) = LoadKind::SPIN[pair];
+        let both = |i9: &Mat<f64>| {
+            let sum = i9[(a * nf + k, b * nf + l)] + i9[(a * nf + l, b * nf + k)];
+            if a == b { 0.5 * sum } else { sum }
+        };
+        self.numbered.i9.as_ref().map_or(0.0, both) + entry(self.spin.as_ref(), pair, k, l)
+    }
+}
+
+/// Entry of a component of geometric stiffness, zero without.
+fn entry(stiffness: Option<&Vec<Mat<f64>>>, component: usize, i: usize, j: usize) -> f64 {
+    stiffness.map_or(0.0, |stiffness| stiffness[component][(i, j)])
 }
 
 /// A frame with the stiffness of a unit force and a unit moment there.
