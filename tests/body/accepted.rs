@@ -142,8 +142,7 @@ fn with_random_inertia(raw: &RawModel, seed: u64, sizes: &[f64]) -> RawModel {
 fn bases(model: &FeModel) -> Vec<BasisChoice> {
     let shapes = Mat::from_fn(model.rows().len(), 4, |i, j| Random((97 * i + j) as u64).signed());
     let raw = RawShapes { matrix: shapes, digits: 17, path: PathBuf::new(), source: None };
-    let with_residual_vectors =
-        |loads| FreeSurface { residual_vectors: vec![loads], ..FreeSurface::default() };
+    let with_residual_vectors = |loads| FreeSurface { residual_vectors: vec![loads] };
     vec![
         BasisChoice::default(),
         BasisChoice::Free(with_residual_vectors(Loads::Centrifugal)),

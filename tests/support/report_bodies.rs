@@ -2,10 +2,7 @@
 
 #![allow(dead_code)]
 
-#[path = "../support/cuboid.rs"]
-mod cuboid;
-
-use cuboid::Cuboid;
+use super::cuboid::Cuboid;
 use faer::Mat;
 use flexbody::base::diagnostic::{Code, Diagnostic};
 use flexbody::base::provenance::SourceFile;

@@ -26,7 +26,7 @@ impl Frame {
     }
 
     /// Body coordinates of points given in model coordinates: x_body = axes' (x_model - origin).
-    pub fn to_body(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    pub fn to_body(self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let to_body = self.axes.transpose();
         positions.iter().map(|x| (to_body * (Vector3::from(*x) - self.origin)).into()).collect()
     }

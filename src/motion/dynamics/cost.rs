@@ -8,7 +8,7 @@ use super::modal_matrix::{ModalMass, ModalMatrix};
 impl EquationsOfMotion {
     /// Multiplications of one evaluation: [`Evaluation::set`](super::Evaluation::set) and
     /// [`Evaluation::accelerations`](super::Evaluation::accelerations), which is what one call of an explicit integrator takes, here or in
-    /// the momenta of [`Motion`](super::Motion).
+    /// the momenta of a motion.
     ///
     /// Counted from the arrays that are there, as they lie in memory: rows that fill up a panel are multiplied too. With nf modes, r rigid
     /// motions, a axes and p pairs of axes to turn about, and t axes to move along:
