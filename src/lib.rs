@@ -25,7 +25,7 @@
 //! # }
 //! ```
 //!
-//! **Make a model of matrices in memory**, here a bar of two masses per axis, from `sprs` or from slices of compressed columns
+//! **Make a model of matrices in memory**, here a truss, from `sprs` or from slices of compressed columns
 //! ([`SparseMatrix::from_csc`]). `examples/from_memory.rs` goes on from here.
 //!
 //! ```
