@@ -1,4 +1,4 @@
-//! What a format is, and the registry.
+//! What a format is that other programs read.
 
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;

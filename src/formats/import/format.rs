@@ -1,4 +1,4 @@
-//! What a reader of another program's file is, and the registry.
+//! What a format of another program is that is read.
 
 use super::{AuditCheck, ImportedBody};
 use crate::base::error::Result;
