@@ -8,7 +8,7 @@ use crate::base::output::OutputSlot;
 use crate::base::progress::SILENT;
 use crate::body::flex_body;
 use crate::body::verification::own_identities;
-use crate::formats::export::{ExportOptions, Exported};
+use crate::formats::export::ExportOptions;
 use crate::formats::{export, find_format};
 use crate::motion::dynamics::{EquationsOfMotion, Terms};
 use crate::motion::scene::simulate;
@@ -62,16 +62,8 @@ impl FlexBody {
     /// FB801 for a format that is not known; FB720 when no file of this format can be made of the body; FB104 and FB602 when it cannot be
     /// written.
     pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
-        let path = path.as_ref();
         let (exported, lost) = export(&self.0, find_format(format)?, &ExportOptions::default(), true)?;
-        let mut slots = vec![OutputSlot::prepare(path)?];
-        slots[0].fill(&exported.file)?;
-        for (ending, bytes) in &exported.beside {
-            let slot = OutputSlot::prepare(Exported::place_beside(path, ending))?;
-            slot.fill(bytes)?;
-            slots.push(slot);
-        }
-        OutputSlot::commit_all(slots)?;
+        OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
         Ok(lost)
     }
 

@@ -3,7 +3,7 @@
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::units::UnitSystem;
-use crate::input::{LoadSource, read_manifest, read_model};
+use crate::input::{LoadSource, check_size, read_manifest, read_model};
 use crate::model::{CheckedModel, Coupling, Damping, DofLabel, FeModel, NodeSet, Nodes, RawModel};
 use crate::numerics::linalg::CscMatrix;
 use std::path::Path;
@@ -17,7 +17,7 @@ impl SparseMatrix {
     ///
     /// # Errors
     /// FB303 and FB304 when the slices are no such matrix: pointers that descend or do not end at the number of entries, rows that do not
-    /// ascend or are not below `n`.
+    /// ascend or are not below `n`; FB313 for too many rows.
     pub fn from_csc(n: usize, col_ptr: &[usize], row_idx: &[usize], values: &[f64]) -> Result<Self> {
         let refuse = |code: Code, what: String| {
             Err(Diagnostic::new(code, format!("compressed columns: {what}")).into())
@@ -35,6 +35,7 @@ impl SparseMatrix {
                 format!("{rows} rows and {numbers} values for {} entries", col_ptr[n]),
             );
         }
+        check_size(n as u64, n as u64, values.len() as u64)?;
         let mut triplets = Vec::with_capacity(values.len());
         for column in 0..n {
             let entries = col_ptr[column]..col_ptr[column + 1];
@@ -55,12 +56,13 @@ impl SparseMatrix {
     /// From triplets (row, column, value); those of the same place are added.
     ///
     /// # Errors
-    /// FB303 when an index is not below `n`.
+    /// FB303 when an index is not below `n`; FB313 for too many rows.
     pub fn from_triplets(n: usize, triplets: &[(usize, usize, f64)]) -> Result<Self> {
         if let Some((row, column, _)) = triplets.iter().find(|(row, column, _)| *row >= n || *column >= n) {
             let message = format!("entry ({row}, {column}) lies outside a matrix of {n} rows");
             return Err(Diagnostic::new(Code::MatrixIndex, message).into());
         }
+        check_size(n as u64, n as u64, triplets.len() as u64)?;
         let narrow: Vec<_> = triplets.iter().map(|&(i, j, value)| (i as u32, j as u32, value)).collect();
         Ok(Self(CscMatrix::from_triplets(n, n, &narrow)))
     }

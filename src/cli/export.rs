@@ -32,23 +32,13 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         .map_err(|error| error.in_file(&arguments.body))?;
     diagnostics.extend(losses);
     refuse_warnings(arguments.printing, &diagnostics)?;
-    let beside: Vec<(PathBuf, Vec<u8>)> = exported
-        .beside
-        .into_iter()
-        .map(|(ending, bytes)| (Exported::place_beside(&arguments.output, ending), bytes))
-        .collect();
+    let place_and_size =
+        |(ending, bytes): &(&str, Vec<u8>)| (Exported::place_beside(&arguments.output, ending), bytes.len());
+    let beside: Vec<(PathBuf, usize)> = exported.beside.iter().map(place_and_size).collect();
     let taken: Vec<&PathBuf> = inputs.into_iter().chain(std::iter::once(&arguments.output)).collect();
     refuse_replacing(taken.into_iter(), beside.iter().map(|(path, _)| path))?;
-    let mut written = vec![(arguments.output.clone(), exported.file.len())];
-    slot.fill(&exported.file)?;
-    let mut slots = vec![slot];
-    for (path, bytes) in beside {
-        written.push((path.clone(), bytes.len()));
-        let slot = OutputSlot::prepare(path)?;
-        slot.fill(&bytes)?;
-        slots.push(slot);
-    }
-    OutputSlot::commit_all(slots)?;
+    OutputSlot::commit_all(exported.fill(slot)?)?;
+    let written = [vec![(arguments.output.clone(), exported.file.len())], beside].concat();
 
     let line = |(path, size): &(PathBuf, usize)| {
         format!("{}, {} bytes: {} for {}\n", path.display(), size, format.name(), format.reader())

@@ -35,7 +35,7 @@ pub(super) struct Sides {
 }
 
 /// Checks a declared size against the number of stored entries, before anything of that size is allocated.
-pub(super) fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnostic> {
+pub(crate) fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnostic> {
     if rows != cols {
         return Err(Diagnostic::new(
             Code::MatrixNotSquare,

@@ -23,6 +23,7 @@ mod table;
 mod tables;
 mod walk;
 
+pub(crate) use assemble::check_size;
 pub use bytes::InputFile;
 pub use compression::Compression;
 pub use manifest::read_manifest;

@@ -9,6 +9,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::{FlexBody, Frame, Group};
 use crate::body::invariants::{CauchySchwarz, Invariants, compare_invariants};
+use crate::numerics::linalg::larger;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{Matrix3, Vector3};
@@ -210,11 +211,6 @@ fn common_nodes(a: &[i64], b: &[i64]) -> Option<Vec<usize>> {
     (a.len() == b.len()).then(|| a.iter().map(|id| places.get(id).copied()).collect()).flatten()
 }
 
-/// The larger, NaN when one of them is.
-fn worst(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
 /// |difference| / scale; 0 when nothing differs, whatever the scale.
 fn relative(difference: f64, scale: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / scale }
@@ -315,14 +311,14 @@ impl BodyComparison {
         for k in 0..3 {
             for l in 0..3 {
                 let scale = (ja[(k, k)] * ja[(l, l)]).sqrt();
-                largest = worst(largest, relative(jb[(k, l)] - ja[(k, l)], scale));
+                largest = larger(largest, relative(jb[(k, l)] - ja[(k, l)], scale));
             }
         }
         let offset = centre_of_mass(ia).norm().max(centre_of_mass(ib).norm());
         let lost = lost_by_shift(ia.mass, offset, ja.diagonal().min());
         self.row("inertia", "largest entry / sqrt(I_kk I_ll)", largest, tolerances.inertia + lost);
         let frequency = |(fa, fb): (&f64, &f64)| relative(fb - fa, *fa);
-        let largest = a.frequencies_hz().iter().zip(&b.frequencies_hz()).map(frequency).fold(0.0, worst);
+        let largest = a.frequencies_hz().iter().zip(&b.frequencies_hz()).map(frequency).fold(0.0, larger);
         self.row("frequency", "relative, largest of all modes", largest, tolerances.frequency);
     }
 
@@ -332,7 +328,7 @@ impl BodyComparison {
         self.same_nodes = true;
         let (pa, pb) = (&a.nodes().positions, &b.nodes().positions);
         let distance = |(x, &i): (&[f64; 3], &usize)| (change.point(&pb[i]) - Vector3::from(*x)).norm();
-        let largest = pa.iter().zip(order).map(distance).fold(0.0, worst);
+        let largest = pa.iter().zip(order).map(distance).fold(0.0, larger);
         let radius = gyration_radius(a.invariants());
         let origin = a.frame().origin.amax().max(b.frame().origin.amax());
         self.row(
@@ -349,7 +345,7 @@ impl BodyComparison {
         let aligned = product(shapes_b.as_ref(), alignment.basis.as_ref());
         let by_group: Vec<f64> =
             groups.iter().map(|g| shape_difference(shapes_a, aligned.as_ref(), g)).collect();
-        let largest = by_group.iter().copied().fold(0.0, worst);
+        let largest = by_group.iter().copied().fold(0.0, larger);
         self.row("mode shapes", "|psi_a - psi_b| / |psi_a|, nodal norm", largest, tolerances.invariants);
         let rest = &by_group[..by_group.len().saturating_sub(1)];
         let shapes_agree = largest <= tolerances.invariants;
@@ -390,18 +386,18 @@ impl BodyComparison {
         for g in groups {
             for k in 0..3 {
                 let x = |body: &Invariants| norm(&mut g.clone().map(|p| body.c1[(k, p)]));
-                c1 = worst(c1, relative(x(in_a) - x(exact), exact.mass.sqrt() * size(g)));
+                c1 = larger(c1, relative(x(in_a) - x(exact), exact.mass.sqrt() * size(g)));
                 for l in 0..3 {
                     let x = |body: &Invariants| norm(&mut g.clone().map(|p| body.ibar[k][l][p]));
                     // ibar() is sqrt(J_kk) |psi_p|.
                     let scale = norm(&mut g.clone().map(|p| bound.ibar(k, p)));
-                    ibar = worst(ibar, relative(x(in_a) - x(exact), scale));
+                    ibar = larger(ibar, relative(x(in_a) - x(exact), scale));
                     for h in groups {
                         let x = |body: &Invariants| {
                             let block = &body.s[k][l];
                             norm(&mut g.clone().flat_map(|p| h.clone().map(move |q| block[(p, q)])))
                         };
-                        s = worst(s, relative(x(in_a) - x(exact), size(g) * size(h)));
+                        s = larger(s, relative(x(in_a) - x(exact), size(g) * size(h)));
                     }
                 }
             }

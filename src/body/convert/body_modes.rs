@@ -6,7 +6,7 @@ use crate::body::invariants::{
 };
 use crate::model::{FeModel, rigid_count};
 use crate::numerics::eigen::canonical_basis;
-use crate::numerics::linalg::{SymmetricMatrix, gram};
+use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
@@ -33,6 +33,14 @@ fn rigid_fields(model: &FeModel, frame: &Frame) -> Mat<f64> {
 pub(crate) fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
     let rigid = rigid_fields(model, frame);
     gram(rigid.as_ref(), model.pencil().apply_mass(rigid.as_ref()).as_ref())
+}
+
+/// Psi' A Psi, where the matrix A and the modes are in model axes.
+pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
+    let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
+    multiply(a, 1, vectors, product.as_mut());
+    let k = gram(vectors, product.as_ref());
+    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
 }
 
 /// The modes of a body.

@@ -3,10 +3,7 @@
 use super::certificate::certificate;
 use super::geometric_stiffness::softening_warning;
 use super::remarks::{free_frequencies, poor_fit};
-use super::{
-    Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping,
-    modal_geometric_stiffness,
-};
+use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
@@ -104,7 +101,6 @@ impl ModalModel<'_> {
         lumped: Vec<LumpedBody>,
     ) -> Result<(Parts, Option<Diagnostic>)> {
         let (modes, overdamped) = self.damped_modes(&condensed.invariants)?;
-        let axes = &self.place.frame.axes;
         let parts = Parts {
             source: self.source(),
             dimension: self.model.dimension(),
@@ -115,7 +111,7 @@ impl ModalModel<'_> {
             nodes: self.nodes.clone(),
             modes,
             invariants: condensed.invariants.clone(),
-            geometric_stiffness: modal_geometric_stiffness(self.model, self.modes.vectors.as_ref(), axes)?,
+            geometric_stiffness: self.geometric_stiffness.clone(),
             lumped,
             certificate: certificate(self.model, &self.found, condensed.guarantee.clone()),
             terms: condensed.terms.clone(),

@@ -1,6 +1,6 @@
 //! Damping of the modes: what the user states, reduced to them.
 
-use super::modal_model::reduced;
+use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::invariants::Invariants;

@@ -1,6 +1,6 @@
 //! Geometric stiffness of the modes: what the user gives for unit loads, reduced to them and turned into body axes.
 
-use super::modal_model::reduced;
+use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::{BasisChoice, Loads};

@@ -1,6 +1,6 @@
 //! What lumped masses would have given: invariants on the same modes, and the pipeline with modes of their own.
 
-use super::modal_model::reduced;
+use super::body_modes::reduced;
 use super::{BodyModes, Lumping, ModalModel};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;

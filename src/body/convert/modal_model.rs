@@ -1,6 +1,7 @@
 //! A model with its modes, in the frame of its body: the first stage of a conversion.
 
-use super::{BodyModes, ConvertSettings, NodesInFrame, rigid_mass};
+use super::body_modes::reduced;
+use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
@@ -9,10 +10,9 @@ use crate::body::flex_body::Interface;
 use crate::body::invariants::{
     BodyFrame, Frame, LumpedMasses, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
 };
-use crate::model::{FeModel, Nodes, Reference};
+use crate::model::{FeModel, GeometricStiffness, Nodes, Reference};
 use crate::numerics::eigen::{Accuracy, Resume};
-use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
-use faer::{Mat, MatRef};
+use faer::Mat;
 use std::collections::HashMap;
 
 /// A checked model and its modes in body axes; of the mass nothing is condensed yet.
@@ -28,6 +28,8 @@ pub struct ModalModel<'m> {
     pub(super) modes: BodyModes,
     /// Psi' K Psi.
     pub(super) modal_stiffness: Mat<f64>,
+    /// Psi' K_geo Psi of unit loads along the body axes.
+    pub(super) geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     pub(super) nodes: Nodes,
     pub(super) interfaces: Vec<Interface>,
 }
@@ -56,6 +58,7 @@ impl<'m> ModalModel<'m> {
         let place = NodesInFrame::new(model, frame);
         let modes = BodyModes::new(model, &place, &found.solution.vectors);
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
+        let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
         let interfaces = interfaces(model, &frame, coupled);
@@ -68,6 +71,7 @@ impl<'m> ModalModel<'m> {
             place,
             modes,
             modal_stiffness,
+            geometric_stiffness,
             nodes,
             interfaces,
         })
@@ -114,12 +118,4 @@ fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
         reference: in_body(&set.reference),
     })
     .collect()
-}
-
-/// Psi' A Psi, where the matrix A and the modes are in model axes.
-pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
-    let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
-    multiply(a, 1, vectors, product.as_mut());
-    let k = gram(vectors, product.as_ref());
-    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
 }

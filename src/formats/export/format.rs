@@ -1,6 +1,7 @@
 //! What a format is that other programs read.
 
 use crate::base::error::Result;
+use crate::base::output::OutputSlot;
 use crate::body::flex_body::FlexBody;
 use std::path::{Path, PathBuf};
 
@@ -82,6 +83,21 @@ impl Exported {
             }
             _ => file.with_extension(ending),
         }
+    }
+
+    /// Fills `slot`, which is for the file, and a slot for each of the others; they appear together when all are committed.
+    ///
+    /// # Errors
+    /// FB104, FB602 when one cannot be written.
+    pub fn fill(&self, slot: OutputSlot) -> Result<Vec<OutputSlot>> {
+        slot.fill(&self.file)?;
+        let mut slots = vec![slot];
+        for (ending, bytes) in &self.beside {
+            let other = OutputSlot::prepare(Self::place_beside(slots[0].path(), ending))?;
+            other.fill(bytes)?;
+            slots.push(other);
+        }
+        Ok(slots)
     }
 
     /// A single file.

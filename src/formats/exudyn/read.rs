@@ -4,9 +4,10 @@ use crate::base::diagnostic::Code;
 use crate::base::error::Result;
 use crate::body::invariants::{Groups, Numbered};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
-use crate::formats::import::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative, worst};
+use crate::formats::import::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative};
 use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use crate::input::InputFile;
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -249,7 +250,7 @@ impl Given {
             let (i, j) = (ij / 3, ij % 3);
             (self.mtt[(i, j)] - if i == j { self.mass } else { 0.0 }).abs()
         });
-        relative(entries.fold(0.0, worst), self.mass.abs())
+        relative(entries.fold(0.0, larger), self.mass.abs())
     }
 
     fn chi_missed(&self, told: &Numbered) -> f64 {
@@ -257,16 +258,16 @@ impl Given {
         let entries = (0..9).map(|ij| (self.chi_tilde[(ij / 3, ij % 3)] - skew[(ij / 3, ij % 3)]).abs());
         // Of a body with its centre of mass in the origin the radius of gyration is the scale.
         let gyration = (0.5 * told.i7.trace() / self.mass).abs().sqrt();
-        relative(entries.fold(0.0, worst), gyration)
+        relative(entries.fold(0.0, larger), gyration)
     }
 
     fn phi_missed(&self, at: impl Fn(usize, usize) -> usize) -> f64 {
         let missed_by_mode = |j: usize| {
             let skew = Vector3::from_fn(|a, _| self.phi_psi[(a, j)]).cross_matrix();
             let entry = |a: usize, b: usize| (self.phi_psi_tilde[(a, at(b, j))] - skew[(a, b)]).abs();
-            let missed = (0..9).map(|ab| entry(ab / 3, ab % 3)).fold(0.0, worst);
+            let missed = (0..9).map(|ab| entry(ab / 3, ab % 3)).fold(0.0, larger);
             relative(missed, (self.mass * self.modal_mass[(j, j)]).abs().sqrt())
         };
-        (0..self.nf()).map(missed_by_mode).fold(0.0, worst)
+        (0..self.nf()).map(missed_by_mode).fold(0.0, larger)
     }
 }

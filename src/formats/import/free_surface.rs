@@ -1,11 +1,10 @@
 //! Free-surface mass-normalised modes from any modes, with nothing but their invariants (theory 5.2).
 
 use super::any_body::{ANY_BODY, DIGITS};
-use super::redundant::worst;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::invariants::{Expected, GeneralTerms, IdentityCheck, Invariants, identities};
-use crate::numerics::linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
+use crate::numerics::linalg::{dense_cholesky, larger, solve_lower, solve_upper, symmetric_eigen};
 use faer::Mat;
 
 /// A mode of which less than this part of its squared M-norm is left without rigid motion is a rigid motion.
@@ -22,7 +21,7 @@ pub(crate) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
         .into_iter()
         .filter(|check| about_modes.contains(&check.name) && !check.passed)
         .map(|check| check.value)
-        .fold(0.0, worst);
+        .fold(0.0, larger);
     let beside = beside_diagonal(invariants);
     let k = &invariants.modal_stiffness;
     let nearly = |j: usize| k[(j - 1, j - 1)] - k[(j, j)] <= DIGITS * k[(j, j)];

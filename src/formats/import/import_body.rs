@@ -2,7 +2,6 @@
 
 use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
 use super::free_surface::{FreeSurface, beside_diagonal, is_free_surface};
-use super::redundant::worst;
 use super::{ImportedBody, ImportedFile, ImportedFrame};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -14,6 +13,7 @@ use crate::body::flex_body::{
 };
 use crate::body::invariants::{BodyFrame, Invariants, identities, symmetrise};
 use crate::model::Nodes;
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use std::collections::HashSet;
 
@@ -231,7 +231,7 @@ fn certificate(file: &ImportedFile, invariants: &Invariants) -> Certificate {
 /// The body with what the digits of its file leave of the identities of inertia, and a warning where this is more than rounding.
 fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
     let missed = body.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed);
-    let missed = missed.map(|check| check.value).fold(0.0, worst);
+    let missed = missed.map(|check| check.value).fold(0.0, larger);
     if missed == 0.0 || missed.is_nan() || missed > BROKEN {
         return Ok((body, None));
     }

@@ -6,7 +6,7 @@
 use super::AuditCheck;
 use crate::base::diagnostic::Code;
 use crate::body::invariants::Numbered;
-use crate::numerics::linalg::symmetric_eigen;
+use crate::numerics::linalg::{larger, symmetric_eigen};
 use faer::Mat;
 
 /// Rounding of sums over the nodes of a large model.
@@ -33,7 +33,7 @@ impl<'n> Redundant<'n> {
 
     fn of_pairs(&self, missed: impl Fn(usize, usize) -> f64) -> f64 {
         let pairs = (0..self.nf()).flat_map(|j| (0..self.nf()).map(move |k| (j, k)));
-        pairs.map(|(j, k)| relative(missed(j, k), self.modes[j] * self.modes[k])).fold(0.0, worst)
+        pairs.map(|(j, k)| relative(missed(j, k), self.modes[j] * self.modes[k])).fold(0.0, larger)
     }
 
     /// I4_j against the skew part of I8_j.
@@ -43,9 +43,9 @@ impl<'n> Redundant<'n> {
             let missed_along = |(a, b, c): (usize, usize, usize)| {
                 told.i4[(c, j)] - (told.i8[j][(a, b)] - told.i8[j][(b, a)])
             };
-            CYCLIC.map(missed_along).into_iter().map(f64::abs).fold(0.0, worst)
+            CYCLIC.map(missed_along).into_iter().map(f64::abs).fold(0.0, larger)
         };
-        (0..self.nf()).map(|j| relative(missed(j), self.extent * self.modes[j])).fold(0.0, worst)
+        (0..self.nf()).map(|j| relative(missed(j), self.extent * self.modes[j])).fold(0.0, larger)
     }
 
     /// I5_jk = -I5_kj.
@@ -53,7 +53,7 @@ impl<'n> Redundant<'n> {
         let Some(i5) = &self.told.i5 else { return 0.0 };
         let nf = self.nf();
         self.of_pairs(|j, k| {
-            (0..3).map(|c| (i5[(c * nf + j, k)] + i5[(c * nf + k, j)]).abs()).fold(0.0, worst)
+            (0..3).map(|c| (i5[(c * nf + j, k)] + i5[(c * nf + k, j)]).abs()).fold(0.0, larger)
         })
     }
 
@@ -65,7 +65,7 @@ impl<'n> Redundant<'n> {
             let at = |a: usize, b: usize| i9[(a * nf + j, b * nf + k)];
             let missed_along =
                 |(a, b, c): (usize, usize, usize)| (i5[(c * nf + j, k)] - (at(b, a) - at(a, b))).abs();
-            CYCLIC.map(missed_along).into_iter().fold(0.0, worst)
+            CYCLIC.map(missed_along).into_iter().fold(0.0, larger)
         })
     }
 
@@ -76,7 +76,7 @@ impl<'n> Redundant<'n> {
         self.of_pairs(|j, k| {
             let axes = (0..9).map(|ab| (ab / 3, ab % 3));
             let missed = |(a, b): (usize, usize)| i9[(a * nf + j, b * nf + k)] - i9[(b * nf + k, a * nf + j)];
-            axes.map(missed).map(f64::abs).fold(0.0, worst)
+            axes.map(missed).map(f64::abs).fold(0.0, larger)
         })
     }
 
@@ -151,17 +151,12 @@ pub(crate) fn lacks_w2(told: &Numbered) -> bool {
 pub(crate) fn asymmetry(a: &Mat<f64>) -> f64 {
     let pairs = (0..a.nrows()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let bound = |i: usize, j: usize| (a[(i, i)] * a[(j, j)]).abs().sqrt();
-    pairs.map(|(i, j)| relative((a[(i, j)] - a[(j, i)]).abs(), bound(i, j))).fold(0.0, worst)
+    pairs.map(|(i, j)| relative((a[(i, j)] - a[(j, i)]).abs(), bound(i, j))).fold(0.0, larger)
 }
 
 /// `missed / size`; nothing missed is perfect whatever the size.
 pub(crate) fn relative(missed: f64, size: f64) -> f64 {
     if missed == 0.0 { 0.0 } else { missed / size }
-}
-
-/// The larger, or the one that is no number.
-pub(crate) fn worst(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
 /// (a, b, c) in cyclic order.

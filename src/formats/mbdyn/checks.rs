@@ -5,7 +5,8 @@ use super::read::records::Records;
 use super::read::words::Surplus;
 use crate::base::diagnostic::Code;
 use crate::formats::import::AuditCheck;
-use crate::formats::import::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, relative, worst};
+use crate::formats::import::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, relative};
+use crate::numerics::linalg::larger;
 
 /// Digits that a number may lack.
 const LOST: f64 = 1e-8;
@@ -111,14 +112,14 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
     let modal = (0..nf)
         .flat_map(|j| (0..nf).map(move |k| (j, k)))
         .map(|(j, k)| relative((own[(j, k)] - sums[(j, k)]).abs(), size(j, k)))
-        .fold(0.0, worst);
+        .fold(0.0, larger);
     let total = relative((read.body.inertia.i1 - lumped.told.i1).abs(), read.body.inertia.i1.abs());
     let tensor =
         relative((read.body.inertia.i7 - lumped.told.i7).abs().max(), read.body.inertia.i7.abs().max());
     let consistent = AuditCheck {
         name: "lumped_masses_carry_modes",
         formula: "record groups 9 and 12 = sums over the masses of record group 11",
-        value: worst(modal, worst(total, tensor)),
+        value: larger(modal, larger(total, tensor)),
         limit: ROUNDING + TERMS * records.rounding(),
         code: Code::AuditLumped,
         meaning: format!(

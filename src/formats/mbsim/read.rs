@@ -4,9 +4,10 @@ use crate::base::diagnostic::Code;
 use crate::base::error::Result;
 use crate::body::invariants::{Groups, Invariants, Numbered};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
-use crate::formats::import::redundant::{ROUNDING, asymmetry, relative, worst};
+use crate::formats::import::redundant::{ROUNDING, asymmetry, relative};
 use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use crate::input::InputFile;
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
@@ -192,7 +193,7 @@ fn checks(
         check(
             "shape_shape_symmetric",
             "blocks 11, 22 and 33 of the shape function shape function integral = their transposes",
-            (0..3).map(|a| asymmetry(&block(a))).fold(0.0, worst),
+            (0..3).map(|a| asymmetry(&block(a))).fold(0.0, larger),
             Code::AuditIdentity,
             "pairs of shape functions have an integral that depends on their order",
         ),
@@ -223,5 +224,5 @@ fn checks(
 fn beside_diagonal(a: &Mat<f64>) -> f64 {
     let pairs = (0..a.nrows()).flat_map(|i| (0..a.ncols()).map(move |j| (i, j)));
     let size = |i: usize, j: usize| (a[(i, i)] * a[(j, j)]).abs().sqrt();
-    pairs.filter(|(i, j)| i != j).map(|(i, j)| relative(a[(i, j)].abs(), size(i, j))).fold(0.0, worst)
+    pairs.filter(|(i, j)| i != j).map(|(i, j)| relative(a[(i, j)].abs(), size(i, j))).fold(0.0, larger)
 }

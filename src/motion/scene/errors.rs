@@ -2,9 +2,10 @@
 
 use super::lively::{LivelyNodes, along_axes, longest};
 use super::peak::Peak;
-use super::{Tolerance, Trace, larger, not_negative};
+use super::{Tolerance, Trace};
 use crate::body::flex_body::FlexBody;
 use crate::motion::dynamics::EulerParameters;
+use crate::numerics::linalg::{larger, not_negative};
 use faer::MatRef;
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -1,10 +1,10 @@
 //! The largest of everything over a continuous motion.
 
-use super::larger::{larger, not_negative};
 use super::lively::{LivelyNodes, longest_of_all};
 use super::peak::Peak;
 use crate::body::flex_body::FlexBody;
 use crate::motion::dynamics::{Balance, BodyPoint};
+use crate::numerics::linalg::{larger, not_negative};
 use nalgebra::Vector3;
 
 /// Differences of energies up to so many roundings of the largest total energy are rounding.

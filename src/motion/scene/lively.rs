@@ -1,7 +1,7 @@
 //! The nodes that move most: enough to know how far a body is deflected.
 
-use super::larger::larger;
 use crate::body::flex_body::FlexBody;
+use crate::numerics::linalg::larger;
 use faer::MatRef;
 use nalgebra::Vector3;
 

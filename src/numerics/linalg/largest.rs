@@ -8,6 +8,11 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
+/// Zero for what only rounding makes negative; NaN stays.
+pub(crate) fn not_negative(value: f64) -> f64 {
+    larger(value, 0.0)
+}
+
 /// The largest of zero and some numbers, NaN when one of them is.
 pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, larger)

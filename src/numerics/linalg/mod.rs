@@ -28,7 +28,7 @@ pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
 pub use inertia::Inertia;
-pub(crate) use largest::{larger, largest, largest_entry};
+pub(crate) use largest::{larger, largest, largest_entry, not_negative};
 pub use ldl::SparseLdl;
 pub use ordering::connected_components;
 pub use pencil::Pencil;

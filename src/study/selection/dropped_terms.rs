@@ -4,7 +4,8 @@ use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
 use super::norms::Norms;
 use crate::body::flex_body::{FlexBody, Groups};
 use crate::motion::dynamics::{Configuration, EquationsOfMotion, Evaluation, Terms};
-use crate::motion::scene::{Recording, Scene, larger};
+use crate::motion::scene::{Recording, Scene};
+use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::Vector3;
 

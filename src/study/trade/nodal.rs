@@ -10,11 +10,9 @@ use crate::motion::dynamics::{
     EulerParameters, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
     ReferenceConditions,
 };
-use crate::motion::scene::{
-    Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace, larger, not_negative,
-};
+use crate::motion::scene::{Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace};
 use crate::numerics::integration::{Explicit, Failure, Method, Work, integrate};
-use crate::numerics::linalg::{combine, multiply};
+use crate::numerics::linalg::{combine, larger, multiply, not_negative};
 use faer::Mat;
 use nalgebra::Vector3;
 

@@ -3,9 +3,9 @@
 use super::missed::{Missed, largest_entry};
 use crate::base::diagnostic::Code;
 use crate::formats::import::AuditCheck;
-use crate::formats::import::redundant::worst;
 use crate::formats::sid::read::arrays::{Array, FrameArrays};
 use crate::formats::sid::read::parse::Listed;
+use crate::numerics::linalg::larger;
 use nalgebra::{Matrix3, Vector3};
 
 /// The checks of the frames; none of a file that has none and states none.
@@ -107,7 +107,7 @@ fn axes_missed(frame: &FrameArrays, nq: usize) -> Option<Missed> {
         largest_entry(3, 3, |i, j| ap.linear(k, i, j) - skew[(i, j)])
     };
     Some(Missed {
-        by: (0..nq).map(missed_by_mode).fold(0.0, worst),
+        by: (0..nq).map(missed_by_mode).fold(0.0, larger),
         scale: psi.sizes()[0].max(ap.sizes()[1]),
         rounding: psi.rounding[0] + ap.rounding[1],
     })
@@ -118,7 +118,7 @@ fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
     array.m1.as_ref()?;
     let missed_along = |a: usize| largest_entry(nq, nq, |k, l| array.linear(l, a, k) - array.linear(k, a, l));
     Some(Missed {
-        by: (0..3).map(missed_along).fold(0.0, worst),
+        by: (0..3).map(missed_along).fold(0.0, larger),
         scale: array.sizes()[1],
         rounding: 2.0 * array.rounding[1],
     })
@@ -131,7 +131,7 @@ fn undeformed_axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
         let Some(ap) = &frame.ap else { continue };
         let axes = Matrix3::from_fn(|i, j| ap.m0[(i, j)]);
         let by =
-            worst((axes.transpose() * axes - Matrix3::identity()).amax(), (axes.determinant() - 1.0).abs());
+            larger((axes.transpose() * axes - Matrix3::identity()).amax(), (axes.determinant() - 1.0).abs());
         total.rounding = total.rounding.max(ap.rounding[0]);
         if by > total.by || by.is_nan() {
             total.by = by;

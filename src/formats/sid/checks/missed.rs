@@ -2,7 +2,7 @@
 
 use crate::base::diagnostic::Code;
 use crate::formats::import::AuditCheck;
-use crate::formats::import::redundant::worst;
+use crate::numerics::linalg::larger;
 
 /// What identities may be missed by, relative to the Cauchy-Schwarz bounds of their arrays, beside the digits of the file: sums over the
 /// nodes of a large model in double precision.
@@ -39,5 +39,5 @@ impl Missed {
 /// The largest magnitude of `entry` over all rows and columns. A NaN, from numbers beyond the range of double precision, passes nothing.
 pub(super) fn largest_entry(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-    places.map(|(i, j)| entry(i, j).abs()).fold(0.0, worst)
+    places.map(|(i, j)| entry(i, j).abs()).fold(0.0, larger)
 }

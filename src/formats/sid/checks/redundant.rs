@@ -7,11 +7,11 @@ use super::missed::{Missed, largest_entry};
 use super::missing::{Missing, is_free};
 use crate::base::diagnostic::Code;
 use crate::formats::import::AuditCheck;
-use crate::formats::import::redundant::worst;
 use crate::formats::sid::read::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
 use crate::formats::sid::read::body::Declared;
 use crate::formats::sid::read::layout::{Blocks, Layout};
 use crate::formats::sid::read::parse::Listed;
+use crate::numerics::linalg::larger;
 
 /// The checks of a file, and what they say of its Oe1.
 pub(crate) struct Found {
@@ -305,7 +305,7 @@ fn symmetric_in_modes(
     let nq = array.m0.nrows();
     let missed_in_column =
         |c: usize| largest_entry(nq, nq, |k, l| array.linear(l, k, c) - array.linear(k, l, c));
-    let by = (0..array.m0.ncols()).map(missed_in_column).fold(0.0, worst);
+    let by = (0..array.m0.ncols()).map(missed_in_column).fold(0.0, larger);
     Missed { by, scale, rounding: 2.0 * array.rounding[1] }.check(name, formula, Code::AuditIdentity, meaning)
 }
 

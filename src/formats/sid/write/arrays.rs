@@ -167,13 +167,13 @@ fn entry(stiffness: Option<&Vec<Mat<f64>>>, component: usize, i: usize, j: usize
 }
 
 /// A frame with the stiffness of a unit force and a unit moment there.
-pub(crate) struct FrameArrays {
+pub(crate) struct StiffenedFrame {
     pub(crate) frame: ExportFrame,
     force: Option<Vec<Mat<f64>>>,
     moment: Option<Vec<Mat<f64>>>,
 }
 
-impl FrameArrays {
+impl StiffenedFrame {
     /// origin, phi, psi and AP. The motion of second order (7.5) is phi1 and psi1.
     pub(crate) fn objects(&self) -> Vec<Taylor> {
         let ExportFrame { position, translation, rotation, .. } = &self.frame;
@@ -220,7 +220,7 @@ impl FrameArrays {
 }
 
 /// The frames of the file. Stiffness of forces at an interface belongs to its reference point.
-pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -> Vec<FrameArrays> {
+pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -> Vec<StiffenedFrame> {
     let place = |frame: ExportFrame| {
         let interface = body
             .interfaces()
@@ -230,7 +230,7 @@ pub(crate) fn places(body: &FlexBody, points: &crate::formats::export::Points) -
             interface.and_then(|interface| stiffness(body, &kind(interface.name.clone())))
         };
         let moment = if frame.rotation.is_some() { stiffness_for(LoadKind::Moment) } else { None };
-        FrameArrays { force: stiffness_for(LoadKind::Force), moment, frame }
+        StiffenedFrame { force: stiffness_for(LoadKind::Force), moment, frame }
     };
     frames(body, points).into_iter().map(place).collect()
 }
