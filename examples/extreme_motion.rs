@@ -97,7 +97,7 @@ fn start(body: &FlexBody, case: Case) -> Configuration {
 
 /// Root of the trace of J: what modal coordinates are beside.
 fn size(body: &FlexBody) -> f64 {
-    body.invariants().second_moment.trace().sqrt()
+    body.invariants().second_moment().trace().sqrt()
 }
 
 fn run(body: &FlexBody, case: Case, method: impl Fn(usize) -> Method) -> Result<Run, Failure> {

@@ -114,12 +114,12 @@ impl FlexBody {
 
     /// m. Unit: mass.
     pub fn mass(&self) -> f64 {
-        self.0.invariants().mass
+        self.0.invariants().mass()
     }
 
     /// First moment c = sum m x. Unit: mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
-        self.0.invariants().first_moment
+        self.0.invariants().first_moment()
     }
 
     /// I0 (3 x 3). Unit: mass length^2.
@@ -144,7 +144,7 @@ impl FlexBody {
 
     /// C1 (3 x nf): coupling of translation and modes; zero for free modes.
     pub fn c1(&self) -> Matrix {
-        shown(self.0.invariants().c1.as_ref())
+        shown(self.0.invariants().c1().as_ref())
     }
 
     /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes.
@@ -159,7 +159,7 @@ impl FlexBody {
 
     /// K_ff (nf x nf) = Psi' K Psi.
     pub fn modal_stiffness(&self) -> Matrix {
-        shown(self.0.invariants().modal_stiffness.as_ref())
+        shown(self.0.invariants().modal_stiffness().as_ref())
     }
 
     /// What lumped masses would have given: scheme, and how far each invariant is off, relative.

@@ -5,4 +5,5 @@ pub mod basis;
 pub mod convert;
 pub mod flex_body;
 pub mod invariants;
+pub(crate) mod problems;
 pub mod verification;

@@ -272,7 +272,7 @@ fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
     let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
     let modal_mass = own.modal_mass();
     largest(bounds.enumerate().map(|(j, (lower, upper))| {
-        let quotient = own.modal_stiffness[(j, j)] / modal_mass[(j, j)];
+        let quotient = own.modal_stiffness()[(j, j)] / modal_mass[(j, j)];
         larger((lower - quotient) / lower, (quotient - upper) / upper)
     }))
 }

@@ -152,7 +152,7 @@ impl Deck {
         deck.remark("mass of the local modes");
         deck.numbers(diagonal(&invariants.modal_mass()));
         deck.remark("stiffness of the local modes");
-        deck.numbers(diagonal(&invariants.modal_stiffness));
+        deck.numbers(diagonal(&invariants.modal_stiffness()));
         deck.products(body, 3 * sets);
         deck
     }
@@ -160,7 +160,7 @@ impl Deck {
     /// Products of the rigid modes with the mass, and of both kinds of modes with mass and stiffness.
     fn products(&mut self, body: &FlexBody, rigid: usize) {
         let (nf, invariants) = (body.n_modes(), body.invariants());
-        let (mass, c, moment) = (invariants.mass, &invariants.first_moment, &invariants.second_moment);
+        let (mass, c, moment) = (invariants.mass(), &invariants.first_moment(), &invariants.second_moment());
         let scalar = |p: usize, q: usize| match (p, q) {
             (3, 3) => mass - 2.0 * c.sum() + moment.sum(),
             (3, axis) | (axis, 3) => c[axis] - moment.row(axis).sum(),
@@ -170,9 +170,10 @@ impl Deck {
             |l: usize, r: usize| if l % 3 == r % 3 && l.max(r) < 12 { scalar(l / 3, r / 3) } else { 0.0 };
         self.remark("mass of the rigid modes, upper triangle");
         self.numbers((0..rigid).flat_map(|l| (l..rigid).map(move |r| (l, r))).map(|(l, r)| pair(l, r)));
+        let ibar_told = invariants.ibar_or_half_c2();
         let ibar = |set: usize, axis: usize, j: usize| match set {
-            3 => invariants.c1[(axis, j)] - (0..3).map(|k| invariants.ibar[k][axis][j]).sum::<f64>(),
-            _ => invariants.ibar[set][axis][j],
+            3 => invariants.c1()[(axis, j)] - (0..3).map(|k| ibar_told[k][axis][j]).sum::<f64>(),
+            _ => ibar_told[set][axis][j],
         };
         // Rigid mode l along e_a with E_ab psi_j: component b of the mode.
         for (a, b) in (0..3).flat_map(|a| [0, 1, 2].map(|b| (a, b))) {
@@ -182,11 +183,10 @@ impl Deck {
         }
         // K psi_j = lambda_j M psi_j. Rigid motion strains nothing: what is antisymmetric is rounding, and so is C1.
         let strained = |set: usize, axis: usize, j: usize| {
-            let symmetric_along =
-                |k: usize| 0.5 * (invariants.ibar[k][axis][j] + invariants.ibar[axis][k][j]);
+            let symmetric_along = |k: usize| 0.5 * (ibar_told[k][axis][j] + ibar_told[axis][k][j]);
             let symmetric =
                 if set == 3 { -(0..3).map(symmetric_along).sum::<f64>() } else { symmetric_along(set) };
-            invariants.modal_stiffness[(j, j)] * symmetric
+            invariants.modal_stiffness()[(j, j)] * symmetric
         };
         for (a, b) in (0..3).flat_map(|a| [0, 1, 2].map(|b| (a, b))) {
             self.remark(&format!("stiffness that couples rigid and local modes, E{}{}", a + 1, b + 1));

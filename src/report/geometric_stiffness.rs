@@ -15,7 +15,7 @@ pub(super) struct GeometricStiffnessFacts {
 
 impl GeometricStiffnessFacts {
     pub fn of(body: &FlexBody) -> Vec<Self> {
-        let stiffness = body.invariants().modal_stiffness.as_ref();
+        let stiffness = body.invariants().modal_stiffness().as_ref();
         body.geometric_stiffness()
             .iter()
             .map(|one| Self {

@@ -103,7 +103,7 @@ impl LumpedFacts {
     pub fn of(lumped: &LumpedBody) -> Self {
         Self {
             scheme: lumped.scheme.clone(),
-            mass: lumped.invariants.mass,
+            mass: lumped.invariants.mass(),
             negative_masses: lumped.negative_masses,
             errors: Errors::new(&lumped.comparison),
         }

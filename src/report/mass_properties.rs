@@ -38,10 +38,10 @@ impl MassProperties {
         let moments = principal_moments(&inertia);
         let com = centre_of_mass(invariants);
         Self {
-            mass: invariants.mass,
+            mass: invariants.mass(),
             centre_of_mass: (frame.origin + frame.axes * com).into(),
             principal_inertia: moments,
-            radii_of_gyration: moments.map(|i| (i / invariants.mass).sqrt()),
+            radii_of_gyration: moments.map(|i| (i / invariants.mass()).sqrt()),
             frame_origin: frame.origin.into(),
             frame_axes: std::array::from_fn(|k| std::array::from_fn(|l| frame.axes[(k, l)])),
             frame: describe(body, &inertia),
@@ -79,13 +79,13 @@ fn turned_degrees(axes: &Matrix3<f64>) -> f64 {
 
 /// c / m: in the body frame. Unit: length.
 pub(super) fn centre_of_mass(body: &Invariants) -> Vector3<f64> {
-    body.first_moment / body.mass
+    body.first_moment() / body.mass()
 }
 
 /// I0 about the centre of mass, body axes. Unit: mass length^2.
 pub(super) fn inertia_about_com(body: &Invariants) -> Matrix3<f64> {
     let com = centre_of_mass(body);
-    let j = body.second_moment - com * com.transpose() * body.mass;
+    let j = body.second_moment() - com * com.transpose() * body.mass();
     // Sums of two diagonal entries: the trace minus the third would cancel for needles.
     Matrix3::from_fn(|k, l| {
         if k == l { j[((k + 1) % 3, (k + 1) % 3)] + j[((k + 2) % 3, (k + 2) % 3)] } else { -j[(k, l)] }
@@ -94,7 +94,7 @@ pub(super) fn inertia_about_com(body: &Invariants) -> Matrix3<f64> {
 
 /// sqrt(tr J_com / m). Unit: length.
 pub(super) fn gyration_radius(body: &Invariants) -> f64 {
-    (0.5 * inertia_about_com(body).trace() / body.mass).max(0.0).sqrt()
+    (0.5 * inertia_about_com(body).trace() / body.mass()).max(0.0).sqrt()
 }
 
 /// Largest |I_kl| / sqrt(I_kk I_ll), k != l; NaN when a moment is not positive.

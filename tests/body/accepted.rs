@@ -200,9 +200,9 @@ fn a_body_that_breaks_an_identity_is_refused() {
         let failed = own_identities(&changed).into_iter().filter(|check| !check.passed);
         failed.map(|check| check.name).collect()
     };
-    assert_eq!(broken(&|parts| parts.invariants.mass *= 1.5), ["row_sums"]);
+    assert_eq!(broken(&|parts| parts.invariants.primary_mut().mass *= 1.5), ["row_sums"]);
     assert_eq!(broken(&|parts| parts.modes.damping_ratio[2] = 0.03), ["damping_ratios"]);
-    let heavy = broken(&|parts| parts.invariants.second_moment[(0, 0)] *= -1.0);
+    let heavy = broken(&|parts| parts.invariants.primary_mut().second_moment[(0, 0)] *= -1.0);
     assert!(heavy.contains(&"second_moment_psd") && heavy.contains(&"inertia_triangle"), "{heavy:?}");
 }
 
@@ -213,7 +213,7 @@ fn inertia_that_is_negative_about_an_axis_is_no_body() {
     // J of an I0 with one negative moment: I0 = tr(J) 1 - J.
     let i0 = parts.invariants.inertia();
     let turned = Matrix3::from_diagonal(&Vector3::new(-i0[(0, 0)], i0[(1, 1)], i0[(2, 2)]));
-    parts.invariants.second_moment = Matrix3::identity() * (0.5 * turned.trace()) - turned;
+    parts.invariants.primary_mut().second_moment = Matrix3::identity() * (0.5 * turned.trace()) - turned;
     let changed = FlexBody::new(parts).expect("no shape changed");
     let failed: Vec<_> =
         own_identities(&changed).into_iter().filter(|check| !check.passed).map(|check| check.name).collect();

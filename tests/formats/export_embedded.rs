@@ -132,7 +132,7 @@ fn state(random: &mut Random, body: &FlexBody) -> Vec<f64> {
     let own = lively_state(random, body);
     // Geometric stiffness takes from the inertia what large deformations would have to give back.
     let amount = if body.geometric_stiffness().is_empty() { 1.0 } else { 0.1 };
-    let (mass, size) = (body.invariants().mass, body.invariants().inertia().norm().sqrt());
+    let (mass, size) = (body.invariants().mass(), body.invariants().inertia().norm().sqrt());
     let rate = body.modes().eigenvalue[0].sqrt();
     let of_nu = |linear: Vector3<f64>, angular: Vector3<f64>| match body.dimension() {
         2 => vec![linear.x, linear.y, angular.z],
@@ -342,8 +342,8 @@ fn laden(body: FlexBody, random: &mut Random) -> FlexBody {
     };
     let rate = lambda[0].sqrt();
     parts.modes.modal_damping = Some(symmetric(random, 0.01 * rate, &|j| 0.1 * lambda[j].sqrt()));
-    parts.invariants.modal_stiffness = symmetric(random, 0.1 * lambda[0], &|j| lambda[j]);
-    if let Some(general) = &mut parts.invariants.general {
+    parts.invariants.primary_mut().modal_stiffness = symmetric(random, 0.1 * lambda[0], &|j| lambda[j]);
+    if let Some(general) = &mut parts.invariants.primary_mut().general {
         general.modal_mass = symmetric(random, 0.05, &|j| 1.0 + 0.1 * j as f64);
     }
     FlexBody::new(parts).expect("valid parts")
@@ -552,7 +552,7 @@ fn what_cannot_be_held_is_told_or_refused() {
 
     // 1e60 in a file of 32-bit floats.
     let mut parts = body.into_parts();
-    parts.invariants.modal_stiffness[(1, 1)] = 1e60;
+    parts.invariants.primary_mut().modal_stiffness[(1, 1)] = 1e60;
     let stiff = FlexBody::new(parts).expect("valid parts");
     let options = ExportOptions { dialect: Some("float".to_owned()), ..ExportOptions::default() };
     let refused = export(&stiff, format, &options, true).expect_err("too large");

@@ -219,8 +219,8 @@ fn a_partial_body_compares_in_what_both_hold() {
     let groups = Groups { w3: true, ..Groups::NONE };
     let mut parts = with_groups(&body, groups).into_parts();
     for (l, m, sign) in [(0, 1, 1.0), (1, 0, -1.0)] {
-        parts.invariants.s[l][m][(0, 1)] += sign * 1e-6;
-        parts.invariants.s[l][m][(1, 0)] -= sign * 1e-6;
+        parts.invariants.primary_mut().s[l][m][(0, 1)] += sign * 1e-6;
+        parts.invariants.primary_mut().s[l][m][(1, 0)] -= sign * 1e-6;
     }
     parts.lumped.clear();
     let changed = FlexBody::new(parts).expect("a body");

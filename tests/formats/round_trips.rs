@@ -61,8 +61,8 @@ fn taken(imported: &ImportedFile) -> Imported {
 /// What no format of other programs tells of a general mass: W0 beyond C1.
 fn without_w0(invariants: &Invariants) -> Invariants {
     let mut told = invariants.clone();
-    if let Some(general) = &mut told.general {
-        general.w0 = Invariants { general: None, ..invariants.clone() }.w0();
+    if let Some(general) = &mut told.primary_mut().general {
+        general.w0 = invariants.as_solid().w0();
         general.plane = false;
     }
     told
@@ -91,7 +91,7 @@ fn what_is_written_comes_back() {
             // What MBSim keeps of a mass that does not commute with rotations is a body of no mass.
             let lossless = format.losses(&body, &ExportOptions::default()).is_empty();
             let whole =
-                coupled && (body.invariants().general.is_none() || lossless || format.name() != "mbsim");
+                coupled && (body.invariants().general().is_none() || lossless || format.name() != "mbsim");
             for finding in found.findings().iter().filter(|_| whole) {
                 complain(finding.to_string());
             }
@@ -103,7 +103,7 @@ fn what_is_written_comes_back() {
                 complain("the modes were changed".to_owned());
             }
             let (own, told) = (body.invariants(), back.invariants());
-            let general = own.general.is_some();
+            let general = own.general().is_some();
             for (quantity, apart) in primary_differences(&without_w0(own), told) {
                 // Of S and W3 of such a mass the formats keep what their equations have, each its own part; and say so.
                 if general && ["S", "W3"].contains(&quantity.as_str()) {

@@ -29,10 +29,10 @@ fn sizes_must_agree() {
         |p| {
             p.modes.residual.pop();
             p.nodes.positions.push([0.0; 3]);
-            p.invariants.ibar[1][2].push(0.0);
-            p.invariants.s[2][0] = faer::Mat::zeros(3, 2);
-            p.invariants.c1 = faer::Mat::zeros(2, 3);
-            p.lumped[1].invariants.modal_stiffness = faer::Mat::zeros(2, 2);
+            p.invariants.primary_mut().ibar[1][2].push(0.0);
+            p.invariants.primary_mut().s[2][0] = faer::Mat::zeros(3, 2);
+            p.invariants.primary_mut().c1 = faer::Mat::zeros(2, 3);
+            p.lumped[1].invariants.primary_mut().modal_stiffness = faer::Mat::zeros(2, 2);
         },
         &[
             "`nodes.positions` has 5 values, expected 4, one per node",
@@ -72,11 +72,17 @@ fn a_body_has_nodes_and_modes_and_no_more_modes_than_freedoms() {
 fn numbers_must_be_finite_and_meaningful() {
     assert_refused(|p| p.modes.shape[(7, 1)] = f64::NAN, &["`modes.shape` has the value NaN at index 19"]);
     assert_refused(
-        |p| p.invariants.second_moment[(0, 1)] = f64::INFINITY,
+        |p| p.invariants.primary_mut().second_moment[(0, 1)] = f64::INFINITY,
         &["second_moment` has the value inf"],
     );
-    assert_refused(|p| p.invariants.ibar[0][0][0] = 1e301, &["`invariants.ibar[0][0]` has the value 1e301"]);
-    assert_refused(|p| p.invariants.mass = 0.0, &["`invariants.mass` is 0e0, expected a positive mass"]);
+    assert_refused(
+        |p| p.invariants.primary_mut().ibar[0][0][0] = 1e301,
+        &["`invariants.ibar[0][0]` has the value 1e301"],
+    );
+    assert_refused(
+        |p| p.invariants.primary_mut().mass = 0.0,
+        &["`invariants.mass` is 0e0, expected a positive mass"],
+    );
     assert_refused(|p| p.certificate.shift = f64::NAN, &["`certificate` has the value NaN at index 0"]);
     assert_refused(|p| p.modes.damping_ratio[2] = -0.1, &["`modes.damping_ratio` is -1e-1 at mode 2"]);
     assert_refused(|p| p.lumped[0].comparison.push(("x".into(), f64::NAN)), &[" x` has the value NaN"]);

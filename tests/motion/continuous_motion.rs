@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 /// The block with loads at two of its nodes that bend it, over so many periods of its first mode.
 fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Scene {
     let rate = body.modes().eigenvalue[0].sqrt();
-    let (mass, size) = (body.invariants().mass, body.invariants().inertia().trace().sqrt());
+    let (mass, size) = (body.invariants().mass(), body.invariants().inertia().trace().sqrt());
     let force = 1e-4 * size * mass.sqrt() * rate * rate;
     let ids = &body.nodes().ids;
     let load = |id: i64| Load {

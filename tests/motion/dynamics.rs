@@ -177,7 +177,8 @@ fn jacobians_are_the_differences_of_the_forces() {
         let mut parts = body.into_parts();
         parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, |i, j| 0.1 * (1 + i.min(j)) as f64));
         // Of the size of the other forces.
-        parts.invariants.modal_stiffness = Mat::from_fn(nf, nf, |i, j| 0.3 * (1 + i.min(j)) as f64);
+        parts.invariants.primary_mut().modal_stiffness =
+            Mat::from_fn(nf, nf, |i, j| 0.3 * (1 + i.min(j)) as f64);
         let body = FlexBody::new(parts).expect("valid parts");
         for terms in [Terms::ALL, Terms::NONE, Terms { w3: false, ..Terms::ALL }] {
             let equations = EquationsOfMotion::new(&body, terms);

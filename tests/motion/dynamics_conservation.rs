@@ -29,7 +29,7 @@ fn start(body: &FlexBody) -> DVector<f64> {
     let spin = 0.2 * omega[0];
     let mut y = DVector::zeros(13 + 2 * nf);
     y.rows_mut(0, 7).copy_from_slice(&[0.3, -0.2, 0.5, 1.0, 0.0, 0.0, 0.0]);
-    let velocity = Vector3::new(0.2, 0.5, -0.4) * spin * radius / body.invariants().mass.sqrt();
+    let velocity = Vector3::new(0.2, 0.5, -0.4) * spin * radius / body.invariants().mass().sqrt();
     y.rows_mut(7 + nf, 3).copy_from(&velocity);
     y.rows_mut(10 + nf, 3).copy_from(&(Vector3::new(0.1, 1.0, 0.05) * spin));
     (0..nf).for_each(|j| y[7 + j] = 0.05 * radius * omega[0] / omega[j]);
@@ -79,7 +79,7 @@ fn energy_is_kept_with_geometric_stiffness() {
     let motion = [LoadKind::Spin, LoadKind::Acceleration, LoadKind::AngularAcceleration];
     for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Model)] {
         let lambda = body.modes().eigenvalue[0];
-        let radius = (body.invariants().inertia()[(1, 1)] / body.invariants().mass).sqrt();
+        let radius = (body.invariants().inertia()[(1, 1)] / body.invariants().mass()).sqrt();
         // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first stiffness.
         let sizes = [0.5, 0.5 / radius, 0.5];
         let single = (0..3).map(|at| at..at + 1);
@@ -94,7 +94,7 @@ fn energy_is_kept_with_geometric_stiffness() {
                 let mut at = Evaluation::new(&equations);
                 at.set(y.rows(7, equations.n_modes()).as_slice(), &vec![0.0; equations.n_velocities()]);
                 let s = orientation(y).axes() * at.first_moment();
-                -gravity.dot(&(body.invariants().mass * y.fixed_rows::<3>(0) + s))
+                -gravity.dot(&(body.invariants().mass() * y.fixed_rows::<3>(0) + s))
             };
             let load = |at: &Evaluation<'_>, axes: &Matrix3<f64>, _: &DVector<f64>, forces: &mut [f64]| {
                 at.add_gravity(&(axes.transpose() * gravity), forces);

@@ -30,7 +30,7 @@ fn the_modes_are_stiffened_by_the_motion_of_the_frame() {
     for (at, name) in ["bracket_hex20", "frame_beams", "plane_frame"].into_iter().enumerate() {
         let mut parts = fixture(name, 6, BodyFrame::Model).into_parts();
         // It would hide the rest.
-        parts.invariants.modal_stiffness = Mat::zeros(6, 6);
+        parts.invariants.primary_mut().modal_stiffness = Mat::zeros(6, 6);
         let plain = FlexBody::new(parts).expect("valid parts");
         for kinds in [&MOTION[..1], &MOTION[1..2], &MOTION[2..], &MOTION] {
             let mut random = Random(at as u64);
@@ -206,7 +206,7 @@ fn momenta_change_as_their_rates_say() {
     for (at, name) in ["bracket_hex20", "frame_beams"].into_iter().enumerate() {
         let mut random = Random(30 + at as u64);
         let mut parts = fixture(name, 5, BodyFrame::Model).into_parts();
-        parts.invariants.modal_stiffness = Mat::zeros(5, 5);
+        parts.invariants.primary_mut().modal_stiffness = Mat::zeros(5, 5);
         let body = stressed(FlexBody::new(parts).expect("valid parts"), &MOTION, 0.3, &mut random);
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let mut evaluation = Evaluation::new(&equations);

@@ -22,7 +22,8 @@ fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
     Configuration {
         origin: flat(Vector3::new(0.3, -0.2, 0.5)),
         attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
-        velocity: flat(Vector3::new(0.2, 0.5, -0.4)) * (spin * rate * radius / body.invariants().mass.sqrt()),
+        velocity: flat(Vector3::new(0.2, 0.5, -0.4))
+            * (spin * rate * radius / body.invariants().mass().sqrt()),
         omega: axis * (spin * rate),
         q: body.modes().eigenvalue.iter().map(|l| 0.05 * radius * rate / l.sqrt()).collect(),
         qd: vec![0.0; body.n_modes()],
@@ -168,9 +169,9 @@ fn work_and_impulses_balance_energy_and_momenta() {
     let body = soft_block(6);
     let equations = EquationsOfMotion::new(&body, Terms::ALL);
     let start = tumbling(&body, 0.1);
-    let weight = body.invariants().mass * start.velocity.norm() / turn(&start);
+    let weight = body.invariants().mass() * start.velocity.norm() / turn(&start);
     let loads = Loads {
-        gravity: Vector3::new(0.0, 0.3, -1.0) * (weight / body.invariants().mass),
+        gravity: Vector3::new(0.0, 0.3, -1.0) * (weight / body.invariants().mass()),
         force: Vector3::new(1.0, 0.5, 0.2) * weight,
         torque: Vector3::new(0.1, -0.2, 0.3) * weight,
     };

@@ -195,7 +195,7 @@ fn in_other_modes(body: FlexBody, t: &Mat<f64>) -> FlexBody {
 fn modal_state(seed: u64, body: &FlexBody) -> Configuration {
     let mut random = Random(seed);
     let (nf, plane) = (body.n_modes(), body.dimension() == 2);
-    let (lambda, mass) = (&body.modes().eigenvalue, body.invariants().mass);
+    let (lambda, mass) = (&body.modes().eigenvalue, body.invariants().mass());
     let (rate, size) = (lambda[0].sqrt(), body.invariants().inertia()[(2, 2)].sqrt());
     let (mut velocity, mut omega) = (
         Vector3::from(random.vector::<3>()) * (rate * size / mass.sqrt()),
@@ -255,7 +255,7 @@ fn assert_projection(name: &str, raw: RawModel) {
 
         // Of the accelerations and forces of translation, rotation and modes.
         let (rate, size) = (body.modes().eigenvalue[0], body.invariants().inertia()[(2, 2)].sqrt());
-        let root = body.invariants().mass.sqrt();
+        let root = body.invariants().mass().sqrt();
         let translations = r.div_ceil(2);
         let group = |i: usize| {
             if i < translations {
@@ -387,7 +387,7 @@ fn assert_same_accelerations(
         (0..x.len()).map(|i| x[i] * product[(i, 0)]).sum::<f64>().sqrt()
     };
     let expected_udd = DVector::from_vec(lifted.u);
-    let size = weighted(&expected_udd) / body.invariants().mass.sqrt();
+    let size = weighted(&expected_udd) / body.invariants().mass().sqrt();
     for (group, scale) in [(0..half, size), (half..found.len(), 0.0)] {
         let (a, b) =
             (DVector::from_column_slice(&found[group.clone()]), DVector::from_column_slice(&expected[group]));
@@ -414,7 +414,7 @@ fn loads_accelerate_the_nodes_as_they_accelerate_all_modes() {
         let node = BodyPoint::node(&whole.1, 4);
         let moment = Vector3::new(0.2, -0.3, 0.5) * (lambda * whole.1.invariants().inertia()[(2, 2)]);
         let moment = if whole.1.dimension() == 2 { Vector3::z() * moment.z } else { moment };
-        let mass = whole.1.invariants().mass;
+        let mass = whole.1.invariants().mass();
         assert_same_accelerations(
             name,
             &whole,

@@ -36,7 +36,7 @@ const ALL: usize = 10_000;
 
 /// Radius of gyration.
 fn radius(body: &FlexBody) -> f64 {
-    (body.invariants().inertia().trace() / body.invariants().mass).sqrt()
+    (body.invariants().inertia().trace() / body.invariants().mass()).sqrt()
 }
 
 /// Spin about nearly the middle axis (of a plane body z) with `spin` times the first circular frequency, and flight; without
@@ -65,7 +65,7 @@ fn spinning(body: &FlexBody, spin: f64) -> Configuration {
 
 /// The same, bent in every mode.
 fn tumbling(body: &FlexBody, spin: f64, deformation: f64) -> Configuration {
-    let (lambda, size) = (&body.modes().eigenvalue, radius(body) * body.invariants().mass.sqrt());
+    let (lambda, size) = (&body.modes().eigenvalue, radius(body) * body.invariants().mass().sqrt());
     let q = lambda.iter().map(|l| deformation * size * lambda[0] / l).collect();
     Configuration { q, ..spinning(body, spin) }
 }

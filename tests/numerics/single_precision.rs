@@ -81,7 +81,7 @@ fn a_single_precision_factor_gives_the_modes_and_invariants_of_a_double_one() {
         }
         let (exact, own) = (double.body.invariants(), single.body.invariants());
         // modal_mass = Psi' M Psi.
-        let mass = &own.s[0][0] + &own.s[1][1] + &own.s[2][2];
+        let mass = &own.s().unwrap()[0][0] + &own.s().unwrap()[1][1] + &own.s().unwrap()[2][2];
         for i in 0..mass.nrows() {
             for j in 0..mass.ncols() {
                 let off = mass[(i, j)] - f64::from(u8::from(i == j));

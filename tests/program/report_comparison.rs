@@ -125,20 +125,23 @@ fn a_turned_basis_is_a_difference_where_eigenvalues_are_distinct() {
 fn each_quantity_is_told_apart() {
     let body = block(BodyFrame::Principal);
     let mut cases: Vec<(&[&str], FlexBody)> = vec![
-        (&["mass"], changed(&body, |p| p.invariants.mass *= 1.0 + 1e-8)),
+        (&["mass"], changed(&body, |p| p.invariants.primary_mut().mass *= 1.0 + 1e-8)),
         (&["frequency"], changed(&body, |p| p.modes.eigenvalue[2] *= 1.0 + 1e-8)),
         (&["node positions"], changed(&body, |p| p.nodes.positions[7][1] += 1e-7)),
         (&["mode shapes"], changed(&body, |p| p.modes.shape[(5, 3)] += 1e-5)),
-        (&["C1"], changed(&body, |p| p.invariants.c1[(1, 5)] += 1e-6)),
-        (&["Ibar (W1, C2)"], changed(&body, |p| p.invariants.ibar[0][2][5] += 1e-6)),
-        (&["S (W2, W3, m_ff)"], changed(&body, |p| p.invariants.s[2][0][(5, 2)] += 1e-6)),
-        (&["modal stiffness"], changed(&body, |p| p.invariants.modal_stiffness[(5, 5)] *= 1.0 + 1e-6)),
+        (&["C1"], changed(&body, |p| p.invariants.primary_mut().c1[(1, 5)] += 1e-6)),
+        (&["Ibar (W1, C2)"], changed(&body, |p| p.invariants.primary_mut().ibar[0][2][5] += 1e-6)),
+        (&["S (W2, W3, m_ff)"], changed(&body, |p| p.invariants.primary_mut().s[2][0][(5, 2)] += 1e-6)),
+        (
+            &["modal stiffness"],
+            changed(&body, |p| p.invariants.primary_mut().modal_stiffness[(5, 5)] *= 1.0 + 1e-6),
+        ),
         // Moved in space: all of it, but nothing in the body frame.
         (&["centre of mass", "node positions", "first moment"], changed(&body, |p| p.frame.origin.x += 1e-7)),
     ];
     cases.push((
         &["inertia", "second moment"],
-        changed(&body, |p| p.invariants.second_moment[(0, 0)] *= 1.0 + 1e-6),
+        changed(&body, |p| p.invariants.primary_mut().second_moment[(0, 0)] *= 1.0 + 1e-6),
     ));
     for (expected, other) in cases {
         let comparison = compared(&body, &other);
@@ -150,7 +153,7 @@ fn each_quantity_is_told_apart() {
 #[test]
 fn tolerances_are_the_user_s() {
     let body = block(BodyFrame::Principal);
-    let other = changed(&body, |p| p.invariants.mass *= 1.0 + 1e-6);
+    let other = changed(&body, |p| p.invariants.primary_mut().mass *= 1.0 + 1e-6);
     let wide = Tolerances { mass: 1e-5, ..Tolerances::default() };
     assert!(!compared(&body, &other).passed());
     assert!(compare(&body, &other, &wide).unwrap().passed());
@@ -171,7 +174,7 @@ fn other_nodes_leave_what_needs_no_common_node() {
     assert!(comparison.notes()[0].contains("different nodes"));
     assert!(comparison.text().contains("note: the bodies have different nodes"));
 
-    let worse = changed(&renumbered, |p| p.invariants.s[1][1][(2, 2)] += 1e-6);
+    let worse = changed(&renumbered, |p| p.invariants.primary_mut().s[1][1][(2, 2)] += 1e-6);
     assert_eq!(failed(&compared(&body, &worse)), ["norms of S"]);
 
     // A finer mesh has the same mass and centre; its inertia is exact too, the modes are near.
@@ -215,7 +218,7 @@ fn bodies_with_different_numbers_of_modes_are_compared_in_what_they_have_in_comm
     // A mode that differs is not taken for one that is missing.
     let wrong = changed(&some(&[2, 5]), |p| {
         p.modes.eigenvalue[1] *= 1.03;
-        p.invariants.modal_stiffness[(1, 1)] *= 1.03;
+        p.invariants.primary_mut().modal_stiffness[(1, 1)] *= 1.03;
     });
     let comparison = common(&body, &wrong).expect("comparable");
     assert_eq!(failed(&comparison), ["frequency", "modal stiffness"], "{}", comparison.text());
@@ -253,7 +256,7 @@ fn a_distant_origin_costs_the_digits_that_it_costs_and_no_more() {
         // 8 eps m d^2 / J_min, d = 2.3e4, m = 6, J_min = 0.5: far below the difference that must be seen next.
         assert!(widest < 1.2e-5, "{}", comparison.text());
     }
-    let other = changed(&principal, |p| p.invariants.second_moment *= 1.0 + 1e-4);
+    let other = changed(&principal, |p| p.invariants.primary_mut().second_moment *= 1.0 + 1e-4);
     assert!(failed(&compared(&principal, &other)).contains(&"inertia"));
 }
 
@@ -261,8 +264,8 @@ fn a_distant_origin_costs_the_digits_that_it_costs_and_no_more() {
 fn numbers_that_overflow_never_agree() {
     let body = changed(&engine_mount(), |p| {
         p.modes.shape[(0, 0)] = 1e300;
-        p.invariants.second_moment *= 1e300;
-        p.invariants.s[0][0][(0, 0)] = 1e300;
+        p.invariants.primary_mut().second_moment *= 1e300;
+        p.invariants.primary_mut().s[0][0][(0, 0)] = 1e300;
     });
     let comparison = compared(&body, &body);
     assert!(comparison.rows().iter().all(|row| row.passed == (row.difference <= row.tolerance)));
@@ -272,7 +275,7 @@ fn numbers_that_overflow_never_agree() {
 #[test]
 fn json_and_text_say_the_same() {
     let body = block(BodyFrame::Principal);
-    let other = changed(&body, |p| p.invariants.mass *= 1.0 + 1e-6);
+    let other = changed(&body, |p| p.invariants.primary_mut().mass *= 1.0 + 1e-6);
     let comparison = compared(&body, &other);
     let json = comparison.json();
     assert_eq!(json["passed"], false);

@@ -192,7 +192,7 @@ fn a_cost_is_kept_by_the_most_accurate() {
 fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
     let mut parts = soft_block(4).into_parts();
     // The mass of the modes is negative: no motion follows from it.
-    let s = &mut parts.lumped[0].invariants.s;
+    let s = &mut parts.lumped[0].invariants.primary_mut().s;
     s.iter_mut().flatten().for_each(|s| *s = -&*s);
     let body = FlexBody::new(parts).expect("a body");
     let scheme = body.lumped()[0].scheme.clone();

@@ -9,7 +9,7 @@ use flexbody::body::flex_body::{
     InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
     Truncation, UnitLoad,
 };
-use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, Invariants};
+use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, Invariants, PrimaryData};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
@@ -73,7 +73,7 @@ impl Random {
     }
 
     pub fn invariants(&mut self, nf: usize) -> Invariants {
-        Invariants {
+        Invariants::new(PrimaryData {
             mass: self.positive(),
             first_moment: Vector3::from_fn(|_, _| self.value()),
             second_moment: Matrix3::from_fn(|_, _| self.value()),
@@ -83,7 +83,7 @@ impl Random {
             modal_stiffness: self.matrix(nf, nf),
             general: None,
             groups: Groups::ALL,
-        }
+        })
     }
 
     fn general(&mut self, nf: usize) -> GeneralTerms {
@@ -204,7 +204,11 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             modal_damping: (r.below(2) == 1).then(|| Mat::from_fn(nf, nf, |_, _| r.value())),
             shape: r.matrix(3 * n, nf),
         },
-        invariants: Invariants { general, ..r.invariants(nf) },
+        invariants: {
+            let mut invariants = r.invariants(nf);
+            invariants.primary_mut().general = general;
+            invariants
+        },
         geometric_stiffness: geometric_stiffness(&mut r, nf, interfaces),
         lumped,
         certificate: Certificate {
@@ -269,7 +273,8 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         }
     };
     let all = [&p.invariants].into_iter().chain(p.lumped.iter().map(|l| &l.invariants));
-    for i in all {
+    for invariants in all {
+        let i = invariants.clone().primary_mut().clone();
         bits.push(i.mass.to_bits());
         bits.extend(i.first_moment.iter().chain(i.second_moment.iter()).map(|v| v.to_bits()));
         matrix(&mut bits, &i.c1);

@@ -12,7 +12,7 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source, Storage};
-use flexbody::body::invariants::{BodyFrame, GeneralTerms, Groups, Invariants};
+use flexbody::body::invariants::{BodyFrame, GeneralTerms, Groups, Invariants, PrimaryData};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
 use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation};
@@ -71,7 +71,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
         }
         -w2[(l * nf + i, k * nf + j)]
     };
-    Invariants {
+    Invariants::new(PrimaryData {
         mass: reduced.mass,
         first_moment: reduced.first_moment,
         second_moment: Matrix3::identity() * (0.5 * reduced.inertia.trace()) - reduced.inertia,
@@ -86,7 +86,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
             plane: false,
         }),
         groups: Groups::ALL,
-    }
+    })
 }
 
 /// A body with these invariants, some nodes and damping.
@@ -97,7 +97,7 @@ pub fn made_of(
     damping: Mat<f64>,
 ) -> FlexBody {
     let nf = invariants.n_modes();
-    let general = invariants.general.is_some();
+    let general = invariants.general().is_some();
     FlexBody::new(Parts {
         source: Source {
             name: "random".to_owned(),
@@ -193,7 +193,7 @@ pub fn lively_state(random: &mut Random, body: &FlexBody) -> State {
     State {
         origin: Vector3::from(random.vector::<3>()),
         axes: random.rotation(),
-        velocity: Vector3::from(random.vector::<3>()) * (rate * size / body.invariants().mass.sqrt()),
+        velocity: Vector3::from(random.vector::<3>()) * (rate * size / body.invariants().mass().sqrt()),
         omega: Vector3::from(random.vector::<3>()) * (0.5 * rate),
         q: DVector::from_fn(nf, |j, _| 0.1 * size * lambda[0] / lambda[j] * random.signed()),
         qd: DVector::from_fn(nf, |j, _| 0.1 * size * rate * (lambda[0] / lambda[j]).sqrt() * random.signed()),

@@ -3,7 +3,7 @@
 use super::equations::{ReducedBody, State};
 use super::random::Random;
 use faer::Mat;
-use flexbody::body::invariants::{Groups, Invariants};
+use flexbody::body::invariants::{Groups, Invariants, PrimaryData};
 use flexbody::numerics::linalg::SymmetricMatrix;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -69,7 +69,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
     let mode = |p: usize| -> Vec<f64> { (0..3 * n).map(|row| shapes[(row, p)]).collect() };
     let w = |a: &[f64], b: &[f64]| weighted(mass, a, b);
     // Different directions for different quantities: all three must do.
-    Invariants {
+    Invariants::new(PrimaryData {
         mass: w(&one(1), &one(1)),
         first_moment: Vector3::from_fn(|k, _| w(&one(2), &x(k, 2))),
         second_moment: Matrix3::from_fn(|k, l| w(&x(k, 0), &x(l, 0))),
@@ -83,7 +83,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
         modal_stiffness: Mat::zeros(nf, nf),
         general: None,
         groups: Groups::ALL,
-    }
+    })
 }
 
 /// Forces on (R world, rotation about the origin body, modes) that M times the nodal accelerations sum to, and the
@@ -137,16 +137,16 @@ pub fn inertia_forces(
 pub fn reduced(body: &Invariants) -> ReducedBody {
     let dense = |a: Mat<f64>| DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)]);
     ReducedBody {
-        mass: body.mass,
-        first_moment: body.first_moment,
+        mass: body.mass(),
+        first_moment: body.first_moment(),
         inertia: body.inertia(),
-        c1: dense(body.c1.clone()),
+        c1: dense(body.c1().clone()),
         c2: dense(body.c2()),
         w1: dense(body.w1().expect("held")),
         w2: dense(body.w2().expect("held")),
         w3: dense(body.w3().expect("held")),
         modal_mass: dense(body.modal_mass()),
-        modal_stiffness: dense(body.modal_stiffness.clone()),
+        modal_stiffness: dense(body.modal_stiffness().clone()),
     }
 }
 

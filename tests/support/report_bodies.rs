@@ -10,7 +10,9 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::{
     Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
 };
-use flexbody::body::invariants::{BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, choose_frame, condense};
+use flexbody::body::invariants::{
+    BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, PrimaryData, choose_frame, condense,
+};
 use flexbody::model::{Coupling, Nodes};
 use flexbody::numerics::linalg::SymmetricMatrix;
 use flexbody::report::{Phase, RunData};
@@ -25,20 +27,22 @@ fn eigenvalue(hz: f64) -> f64 {
 pub fn engine_mount() -> FlexBody {
     let hz = [812.5, 812.5, 1204.0, 1890.25, 2411.0, 3020.0, 3999.0, 4412.5];
     let nf = hz.len();
-    let invariants = |mass: f64, inertia: f64| Invariants {
-        mass,
-        first_moment: Vector3::zeros(),
-        second_moment: Matrix3::from_diagonal(&Vector3::new(3.0e-3, 2.0e-3, 0.5e-3)) * inertia,
-        c1: Mat::zeros(3, nf),
-        ibar: [(); 3].map(|()| [(); 3].map(|()| vec![0.0; nf])),
-        s: std::array::from_fn(|k| {
-            std::array::from_fn(|l| {
-                Mat::from_fn(nf, nf, |p, q| if k == l && p == q { 1.0 / 3.0 } else { 0.0 })
-            })
-        }),
-        modal_stiffness: Mat::from_fn(nf, nf, |p, q| if p == q { eigenvalue(hz[p]) } else { 0.0 }),
-        general: None,
-        groups: Groups::ALL,
+    let invariants = |mass: f64, inertia: f64| {
+        Invariants::new(PrimaryData {
+            mass,
+            first_moment: Vector3::zeros(),
+            second_moment: Matrix3::from_diagonal(&Vector3::new(3.0e-3, 2.0e-3, 0.5e-3)) * inertia,
+            c1: Mat::zeros(3, nf),
+            ibar: [(); 3].map(|()| [(); 3].map(|()| vec![0.0; nf])),
+            s: std::array::from_fn(|k| {
+                std::array::from_fn(|l| {
+                    Mat::from_fn(nf, nf, |p, q| if k == l && p == q { 1.0 / 3.0 } else { 0.0 })
+                })
+            }),
+            modal_stiffness: Mat::from_fn(nf, nf, |p, q| if p == q { eigenvalue(hz[p]) } else { 0.0 }),
+            general: None,
+            groups: Groups::ALL,
+        })
     };
     let lumped = |scheme: &str, negative_masses: usize, factor: f64| LumpedBody {
         scheme: scheme.to_owned(),

@@ -152,7 +152,7 @@ impl Doing {
         let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
         let duration = self.periods * TAU / rates[0];
         let plane = body.dimension() == 2;
-        let (mass, size) = (body.invariants().mass, body.invariants().inertia().trace().sqrt());
+        let (mass, size) = (body.invariants().mass(), body.invariants().inertia().trace().sqrt());
         let axis = if plane { Vector3::z() } else { Vector3::from(self.axis).normalize() };
         let node = |part: f64| Point::Node(body.nodes().ids[(part * body.n_nodes() as f64) as usize]);
         // About a thousandth of the size of the body where it acts statically on the first mode.

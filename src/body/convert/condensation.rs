@@ -25,7 +25,7 @@ impl ModalModel<'_> {
         let stiffness = self.modal_stiffness.clone();
         let invariants = self.modes.condensed_linear(self.model, &self.place, stiffness);
         Condensation {
-            terms: invariants.groups.dropped().map(not_computed).collect(),
+            terms: invariants.groups().dropped().map(not_computed).collect(),
             invariants,
             guarantee: None,
             columns: self.modes.condensed_columns(self.model, true),

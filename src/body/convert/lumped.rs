@@ -63,7 +63,7 @@ impl Lumping {
 /// Invariants of `masses` on the same modes, and what they are off by.
 pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &Invariants) -> LumpedBody {
     let shapes = modal.modes.of_nodes();
-    let own = lumped_invariants(modal, masses, shapes, exact.modal_stiffness.clone(), exact.groups);
+    let own = lumped_invariants(modal, masses, shapes, exact.modal_stiffness().clone(), exact.groups());
     LumpedBody {
         scheme: masses.scheme().name().to_owned(),
         comparison: error_norms(exact, &own),
@@ -104,7 +104,7 @@ pub(super) fn pipeline(
     let cross = gram(modal.modes.vectors.as_ref(), mass_times_modes.as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..modal.n_modes())));
     let stiffness = reduced(modal.model.stiffness(), modes.vectors.as_ref());
-    let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups);
+    let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
     Ok(LumpedPipeline {
         scheme,
         eigenvalues: eigenvectors.eigenvalues,

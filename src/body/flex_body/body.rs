@@ -165,7 +165,7 @@ impl FlexBody {
 
     /// The groups of the kinetic energy that the body holds.
     pub fn groups(&self) -> Groups {
-        self.parts.invariants.groups
+        self.parts.invariants.groups()
     }
 
     /// Every identity that the file itself can be held to (theory section 10), those of the interface coordinates included; `frame` is what the

@@ -144,7 +144,7 @@ impl FlexBody {
             return None;
         }
         let (stiffness, c1, c2) =
-            (&self.invariants().modal_stiffness, &self.invariants().c1, self.invariants().c2());
+            (&self.invariants().modal_stiffness(), &self.invariants().c1(), self.invariants().c2());
         let nf = self.n_modes();
         let energy = |row: usize, modes: usize| -> f64 {
             let load = |j: usize| if row < 3 { c1[(row, j)] } else { c2[(row - 3, j)] };
@@ -202,7 +202,7 @@ impl FlexBody {
     /// Eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).
     fn eigenpairs_in_frame(&self) -> Option<(Vec<f64>, Mat<f64>)> {
         let lower = dense_cholesky(self.invariants().modal_mass())?;
-        let half = solve_lower(&lower, &self.invariants().modal_stiffness);
+        let half = solve_lower(&lower, &self.invariants().modal_stiffness());
         let eigen = symmetric_eigen(solve_lower(&lower, &half.transpose().to_owned()).as_ref())?;
         Some((eigen.values, solve_upper(&lower, &eigen.vectors)))
     }

@@ -24,14 +24,14 @@ impl Parts {
         let relative =
             |difference: f64, bound: f64| if difference == 0.0 { 0.0 } else { difference.abs() / bound };
         let first =
-            (0..3).map(|k| relative(own.first_moment[k] - lumped.first_moment[k], bound.first_moment(k)));
+            (0..3).map(|k| relative(own.first_moment()[k] - lumped.first_moment()[k], bound.first_moment(k)));
         // Rows without a place are none of a node's.
         let modes = if self.modes.internal.is_none() { own.n_modes() } else { 0 };
         let c1 = (0..modes).flat_map(|p| {
             let bound = &bound;
-            (0..3).map(move |k| relative(own.c1[(k, p)] - lumped.c1[(k, p)], bound.c1(p)))
+            (0..3).map(move |k| relative(own.c1()[(k, p)] - lumped.c1()[(k, p)], bound.c1(p)))
         });
-        let value = first.chain(c1).fold(relative(own.mass - lumped.mass, own.mass), larger);
+        let value = first.chain(c1).fold(relative(own.mass() - lumped.mass(), own.mass()), larger);
         Some(IdentityCheck::new(
             "row_sums",
             "m, c and C1 of the row sums of M are those of M",

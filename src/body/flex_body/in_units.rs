@@ -6,7 +6,7 @@ use super::{
 };
 use crate::base::error::Result;
 use crate::base::units::UnitSystem;
-use crate::body::invariants::{GeneralTerms, Invariants};
+use crate::body::invariants::{Invariants, UnitFactors};
 use crate::model::{GeometricStiffness, LoadKind};
 use faer::Mat;
 
@@ -35,24 +35,14 @@ impl Change {
     }
 
     fn invariants(self, given: &Invariants) -> Invariants {
-        let (of_c1, of_ibar) = (self.of(1, 0, 0), self.modal());
-        Invariants {
-            mass: given.mass * self.of(2, 0, 0),
-            first_moment: given.first_moment * self.of(2, 1, 0),
-            second_moment: given.second_moment * self.of(2, 2, 0),
-            c1: times(&given.c1, of_c1),
-            ibar: given
-                .ibar
-                .each_ref()
-                .map(|row| row.each_ref().map(|all| all.iter().map(|v| v * of_ibar).collect())),
-            s: given.s.clone(),
-            modal_stiffness: times(&given.modal_stiffness, self.eigenvalue()),
-            general: given
-                .general
-                .as_ref()
-                .map(|general| GeneralTerms { w0: times(&general.w0, of_c1), ..general.clone() }),
-            groups: given.groups,
-        }
+        given.scaled(&UnitFactors {
+            mass: self.of(2, 0, 0),
+            first_moment: self.of(2, 1, 0),
+            second_moment: self.of(2, 2, 0),
+            c1: self.of(1, 0, 0),
+            ibar: self.modal(),
+            modal_stiffness: self.eigenvalue(),
+        })
     }
 
     fn modes(self, given: &Modes) -> Modes {

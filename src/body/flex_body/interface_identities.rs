@@ -98,7 +98,8 @@ impl Parts {
     /// The mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the origin of the body frame, body
     /// axes: translations, then rotations.
     pub fn rigid_mass(&self) -> Mat<f64> {
-        let (m, c, inertia) = (self.invariants.mass, self.invariants.first_moment, self.invariants.inertia());
+        let (m, c, inertia) =
+            (self.invariants.mass(), self.invariants.first_moment(), self.invariants.inertia());
         let lever: Matrix3<f64> = Vector3::cross_matrix(&c);
         // Translations and rotations that are there: in the plane two and the third.
         let axes: Vec<usize> = if self.dimension == 2 { vec![0, 1, 5] } else { (0..6).collect() };

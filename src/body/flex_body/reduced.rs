@@ -29,7 +29,7 @@ impl FlexBody {
         let parts = self.parts();
         let all = modes.len() == nf;
         let invariants = parts.invariants.with_modes(modes).with_groups(groups);
-        let unchanged = all && invariants.groups == parts.invariants.groups;
+        let unchanged = all && invariants.groups() == parts.invariants.groups();
         let lumped = |lumped: &LumpedBody| {
             let own = lumped.invariants.with_modes(modes).with_groups(groups);
             LumpedBody {

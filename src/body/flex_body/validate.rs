@@ -1,10 +1,10 @@
 //! What must hold for the parts of a flexible body, checked once, all violations collected.
 
-use super::{Group, Groups, MassStructure, Parts};
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::body::invariants::{DIGITS, Invariants};
+use super::{Group, MassStructure, Parts};
+use crate::base::diagnostic::Diagnostic;
+use crate::body::invariants::DIGITS;
+use crate::body::problems::{LARGEST, Problems};
 use crate::model::{Coupling, UnitLoad};
-use faer::{Mat, MatRef};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
 
@@ -12,14 +12,8 @@ use std::collections::HashSet;
 /// digits; anything worse rotates the invariants by more than their own accuracy.
 const AXES_TOLERANCE: f64 = 1e-10;
 
-/// Invariants are sums of products: numbers beyond this overflow in them.
-const LARGEST: f64 = 1e300;
-
-/// Longest name of an interface or lumping scheme in bytes: it names a group in the file.
-const LONGEST_NAME: usize = 1000;
-
 pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
-    let mut check = Check { problems: Vec::new() };
+    let mut check = Problems::default();
     let (n, nf) = (parts.nodes.ids.len(), parts.modes.eigenvalue.len());
     check.sizes(n, nf, parts);
     check.plane(parts);
@@ -32,9 +26,9 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
             parts.units.time.name()
         ));
     }
-    check.invariants("invariants", &parts.invariants, nf);
-    if parts.invariants.mass.is_finite() && parts.invariants.mass <= 0.0 {
-        check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass));
+    check.extend(parts.invariants.problems("invariants", nf));
+    if parts.invariants.mass().is_finite() && parts.invariants.mass() <= 0.0 {
+        check.add(format!("`invariants.mass` is {:e}, expected a positive mass", parts.invariants.mass()));
     }
     check.structure(parts);
     check.geometric_stiffness(parts, nf);
@@ -54,61 +48,10 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
         check.add(format!("`source.number` is {number}"));
     }
     check.text("certificate.remark", &c.remark);
-    check.problems
+    check.found()
 }
 
-struct Check {
-    problems: Vec<Diagnostic>,
-}
-
-impl Check {
-    fn add(&mut self, message: String) {
-        self.problems.push(Diagnostic::new(Code::BodySchema, message));
-    }
-
-    /// Reports the first value that is not finite, or so large that what follows from it would not be.
-    fn finite(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
-        if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > LARGEST) {
-            self.add(format!(
-                "`{name}` has the value {v:e} at index {i}, expected finite numbers up to {LARGEST:e}"
-            ));
-        }
-    }
-
-    fn length(&mut self, name: &str, found: usize, expected: usize, per: &str) {
-        if found != expected {
-            self.add(format!("`{name}` has {found} values, expected {expected}, one per {per}"));
-        }
-    }
-
-    fn matrix(&mut self, name: &str, m: &Mat<f64>, rows: usize, columns: usize) {
-        if (m.nrows(), m.ncols()) != (rows, columns) {
-            let (r, c) = (m.nrows(), m.ncols());
-            self.add(format!("`{name}` is {r} x {c}, expected {rows} x {columns}"));
-        }
-        self.finite(name, values(m.as_ref()));
-    }
-
-    /// A text that the file can hold.
-    fn text(&mut self, name: &str, text: &str) {
-        if text.contains('\0') {
-            self.add(format!("`{name}` contains a NUL character, expected text"));
-        }
-    }
-
-    fn names<'a>(&mut self, what: &str, names: impl Iterator<Item = &'a String>) {
-        let mut seen = HashSet::new();
-        for name in names {
-            if name.is_empty() {
-                self.add(format!("empty name of {what}"));
-            } else if name.len() > LONGEST_NAME {
-                self.add(format!("name of {what} has {} bytes, expected at most {LONGEST_NAME}", name.len()));
-            } else if !seen.insert(name) {
-                self.add(format!("{what} `{name}` is given twice"));
-            }
-        }
-    }
-
+impl Problems {
     fn sizes(&mut self, n: usize, nf: usize, parts: &Parts) {
         let modes = &parts.modes;
         let internal = modes.internal.as_ref().map_or(0, |internal| internal.dofs.len());
@@ -215,39 +158,18 @@ impl Check {
         }
     }
 
-    fn invariants(&mut self, name: &str, invariants: &Invariants, nf: usize) {
-        self.finite(&format!("{name}.mass"), [invariants.mass]);
-        self.finite(&format!("{name}.first_moment"), invariants.first_moment.iter().copied());
-        self.finite(&format!("{name}.second_moment"), invariants.second_moment.iter().copied());
-        self.matrix(&format!("{name}.c1"), &invariants.c1, 3, nf);
-        for k in 0..3 {
-            for l in 0..3 {
-                let block = &invariants.ibar[k][l];
-                self.length(&format!("{name}.ibar[{k}][{l}]"), block.len(), nf, "mode");
-                self.finite(&format!("{name}.ibar[{k}][{l}]"), block.iter().copied());
-                self.matrix(&format!("{name}.s[{k}][{l}]"), &invariants.s[k][l], nf, nf);
-            }
-        }
-        self.matrix(&format!("{name}.modal_stiffness"), &invariants.modal_stiffness, nf, nf);
-        if let Some(general) = &invariants.general {
-            self.matrix(&format!("{name}.w0"), &general.w0, 3, 3 * nf);
-            self.matrix(&format!("{name}.w3"), &general.w3, 3 * nf, nf);
-            self.matrix(&format!("{name}.modal_mass"), &general.modal_mass, nf, nf);
-        }
-    }
-
     /// A body has the terms of a general mass when its mass is one, and lumped masses never have.
     fn structure(&mut self, parts: &Parts) {
         let general = parts.source.mass_structure == MassStructure::General;
-        if general != parts.invariants.general.is_some() {
+        if general != parts.invariants.general().is_some() {
             self.add(
                 "`invariants.W0` is there for the mass structure `general`, and only for that".to_owned(),
             );
         }
-        if parts.invariants.general.as_ref().is_some_and(|terms| terms.plane != (parts.dimension == 2)) {
+        if parts.invariants.general().as_ref().is_some_and(|terms| terms.plane != (parts.dimension == 2)) {
             self.add(format!("general terms of another dimension than {}", parts.dimension));
         }
-        if parts.lumped.iter().any(|lumped| lumped.invariants.general.is_some()) {
+        if parts.lumped.iter().any(|lumped| lumped.invariants.general().is_some()) {
             self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
         }
     }
@@ -273,7 +195,7 @@ impl Check {
         self.names("a lumping scheme", parts.lumped.iter().map(|l| &l.scheme));
         for body in &parts.lumped {
             let name = format!("lumped `{}`", body.scheme);
-            self.invariants(&name, &body.invariants, nf);
+            self.extend(body.invariants.problems(&name, nf));
             self.names(&format!("an error norm of {name}"), body.comparison.iter().map(|(norm, _)| norm));
             for (norm, value) in &body.comparison {
                 self.text(&format!("{name} error norm"), norm);
@@ -345,7 +267,7 @@ impl Check {
 
     /// A group is dropped by a decision, or held.
     fn terms(&mut self, parts: &Parts) {
-        let held = parts.invariants.groups;
+        let held = parts.invariants.groups();
         for (at, term) in parts.terms.iter().enumerate() {
             let name = term.group.name();
             self.text(&format!("terms.{name}.reason"), &term.reason);
@@ -376,19 +298,11 @@ impl Check {
                 _ => {}
             }
         }
-        for lumped in parts.lumped.iter().filter(|lumped| lumped.invariants.groups != held) {
+        for lumped in parts.lumped.iter().filter(|lumped| lumped.invariants.groups() != held) {
             self.add(format!(
                 "lumped `{}` holds other groups of the kinetic energy than `invariants`",
                 lumped.scheme
             ));
-        }
-        // What follows takes the shapes of all arrays for granted.
-        if !self.problems.is_empty() || held == Groups::ALL {
-            return;
-        }
-        let all = std::iter::once(&parts.invariants).chain(parts.lumped.iter().map(|l| &l.invariants));
-        if !all.into_iter().all(Invariants::holds_its_groups_only) {
-            self.add("`invariants` has entries of groups that it does not hold".to_owned());
         }
     }
 
@@ -423,8 +337,4 @@ impl Check {
             }
         }
     }
-}
-
-fn values(m: MatRef<'_, f64>) -> impl Iterator<Item = f64> + '_ {
-    (0..m.ncols()).flat_map(move |j| (0..m.nrows()).map(move |i| m[(i, j)]))
 }

@@ -23,21 +23,21 @@ impl CauchySchwarz {
     /// Bounds of a body's own entries. A direction in which the body has no extent counts with the rounding of
     /// the others, J_kk >= 2.2e-16 tr J.
     pub fn of(invariants: &Invariants) -> Self {
-        let floor = f64::EPSILON * invariants.second_moment.trace();
+        let floor = f64::EPSILON * invariants.0.second_moment.trace();
         let norm = |p| {
-            let moved = (0..3).map(|k| invariants.s[k][k][(p, p)]).sum::<f64>();
+            let moved = (0..3).map(|k| invariants.0.s[k][k][(p, p)]).sum::<f64>();
             // Rotations of nodes carry mass that S does not have, and S mass that m_ff does not have.
-            let whole = invariants.general.as_ref().map_or(moved, |general| general.modal_mass[(p, p)]);
+            let whole = invariants.0.general.as_ref().map_or(moved, |general| general.modal_mass[(p, p)]);
             moved.max(whole).max(0.0).sqrt()
         };
-        let inertia = invariants.general.as_ref().map(|_| {
+        let inertia = invariants.0.general.as_ref().map(|_| {
             let floor = f64::EPSILON * invariants.inertia().trace();
             invariants.inertia().diagonal().map(|i| i.max(floor).max(0.0))
         });
         Self {
-            mass: invariants.mass,
+            mass: invariants.0.mass,
             inertia,
-            second_moment: invariants.second_moment.diagonal().map(|j| j.max(floor).max(0.0)),
+            second_moment: invariants.0.second_moment.diagonal().map(|j| j.max(floor).max(0.0)),
             mode: (0..invariants.n_modes()).map(norm).collect(),
         }
     }
@@ -132,22 +132,22 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
     let nf = a.n_modes();
     assert_eq!(nf, b.n_modes(), "modes of the two bodies");
     let pair =
-        Pair { a, b, bound: CauchySchwarz::of(a), general: a.general.is_some() || b.general.is_some() };
-    let groups = a.groups.and(b.groups);
+        Pair { a, b, bound: CauchySchwarz::of(a), general: a.0.general.is_some() || b.0.general.is_some() };
+    let groups = a.0.groups.and(b.0.groups);
     let bound = &pair.bound;
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
     let mut table = vec![
-        ("mass", scaled(a.mass - b.mass, a.mass.abs())),
+        ("mass", scaled(a.0.mass - b.0.mass, a.0.mass.abs())),
         ("first_moment", pair.first_moment()),
         ("second_moment", pair.second_moment()),
-        ("C1", entries(&a.c1, &b.c1, |_, p| bound.c1(p))),
+        ("C1", entries(&a.0.c1, &b.0.c1, |_, p| bound.c1(p))),
         match groups.w1 {
             true => ("Ibar", pair.ibar()),
             false => ("C2", entries(&a.c2(), &b.c2(), |k, p| bound.c2(k, p))),
         },
     ];
     if groups.w2 {
-        let block = |(k, l): (usize, usize)| entries(&a.s[k][l], &b.s[k][l], by_modes);
+        let block = |(k, l): (usize, usize)| entries(&a.0.s[k][l], &b.0.s[k][l], by_modes);
         table.push(("S", largest(axes().map(block))));
     }
     table.push(("modal_stiffness", pair.modal_stiffness()));
@@ -184,7 +184,7 @@ struct Pair<'a> {
 
 impl Pair<'_> {
     fn first_moment(&self) -> f64 {
-        let difference = self.a.first_moment - self.b.first_moment;
+        let difference = self.a.0.first_moment - self.b.0.first_moment;
         largest((0..3).map(|k| scaled(difference[k], self.bound.first_moment(k))))
     }
 
@@ -194,7 +194,7 @@ impl Pair<'_> {
             true if k == l => self.bound.largest_moment(),
             true => self.bound.inertia(k, l),
         };
-        let difference = self.a.second_moment - self.b.second_moment;
+        let difference = self.a.0.second_moment - self.b.0.second_moment;
         largest(axes().map(|(k, l)| scaled(difference[(k, l)], bound(k, l))))
     }
 
@@ -204,13 +204,13 @@ impl Pair<'_> {
             true if k == l => self.bound.largest_moment().sqrt() * self.bound.mode(p),
             true => self.bound.c2(3 - k - l, p),
         };
-        let (a, b) = (&self.a.ibar, &self.b.ibar);
+        let (a, b) = (&self.a.0.ibar, &self.b.0.ibar);
         let places = axes().flat_map(|(k, l)| (0..self.a.n_modes()).map(move |p| (k, l, p)));
         largest(places.map(|(k, l, p)| scaled(a[k][l][p] - b[k][l][p], bound(k, l, p))))
     }
 
     fn modal_stiffness(&self) -> f64 {
-        let (a, b) = (&self.a.modal_stiffness, &self.b.modal_stiffness);
+        let (a, b) = (&self.a.0.modal_stiffness, &self.b.0.modal_stiffness);
         let largest_stiffness = (0..a.ncols()).fold(0.0, |m: f64, p| m.max(a[(p, p)].abs()));
         let size = |p: usize| a[(p, p)].abs().max(f64::EPSILON * largest_stiffness);
         entries(a, b, |p, q| (size(p) * size(q)).sqrt())

@@ -225,16 +225,16 @@ fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
     let nf = value.n_modes();
     let entries = EntryErrors { value, errors, bound: CauchySchwarz::of(value), nf };
     let EntryErrors { errors: e, bound, .. } = &entries;
-    let j = &e.second_moment;
+    let j = &e.0.second_moment;
     let ratios = [
-        worst_ratio(1, 1, |_, _| (e.mass, value.mass.abs())),
-        worst_ratio(3, 1, |k, _| (e.first_moment[k], bound.first_moment(k))),
+        worst_ratio(1, 1, |_, _| (e.0.mass, value.0.mass.abs())),
+        worst_ratio(3, 1, |k, _| (e.0.first_moment[k], bound.first_moment(k))),
         worst_ratio(3, 3, |k, l| (j[(k, l)], bound.second_moment(k, l))),
-        worst_ratio(3, nf, |k, p| (e.c1[(k, p)], bound.c1(p))),
-        worst_ratio(9, nf, |kl, p| (e.ibar[kl / 3][kl % 3][p], bound.ibar(kl / 3, p))),
+        worst_ratio(3, nf, |k, p| (e.0.c1[(k, p)], bound.c1(p))),
+        worst_ratio(9, nf, |kl, p| (e.0.ibar[kl / 3][kl % 3][p], bound.ibar(kl / 3, p))),
         worst_ratio(9 * nf, nf, |row, q| {
             let (kl, p) = (row / nf, row % nf);
-            (e.s[kl / 3][kl % 3][(p, q)], bound.s(p, q))
+            (e.0.s[kl / 3][kl % 3][(p, q)], bound.s(p, q))
         }),
         worst_ratio(nf, nf, |p, q| entries.stiffness(p, q)),
         worst_ratio(3, 3, |k, l| entries.inertia(k, l)),
@@ -276,25 +276,25 @@ fn error_of_sum(errors: f64, magnitudes: f64) -> f64 {
 impl EntryErrors<'_> {
     /// Of a sum or difference of two entries of Ibar.
     fn ibar(&self, a: (usize, usize), b: (usize, usize), p: usize) -> f64 {
-        let error = |(k, l): (usize, usize)| self.errors.ibar[k][l][p];
-        let magnitude = |(k, l): (usize, usize)| self.value.ibar[k][l][p].abs();
+        let error = |(k, l): (usize, usize)| self.errors.0.ibar[k][l][p];
+        let magnitude = |(k, l): (usize, usize)| self.value.0.ibar[k][l][p].abs();
         error_of_sum(error(a) + error(b), magnitude(a) + magnitude(b))
     }
 
     /// Of a sum or difference of entries of blocks of S.
     fn s(&self, terms: &[(usize, usize)], p: usize, q: usize) -> f64 {
-        let total = |m: &Invariants| terms.iter().map(|&(k, l)| m.s[k][l][(p, q)].abs()).sum::<f64>();
+        let total = |m: &Invariants| terms.iter().map(|&(k, l)| m.0.s[k][l][(p, q)].abs()).sum::<f64>();
         error_of_sum(total(self.errors), total(self.value))
     }
 
     fn stiffness(&self, p: usize, q: usize) -> (f64, f64) {
-        let k_ff = &self.value.modal_stiffness;
+        let k_ff = &self.value.0.modal_stiffness;
         let scale = (k_ff[(p, p)].abs() * k_ff[(q, q)].abs()).sqrt();
-        (self.errors.modal_stiffness[(p, q)], scale)
+        (self.errors.0.modal_stiffness[(p, q)], scale)
     }
 
     fn inertia(&self, k: usize, l: usize) -> (f64, f64) {
-        let (j, value) = (&self.errors.second_moment, &self.value.second_moment);
+        let (j, value) = (&self.errors.0.second_moment, &self.value.0.second_moment);
         let (_, a, b) = CYCLIC[k];
         let moment = || error_of_sum(j[(a, a)] + j[(b, b)], value[(a, a)] + value[(b, b)]);
         (if k == l { moment() } else { j[(k, l)] }, self.bound.inertia(k, l))
@@ -311,7 +311,7 @@ impl EntryErrors<'_> {
         let nf = self.nf;
         let (k, p, l, q) = (row / nf, row % nf, column / nf, column % nf);
         let (_, a, b) = CYCLIC[k];
-        let error = if k == l { self.s(&[(a, a), (b, b)], p, q) } else { self.errors.s[l][k][(p, q)] };
+        let error = if k == l { self.s(&[(a, a), (b, b)], p, q) } else { self.errors.0.s[l][k][(p, q)] };
         (error, self.bound.s(p, q))
     }
 

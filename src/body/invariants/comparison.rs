@@ -55,11 +55,11 @@ pub fn error_norms(exact: &Invariants, other: &Invariants) -> Vec<(String, f64)>
     let mode_norm = spectral_norm(a.modal_mass.as_ref()).sqrt();
     let largest_moment = spectral_norm(matrix(&a.inertia).as_ref());
     let rotation = mode_norm * largest_moment.sqrt();
-    let translation = mode_norm * exact.mass.sqrt();
+    let translation = mode_norm * exact.0.mass.sqrt();
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
 
     let mut values = vec![
-        Some(scaled(other.mass - exact.mass, exact.mass.abs())),
+        Some(scaled(other.0.mass - exact.0.mass, exact.0.mass.abs())),
         Some(scaled(com_shift(exact, other), gyration_radius(exact))),
     ];
     let mut group =
@@ -76,7 +76,7 @@ pub fn error_norms(exact: &Invariants, other: &Invariants) -> Vec<(String, f64)>
     group(a.w1.as_ref(), b.w1.as_ref(), 2.0 * rotation, &w1_bound);
     group(a.w2.as_ref(), b.w2.as_ref(), 0.0, &by_modes);
     group(a.w3.as_ref(), b.w3.as_ref(), mode_norm * mode_norm, &by_modes);
-    group(Some(&exact.c1), Some(&other.c1), translation, &|_, p| bound.c1(p));
+    group(Some(&exact.0.c1), Some(&other.0.c1), translation, &|_, p| bound.c1(p));
     group(Some(&a.c2), Some(&b.c2), rotation, &|k, p| bound.c2(k, p));
     let named = ERROR_NORMS.iter().zip(values);
     named.filter_map(|((name, _), value)| Some(((*name).to_owned(), value?))).collect()
@@ -102,7 +102,7 @@ fn matrix(a: &Matrix3<f64>) -> Mat<f64> {
 }
 
 fn centre_of_mass(invariants: &Invariants) -> Vector3<f64> {
-    invariants.first_moment / invariants.mass
+    invariants.0.first_moment / invariants.0.mass
 }
 
 fn com_shift(exact: &Invariants, other: &Invariants) -> f64 {
@@ -111,5 +111,5 @@ fn com_shift(exact: &Invariants, other: &Invariants) -> f64 {
 
 /// sqrt(tr J_com / m).
 fn gyration_radius(body: &Invariants) -> f64 {
-    (body.second_moment.trace() / body.mass - centre_of_mass(body).norm_squared()).max(0.0).sqrt()
+    (body.0.second_moment.trace() / body.0.mass - centre_of_mass(body).norm_squared()).max(0.0).sqrt()
 }

@@ -6,7 +6,7 @@
 //! summed in order. The result is therefore the same to the last bit at any number of threads, and no sum is longer than a
 //! chunk, the chunks of a group or the groups: rounding does not grow with the model.
 
-use super::{Groups, Invariants};
+use super::{Groups, Invariants, PrimaryData};
 use crate::numerics::linalg::SymmetricMatrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -125,7 +125,7 @@ pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Inv
     let nf = modal_stiffness.ncols();
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
     let (mass, first_moment, second_moment) = rigid_part(gram);
-    Invariants {
+    Invariants(PrimaryData {
         mass,
         first_moment,
         second_moment,
@@ -135,7 +135,7 @@ pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Inv
         modal_stiffness,
         general: None,
         groups: Groups::ALL,
-    }
+    })
 }
 
 /// m, c and J of rigid motion alone.

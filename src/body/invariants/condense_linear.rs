@@ -3,7 +3,7 @@
 use super::condense::{
     Aligned, CHUNK, LANE, Lane, NodalMass, SolidColumns, mass_times, rigid_part, sum_of_groups,
 };
-use super::{Groups, Invariants, LumpedMasses, s_of_modal_mass};
+use super::{Groups, Invariants, LumpedMasses, PrimaryData, s_of_modal_mass};
 use crate::numerics::linalg::{SymmetricMatrix, gram};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -57,7 +57,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
     // J is symmetric but for rounding: one half of it counts.
     let rigid = Mat::from_fn(4, 4, |i, j| products[(i.min(j), i.max(j))]);
     let (mass, first_moment, second_moment) = rigid_part(rigid.as_ref());
-    Invariants {
+    Invariants(PrimaryData {
         mass,
         first_moment,
         second_moment,
@@ -67,7 +67,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
         modal_stiffness,
         general: None,
         groups: Groups { w1: true, ..Groups::NONE },
-    }
+    })
 }
 
 /// X' Ms [1, x, y, z], in the partition of the whole condensation; columns beyond the fourth mean nothing.
@@ -137,14 +137,16 @@ mod tests {
         let whole = condense_with(&mass, &positions, shapes.as_ref(), stiffness());
         assert_eq!(mass.1.load(Ordering::Relaxed), n * (4 + 3 * nf).div_ceil(LANE));
         let near = |a: f64, b: f64, size: f64| assert!((a - b).abs() <= 1e-13 * size, "{a} is not {b}");
-        near(linear.mass, whole.mass, whole.mass);
+        near(linear.mass(), whole.mass(), whole.mass());
         for k in 0..3 {
-            near(linear.first_moment[k], whole.first_moment[k], whole.mass);
+            near(linear.first_moment()[k], whole.first_moment()[k], whole.mass());
             for l in 0..3 {
-                near(linear.second_moment[(k, l)], whole.second_moment[(k, l)], whole.mass);
-                (0..nf).for_each(|p| near(linear.ibar[k][l][p], whole.ibar[k][l][p], whole.mass));
+                near(linear.second_moment()[(k, l)], whole.second_moment()[(k, l)], whole.mass());
+                (0..nf).for_each(|p| {
+                    near(linear.ibar().unwrap()[k][l][p], whole.ibar().unwrap()[k][l][p], whole.mass())
+                });
             }
-            (0..nf).for_each(|p| near(linear.c1[(k, p)], whole.c1[(k, p)], whole.mass));
+            (0..nf).for_each(|p| near(linear.c1()[(k, p)], whole.c1()[(k, p)], whole.mass()));
         }
         assert_eq!(linear.modal_mass(), Mat::<f64>::identity(nf, nf));
         assert_eq!((linear.w1().is_some(), linear.w2(), linear.w3()), (true, None, None));

@@ -38,19 +38,19 @@ pub(super) fn inertia_of(second_moment: &Matrix3<f64>) -> Matrix3<f64> {
 impl Invariants {
     /// Number of modes nf.
     pub fn n_modes(&self) -> usize {
-        self.c1.ncols()
+        self.0.c1.ncols()
     }
 
     /// I0 = tr(J) I - J: inertia of the undeformed body about the frame origin, frame axes. Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
-        inertia_of(&self.second_moment)
+        inertia_of(&self.0.second_moment)
     }
 
     /// C2 (3 x nf) = Phi_r' M Psi: rows Ibar23 - Ibar32, Ibar31 - Ibar13, Ibar12 - Ibar21.
     pub fn c2(&self) -> Mat<f64> {
         Mat::from_fn(3, self.n_modes(), |k, p| {
             let (_, l, m) = CYCLIC[k];
-            self.ibar[l][m][p] - self.ibar[m][l][p]
+            self.0.ibar[l][m][p] - self.0.ibar[m][l][p]
         })
     }
 
@@ -62,12 +62,12 @@ impl Invariants {
             let (l, p) = (column / nf, column % nf);
             if k == l {
                 let (_, a, b) = CYCLIC[k];
-                2.0 * (self.ibar[a][a][p] + self.ibar[b][b][p])
+                2.0 * (self.0.ibar[a][a][p] + self.0.ibar[b][b][p])
             } else {
-                -(self.ibar[k][l][p] + self.ibar[l][k][p])
+                -(self.0.ibar[k][l][p] + self.0.ibar[l][k][p])
             }
         };
-        self.groups.w1.then(|| Mat::from_fn(3, 3 * nf, w1))
+        self.0.groups.w1.then(|| Mat::from_fn(3, 3 * nf, w1))
     }
 
     /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk. `None` where the body does not hold it.
@@ -77,18 +77,18 @@ impl Invariants {
             let (k, p, l, q) = (row / nf, row % nf, column / nf, column % nf);
             if k == l {
                 let (_, a, b) = CYCLIC[k];
-                self.s[a][a][(p, q)] + self.s[b][b][(p, q)]
+                self.0.s[a][a][(p, q)] + self.0.s[b][b][(p, q)]
             } else {
-                -self.s[l][k][(p, q)]
+                -self.0.s[l][k][(p, q)]
             }
         };
-        self.groups.w2.then(|| Mat::from_fn(3 * nf, 3 * nf, w2))
+        self.0.groups.w2.then(|| Mat::from_fn(3 * nf, 3 * nf, w2))
     }
 
     /// W0 (3 x 3nf): how modes move the coupling of translation and rotation, block b column j = -C1_j~ e_b or, for a mass that
     /// does not commute with rotations, Phi_t' M B_j e_b. s~ = c~ - W0 Q.
     pub fn w0(&self) -> Mat<f64> {
-        if let Some(general) = &self.general {
+        if let Some(general) = &self.0.general {
             return general.w0.clone();
         }
         let nf = self.n_modes();
@@ -97,8 +97,8 @@ impl Invariants {
             // (e_b x C1_p)_k
             let (_, l, m) = CYCLIC[k];
             match b {
-                _ if b == l => self.c1[(m, p)],
-                _ if b == m => -self.c1[(l, p)],
+                _ if b == l => self.0.c1[(m, p)],
+                _ if b == m => -self.0.c1[(l, p)],
                 _ => 0.0,
             }
         })
@@ -110,9 +110,9 @@ impl Invariants {
         let nf = self.n_modes();
         let difference = |row: usize, q: usize| {
             let ((_, l, m), p) = (CYCLIC[row / nf], row % nf);
-            self.s[l][m][(p, q)] - self.s[m][l][(p, q)]
+            self.0.s[l][m][(p, q)] - self.0.s[m][l][(p, q)]
         };
-        self.groups.w3.then(|| match &self.general {
+        self.0.groups.w3.then(|| match &self.0.general {
             Some(general) => general.w3.clone(),
             None => Mat::from_fn(3 * nf, nf, difference),
         })
@@ -120,11 +120,11 @@ impl Invariants {
 
     /// m_ff (nf x nf) = S11 + S22 + S33 = Psi' M Psi: the identity for mass-normalised modes.
     pub fn modal_mass(&self) -> Mat<f64> {
-        if let Some(general) = &self.general {
+        if let Some(general) = &self.0.general {
             return general.modal_mass.clone();
         }
         let nf = self.n_modes();
-        Mat::from_fn(nf, nf, |p, q| (0..3).map(|k| self.s[k][k][(p, q)]).sum())
+        Mat::from_fn(nf, nf, |p, q| (0..3).map(|k| self.0.s[k][k][(p, q)]).sum())
     }
 
     /// All of them.

@@ -5,7 +5,7 @@
 //! displacements and zeros at the rotations in B_j, the body-frame velocities of all rows are (Phi_t, B_x + sum_j q_j B_j, Psi)
 //! times (V, omega, qd).
 
-use super::{GeneralTerms, Groups, Invariants};
+use super::{GeneralTerms, Groups, Invariants, PrimaryData};
 use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -226,7 +226,7 @@ impl Products {
             }
         }
         symmetrise(&mut s);
-        Invariants {
+        Invariants(PrimaryData {
             mass,
             first_moment,
             second_moment,
@@ -241,7 +241,7 @@ impl Products {
                 plane: false,
             }),
             groups: Groups::ALL,
-        }
+        })
     }
 
     fn in_plane(&self, modal_stiffness: Mat<f64>) -> Invariants {
@@ -252,7 +252,7 @@ impl Products {
         let w2 = |i: usize, j: usize| g[(self.turned(0, i), self.turned(0, j))];
         let half = || Mat::from_fn(nf, nf, |i, j| 0.5 * w2(i, j));
         let zero = || Mat::zeros(nf, nf);
-        Invariants {
+        Invariants(PrimaryData {
             mass,
             first_moment,
             second_moment,
@@ -273,7 +273,7 @@ impl Products {
                 plane: true,
             }),
             groups: Groups::ALL,
-        }
+        })
     }
 
     /// Phi_t' M Psi; of a plane body none along z.
@@ -336,21 +336,21 @@ impl Invariants {
     /// What a plane body is compared with whose mass does not commute with rotations.
     pub fn about_z(mut self) -> Self {
         let half = |a: f64, b: f64| 0.5 * (a + b);
-        let j = &self.second_moment;
-        self.second_moment = plane_second_moment(j[(0, 0)] + j[(1, 1)], self.mass, &self.first_moment);
+        let j = &self.0.second_moment;
+        self.0.second_moment = plane_second_moment(j[(0, 0)] + j[(1, 1)], self.0.mass, &self.0.first_moment);
         for p in 0..self.n_modes() {
-            let mean = half(self.ibar[0][0][p], self.ibar[1][1][p]);
-            let skew = half(self.ibar[0][1][p], -self.ibar[1][0][p]);
-            (self.ibar[0][0][p], self.ibar[1][1][p]) = (mean, mean);
-            (self.ibar[0][1][p], self.ibar[1][0][p]) = (skew, -skew);
+            let mean = half(self.0.ibar[0][0][p], self.0.ibar[1][1][p]);
+            let skew = half(self.0.ibar[0][1][p], -self.0.ibar[1][0][p]);
+            (self.0.ibar[0][0][p], self.0.ibar[1][1][p]) = (mean, mean);
+            (self.0.ibar[0][1][p], self.0.ibar[1][0][p]) = (skew, -skew);
         }
         let nf = self.n_modes();
-        let [[xx, xy, _], [yx, yy, _], _] = &self.s;
+        let [[xx, xy, _], [yx, yy, _], _] = &self.0.s;
         let mean = Mat::from_fn(nf, nf, |p, q| half(xx[(p, q)], yy[(p, q)]));
         let skew = Mat::from_fn(nf, nf, |p, q| half(xy[(p, q)], -yx[(p, q)]));
         let zero = || Mat::zeros(nf, nf);
         let back = skew.transpose().to_owned();
-        self.s = [[mean.clone(), skew, zero()], [back, mean, zero()], [zero(), zero(), zero()]];
+        self.0.s = [[mean.clone(), skew, zero()], [back, mean, zero()], [zero(), zero(), zero()]];
         self
     }
 }

@@ -68,7 +68,7 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
     let check = IdentityCheck::new;
     let mut checks = vec![
         check("finite", "no NaN, no infinity", terms::not_finite(body), 0.0),
-        check("mass_positive", "m > 0", if body.mass > 0.0 { 0.0 } else { 1.0 }, 0.0),
+        check("mass_positive", "m > 0", if body.0.mass > 0.0 { 0.0 } else { 1.0 }, 0.0),
         check("second_moment_symmetric", "J = J'", terms::second_moment_asymmetry(body, &bound), ROUNDING),
     ];
     checks.extend(rigid_identities(body));
@@ -80,7 +80,7 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
 
 /// What products of rigid motion and modes must be, whatever the modes are.
 fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
-    let (check, groups) = (IdentityCheck::new, body.groups);
+    let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
     if groups.w2 || groups.w3 {
         checks.push(check("s_transposed", "S_lk = S_kl'", terms::s_asymmetry(body, bound), ROUNDING));
@@ -94,14 +94,14 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityChec
             ROUNDING,
         ),
     ]);
-    match body.w2().zip(body.w3()).filter(|_| body.general.is_some()) {
+    match body.w2().zip(body.w3()).filter(|_| body.0.general.is_some()) {
         Some((w2, w3)) => checks.push(check(
             "velocity_gram_psd",
             "[Phi_t B Psi]' M [Phi_t B Psi] positive semidefinite",
             terms::velocity_gram_negative(body, &w2, &w3, bound),
             ROUNDING,
         )),
-        None if body.general.is_some() => {}
+        None if body.0.general.is_some() => {}
         None => checks.extend(scalar_identities(body, bound)),
     }
     checks
@@ -118,7 +118,7 @@ fn mode_identities(body: &Invariants, expected: &Expected<'_>, bound: &CauchySch
     if expected.free_surface {
         checks.push(check("c1_zero", "C1 = 0", terms::c1_ratio(body, bound), MODAL));
         checks.push(check("c2_zero", "C2 = 0", terms::c2_ratio(body, bound), MODAL));
-        if body.groups.w1 {
+        if body.0.groups.w1 {
             let value = terms::ibar_asymmetry(body, bound);
             checks.push(check("ibar_symmetric", "Ibar_kl = Ibar_lk", value, MODAL));
         }
@@ -137,8 +137,8 @@ fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityC
     let check = IdentityCheck::new;
     let mut checks = Vec::new();
     if expected.frame != BodyFrame::Model {
-        let radius = (body.second_moment.trace() / body.mass).sqrt();
-        let value = scaled(body.first_moment.norm(), body.mass * radius);
+        let radius = (body.0.second_moment.trace() / body.0.mass).sqrt();
+        let value = scaled(body.0.first_moment.norm(), body.0.mass * radius);
         let limit = ROUNDING + 4.0 * f64::EPSILON * scaled(expected.origin.norm(), radius);
         checks.push(check("first_moment_zero", "c = 0: origin at the centre of mass", value, limit));
     }
@@ -153,7 +153,7 @@ fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityC
 /// of a wheel on a beam, have I0 that is positive semidefinite, and no J of any places.
 fn rigid_identities(body: &Invariants) -> Vec<IdentityCheck> {
     let check = IdentityCheck::new;
-    if body.general.is_some() {
+    if body.0.general.is_some() {
         let value = terms::inertia_negative(body);
         let formula = "I0 about the centre of mass positive semidefinite";
         return vec![check("inertia_psd", formula, value, ROUNDING)];
@@ -176,7 +176,7 @@ fn rigid_identities(body: &Invariants) -> Vec<IdentityCheck> {
 
 /// What holds where M = Ms kron I3: Ibar and S are products of the same vectors then, direction by direction.
 fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
-    let (check, groups) = (IdentityCheck::new, body.groups);
+    let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
     if groups.w2 {
         checks.push(check("s_psd", "S_kk positive semidefinite", terms::s_negative(body), ROUNDING));
@@ -250,7 +250,7 @@ pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCh
     );
     group("w2_of_s", "W2_kl = -S_lk, W2_kk = S_ll + S_mm", &own.w2, &stored.w2, &by_modes);
     group("w3_of_s", "W3_k = S_lm - S_ml", &own.w3, &stored.w3, &by_modes);
-    if let Some((w2, w3)) = stored.w2.as_ref().zip(stored.w3.as_ref()).filter(|_| body.general.is_none()) {
+    if let Some((w2, w3)) = stored.w2.as_ref().zip(stored.w3.as_ref()).filter(|_| body.0.general.is_none()) {
         let expected = terms::w3_of_w2(w2, nf);
         checks.push(check("w3_of_w2", "W3_k = W2_lm - W2_ml", &expected, w3, &by_modes));
     }

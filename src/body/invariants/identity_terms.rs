@@ -21,31 +21,31 @@ fn over(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
 
 /// Count of numbers that are not finite.
 pub(super) fn not_finite(body: &Invariants) -> f64 {
-    let rigid = [body.mass]
+    let rigid = [body.0.mass]
         .into_iter()
-        .chain(body.first_moment.iter().copied())
-        .chain(body.second_moment.iter().copied());
-    let modal = entries(body.c1.as_ref()).chain(entries(body.modal_stiffness.as_ref()));
-    let ibar = body.ibar.iter().flatten().flatten().copied();
-    let s = body.s.iter().flatten().flat_map(|s| entries(s.as_ref()));
-    let general = body.general.iter().flat_map(|g| [&g.w0, &g.w3, &g.modal_mass]);
+        .chain(body.0.first_moment.iter().copied())
+        .chain(body.0.second_moment.iter().copied());
+    let modal = entries(body.0.c1.as_ref()).chain(entries(body.0.modal_stiffness.as_ref()));
+    let ibar = body.0.ibar.iter().flatten().flatten().copied();
+    let s = body.0.s.iter().flatten().flat_map(|s| entries(s.as_ref()));
+    let general = body.0.general.iter().flat_map(|g| [&g.w0, &g.w3, &g.modal_mass]);
     let general = general.flat_map(|a| entries(a.as_ref()));
     rigid.chain(modal).chain(ibar).chain(s).chain(general).filter(|v| !v.is_finite()).count() as f64
 }
 
 pub(super) fn second_moment_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
-    let j = &body.second_moment;
+    let j = &body.0.second_moment;
     over(3, 3, |k, l| scaled(j[(k, l)] - j[(l, k)], bound.second_moment(k, l)))
 }
 
 /// J about the centre of mass.
 fn central(body: &Invariants) -> Matrix3<f64> {
-    body.second_moment - body.first_moment * body.first_moment.transpose() / body.mass
+    body.0.second_moment - body.0.first_moment * body.0.first_moment.transpose() / body.0.mass
 }
 
 pub(super) fn second_moment_negative(body: &Invariants) -> f64 {
     // Not the trace, which may be negative too.
-    negative(&matrix(&central(body)), body.second_moment.diagonal().abs().sum())
+    negative(&matrix(&central(body)), body.0.second_moment.diagonal().abs().sum())
 }
 
 /// How negative the smallest principal moment about the centre of mass is, relative to the sum of all.
@@ -57,42 +57,44 @@ pub(super) fn inertia_negative(body: &Invariants) -> f64 {
 pub(super) fn triangle_excess(body: &Invariants) -> f64 {
     let moments = symmetric_eigenvalues(matrix(&inertia_of(&central(body))).as_ref());
     moments.map_or(f64::NAN, |i| {
-        scaled((i[2] - i[1] - i[0]).max(0.0), body.second_moment.diagonal().abs().sum())
+        scaled((i[2] - i[1] - i[0]).max(0.0), body.0.second_moment.diagonal().abs().sum())
     })
 }
 
 pub(super) fn s_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let nf = body.n_modes();
-    over(3, 3, |k, l| over(nf, nf, |p, q| scaled(body.s[k][l][(p, q)] - body.s[l][k][(q, p)], bound.s(p, q))))
+    over(3, 3, |k, l| {
+        over(nf, nf, |p, q| scaled(body.0.s[k][l][(p, q)] - body.0.s[l][k][(q, p)], bound.s(p, q)))
+    })
 }
 
 pub(super) fn s_negative(body: &Invariants) -> f64 {
     let scale = spectral_norm(body.modal_mass().as_ref());
-    over(3, 1, |k, _| negative(&body.s[k][k], scale))
+    over(3, 1, |k, _| negative(&body.0.s[k][k], scale))
 }
 
 pub(super) fn s_excess(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let nf = body.n_modes();
-    over(3, 3, |k, l| over(nf, nf, |p, q| scaled(body.s[k][l][(p, q)], bound.s(p, q)) - 1.0))
+    over(3, 3, |k, l| over(nf, nf, |p, q| scaled(body.0.s[k][l][(p, q)], bound.s(p, q)) - 1.0))
 }
 
 pub(super) fn ibar_excess(body: &Invariants, bound: &CauchySchwarz) -> f64 {
-    over(3, 3, |k, l| over(body.n_modes(), 1, |p, _| scaled(body.ibar[k][l][p], bound.ibar(k, p)) - 1.0))
+    over(3, 3, |k, l| over(body.n_modes(), 1, |p, _| scaled(body.0.ibar[k][l][p], bound.ibar(k, p)) - 1.0))
 }
 
 pub(super) fn ibar_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     over(3, 3, |k, l| {
-        let size = |p| match body.general {
+        let size = |p| match body.0.general {
             // Ibar then stands for W1 and C2: the difference is C2 about the third axis.
             Some(_) if k != l => bound.c2(3 - k - l, p),
             _ => bound.ibar(k, p).hypot(bound.ibar(l, p)),
         };
-        over(body.n_modes(), 1, |p, _| scaled(body.ibar[k][l][p] - body.ibar[l][k][p], size(p)))
+        over(body.n_modes(), 1, |p, _| scaled(body.0.ibar[k][l][p] - body.0.ibar[l][k][p], size(p)))
     })
 }
 
 pub(super) fn c1_ratio(body: &Invariants, bound: &CauchySchwarz) -> f64 {
-    over(3, body.n_modes(), |k, p| scaled(body.c1[(k, p)], bound.c1(p)))
+    over(3, body.n_modes(), |k, p| scaled(body.0.c1[(k, p)], bound.c1(p)))
 }
 
 pub(super) fn c2_ratio(body: &Invariants, bound: &CauchySchwarz) -> f64 {
@@ -115,33 +117,33 @@ pub(super) fn w3_excess(w3: &Mat<f64>, modal_mass: &Mat<f64>) -> f64 {
 pub(super) fn scalar_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let nf = body.n_modes();
     let size = |i: usize| match i {
-        0 => body.mass.sqrt(),
+        0 => body.0.mass.sqrt(),
         1..4 => bound.second_moment(i - 1, i - 1).sqrt(),
         _ => bound.mode((i - 4) % nf),
     };
     unit_gram_negative(4 + 3 * nf, size, |i, j| match (i, j) {
-        (0, 0) => body.mass,
-        (0, 1..4) => body.first_moment[j - 1],
-        (0, _) => body.c1[((j - 4) / nf, (j - 4) % nf)],
-        (1..4, 1..4) => body.second_moment[(i - 1, j - 1)],
-        (1..4, _) => body.ibar[i - 1][(j - 4) / nf][(j - 4) % nf],
-        _ => body.s[(i - 4) / nf][(j - 4) / nf][((i - 4) % nf, (j - 4) % nf)],
+        (0, 0) => body.0.mass,
+        (0, 1..4) => body.0.first_moment[j - 1],
+        (0, _) => body.0.c1[((j - 4) / nf, (j - 4) % nf)],
+        (1..4, 1..4) => body.0.second_moment[(i - 1, j - 1)],
+        (1..4, _) => body.0.ibar[i - 1][(j - 4) / nf][(j - 4) % nf],
+        _ => body.0.s[(i - 4) / nf][(j - 4) / nf][((i - 4) % nf, (j - 4) % nf)],
     })
 }
 
 /// Gram matrix of the rigid motions and the modes, [Phi_t, Phi_r, Psi]' M [...], the columns of unit size.
 pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let (i0, c2, modal_mass) = (body.inertia(), body.c2(), body.modal_mass());
-    let coupling = -body.first_moment.cross_matrix();
+    let coupling = -body.0.first_moment.cross_matrix();
     let size = |i: usize| match i {
-        0..3 => body.mass.sqrt(),
+        0..3 => body.0.mass.sqrt(),
         3..6 => bound.inertia(i - 3, i - 3).sqrt(),
         _ => bound.mode(i - 6),
     };
     unit_gram_negative(6 + body.n_modes(), size, |i, j| match (i, j) {
-        (0..3, 0..3) => body.mass * f64::from(u8::from(i == j)),
+        (0..3, 0..3) => body.0.mass * f64::from(u8::from(i == j)),
         (0..3, 3..6) => coupling[(i, j - 3)],
-        (0..3, _) => body.c1[(i, j - 6)],
+        (0..3, _) => body.0.c1[(i, j - 6)],
         (3..6, 3..6) => i0[(i - 3, j - 3)],
         (3..6, _) => c2[(i - 3, j - 6)],
         _ => modal_mass[(i - 6, j - 6)],
@@ -159,13 +161,13 @@ pub(super) fn velocity_gram_negative(
     let (w0, modal_mass) = (body.w0(), body.modal_mass());
     // Not of its own size: a rotation about the direction in which a mode moves all nodes has none.
     let size = |i: usize| match i {
-        0..3 => body.mass.sqrt(),
+        0..3 => body.0.mass.sqrt(),
         _ => bound.mode((i - 3) % nf),
     };
     unit_gram_negative(3 + 4 * nf, size, |i, j| match (i, j) {
-        (0..3, 0..3) => body.mass * f64::from(u8::from(i == j)),
+        (0..3, 0..3) => body.0.mass * f64::from(u8::from(i == j)),
         (0..3, _) if j < 3 + 3 * nf => w0[(i, j - 3)],
-        (0..3, _) => body.c1[(i, j - 3 - 3 * nf)],
+        (0..3, _) => body.0.c1[(i, j - 3 - 3 * nf)],
         _ if j < 3 + 3 * nf => w2[(i - 3, j - 3)],
         _ if i < 3 + 3 * nf => w3[(i - 3, j - 3 - 3 * nf)],
         _ => modal_mass[(i - 3 - 3 * nf, j - 3 - 3 * nf)],
@@ -198,7 +200,7 @@ pub(super) fn stiffness_deviation(body: &Invariants, eigenvalues: &[f64]) -> f64
     let size = |p: usize| eigenvalues[p].abs().max(floor).sqrt();
     over(nf, nf, |p, q| {
         let expected = if p == q { eigenvalues[p] } else { 0.0 };
-        scaled(body.modal_stiffness[(p, q)] - expected, size(p) * size(q))
+        scaled(body.0.modal_stiffness[(p, q)] - expected, size(p) * size(q))
     })
 }
 

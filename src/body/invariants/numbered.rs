@@ -1,7 +1,7 @@
 //! The invariants as other programs number them: I1 to I9 of Adams and MBDyn, from which every other set of names follows.
 
 use super::general::{s_of, second_moment_of};
-use super::{CauchySchwarz, GeneralTerms, Groups, Invariants, s_of_modal_mass};
+use super::{CauchySchwarz, GeneralTerms, Groups, Invariants, PrimaryData, s_of_modal_mass};
 use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -40,20 +40,20 @@ impl Invariants {
     /// The nine invariants.
     pub fn numbered(&self) -> Numbered {
         let i8 = |j: usize| {
-            let ibar = Matrix3::from_fn(|k, l| self.ibar[k][l][j]);
+            let ibar = Matrix3::from_fn(|k, l| self.0.ibar[k][l][j]);
             Matrix3::identity() * ibar.trace() - ibar.transpose()
         };
         Numbered {
-            i1: self.mass,
-            i2: self.first_moment,
-            i3: self.c1.clone(),
+            i1: self.0.mass,
+            i2: self.0.first_moment,
+            i3: self.0.c1.clone(),
             i4: self.c2(),
             i5: self.w3(),
             i6: self.modal_mass(),
             i7: self.inertia(),
             i8: (0..self.n_modes()).map(i8).collect(),
             i9: self.w2().map(|w2| Mat::from_fn(w2.nrows(), w2.ncols(), |i, j| -w2[(i, j)])),
-            groups: self.groups,
+            groups: self.0.groups,
         }
     }
 
@@ -78,7 +78,7 @@ impl Invariants {
                 [0, 1, 2].map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| pair(i, j)[(k, l)])))
             }
         };
-        let mut body = Self {
+        let mut body = Self(PrimaryData {
             mass: numbered.i1,
             first_moment: numbered.i2,
             second_moment: second_moment_of(&numbered.i7),
@@ -88,7 +88,7 @@ impl Invariants {
             modal_stiffness,
             general: None,
             groups,
-        };
+        });
         let solid = (body.modal_mass(), body.w3());
         let bound = CauchySchwarz::of(&body);
         let apart = |own: &Mat<f64>, told: &Mat<f64>| {
@@ -102,7 +102,7 @@ impl Invariants {
         let differs =
             apart(&solid.0, i6) || solid.1.zip(i5.as_ref()).is_some_and(|(own, told)| apart(&own, told));
         if differs {
-            body.general = Some(GeneralTerms {
+            body.0.general = Some(GeneralTerms {
                 w0: body.w0(),
                 w3: i5.clone().unwrap_or_else(|| Mat::zeros(3 * nf, nf)),
                 modal_mass: i6.clone(),

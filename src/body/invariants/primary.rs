@@ -6,10 +6,28 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Constant inertia data of a body about its frame origin, in frame axes (theory section 2).
 ///
-/// `nf` modes; coordinates x (n x 3) and modes Psi_k (n x nf, component k) are in the same frame. Only the primary
-/// data are stored; [`Invariants::inertia`], [`Invariants::w1`] and the others follow from them.
+/// `nf` modes; coordinates x (n x 3) and modes Psi_k (n x nf, component k) are in the same frame. Only the primary data are stored;
+/// [`Invariants::inertia`], [`Invariants::w1`] and the others follow from them.
+///
+/// The arrays have shapes that belong together, and nothing can be read that the body does not hold: what a dropped group would give
+/// answers `None`, and [`kind`](Invariants::kind) says whether S and Ibar tell all there is.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Invariants {
+pub struct Invariants(pub(super) PrimaryData);
+
+/// What sort of mass the invariants were condensed from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MassKind<'a> {
+    /// M = Ms kron I3: it commutes with rotations, and J, C1, Ibar and S tell everything.
+    Solid,
+    /// A mass that does not commute with rotations: nodal rotations, constraints, directional masses.
+    General(&'a GeneralTerms),
+    /// A body that moves in its plane z = 0 only; nothing but its rotation about z is known.
+    Plane(&'a GeneralTerms),
+}
+
+/// The arrays of [`Invariants`] as files hold them, not yet checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrimaryData {
     /// m = 1' Ms 1. Unit: mass.
     pub mass: f64,
     /// First moment c_k = 1' Ms x_k. Unit: mass length.
@@ -28,6 +46,86 @@ pub struct Invariants {
     pub general: Option<GeneralTerms>,
     /// The groups of the kinetic energy that are held; the arrays know nothing of others ([`Invariants::with_groups`]).
     pub groups: Groups,
+}
+
+impl Invariants {
+    /// The invariants with these arrays. Their numbers are checked by [`FlexBody::new`](crate::body::flex_body::FlexBody::new), which
+    /// tells all that is wrong with a body at once.
+    ///
+    /// # Panics
+    /// When the arrays have other shapes than [`PrimaryData`] says.
+    pub fn new(data: PrimaryData) -> Self {
+        let invariants = Self(data);
+        assert!(invariants.has_its_shapes(), "arrays of shapes that do not belong together");
+        invariants
+    }
+
+    /// m = 1' Ms 1. Unit: mass.
+    pub fn mass(&self) -> f64 {
+        self.0.mass
+    }
+
+    /// First moment c_k = 1' Ms x_k. Unit: mass length.
+    pub fn first_moment(&self) -> Vector3<f64> {
+        self.0.first_moment
+    }
+
+    /// Second moment J_kl = x_k' Ms x_l, or tr(I0)/2 I - I0. Unit: mass length^2.
+    pub fn second_moment(&self) -> Matrix3<f64> {
+        self.0.second_moment
+    }
+
+    /// C1 (3 x nf) = 1' Ms Psi_k.
+    pub fn c1(&self) -> &Mat<f64> {
+        &self.0.c1
+    }
+
+    /// `Ibar[k][l]` (nf) = x_k' Ms Psi_l; `None` where the body does not hold W1. Of a mass that is not
+    /// [solid](MassKind::Solid), what gives W1 and C2 by their formulas, and nothing else.
+    pub fn ibar(&self) -> Option<&[[Vec<f64>; 3]; 3]> {
+        self.0.groups.w1.then_some(&self.0.ibar)
+    }
+
+    /// `S[k][l]` (nf x nf) = Psi_k' Ms Psi_l; `None` where the body does not hold W2. Of a mass that is not
+    /// [solid](MassKind::Solid), what gives W2 by its formula, and nothing else.
+    pub fn s(&self) -> Option<&[[Mat<f64>; 3]; 3]> {
+        self.0.groups.w2.then_some(&self.0.s)
+    }
+
+    /// What C2 is the difference of: Ibar or, where the body does not hold W1, the antisymmetric arrays that give the same C2.
+    pub fn ibar_or_half_c2(&self) -> &[[Vec<f64>; 3]; 3] {
+        &self.0.ibar
+    }
+
+    /// K_ff (nf x nf) = Psi' K Psi.
+    pub fn modal_stiffness(&self) -> &Mat<f64> {
+        &self.0.modal_stiffness
+    }
+
+    /// Whether the mass commutes with rotations, and what else is known of one that does not.
+    pub fn kind(&self) -> MassKind<'_> {
+        match &self.0.general {
+            None => MassKind::Solid,
+            Some(terms) if terms.plane => MassKind::Plane(terms),
+            Some(terms) => MassKind::General(terms),
+        }
+    }
+
+    /// What a mass that does not commute with rotations adds; `None` of a [solid](MassKind::Solid).
+    pub fn general(&self) -> Option<&GeneralTerms> {
+        self.0.general.as_ref()
+    }
+
+    /// The groups of the kinetic energy that the body holds.
+    pub fn groups(&self) -> Groups {
+        self.0.groups
+    }
+
+    /// The arrays themselves, to break them: what they hold is checked again by whoever makes a body of them.
+    #[cfg(feature = "internals")]
+    pub fn primary_mut(&mut self) -> &mut PrimaryData {
+        &mut self.0
+    }
 }
 
 /// Terms of a mass matrix that does not commute with rotations (theory section 6), with Phi_t the unit translations and the

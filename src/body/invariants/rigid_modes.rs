@@ -1,16 +1,16 @@
 //! Rigid motion as modes: M in rigid motions and modes, and the same body with other amounts of rigid motion in its modes.
 
-use super::{GeneralTerms, Groups, Invariants};
+use super::{GeneralTerms, Groups, Invariants, PrimaryData};
 use faer::{Mat, MatRef};
 
 impl Invariants {
     /// \[m I, -c~, C1; ., I0, C2; ., ., m_ff\]: M in the six rigid motions and the modes.
     pub fn mass_matrix(&self) -> Mat<f64> {
-        let (c1, c2, modal) = (&self.c1, self.c2(), self.modal_mass());
-        let (lever, inertia) = (self.first_moment.cross_matrix(), self.inertia());
+        let (c1, c2, modal) = (&self.0.c1, self.c2(), self.modal_mass());
+        let (lever, inertia) = (self.0.first_moment.cross_matrix(), self.inertia());
         let nf = self.n_modes();
         Mat::from_fn(6 + nf, 6 + nf, |i, j| match (i.min(j), i.max(j)) {
-            (a, b) if b < 3 => self.mass * f64::from(a == b),
+            (a, b) if b < 3 => self.0.mass * f64::from(a == b),
             (a, b) if a < 3 && b < 6 => -lever[(a, b - 3)],
             (a, b) if b < 6 => inertia[(a - 3, b - 3)],
             (a, b) if a < 3 => c1[(a, b - 6)],
@@ -23,7 +23,7 @@ impl Invariants {
     pub(crate) fn with_rigid_modes(&self) -> Self {
         let old = self;
         let nf = old.n_modes();
-        let (m, c, j) = (old.mass, &old.first_moment, &old.second_moment);
+        let (m, c, j) = (old.0.mass, &old.0.first_moment, &old.0.second_moment);
         let axes = || 0..3;
         let delta = |a: usize, b: usize| f64::from(a == b);
         // (e_d x c)_l.
@@ -31,25 +31,25 @@ impl Invariants {
         let c1 = Mat::from_fn(3, 6 + nf, |k, p| match p {
             0..3 => m * delta(k, p),
             3..6 => turned(k, p - 3),
-            _ => old.c1[(k, p - 6)],
+            _ => old.0.c1[(k, p - 6)],
         });
         let ibar = |k: usize, l: usize, p: usize| match p {
             0..3 => delta(l, p) * c[k],
             3..6 => axes().map(|i| permutation(l, p - 3, i) * j[(k, i)]).sum(),
-            _ => old.ibar[k][l][p - 6],
+            _ => old.0.ibar[k][l][p - 6],
         };
         // u_k' Ms v_l of motions in this order: translations, rotations, modes.
         let product = |k: usize, l: usize, p: usize, q: usize| match (p, q) {
             (0..3, 0..3) => delta(k, p) * delta(l, q) * m,
             (0..3, 3..6) => delta(k, p) * turned(l, q - 3),
-            (0..3, _) => delta(k, p) * old.c1[(l, q - 6)],
+            (0..3, _) => delta(k, p) * old.0.c1[(l, q - 6)],
             (3..6, 3..6) => {
                 let entry =
                     |a: usize, b: usize| permutation(k, p - 3, a) * permutation(l, q - 3, b) * j[(a, b)];
                 axes().flat_map(|a| axes().map(move |b| (a, b))).map(|(a, b)| entry(a, b)).sum()
             }
-            (3..6, _) => axes().map(|i| permutation(k, p - 3, i) * old.ibar[i][l][q - 6]).sum(),
-            _ => old.s[k][l][(p - 6, q - 6)],
+            (3..6, _) => axes().map(|i| permutation(k, p - 3, i) * old.0.ibar[i][l][q - 6]).sum(),
+            _ => old.0.s[k][l][(p - 6, q - 6)],
         };
         let rank = |p: usize| (p / 3).min(2);
         let s = |k: usize, l: usize| {
@@ -57,7 +57,7 @@ impl Invariants {
                 if rank(p) <= rank(q) { product(k, l, p, q) } else { product(l, k, q, p) }
             })
         };
-        Self {
+        Self(PrimaryData {
             mass: m,
             first_moment: *c,
             second_moment: *j,
@@ -65,16 +65,16 @@ impl Invariants {
             ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| (0..6 + nf).map(|p| ibar(k, l, p)).collect())),
             s: [0, 1, 2].map(|k| [0, 1, 2].map(|l| s(k, l))),
             modal_stiffness: Mat::from_fn(6 + nf, 6 + nf, |p, q| {
-                if p < 6 || q < 6 { 0.0 } else { old.modal_stiffness[(p - 6, q - 6)] }
+                if p < 6 || q < 6 { 0.0 } else { old.0.modal_stiffness[(p - 6, q - 6)] }
             }),
             general: None,
             groups: Groups::ALL,
-        }
+        })
     }
 
     /// W3 by its formula from S.
     pub(crate) fn w3_of_s(&self) -> Mat<f64> {
-        let solid = Self { general: None, groups: Groups::ALL, ..self.clone() };
+        let solid = Self(PrimaryData { general: None, groups: Groups::ALL, ..self.0.clone() });
         solid.w3().expect("held")
     }
 
@@ -89,21 +89,21 @@ impl Invariants {
     pub fn without_rigid_motion(&self, taken: MatRef<'_, f64>) -> Self {
         let nf = self.n_modes();
         assert!((taken.nrows(), taken.ncols()) == (6, nf), "six rigid motions of every mode");
-        assert!(self.groups == Groups::ALL, "a body that holds all groups");
+        assert!(self.0.groups == Groups::ALL, "a body that holds all groups");
         let change = Mat::from_fn(6 + nf, nf, |i, j| match i.checked_sub(6) {
             None => -taken[(i, j)],
             Some(mode) => f64::from(mode == j),
         });
         let mut new = self.with_rigid_modes().with_basis(change.as_ref());
-        new.modal_stiffness = self.modal_stiffness.clone();
-        let Some(general) = &self.general else { return new };
+        new.0.modal_stiffness = self.0.modal_stiffness.clone();
+        let Some(general) = &self.0.general else { return new };
         let solid = |body: &Self| {
-            let solid = Self { general: None, ..body.clone() };
+            let solid = body.as_solid();
             (solid.w0(), solid.w3_of_s())
         };
         let ((old_w0, old_w3), (new_w0, new_w3)) = (solid(self), solid(&new));
         let modal_mass = change.transpose() * self.mass_matrix() * &change;
-        new.general = Some(GeneralTerms {
+        new.0.general = Some(GeneralTerms {
             w0: new_w0 + (&general.w0 - old_w0),
             w3: new_w3 + (&general.w3 - old_w3),
             modal_mass: Mat::from_fn(nf, nf, |i, j| 0.5 * (modal_mass[(i, j)] + modal_mass[(j, i)])),

@@ -34,7 +34,7 @@ impl Invariants {
     pub fn softening_rate(&self, axis: usize) -> Option<f64> {
         let (nf, w2) = (self.n_modes(), self.w2()?);
         let block = w2.as_ref().submatrix(axis * nf, axis * nf, nf, nf);
-        let mu = relative_norm(block, self.modal_stiffness.as_ref())?;
+        let mu = relative_norm(block, self.0.modal_stiffness.as_ref())?;
         (mu > 0.0).then(|| (PART / mu).sqrt())
     }
 }

@@ -2,7 +2,7 @@
 
 use super::dense::{product, transpose_product};
 use super::general::{ibar_of, plane_ibar, symmetrise};
-use super::{GeneralTerms, Invariants};
+use super::{GeneralTerms, Invariants, PrimaryData};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,56 +13,56 @@ impl Invariants {
     /// with rotations, B_x' = B_x + Phi_t d~ gives W1' = W1 - d~ W0 - (d~ W0)' block by block and C2' = C2 - d~ C1. Cancels when d
     /// is far compared with the body: to get data about the centre of mass, shift the coordinates and condense.
     pub fn shifted(&self, d: Vector3<f64>) -> Self {
-        let c = &self.first_moment;
+        let c = &self.0.first_moment;
         let mixed = c * d.transpose();
         let mut shifted = self.clone();
-        shifted.first_moment = c - self.mass * d;
-        shifted.second_moment =
-            self.second_moment - (mixed + mixed.transpose()) + d * d.transpose() * self.mass;
+        shifted.0.first_moment = c - self.0.mass * d;
+        shifted.0.second_moment =
+            self.0.second_moment - (mixed + mixed.transpose()) + d * d.transpose() * self.0.mass;
         let w0 = self.w0();
         for p in 0..self.n_modes() {
             let w0 = Matrix3::from_fn(|k, b| w0[(k, b * self.n_modes() + p)]);
-            let c1 = Vector3::from_fn(|k, _| self.c1[(k, p)]);
-            let change = match self.general {
+            let c1 = Vector3::from_fn(|k, _| self.0.c1[(k, p)]);
+            let change = match self.0.general {
                 None => d * c1.transpose(),
                 Some(GeneralTerms { plane: true, .. }) => {
                     plane_ibar((d.cross_matrix() * w0)[(2, 2)], d.cross(&c1)[2])
                 }
                 Some(_) => ibar_of(&(d.cross_matrix() * w0), &(d.cross(&c1))),
             };
-            for (k, row) in shifted.ibar.iter_mut().enumerate() {
+            for (k, row) in shifted.0.ibar.iter_mut().enumerate() {
                 for (l, entry) in row.iter_mut().enumerate() {
                     entry[p] -= change[(k, l)];
                 }
             }
         }
         // Of W1, C1 and the shift would make some: it is not held about the new origin either.
-        shifted.with_groups(self.groups)
+        shifted.with_groups(self.0.groups)
     }
 
     /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same origin.
     pub fn rotated(&self, axes: &Matrix3<f64>) -> Self {
         let nf = self.n_modes();
-        let second_moment = axes.transpose() * self.second_moment * axes;
+        let second_moment = axes.transpose() * self.0.second_moment * axes;
         let terms = |k: usize, l: usize| {
             (0..9).map(move |ab| (ab / 3, ab % 3, axes[(ab / 3, k)] * axes[(ab % 3, l)]))
         };
         let s = |k: usize, l: usize| {
-            Mat::from_fn(nf, nf, |p, q| terms(k, l).map(|(a, b, r)| r * self.s[a][b][(p, q)]).sum::<f64>())
+            Mat::from_fn(nf, nf, |p, q| terms(k, l).map(|(a, b, r)| r * self.0.s[a][b][(p, q)]).sum::<f64>())
         };
-        let mut rotated = Self {
-            mass: self.mass,
-            first_moment: axes.transpose() * self.first_moment,
+        let mut rotated = Self(PrimaryData {
+            mass: self.0.mass,
+            first_moment: axes.transpose() * self.0.first_moment,
             second_moment: (second_moment + second_moment.transpose()) * 0.5,
-            c1: Mat::from_fn(3, nf, |k, p| (0..3).map(|a| axes[(a, k)] * self.c1[(a, p)]).sum()),
+            c1: Mat::from_fn(3, nf, |k, p| (0..3).map(|a| axes[(a, k)] * self.0.c1[(a, p)]).sum()),
             ibar: std::array::from_fn(|k| {
                 std::array::from_fn(|l| {
-                    (0..nf).map(|p| terms(k, l).map(|(a, b, r)| r * self.ibar[a][b][p]).sum()).collect()
+                    (0..nf).map(|p| terms(k, l).map(|(a, b, r)| r * self.0.ibar[a][b][p]).sum()).collect()
                 })
             }),
             s: std::array::from_fn(|k| std::array::from_fn(|l| s(k, l))),
-            modal_stiffness: self.modal_stiffness.clone(),
-            general: self.general.as_ref().map(|general| GeneralTerms {
+            modal_stiffness: self.0.modal_stiffness.clone(),
+            general: self.0.general.as_ref().map(|general| GeneralTerms {
                 w0: Mat::from_fn(3, 3 * nf, |k, column| {
                     let (l, p) = (column / nf, column % nf);
                     terms(k, l).map(|(a, b, r)| r * general.w0[(a, b * nf + p)]).sum()
@@ -74,10 +74,10 @@ impl Invariants {
                 modal_mass: general.modal_mass.clone(),
                 plane: general.plane,
             }),
-            groups: self.groups,
-        };
-        symmetrise(&mut rotated.s);
-        rotated.with_groups(self.groups)
+            groups: self.0.groups,
+        });
+        symmetrise(&mut rotated.0.s);
+        rotated.with_groups(self.0.groups)
     }
 
     /// The same body in the basis Psi' = Psi T, with `t` (nf x nf'): S' = T' S T, Ibar' = Ibar T, C1' = C1 T,
@@ -89,21 +89,21 @@ impl Invariants {
         let nf = self.n_modes();
         assert_eq!(t.nrows(), nf, "one row per mode");
         let congruent = |a: &Mat<f64>| transpose_product(t, product(a.as_ref(), t).as_ref());
-        let stiffness = congruent(&self.modal_stiffness);
-        let mut changed = Self {
-            mass: self.mass,
-            first_moment: self.first_moment,
-            second_moment: self.second_moment,
-            c1: product(self.c1.as_ref(), t),
-            ibar: self.ibar.each_ref().map(|row| {
+        let stiffness = congruent(&self.0.modal_stiffness);
+        let mut changed = Self(PrimaryData {
+            mass: self.0.mass,
+            first_moment: self.0.first_moment,
+            second_moment: self.0.second_moment,
+            c1: product(self.0.c1.as_ref(), t),
+            ibar: self.0.ibar.each_ref().map(|row| {
                 row.each_ref()
                     .map(|a| (0..t.ncols()).map(|q| (0..nf).map(|p| a[p] * t[(p, q)]).sum()).collect())
             }),
-            s: self.s.each_ref().map(|row| row.each_ref().map(congruent)),
+            s: self.0.s.each_ref().map(|row| row.each_ref().map(congruent)),
             modal_stiffness: Mat::from_fn(t.ncols(), t.ncols(), |p, q| {
                 0.5 * (stiffness[(p, q)] + stiffness[(q, p)])
             }),
-            general: self.general.as_ref().map(|general| {
+            general: self.0.general.as_ref().map(|general| {
                 let block = |a: &Mat<f64>, row: usize| a.as_ref().subrows(row, nf).to_owned();
                 let w0 = [0, 1, 2].map(|b| product(general.w0.as_ref().subcols(b * nf, nf), t));
                 let w3 = [0, 1, 2].map(|b| congruent(&block(&general.w3, b * nf)));
@@ -115,9 +115,9 @@ impl Invariants {
                     plane: general.plane,
                 }
             }),
-            groups: self.groups,
-        };
-        symmetrise(&mut changed.s);
-        changed.with_groups(self.groups)
+            groups: self.0.groups,
+        });
+        symmetrise(&mut changed.0.s);
+        changed.with_groups(self.0.groups)
     }
 }

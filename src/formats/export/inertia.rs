@@ -16,7 +16,7 @@ pub(crate) fn inertia(body: &FlexBody) -> Numbered {
     let invariants = body.invariants();
     let nf = body.n_modes();
     let mut told = invariants.numbered();
-    if invariants.general.is_none() && told.groups.w2 && told.groups.w3 {
+    if invariants.general().is_none() && told.groups.w2 && told.groups.w3 {
         return told;
     }
     let w3 = told.i5.take().unwrap_or_else(|| Mat::zeros(3 * nf, nf));

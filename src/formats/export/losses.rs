@@ -21,9 +21,7 @@ pub(crate) fn general_w0(body: &FlexBody) -> Option<String> {
     let bound = CauchySchwarz::of(invariants);
     let nf = body.n_modes();
     // Without what M alone knows of it, W0 is that of C1.
-    let mut solid = invariants.clone();
-    solid.general = None;
-    let (own, told) = (invariants.w0(), solid.w0());
+    let (own, told) = (invariants.w0(), invariants.as_solid().w0());
     let lost = largest(&own, &told, |_, column| bound.c1(column % nf));
     told_if(lost, "W0 other than -C1~ (how modes move the coupling of translation and rotation)")
 }

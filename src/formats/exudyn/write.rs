@@ -63,7 +63,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
         array("trigList", Hdf5Contents::Integers(vec![0, 3], Vec::new())),
         Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
         modal_mass(body, &told),
-        array("stiffnessMatrixReduced", Hdf5Contents::matrix(&body.invariants().modal_stiffness)),
+        array("stiffnessMatrixReduced", Hdf5Contents::matrix(&body.invariants().modal_stiffness())),
         array("infoList", Hdf5Contents::Integers(vec![6], info)),
         text("NodeType.RotationEulerParameters").named("rigidBodyNodeType").with("datatype", "str"),
         array("xRef", Hdf5Contents::list(body.nodes().positions.as_flattened())),
@@ -84,7 +84,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
 /// mPsiTildePsiTilde then need not agree. Exudyn does not look at it.
 fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
     let entry = array("massMatrixReduced", Hdf5Contents::matrix(&told.i6));
-    match body.invariants().general {
+    match body.invariants().general() {
         Some(_) => entry.with("mass_structure", "general"),
         None => entry,
     }

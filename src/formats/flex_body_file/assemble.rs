@@ -9,7 +9,7 @@ use crate::body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
     InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
 };
-use crate::body::invariants::{DIGITS, GeneralTerms, Invariants, ibar_of_c2, s_of_modal_mass};
+use crate::body::invariants::{DIGITS, GeneralTerms, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass};
 use crate::model::{BodyNumber, Coupling, Nodes};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -240,7 +240,7 @@ impl Take<'_> {
                 s_of_modal_mass(nf, Some(&modal_mass), w3.as_ref())
             }
         };
-        Invariants {
+        Invariants::new(PrimaryData {
             general,
             mass: self.floats(&path("mass"))[0],
             first_moment: Vector3::from_column_slice(&self.floats(&path("first_moment"))),
@@ -250,7 +250,7 @@ impl Take<'_> {
             s,
             modal_stiffness: self.matrix(&path("modal_stiffness"), nf),
             groups,
-        }
+        })
     }
 
     fn geometric_stiffness(&mut self, nf: usize) -> Vec<GeometricStiffness<Mat<f64>>> {

@@ -380,37 +380,35 @@ const MODES: &[Item] = &[
 ];
 
 const INVARIANTS: &[Item] = &[
-    dataset("mass", Floats(&[Fixed(1)]), MASS, "m", "mass, 1' Ms 1", |v| Some(Value::Floats(vec![v.invariants().mass]))),
+    dataset("mass", Floats(&[Fixed(1)]), MASS, "m", "mass, 1' Ms 1", |v| Some(Value::Floats(vec![v.invariants().mass()]))),
     dataset("first_moment", Floats(&[Fixed(3)]), MASS_LENGTH, "c", "first moment about the frame origin, c_k = 1' Ms x_k", |v| {
-        small(v.invariants().first_moment)
+        small(v.invariants().first_moment())
     }),
     dataset("second_moment", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "J", "second moment about the frame origin, J_kl = x_k' Ms x_l", |v| {
-        small(v.invariants().second_moment)
+        small(v.invariants().second_moment())
     }),
     dataset("C1", Floats(&[Fixed(3), Modes]), ROOT_MASS, "C1", "linear momentum of the modes, 1' Ms Psi_k", |v| {
-        matrix(v.invariants().c1.as_ref())
+        matrix(v.invariants().c1().as_ref())
     }),
     dataset("Ibar", Floats(&[Fixed(3), Fixed(3), Modes]), ROOT_MASS_LENGTH, "Ibar", "Ibar_kl = x_k' Ms Psi_l", |v| {
-        let own = v.invariants();
-        own.groups.w1.then(|| Value::Floats(own.ibar.as_flattened().iter().flatten().copied().collect()))
+        v.invariants().ibar().map(|ibar| Value::Floats(ibar.as_flattened().iter().flatten().copied().collect()))
     })
     .of(TermGroup::W1)
     .large(),
     dataset("S", Floats(&[Fixed(3), Fixed(3), Modes, Modes]), ONE, "S", "S_kl = Psi_k' Ms Psi_l", |v| {
-        let own = v.invariants();
-        own.groups.w2.then(|| Value::Floats(own.s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
+        v.invariants().s().map(|s| Value::Floats(s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
     })
     .of(TermGroup::W2)
     .large(),
     dataset("modal_stiffness", Floats(&[Modes, Modes]), PER_TIME2, "K_ff", "Psi' K Psi", |v| {
-        matrix(v.invariants().modal_stiffness.as_ref())
+        matrix(v.invariants().modal_stiffness().as_ref())
     }),
     dataset("I0", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "I0", "inertia about the frame origin, tr(J) I - J", |v| {
         small(v.invariants().inertia())
     })
     .derived("second_moment"),
     dataset("W0", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS, "W0", "mass structure `general` only: Phi_t' M B_j, column b nf + j; else block b is (-C1~) e_b", |v| {
-        matrix(v.invariants().general.as_ref()?.w0.as_ref())
+        matrix(v.invariants().general()?.w0.as_ref())
     })
     .added(2)
     .large(),

@@ -23,7 +23,7 @@ pub(crate) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
         .map(|check| check.value)
         .fold(0.0, larger);
     let beside = beside_diagonal(invariants);
-    let k = &invariants.modal_stiffness;
+    let k = &invariants.modal_stiffness();
     let nearly = |j: usize| k[(j - 1, j - 1)] - k[(j, j)] <= DIGITS * k[(j, j)];
     let ascending = k[(0, 0)] > 0.0 && (1..k.ncols()).all(nearly);
     let diagonal = beside <= NEARLY_DIAGONAL;
@@ -41,7 +41,7 @@ pub(crate) fn beside_diagonal(invariants: &Invariants) -> f64 {
 /// The identities of mass-normalised free-surface modes with the frequencies that the diagonal of K_ff tells.
 fn of_modes(invariants: &Invariants) -> Vec<IdentityCheck> {
     let eigenvalues: Vec<f64> =
-        (0..invariants.n_modes()).map(|j| invariants.modal_stiffness[(j, j)]).collect();
+        (0..invariants.n_modes()).map(|j| invariants.modal_stiffness()[(j, j)]).collect();
     let expected =
         Expected { mass_normalised: true, free_surface: true, eigenvalues: Some(&eigenvalues), ..ANY_BODY };
     identities(invariants, &expected)
@@ -134,7 +134,7 @@ impl FreeSurface {
             Some(mode) => self.modes[(mode, j)],
         });
         let mut new = old.with_rigid_modes().with_basis(t.as_ref());
-        if let Some(general) = &old.general {
+        if let Some(general) = old.general() {
             let (own, mut w3) = (old.w3_of_s(), new.w3_of_s());
             let count = new.n_modes();
             for a in 0..3 {
@@ -143,9 +143,9 @@ impl FreeSurface {
                 (0..count).for_each(|i| (0..count).for_each(|j| w3[(a * count + i, j)] += change[(i, j)]));
             }
             let (w0, modal_mass) = (new.w0(), Mat::identity(count, count));
-            new.general = Some(GeneralTerms { w0, w3, modal_mass, plane: false });
+            new = new.with_general(GeneralTerms { w0, w3, modal_mass, plane: false });
         }
-        new.with_groups(old.groups)
+        new.with_groups(old.groups())
     }
 }
 
@@ -162,7 +162,7 @@ fn eigenmodes(invariants: &Invariants, elastic: Mat<f64>, kept: &[usize]) -> Res
         );
     };
     let stiffness =
-        Mat::from_fn(kept.len(), kept.len(), |i, j| invariants.modal_stiffness[(kept[i], kept[j])]);
+        Mat::from_fn(kept.len(), kept.len(), |i, j| invariants.modal_stiffness()[(kept[i], kept[j])]);
     let half = solve_lower(&factor, &stiffness);
     let small = solve_lower(&factor, &half.transpose().to_owned());
     let eigen = symmetric_eigen(small.as_ref());

@@ -11,7 +11,7 @@ use crate::body::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, Modes, Parts, Source,
     Storage, TermDecision,
 };
-use crate::body::invariants::{BodyFrame, Invariants, identities, symmetrise};
+use crate::body::invariants::{BodyFrame, Invariants, identities, symmetric_part};
 use crate::model::Nodes;
 use crate::numerics::linalg::larger;
 use faer::Mat;
@@ -117,8 +117,7 @@ impl ModalCoordinates {
 /// The invariants of the file, which must be those of some body.
 fn sound_invariants(given: &ImportedBody) -> Result<Invariants> {
     let stiffness = symmetric_part(&given.modal_stiffness);
-    let mut invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS);
-    restore_symmetries(&mut invariants);
+    let invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS).with_symmetries();
     if let Some(broken) = identities(&invariants, &ANY_BODY).into_iter().find(|check| {
         matches!(check.name, "finite" | "mass_positive" | "second_moment_psd" | "inertia_psd")
             && check.value > BROKEN
@@ -146,7 +145,7 @@ fn parts(file: &ImportedFile, coordinates: ModalCoordinates, source: SourceFile,
         certificate: certificate(file, invariants),
         interfaces: interfaces(given),
         coordinates: None,
-        terms: invariants.groups.dropped().map(|group| not_in_file(group, file.format)).collect(),
+        terms: invariants.groups().dropped().map(|group| not_in_file(group, file.format)).collect(),
         storage: Storage::F64,
         modes: modes(
             file,
@@ -168,7 +167,7 @@ fn source_facts(file: &ImportedFile, invariants: &Invariants, source: SourceFile
         number: None,
         // The file does not tell the degrees of freedom of the model.
         n_dofs: 0,
-        mass_structure: match invariants.general {
+        mass_structure: match invariants.general() {
             Some(_) => MassStructure::General,
             None => MassStructure::RotationInvariant,
         },
@@ -241,21 +240,6 @@ fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
     Ok((FlexBody::new(parts)?, Some(Diagnostic::new(Code::ForeignRounded, message))))
 }
 
-/// (A + A') / 2.
-fn symmetric_part(a: &Mat<f64>) -> Mat<f64> {
-    Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))
-}
-
-/// What files of few digits leave of symmetries that every body has.
-fn restore_symmetries(invariants: &mut Invariants) {
-    let j = invariants.second_moment;
-    invariants.second_moment = (j + j.transpose()) * 0.5;
-    symmetrise(&mut invariants.s);
-    if let Some(general) = &mut invariants.general {
-        general.modal_mass = symmetric_part(&general.modal_mass);
-    }
-}
-
 /// 3n x nf of the rows of all frames, zeros where one has none.
 fn stacked<'f>(
     frames: &'f [ImportedFrame],
@@ -269,7 +253,7 @@ fn stacked<'f>(
 fn eigenvalues(invariants: &Invariants) -> Vec<f64> {
     let mut largest = 0.0f64;
     let mut next = |j: usize| {
-        largest = largest.max(invariants.modal_stiffness[(j, j)]);
+        largest = largest.max(invariants.modal_stiffness()[(j, j)]);
         largest
     };
     (0..invariants.n_modes()).map(&mut next).collect()
@@ -277,7 +261,7 @@ fn eigenvalues(invariants: &Invariants) -> Vec<f64> {
 
 /// |K x - lambda x| of each unit vector x, relative to lambda.
 fn residuals(invariants: &Invariants, eigenvalue: &[f64]) -> Vec<f64> {
-    let k = &invariants.modal_stiffness;
+    let k = &invariants.modal_stiffness();
     let beside = |j: usize| (0..eigenvalue.len()).filter(|i| *i != j).map(|i| k[(i, j)].powi(2)).sum::<f64>();
     eigenvalue.iter().enumerate().map(|(j, l)| beside(j).sqrt() / (2.0 * l)).collect()
 }

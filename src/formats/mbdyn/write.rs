@@ -80,7 +80,7 @@ impl ExportFormat for Mbdyn {
         let told = inertia(body);
         file.nodes(&places, body.n_modes());
         file.matrix(9, "MODAL MASS MATRIX", &told.i6);
-        file.matrix(10, "MODAL STIFFNESS MATRIX", &body.invariants().modal_stiffness);
+        file.matrix(10, "MODAL STIFFNESS MATRIX", &body.invariants().modal_stiffness());
         file.rigid(&told);
         if losses::is_damped(body) {
             file.matrix(13, "MODAL DAMPING MATRIX", &body.damping());
@@ -108,7 +108,7 @@ fn head(body: &FlexBody) -> String {
     let units = body.units();
     let printable = |c: char| if c.is_control() { ' ' } else { c };
     let name: String = body.source().name.chars().map(printable).take(LONGEST_NAME).collect();
-    let general = body.invariants().general.as_ref().map_or("", |_| GENERAL_MASS);
+    let general = body.invariants().general().map_or("", |_| GENERAL_MASS);
     // A name alone could look like a record group.
     format!(
         "** BODY {name}, WRITTEN BY {}\n** UNITS {}, {}, {}; ALL ABOUT THE ORIGIN OF THE NODES, WHICH IS THAT OF THE MODAL NODE\n{general}",

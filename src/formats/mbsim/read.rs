@@ -2,7 +2,7 @@
 
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;
-use crate::body::invariants::{Groups, Invariants, Numbered};
+use crate::body::invariants::{Groups, Invariants, Numbered, PrimaryData};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
 use crate::formats::import::redundant::{ROUNDING, asymmetry, relative};
 use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
@@ -119,7 +119,7 @@ impl Integrals {
         let nf = self.nf();
         let ibar = |a: usize, b: usize| (0..nf).map(|j| self.position_shape[(3 * a + b, j)]).collect();
         let s = |a: usize, b: usize| Mat::from_fn(nf, nf, |j, k| self.s(a, b, j, k));
-        let body = Invariants {
+        let body = PrimaryData {
             mass: self.mass,
             first_moment: self.first,
             second_moment: Matrix3::from_fn(|i, j| self.second[(i, j)]),
@@ -130,7 +130,7 @@ impl Integrals {
             general: None,
             groups: Groups::ALL,
         };
-        body.numbered()
+        Invariants::new(body).numbered()
     }
 }
 

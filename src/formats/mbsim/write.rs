@@ -5,7 +5,7 @@
 
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
-use crate::body::invariants::CauchySchwarz;
+use crate::body::invariants::{CauchySchwarz, MassKind};
 use crate::formats::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::formats::export::inertia::inertia;
 use crate::formats::export::{ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
@@ -52,13 +52,13 @@ impl ExportFormat for Mbsim {
 /// S_aa of the file: those of W2 and, where the sum of these is not the modal mass, what lacks in equal parts.
 fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
     let invariants = body.invariants();
-    let s = |a: usize| &invariants.s[a][a];
-    if invariants.general.is_none() && invariants.groups.w2 {
-        return [0, 1, 2].map(|a| s(a).clone());
+    let s = invariants.s();
+    if let (MassKind::Solid, Some(s)) = (invariants.kind(), s) {
+        return [0, 1, 2].map(|a| s[a][a].clone());
     }
     let modal_mass = invariants.modal_mass();
     let nf = body.n_modes();
-    let held = |a: usize, j: usize, k: usize| if invariants.groups.w2 { s(a)[(j, k)] } else { 0.0 };
+    let held = |a: usize, j: usize, k: usize| s.map_or(0.0, |s| s[a][a][(j, k)]);
     [0, 1, 2].map(|a| {
         Mat::from_fn(nf, nf, |j, k| {
             let sum: f64 = (0..3).map(|c| held(c, j, k)).sum();
@@ -103,7 +103,7 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
         (a, b) if a == b => s_aa[a][(j, k)],
         (a, b) => told.i9.as_ref().map_or(0.0, |i9| i9[(b * nf + j, a * nf + k)]),
     };
-    let second = &invariants.second_moment;
+    let second = &invariants.second_moment();
     let positions: Vec<f64> = places.iter().flat_map(|place| place.position).collect();
     let numbers = places.iter().map(|place| place.id).collect();
     let turn = |row: usize, j: usize| {
@@ -114,8 +114,8 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
         Hdf5Contents::list(told.i2.as_slice()).named("position integral"),
         Hdf5Contents::from_fn(3, 3, |i, j| second[(i, j)]).named("position position integral"),
         Hdf5Contents::matrix(&told.i3).named("shape function integral"),
-        Hdf5Contents::matrix(&invariants.modal_stiffness).named("stiffness matrix"),
-        Hdf5Contents::from_fn(9, nf, |row, j| invariants.ibar[row / 3][row % 3][j])
+        Hdf5Contents::matrix(&invariants.modal_stiffness()).named("stiffness matrix"),
+        Hdf5Contents::from_fn(9, nf, |row, j| invariants.ibar_or_half_c2()[row / 3][row % 3][j])
             .named("position shape function integral"),
         Hdf5Contents::from_fn(6 * nf, nf, |row, k| s(row / nf, row % nf, k))
             .named("shape function shape function integral"),

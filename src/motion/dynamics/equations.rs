@@ -99,7 +99,7 @@ impl EquationsOfMotion {
             axes: parts.axes,
             pairs: parts.pairs,
             nf,
-            mass: invariants.mass,
+            mass: invariants.mass(),
             first_moment: parts.first_moment(),
             inertia: parts.inertia(),
             linear_panels: Panels::new(LINEAR, nf, |row, j| linear[row * nf + j]),
@@ -112,7 +112,7 @@ impl EquationsOfMotion {
                 invariants.modal_mass().as_ref(),
                 MASS_ROUNDING + body.storage().rounding(),
             ),
-            stiffness: ModalMatrix::new(invariants.modal_stiffness.as_ref(), STIFFNESS_ROUNDING),
+            stiffness: ModalMatrix::new(invariants.modal_stiffness().as_ref(), STIFFNESS_ROUNDING),
             damping: ModalMatrix::new(body.damping().as_ref(), STIFFNESS_ROUNDING),
             terms: parts.terms,
         }
@@ -217,7 +217,7 @@ impl<'b> EquationParts<'b> {
             (&[0, 1, 2, 3, 4, 5], &[0, 1, 2], &PAIRS)
         };
         let invariants = body.invariants();
-        let terms = terms.held(invariants.groups);
+        let terms = terms.held(invariants.groups());
         Self { body, invariants, nf: body.n_modes(), rigid, axes, pairs, terms }
     }
 
@@ -230,7 +230,7 @@ impl<'b> EquationParts<'b> {
     }
 
     fn first_moment(&self) -> Vector3<f64> {
-        Vector3::from_fn(|k, _| if self.moves(k) { self.invariants.first_moment[k] } else { 0.0 })
+        Vector3::from_fn(|k, _| if self.moves(k) { self.invariants.first_moment()[k] } else { 0.0 })
     }
 
     fn inertia(&self) -> Matrix3<f64> {
@@ -255,7 +255,7 @@ impl<'b> EquationParts<'b> {
                 let mean = |w1: &Mat<f64>| 0.5 * (w1[(a, b * nf + j)] + w1[(b, a * nf + j)]);
                 w1.as_ref().filter(|_| self.turns(a) && self.turns(b)).map_or(0.0, mean)
             }
-            row if row < C2 => f64::from(self.moves(row - C1)) * invariants.c1[(row - C1, j)],
+            row if row < C2 => f64::from(self.moves(row - C1)) * invariants.c1()[(row - C1, j)],
             row => f64::from(self.turns(row - C2)) * c2[(row - C2, j)],
         };
         (0..LINEAR * nf).map(|at| entry(at / nf, at % nf)).collect()
@@ -293,7 +293,7 @@ impl<'b> EquationParts<'b> {
             let a = axes[at];
             w3.as_ref().map_or((0.0, 0.0), |w3| (w3[(a * nf + i, j)], w3[(a * nf + j, i)]))
         };
-        let general = self.invariants.general.is_some();
+        let general = self.invariants.general().is_some();
         let transposed = self.stacked(axes.len(), &|at, i, j| {
             let (own, mirrored) = entries(at, i, j);
             // Of a solid the blocks are skew: what is left of W3 + W3' is rounding.

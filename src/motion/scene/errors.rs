@@ -236,7 +236,7 @@ impl<'r> Measure<'r> {
     /// # Panics
     /// When the reference has no such modes, or the motions were not looked at in the same places.
     pub fn of_subset(&self, candidate: &Trace, kept: &[usize]) -> ErrorHistory {
-        let energy = &self.body.invariants().modal_stiffness;
+        let energy = &self.body.invariants().modal_stiffness();
         let apart = self.apart(candidate, |reference, own| {
             let mut difference: Vec<f64> = reference.iter().map(|q| -q).collect();
             kept.iter().zip(own).for_each(|(&mode, q)| difference[mode] += q);
@@ -252,7 +252,7 @@ impl<'r> Measure<'r> {
     /// When the motions were not looked at in the same places.
     pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
         let (energy, rows) =
-            (&self.body.invariants().modal_stiffness, LivelyNodes::new(modes.body, &self.nodes));
+            (&self.body.invariants().modal_stiffness(), LivelyNodes::new(modes.body, &self.nodes));
         let apart = self.apart(candidate, |reference, own| {
             let q = DVector::from_column_slice(own);
             let difference = &modes.map * &q - DVector::from_column_slice(reference);
@@ -297,7 +297,7 @@ impl<'c> OtherModes<'c> {
             return None;
         }
         let stiffness = |body: &FlexBody| {
-            let k = &body.invariants().modal_stiffness;
+            let k = &body.invariants().modal_stiffness();
             DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
         };
         let transposed = DMatrix::from_fn(nr, nc, |i, j| shared[(j, i)]);

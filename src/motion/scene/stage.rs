@@ -74,7 +74,7 @@ fn carrier(point: &Point) -> Carrier {
 /// The body along the axes of the model, with its origin at the centre of mass.
 fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
     let invariants = body.invariants();
-    let centre = invariants.first_moment / invariants.mass;
+    let centre = invariants.first_moment() / invariants.mass();
     let shift = if centre.norm() <= AT_ORIGIN * body.extent() { Vector3::zeros() } else { centre };
     if shift == Vector3::zeros() && body.frame().axes == Matrix3::identity() {
         return Ok(Cow::Borrowed(body));
@@ -223,7 +223,7 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
 fn is_uncoupled(body: &FlexBody) -> bool {
     let (invariants, modal) = (body.invariants(), body.invariants().modal_mass());
     (0..body.n_modes()).all(|j| {
-        let bound = (invariants.mass * modal[(j, j)]).sqrt();
-        (0..3).all(|k| invariants.c1[(k, j)].abs() <= UNCOUPLED * bound)
+        let bound = (invariants.mass() * modal[(j, j)]).sqrt();
+        (0..3).all(|k| invariants.c1()[(k, j)].abs() <= UNCOUPLED * bound)
     })
 }

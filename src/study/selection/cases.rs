@@ -118,7 +118,7 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
             let has_axis = driven.rotation.axis.is_some();
             let follows_run = scene.spin.is_some() && scene.run.duration.is_some() && has_axis;
-            let held = body.invariants().groups;
+            let held = body.invariants().groups();
             let is_cheap = kept == Groups::NONE || kept == only_w1 && held.w1;
             if follows_run && !is_cheap {
                 return Ok(Vec::new());

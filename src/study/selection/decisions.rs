@@ -15,7 +15,7 @@ pub(super) fn decisions(
     trials: &[Trial],
     short_of: Option<(f64, f64)>,
 ) -> Vec<TermDecision> {
-    let held = body.invariants().groups;
+    let held = body.invariants().groups();
     let last_with = |kept: Groups| trials.iter().rfind(move |trial| trial.kept == kept);
     let first_passed = |kept: Groups| trials.iter().find(move |trial| trial.kept == kept && trial.passed());
     let decide = |group: Group| {

@@ -217,7 +217,7 @@ fn by_terms(
     kept: Groups,
     root: &[f64],
 ) -> (LoadSizes, TorqueDefect) {
-    let groups = body.invariants().groups;
+    let groups = body.invariants().groups();
     let equations = [groups, kept].map(|groups| EquationsOfMotion::new(body, Terms::ALL.held(groups)));
     let mut balances = Balances::new(&equations);
     let w3 = body.invariants().w3();

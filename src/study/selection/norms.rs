@@ -81,7 +81,7 @@ impl Norms {
             let part = block(at % 3, at / 3);
             Mat::from_fn(nf, nf, |i, j| sum[(i, j)] + weights[at] * part[(i, j)])
         });
-        let softening = relative_norm(spin.as_ref(), invariants.modal_stiffness.as_ref())?;
+        let softening = relative_norm(spin.as_ref(), invariants.modal_stiffness().as_ref())?;
         let w3 = invariants.w3()?;
         let coupling = |e: &Vector3<f64>| {
             let part = |i: usize, j: usize| (0..3).map(|a| e[a] * w3[(a * nf + i, j)]).sum::<f64>();

@@ -138,7 +138,7 @@ impl Search<'_> {
             }
             let cost = |count: usize| -> Result<usize> {
                 let modes: Vec<usize> = (0..count).collect();
-                let body = self.body().reduced(&modes, self.body().invariants().groups, Vec::new())?;
+                let body = self.body().reduced(&modes, self.body().invariants().groups(), Vec::new())?;
                 Ok(multiplications(&body, groups))
             };
             // The cost grows with the number of modes.

@@ -117,7 +117,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         inputs: situation.inputs().into_iter().cloned().collect(),
         tolerance: [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction],
         significances,
-        multiplications: multiplications(body, body.invariants().groups),
+        multiplications: multiplications(body, body.invariants().groups()),
         terms: decisions(body, scene, &situation.spin, &choice, &trials, short_of),
         guideline: guideline(choice.groups),
         groups: choice.groups,
@@ -157,7 +157,7 @@ impl<'s> Deciding<'s> {
     ) -> Result<Self> {
         let trials = bounded(cases, true)?;
         let by_bounds = trials.iter().find(|trial| trial.passed()).map(|trial| trial.kept);
-        let held = body.invariants().groups;
+        let held = body.invariants().groups();
         let choice = Choice {
             groups: by_bounds.map_or(held, |kept| kept.and(held)),
             modes: (0..body.n_modes()).collect(),

@@ -263,7 +263,7 @@ fn given_rotation(
 fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
     let reason = if scene.carried.is_some() {
         "the body is carried: its frame moves its modes"
-    } else if body.invariants().general.is_some() {
+    } else if body.invariants().general().is_some() {
         "the mass matrix does not commute with rotations"
     } else if !body.geometric_stiffness().is_empty() {
         "the body has geometric stiffness"
@@ -334,12 +334,12 @@ fn start_of_modes(scene: &Scene, damping: f64, root: &[f64]) -> Start {
 fn is_about_centre(invariants: &Invariants) -> bool {
     let (nf, c2, m) = (invariants.n_modes(), invariants.c2(), invariants.modal_mass());
     let inertia = invariants.inertia().trace();
-    let size = (inertia / invariants.mass).sqrt();
+    let size = (inertia / invariants.mass()).sqrt();
     let small = |value: f64, scale: f64| value.abs() <= ROUNDING * scale;
     (0..3).all(|k| {
-        small(invariants.first_moment[k], invariants.mass * size)
+        small(invariants.first_moment()[k], invariants.mass() * size)
             && (0..nf).all(|j| {
-                small(invariants.c1[(k, j)], invariants.mass.sqrt()) && small(c2[(k, j)], inertia.sqrt())
+                small(invariants.c1()[(k, j)], invariants.mass().sqrt()) && small(c2[(k, j)], inertia.sqrt())
             })
     }) && (0..nf).all(|i| (0..nf).all(|j| small(m[(i, j)] - f64::from(i == j), 1.0)))
 }

@@ -128,7 +128,7 @@ impl TrialRuns<'_> {
         let body = if modes.len() == whole.n_modes() {
             whole
         } else {
-            own = whole.reduced(modes, whole.invariants().groups, Vec::new())?;
+            own = whole.reduced(modes, whole.invariants().groups(), Vec::new())?;
             &own
         };
         let mut scene =

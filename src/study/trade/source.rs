@@ -80,7 +80,7 @@ impl Source {
         let mut parts = self.body.clone().into_parts();
         if let Some(lumped) = self.lumped.iter().find(|lumped| lumped.scheme == scheme) {
             parts.invariants = lumped.invariants.clone();
-            if parts.invariants.general.is_none() {
+            if parts.invariants.general().is_none() {
                 parts.source.mass_structure = MassStructure::Diagonal;
             }
         }
@@ -103,7 +103,7 @@ impl Source {
         if own.initial.modes.is_empty() {
             return own;
         }
-        let k = &body.invariants().modal_stiffness;
+        let k = &body.invariants().modal_stiffness();
         let stiffness =
             DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)])).cholesky();
         let part = |q: &[f64]| {

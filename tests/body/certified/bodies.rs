@@ -95,7 +95,9 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
     };
     assert!(failed(&|_| {}).is_empty());
     assert_eq!(
-        failed(&|parts| parts.invariants.ibar[0][1][2] += 1e-14 * parts.invariants.mass.sqrt()),
+        failed(
+            &|parts| parts.invariants.primary_mut().ibar[0][1][2] += 1e-14 * parts.invariants.mass().sqrt()
+        ),
         ["digits_recomputed"]
     );
     let moved = failed(&|parts| {

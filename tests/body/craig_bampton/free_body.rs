@@ -110,7 +110,7 @@ fn without_fixed_interface_modes_the_body_is_statically_condensed() {
                 && body.identities(BodyFrame::Principal).iter().all(|check| check.passed)
         );
         let mass = oracle.rigid.transpose() * &oracle.m * &oracle.rigid;
-        close(body.invariants().mass, mass[(0, 0)], 1e-12, &what);
+        close(body.invariants().mass(), mass[(0, 0)], 1e-12, &what);
         let fixed = record(&body);
         assert_eq!((fixed.modes, fixed.counted.is_some_and(|counted| counted > 0)), (0, true));
         close(fixed.next.expect("the first mode that is left out"), held[0], 1e-9, &what);

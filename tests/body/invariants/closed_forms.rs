@@ -28,7 +28,7 @@ fn inertia_of_a_cuboid_is_exact_for_any_mesh() {
         let invariants = condense(&mass, &frame.to_body(&positions), none.as_ref(), Mat::zeros(0, 0));
         let inertia = invariants.inertia();
         assert!((inertia - Matrix3::from_diagonal(&Vector3::from(moments))).amax() < 1e-14 * moments[2]);
-        assert!(invariants.first_moment.amax() < 1e-15 * m);
+        assert!(invariants.first_moment().amax() < 1e-15 * m);
         assert_eq!(
             (invariants.n_modes(), invariants.w2().expect("held").nrows(), invariants.c2().ncols()),
             (0, 0, 0)
@@ -57,16 +57,16 @@ fn homogeneous_strains_of_a_cuboid_follow_from_its_second_moments() {
     for p in 0..9 {
         let (a, b) = (p / 3, p % 3);
         for k in 0..3 {
-            assert!(near(invariants.c1[(k, p)], 0.0));
+            assert!(near(invariants.c1()[(k, p)], 0.0));
             for l in 0..3 {
                 assert!(
-                    near(invariants.ibar[k][l][p], kronecker(l, a) * kronecker(k, b) * j[b]),
+                    near(invariants.ibar().unwrap()[k][l][p], kronecker(l, a) * kronecker(k, b) * j[b]),
                     "Ibar {k}{l},{p}"
                 );
                 for q in 0..9 {
                     let (c, d) = (q / 3, q % 3);
                     let exact = kronecker(k, a) * kronecker(l, c) * kronecker(b, d) * j[b];
-                    assert!(near(invariants.s[k][l][(p, q)], exact), "S {k}{l},{p}{q}");
+                    assert!(near(invariants.s().unwrap()[k][l][(p, q)], exact), "S {k}{l},{p}{q}");
                 }
             }
         }
@@ -78,7 +78,7 @@ fn homogeneous_strains_of_a_cuboid_follow_from_its_second_moments() {
     let (w1, w2, q) = (invariants.w1().expect("held"), invariants.w2().expect("held"), 0.3);
     let moment = invariants.inertia()[(1, 1)] + w1[(1, 9)] * q + w2[(9, 9)] * q * q;
     assert!(near(moment, (1.0 + q) * (1.0 + q) * j[0] + j[2]));
-    assert_eq!(invariants.modal_stiffness, stiffness(9));
+    assert_eq!(invariants.modal_stiffness(), &stiffness(9));
 }
 
 #[test]
@@ -90,11 +90,11 @@ fn layout_is_component_blocked() {
     (shapes[(0, 0)], shapes[(1, 0)], shapes[(5, 1)], shapes[(1, 1)]) = (1.0, 2.0, 5.0, 7.0);
     let body = condense(&mass, &positions, shapes.as_ref(), stiffness(2));
     let matrix = |rows: &[&[f64]]| Mat::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]);
-    assert_eq!(body.c1, matrix(&[&[2.0, 0.0], &[4.0, 14.0], &[0.0, 15.0]]));
-    assert_eq!(body.ibar[0][0], [2.0, 0.0]);
-    assert_eq!(body.ibar[0][1], [4.0, 14.0]);
-    assert_eq!(body.ibar[1][2], [0.0, 15.0]);
-    assert_eq!(body.s[0][1], matrix(&[&[4.0, 14.0], &[0.0, 0.0]]));
+    assert_eq!(body.c1(), &matrix(&[&[2.0, 0.0], &[4.0, 14.0], &[0.0, 15.0]]));
+    assert_eq!(body.ibar().unwrap()[0][0], [2.0, 0.0]);
+    assert_eq!(body.ibar().unwrap()[0][1], [4.0, 14.0]);
+    assert_eq!(body.ibar().unwrap()[1][2], [0.0, 15.0]);
+    assert_eq!(body.s().unwrap()[0][1], matrix(&[&[4.0, 14.0], &[0.0, 0.0]]));
     assert_eq!(body.inertia(), Matrix3::from_diagonal(&Vector3::new(3.0, 2.0, 5.0)));
     assert_eq!(body.c2(), matrix(&[&[0.0, 15.0], &[0.0, 0.0], &[4.0, 14.0]]));
     assert_eq!(

@@ -136,12 +136,12 @@ fn in_units(raw: &RawModel, length: f64, mass: f64, time: f64) -> RawModel {
 fn invariants_in_units(a: &Invariants, length: f64, mass: f64, time: f64) -> Invariants {
     let root = mass.sqrt();
     let mut b = a.clone();
-    b.mass *= mass;
-    b.first_moment *= mass * length;
-    b.second_moment *= mass * length * length;
-    b.c1 = &a.c1 * faer::Scale(root);
-    b.ibar.iter_mut().flatten().flatten().for_each(|v| *v *= root * length);
-    b.modal_stiffness = &a.modal_stiffness * faer::Scale(time.powi(-2));
+    b.primary_mut().mass *= mass;
+    b.primary_mut().first_moment *= mass * length;
+    b.primary_mut().second_moment *= mass * length * length;
+    b.primary_mut().c1 = a.c1() * faer::Scale(root);
+    b.primary_mut().ibar.iter_mut().flatten().flatten().for_each(|v| *v *= root * length);
+    b.primary_mut().modal_stiffness = a.modal_stiffness() * faer::Scale(time.powi(-2));
     b
 }
 

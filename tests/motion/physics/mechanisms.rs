@@ -92,7 +92,7 @@ impl Mechanism {
         };
         let mut system = Jointed {
             bodies: &equations,
-            masses: bodies.iter().map(|body| body.invariants().mass).collect(),
+            masses: bodies.iter().map(|body| body.invariants().mass()).collect(),
             joints: self.joints.iter().map(joint).collect(),
             gravity,
             scales: Scales { length: 100.0, rate: std::f64::consts::TAU / self.duration },
@@ -181,7 +181,7 @@ fn tips(youngs: f64) -> Vec<Vector3<f64>> {
     let all = [true; 3];
     let mut system = Jointed {
         bodies: &equations,
-        masses: vec![body.invariants().mass; 2],
+        masses: vec![body.invariants().mass(); 2],
         joints: vec![
             Joint { ends: [End::Body(0, left.clone()), End::Ground(Vector3::zeros())], axes: all },
             Joint { ends: [End::Body(1, left.clone()), End::Body(0, right.clone())], axes: all },
@@ -210,7 +210,7 @@ fn tips(youngs: f64) -> Vec<Vector3<f64>> {
 /// Tips of the rigid double pendulum, from its two equations for the angles.
 fn rigid_tips() -> Vec<Vector3<f64>> {
     let body = bar(1.0);
-    let (m, l, d) = (body.invariants().mass, LENGTH, 0.5 * LENGTH);
+    let (m, l, d) = (body.invariants().mass(), LENGTH, 0.5 * LENGTH);
     let j = body.invariants().inertia()[(2, 2)];
     let rate = |y: &DVector<f64>| {
         let (a, b, a_rate, b_rate) = (y[0], y[1], y[2], y[3]);

@@ -161,7 +161,7 @@ fn the_vibration_of_a_spinning_ring_turns_with_bryans_factor() {
     let equations = EquationsOfMotion::new(&body, Terms::ALL);
     let mut start = rest(&body);
     start.omega = Vector3::z() * spin;
-    start.q[pair] = 1e-3 * body.invariants().mass.sqrt();
+    start.q[pair] = 1e-3 * body.invariants().mass().sqrt();
     // Half the time in which the vibration goes over to the other mode, and all of it.
     let over = PI / (2.0 * factor * spin);
     let instants = [0.0, 0.5 * over, over];

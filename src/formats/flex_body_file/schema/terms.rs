@@ -16,7 +16,7 @@ fn decision<'a>(view: &View<'a>, group: Group) -> Option<&'a TermDecision> {
 }
 
 fn held(view: &View<'_>, group: Group) -> Option<Value> {
-    text(if view.body.invariants.groups.has(group) { KEPT } else { DROPPED })
+    text(if view.body.invariants.groups().has(group) { KEPT } else { DROPPED })
 }
 
 fn number(value: f64) -> Option<Value> {

@@ -83,7 +83,7 @@ pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
         Taylor::constant("Ge", blocks(nf, nf, dialect.ge, |k, a, l| terms.w3(a, l, k) - terms.w3(a, k, l))),
         terms.oe(),
         Taylor::zero("ksigma", nf, 1),
-        Taylor::symmetric("Ke", body.invariants().modal_stiffness.clone()),
+        Taylor::symmetric("Ke", body.invariants().modal_stiffness().clone()),
         if is_damped(body) { Taylor::symmetric("De", body.damping()) } else { Taylor::zero("De", nf, nf) },
     ]
 }

@@ -98,7 +98,7 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
             facts.push(format!("geometric stiffness for {}", kind.name().replace('_', " ")));
         }
     }
-    if body.invariants().general.is_some() {
+    if body.invariants().general().is_some() {
         facts.push("general mass".to_owned());
     }
     let groups = body.groups();
@@ -117,7 +117,7 @@ fn refmod(body: &FlexBody, text: &mut Text<'_>) {
     let time = &body.units().time;
     let unit = if time.to_si() == 1.0 { "Hz".to_owned() } else { format!("1/{}", time.name()) };
     text.line(11, "refmod");
-    let mass = text.number(body.invariants().mass);
+    let mass = text.number(body.invariants().mass());
     text.value(16, "mass", mass);
     text.value(16, "nelastq", format_args!("{:6}", body.n_modes()));
     for (k, eigenvalue) in body.modes().eigenvalue.iter().enumerate() {
