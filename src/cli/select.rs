@@ -18,7 +18,8 @@ use crate::model::{CheckedModel, FeModel};
 use crate::motion::scene::{Scene, read_scene};
 use crate::numerics::eigen::{Resume, Wanted};
 use crate::report::{Format, RunData, SelectionFacts};
-use crate::study::selection::select;
+use crate::study::reference::{Enriched, ReferenceError};
+use crate::study::selection::select_from;
 use crate::study::tailoring::{Tailoring, loads_for, read_loads};
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
@@ -31,14 +32,15 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let scene = read_scene(&arguments.scene)?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let is_manifest = arguments.body.extension().is_some_and(|extension| extension == "toml");
-    let (body, mut diagnostics) = if is_manifest {
+    let (body, lacks, mut diagnostics) = if is_manifest {
         converted(arguments, &scene, &watch)?
     } else {
         refuse_modes(arguments)?;
-        flex_body_file::read_with_notes(&arguments.body)?
+        let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
+        (body, Vec::new(), notes)
     };
-    let selection =
-        select(&body, &scene, memory_left(None), &watch).map_err(|error| error.in_file(&arguments.scene))?;
+    let selection = select_from(&body, &lacks, &scene, memory_left(None), &watch)
+        .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
@@ -55,12 +57,12 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     })
 }
 
-/// The body of a model with everything that the scene may need.
+/// The body of a model with everything that the scene may need, and what it lacks of the model there.
 fn converted(
     arguments: &SelectArguments,
     scene: &Scene,
     watch: Watch<'_>,
-) -> Result<(FlexBody, Vec<Diagnostic>)> {
+) -> Result<(FlexBody, Vec<ReferenceError>, Vec<Diagnostic>)> {
     let files = read_manifest(&arguments.body)?;
     refuse_replacing(files.paths().into_iter(), arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
@@ -78,9 +80,11 @@ fn converted(
         ..ConvertSettings::default()
     };
     let tailoring = Tailoring { settings, by_band: arguments.modes.is_none() };
-    let conversion = tailoring.convert(&model, scene, Resume::default(), watch)?;
-    diagnostics.extend(conversion.diagnostics);
-    Ok((conversion.body, diagnostics))
+    let Enriched { made, rounds } = tailoring
+        .convert(&model, scene, Resume::default(), watch)
+        .map_err(|error| error.in_file(&arguments.scene))?;
+    diagnostics.extend(made.diagnostics);
+    Ok((made.body, rounds, diagnostics))
 }
 
 fn refuse_modes(arguments: &SelectArguments) -> Result<()> {

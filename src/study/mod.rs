@@ -2,6 +2,7 @@
 
 #[cfg(feature = "hdf5")]
 pub(crate) mod checkpoint;
+pub mod reference;
 pub mod selection;
 pub mod tailoring;
 #[cfg(feature = "hdf5")]

@@ -4,13 +4,15 @@ use crate::base::diagnostic::Code;
 use crate::base::error::Result;
 use crate::base::progress::Watch;
 use crate::body::basis::{Loads, UserLoads};
-use crate::body::convert::{Conversion, ConvertSettings, ModalModel};
+use crate::body::convert::{Condensation, Conversion, ConvertSettings, ModalModel};
 use crate::body::flex_body::FlexBody;
 use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
 use crate::motion::scene::Scene;
-use crate::numerics::eigen::{Resume, Wanted};
-use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
+use crate::numerics::eigen::{Accuracy, Resume, Wanted};
+use crate::study::reference::{Enriched, enrich};
+use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_from};
+use faer::Mat;
 
 /// Settings of a conversion for a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,21 +24,49 @@ pub struct Tailoring {
 }
 
 impl Tailoring {
-    /// A body with everything that `scene` may need.
+    /// A body with everything that `scene` may need, enriched until what it lacks of the model no longer counts there.
     ///
     /// # Errors
-    /// As [`convert`](crate::body::convert::convert).
+    /// As [`convert`](crate::body::convert::convert) and [`enrich`].
     pub fn convert(
         &self,
         model: &FeModel,
         scene: &Scene,
         resume: Resume<'_>,
         watch: Watch<'_>,
-    ) -> Result<Conversion> {
-        let band_settings = self.settings_of_band(scene);
-        let modal = self.find_modes(band_settings.as_ref(), model, resume, watch)?;
-        let condensed = modal.condense();
-        modal.finish(condensed, watch)
+    ) -> Result<Enriched<Conversion>> {
+        self.enriched(model, scene, resume, watch, |modal| Ok(modal.condense()))
+    }
+
+    /// Conversions by `condense`, each with more static responses than the one before, until the body lacks nothing that counts.
+    fn enriched(
+        &self,
+        model: &FeModel,
+        scene: &Scene,
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+        condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
+    ) -> Result<Enriched<Conversion>> {
+        let make = |loads: &Mat<f64>| {
+            let own = self.with_motion(loads);
+            let band_settings = own.settings_of_band(scene);
+            // A search that was interrupted is that of the free modes, which come first.
+            let resume = if loads.ncols() == 0 { resume } else { Resume::default() };
+            let modal = own.find_modes(band_settings.as_ref(), model, resume, watch)?;
+            let condensed = condense(&modal)?;
+            modal.finish(condensed, watch)
+        };
+        let Self { settings, .. } = self;
+        let grows = settings.modes.accuracy != Accuracy::Certified
+            && settings.basis.with_motion(&Mat::new()).is_some();
+        enrich(model, scene, settings.modes.memory, grows, watch, make, |made| &made.body)
+    }
+
+    /// The same with the static responses to `loads` in the basis.
+    fn with_motion(&self, loads: &Mat<f64>) -> Self {
+        let mut own = self.clone();
+        own.settings.basis = self.settings.basis.with_motion(loads).unwrap_or(own.settings.basis);
+        own
     }
 
     /// The settings with the modes that the band of `scene` wants.
@@ -96,7 +126,7 @@ pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
 /// decided about the converted body. The scene becomes one of its sources.
 ///
 /// # Errors
-/// As [`convert`](crate::body::convert::convert) and [`select`].
+/// As [`convert`](crate::body::convert::convert), [`enrich`] and [`select_from`].
 pub fn convert_for_scene(
     model: &FeModel,
     tailoring: &Tailoring,
@@ -105,14 +135,14 @@ pub fn convert_for_scene(
     watch: Watch<'_>,
 ) -> Result<(Conversion, Selection)> {
     let memory = tailoring.settings.modes.memory;
-    let band_settings = tailoring.settings_of_band(scene);
-    let modal = tailoring.find_modes(band_settings.as_ref(), model, resume, watch)?;
-    // Rigid motion alone is multiplied by M before the scene has said which groups it may need.
-    let linear = modal.condense_linear();
-    let terms = rule_out(&modal.body(&linear)?, scene, memory)?;
-    let condensed = modal.condense_kept(linear, terms);
-    let mut conversion = modal.finish(condensed, watch)?;
-    let selection = select(&conversion.body, scene, memory, watch)?;
+    let enriched = tailoring.enriched(model, scene, resume, watch, |modal| {
+        // Rigid motion alone is multiplied by M before the scene has said which groups it may need.
+        let linear = modal.condense_linear();
+        let terms = rule_out(&modal.body(&linear)?, scene, memory)?;
+        Ok(modal.condense_kept(linear, terms))
+    })?;
+    let Enriched { made: mut conversion, rounds } = enriched;
+    let selection = select_from(&conversion.body, &rounds, scene, memory, watch)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
     let mut parts = reduced.into_parts();
     parts.source.files.extend(scene.source.clone());

@@ -4,6 +4,7 @@
 mod support;
 
 mod output_errors;
+mod reference;
 mod select_command;
 mod selection_bounds;
 mod selection_verdicts;

@@ -2,6 +2,7 @@
 
 use super::{Basis, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
 use crate::base::provenance::SourceFile;
+use faer::Mat;
 
 /// Which basis a body gets: every implementation of [`Basis`] has a variant here.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +41,21 @@ impl BasisChoice {
             Self::CraigBampton(fixed) => fixed,
             Self::CraigChang(free) => free,
         }
+    }
+
+    /// The same basis with the static responses to what a motion leaves unbalanced at the nodes (N x m) beside its modes; `None` for a basis
+    /// that takes none.
+    pub fn with_motion(&self, loads: &Mat<f64>) -> Option<Self> {
+        let mut own = self.clone();
+        let residual_vectors = match &mut own {
+            Self::Free(FreeSurface { residual_vectors })
+            | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
+            Self::Imported(_) | Self::CraigBampton(_) => return None,
+        };
+        if loads.ncols() > 0 {
+            residual_vectors.push(Loads::Motion(loads.clone()));
+        }
+        Some(own)
     }
 
     /// Loads, named by the user, whose static responses join the modes.

@@ -26,4 +26,4 @@ pub use free_surface::{FreeSurface, free_surface, free_surface_of, free_surface_
 pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
-pub use residual_vectors::{Loads, UserLoads};
+pub use residual_vectors::{Loads, UserLoads, free_static_responses, interface_loads};

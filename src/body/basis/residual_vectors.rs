@@ -3,17 +3,18 @@
 use super::columns::columns;
 use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
-use super::modal_basis::ModalBasis;
+use super::modal_basis::{ModalBasis, problem_of_span};
 use super::pseudo_free_surface::independent;
+use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
-use crate::model::{FeModel, RawShapes, centre_and_length};
+use crate::model::{Coupling, FeModel, RawShapes, centre_and_length};
 use crate::numerics::eigen::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, Wanted, modes_of_span,
-    static_responses,
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Resume,
+    Wanted, modes_of_span, static_responses,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
 use faer::{Mat, MatRef};
@@ -23,6 +24,37 @@ const LEFT: f64 = 1e-8;
 
 /// Part of a load that must be left without its resultants: what moves the body only as a whole needs no mode.
 const SELF_EQUILIBRATED: f64 = 1e-10;
+
+/// K^+ f of every column of `loads` (N x m), which are made self-equilibrated by inertia relief; to some digits, for estimates.
+///
+/// * `first`: about the first flexible eigenvalue.
+///
+/// # Errors
+/// Failures of the factorisation, and responses that are not accurate: exit code 3.
+pub fn free_static_responses(model: &FeModel, loads: Mat<f64>, first: f64) -> Result<Mat<f64>> {
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+    let none = Mat::zeros(loads.nrows(), 0);
+    let (precision, accuracy) = (Precision::Double, ResponseAccuracy::ROUGH);
+    static_responses(&problem, none.as_ref(), loads, first, precision, accuracy, &mut Counters::default())
+        .map_err(|failure| explain(model, failure))
+}
+
+/// Nodal forces (N x 6, in the plane N x 3) of unit forces and unit torques along the model axes at the reference point of the interface
+/// `name`; which are also the weights that take the motion of that point from the displacements. `None` where the model has no such
+/// interface, or it has no reference point.
+///
+/// # Errors
+/// [`InterfaceNode`](Code::InterfaceNode).
+pub fn interface_loads(model: &FeModel, name: &str) -> Result<Option<Mat<f64>>> {
+    let joints = coupled_interfaces(model, "interface loads")?;
+    let joint = joints.iter().find(|joint| joint.name == name && joint.coupling != Coupling::Free);
+    Ok(joint.map(|joint| {
+        let mut loads = Mat::zeros(model.pencil().n(), joint.loads.len());
+        joint.scatter(joint.measure(), &mut loads, 0);
+        loads
+    }))
+}
 
 /// Loads whose static responses are to be in the basis.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +69,8 @@ pub enum Loads {
     Interfaces,
     /// Nodal forces.
     User(UserLoads),
+    /// What a motion leaves unbalanced at the nodes (N x m): the loads that a body lacks the responses to.
+    Motion(Mat<f64>),
 }
 
 /// Nodal forces in the order of a model's degrees of freedom, one load in each column.
@@ -64,6 +98,7 @@ impl Loads {
             Self::Centrifugal => "centrifugal",
             Self::Interfaces => "interfaces",
             Self::User(_) => "loads",
+            Self::Motion(_) => "motion",
         }
     }
 
@@ -80,11 +115,16 @@ impl Loads {
         match self {
             Self::Centrifugal => Ok(centrifugal(problem, model)),
             Self::Interfaces => interfaces(model),
-            Self::User(UserLoads { loads, .. }) => Ok((0..loads.ncols())
-                .map(|j| (format!("load {}", j + 1), loads.as_ref().subcols(j, 1).to_owned()))
-                .collect()),
+            Self::User(UserLoads { loads, .. }) => Ok(numbered("load", loads)),
+            Self::Motion(loads) => Ok(numbered("motion", loads)),
         }
     }
+}
+
+/// The columns of `loads`, each with its number as its name.
+fn numbered(what: &str, loads: &Mat<f64>) -> Vec<(String, Mat<f64>)> {
+    let one = |j: usize| (format!("{what} {}", j + 1), loads.as_ref().subcols(j, 1).to_owned());
+    (0..loads.ncols()).map(one).collect()
 }
 
 fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
@@ -240,7 +280,8 @@ impl<'a> Responses<'a> {
         let (pencil, forces) = (&problem.pencil, &loads.forces);
         let (modes, lambda) = (free.vectors.as_ref(), &free.eigenvalues);
         let precision = free.plan.map_or(Precision::Double, |plan| plan.precision);
-        let beside = static_responses(problem, modes, forces.clone(), lambda[0], precision, counters)?;
+        let full = ResponseAccuracy::FULL;
+        let beside = static_responses(problem, modes, forces.clone(), lambda[0], precision, full, counters)?;
         // K^+ f = Psi Lambda^-1 Psi'f + what the modes do not have.
         let modal = gram(modes, forces.as_ref());
         let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);

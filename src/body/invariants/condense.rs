@@ -92,7 +92,7 @@ impl NodalMass for [f64] {
 /// let mass = SymmetricMatrix::new(CscMatrix::from_triplets(2, 2, &entries)).expect("symmetric");
 /// let shapes = mat![[-1.0], [0.0], [0.0], [1.0], [0.0], [0.0f64]];
 /// let body = condense(&mass, &[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], shapes.as_ref(), Mat::zeros(1, 1));
-/// assert_eq!((body.mass, body.inertia()[(2, 2)]), (6.0, 2.0)); // m l^2 / 12
+/// assert_eq!((body.mass(), body.inertia()[(2, 2)]), (6.0, 2.0)); // m l^2 / 12
 /// assert_eq!(body.w1().map(|w1| w1[(2, 2)]), Some(4.0)); // I_zz(q) = 2 (1 + q)^2 = 2 + 4 q + 2 q^2
 /// ```
 ///

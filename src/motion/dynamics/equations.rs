@@ -152,7 +152,7 @@ impl EquationsOfMotion {
     }
 
     /// V, omega and the modes of a vector in the order of nu.
-    pub(super) fn split<'v>(&self, nu: &'v [f64]) -> (Vector3<f64>, Vector3<f64>, &'v [f64]) {
+    pub(crate) fn split<'v>(&self, nu: &'v [f64]) -> (Vector3<f64>, Vector3<f64>, &'v [f64]) {
         assert_eq!(nu.len(), self.n_velocities(), "one entry per rigid motion and mode");
         let (rigid, modal) = nu.split_at(self.rigid.len());
         let mut both = [Vector3::zeros(); 2];

@@ -227,6 +227,21 @@ impl<'a> Motion<'a> {
         })
     }
 
+    /// nu' at a state, in the order of [`EquationsOfMotion`]: V' and omega' are the rates of the components in body axes.
+    ///
+    /// # Errors
+    /// As [`Motion::evaluate`].
+    pub fn accelerations(&mut self, time: f64, state: &[f64]) -> Result<&[f64], Failure> {
+        let (place, rates) = self.go_to(time, state)?;
+        self.apply(time, &place, &rates)?;
+        if rates == Prescribed::NOTHING {
+            self.evaluation
+                .accelerations(&self.forces, &mut self.rates)
+                .map_err(|_| not_positive_definite())?;
+        }
+        Ok(&self.rates)
+    }
+
     fn layout(&self) -> Layout {
         Layout(self.evaluation.equations().n_modes())
     }

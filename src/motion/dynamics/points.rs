@@ -204,9 +204,17 @@ impl BodyPoint {
     /// # Panics
     /// When `forces` has another length, or the point has no orientation.
     pub fn add_torque(&self, evaluation: &Evaluation<'_>, torque: &Vector3<f64>, forces: &mut [f64]) {
-        let (rotation, turn) = self.orientation(evaluation);
+        let (rotation, _) = self.orientation(evaluation);
         let modal = evaluation.equations().add_rigid(Vector3::zeros(), *torque, forces);
-        rotation.add_work(&(turn.map() * torque), &evaluation.q, modal);
+        rotation.add_work(&self.turned_torque(evaluation, torque), &evaluation.q, modal);
+    }
+
+    /// G(theta) t: a torque t as it works on the rotation vector of the point.
+    ///
+    /// # Panics
+    /// When the point has no orientation.
+    pub fn turned_torque(&self, evaluation: &Evaluation<'_>, torque: &Vector3<f64>) -> Vector3<f64> {
+        self.orientation(evaluation).1.map() * torque
     }
 
     /// Adds the derivatives of [`BodyPoint::add_force`]: with r_j = dr/dq_j

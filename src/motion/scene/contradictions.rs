@@ -32,6 +32,9 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
         if !initial.contains_key("angular_velocity") {
             refuse("axes", Some("there is no `angular_velocity` along them"));
         }
+        if initial.contains_key("mode") {
+            refuse("deformation", Some("[[initial.mode]] says how the body starts"));
+        }
         twice(walk, initial.get("mode"), "mode", numbered);
     }
     let is_list = |table: &Table, key: &str| {

@@ -138,6 +138,8 @@ pub struct Initial {
     pub axes: Axes,
     /// Modes that are not at rest and undeformed.
     pub modes: Vec<ModeStart>,
+    /// Whether the deformation starts at rest in equilibrium with what acts at time zero, instead of with a shock.
+    pub settled: bool,
 }
 
 /// A mode at time zero.

@@ -19,7 +19,8 @@ use toml::de::DeValue;
 
 const TOP: &[&str] = &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch"];
 const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
-const INITIAL: &[&str] = &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode"];
+const INITIAL: &[&str] =
+    &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
 const MODE: &[&str] = &["number", "amplitude", "rate"];
 const LOAD: &[&str] = &["node", "interface", "force", "torque", "axes", "history"];
 const SPIN: &[&str] = &["axis", "axes", "rate", "hold"];
@@ -208,6 +209,10 @@ fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
         let (amplitude, rate) = (or_zero("amplitude"), or_zero("rate"));
         Some(ModeStart { mode: number?, amplitude: amplitude?, rate: rate? })
     });
+    let settled = match table.get("deformation") {
+        None => Some(false),
+        Some(value) => settled(walk, value),
+    };
     Some(Initial {
         origin: origin?,
         velocity: velocity?,
@@ -215,7 +220,21 @@ fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
         angular_velocity: angular_velocity?,
         axes: axes?,
         modes: modes?,
+        settled: settled?,
     })
+}
+
+/// Whether `deformation` is static.
+fn settled(walk: &mut Walk<'_>, value: &Value) -> Option<bool> {
+    let settled = match value.get_ref() {
+        DeValue::String(text) if text == "static" => Some(true),
+        DeValue::String(text) if text == "none" => Some(false),
+        _ => None,
+    };
+    if settled.is_none() {
+        walk.mistyped("deformation", value, "\"none\" or \"static\"");
+    }
+    settled
 }
 
 fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> {

@@ -159,21 +159,40 @@ fn leaving_the_plane(scene: &Scene) -> Vec<String> {
     checks.into_iter().filter(|(fits, _)| !fits).map(|(_, what)| what).collect()
 }
 
-impl Surroundings for SceneForces<'_> {
-    fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]) {
-        if let Some(gravity) = &self.gravity {
-            evaluation.add_gravity(&place.axes.tr_mul(gravity), forces);
-        }
-        for (point, load) in &self.loads {
+impl SceneForces<'_> {
+    /// Gravity along the axes of the body.
+    pub fn gravity(&self, place: &Place) -> Vector3<f64> {
+        self.gravity.map_or_else(Vector3::zeros, |gravity| place.axes.tr_mul(&gravity))
+    }
+
+    /// Force and torque of every load along the axes of the body, with the point where it acts.
+    pub fn acting(
+        &self,
+        time: f64,
+        place: &Place,
+    ) -> impl Iterator<Item = (&BodyPoint, Vector3<f64>, Vector3<f64>)> {
+        let axes = place.axes;
+        self.loads.iter().map(move |(point, load)| {
             let factor = load.history.at(time).0;
             let in_body = |v: &Vector3<f64>| match load.axes {
-                Axes::World => place.axes.tr_mul(v) * factor,
+                Axes::World => axes.tr_mul(v) * factor,
                 // The frame of the body is that of the scene.
                 Axes::Model | Axes::Body => v * factor,
             };
-            point.add_force(evaluation, &in_body(&load.force), forces);
-            if load.torque != Vector3::zeros() {
-                point.add_torque(evaluation, &in_body(&load.torque), forces);
+            (point, in_body(&load.force), in_body(&load.torque))
+        })
+    }
+}
+
+impl Surroundings for SceneForces<'_> {
+    fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]) {
+        if self.gravity.is_some() {
+            evaluation.add_gravity(&self.gravity(place), forces);
+        }
+        for (point, force, torque) in self.acting(time, place) {
+            point.add_force(evaluation, &force, forces);
+            if torque != Vector3::zeros() {
+                point.add_torque(evaluation, &torque, forces);
             }
         }
     }

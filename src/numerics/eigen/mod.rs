@@ -37,4 +37,4 @@ pub use settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wan
 pub use solution::{EigenSolution, EigenvalueBounds};
 pub use solve::solve;
 pub use span::modes_of_span;
-pub use static_response::{static_responses, static_responses_twice};
+pub use static_response::{ResponseAccuracy, static_responses, static_responses_twice};

@@ -15,14 +15,23 @@ use faer::{Mat, MatRef};
 /// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of six in each.
 const ITERATIONS: usize = 40;
 
-/// Energy norm of the error, relative to that of the start, at which a cycle ends: its floor in f64.
-const REACHED: f64 = 1e-14;
+/// How accurate responses are to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResponseAccuracy {
+    /// Cycles: each begins with the true residual, which the recurrence loses sight of.
+    cycles: usize,
+    /// Energy norm of the error, relative to that of the start, at which a cycle ends.
+    reached: f64,
+    /// Residual |f - K x| / |f| above which a response is no result, unless rounding explains it.
+    accepted: f64,
+}
 
-/// Cycles: each begins with the true residual, which the recurrence loses sight of.
-const CYCLES: usize = 3;
-
-/// Residual |f - K x| / |f| above which a response is no result, unless rounding explains it.
-const ACCEPTED: f64 = 1e-9;
+impl ResponseAccuracy {
+    /// To the floor of f64.
+    pub const FULL: Self = Self { cycles: 3, reached: 1e-14, accepted: 1e-9 };
+    /// Some digits, for estimates.
+    pub const ROUGH: Self = Self { cycles: 1, reached: 1e-5, accepted: 1e-2 };
+}
 
 /// For each load (column of `loads`, N x m) the part of K^+ f that `modes` do not have: with P = \[R, Psi\] of rigid modes and
 /// eigenvectors (`modes` M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are thereby self-equilibrated (inertia relief).
@@ -37,10 +46,11 @@ pub fn static_responses(
     loads: Mat<f64>,
     first: f64,
     precision: Precision,
+    accuracy: ResponseAccuracy,
     counters: &mut Counters,
 ) -> Result<Mat<f64>, EigenFailure> {
     let respond = |responses: &Responses<'_>, counters: &mut Counters| responses.of(loads, counters);
-    with_responses(problem, modes, first, precision, counters, respond)
+    with_responses(problem, modes, first, precision, accuracy, counters, respond)
 }
 
 /// The responses of a body that is held, K^-1 f, and with the same factor those to further loads that these responses tell.
@@ -61,7 +71,7 @@ pub fn static_responses_twice(
         let loads = further(&x);
         Ok([x, responses.of(loads, counters)?])
     };
-    with_responses(problem, none.as_ref(), first, precision, counters, respond)
+    with_responses(problem, none.as_ref(), first, precision, ResponseAccuracy::FULL, counters, respond)
 }
 
 fn with_responses<T>(
@@ -69,6 +79,7 @@ fn with_responses<T>(
     modes: MatRef<'_, f64>,
     first: f64,
     precision: Precision,
+    accuracy: ResponseAccuracy,
     counters: &mut Counters,
     respond: impl FnOnce(&Responses<'_>, &mut Counters) -> Result<T, EigenFailure>,
 ) -> Result<T, EigenFailure> {
@@ -79,11 +90,11 @@ fn with_responses<T>(
     match precision {
         Precision::Double => {
             let factor: Cholesky<'_, f64> = factorise(problem, &analysis, tau, counters)?;
-            respond(&Responses::new(&problem.pencil, &known, &factor), counters)
+            respond(&Responses::new(&problem.pencil, &known, &factor, accuracy), counters)
         }
         Precision::Single => {
             let factor: Cholesky<'_, f32> = factorise(problem, &analysis, tau, counters)?;
-            respond(&Responses::new(&problem.pencil, &known, &factor), counters)
+            respond(&Responses::new(&problem.pencil, &known, &factor, accuracy), counters)
         }
     }
 }
@@ -94,11 +105,17 @@ struct Responses<'a> {
     known: &'a Mat<f64>,
     products: Mat<f64>,
     factor: &'a dyn Solve,
+    accuracy: ResponseAccuracy,
 }
 
 impl<'a> Responses<'a> {
-    fn new(pencil: &'a Pencil<'a>, known: &'a Mat<f64>, factor: &'a dyn Solve) -> Self {
-        Self { pencil, known, products: pencil.apply_mass(known.as_ref()), factor }
+    fn new(
+        pencil: &'a Pencil<'a>,
+        known: &'a Mat<f64>,
+        factor: &'a dyn Solve,
+        accuracy: ResponseAccuracy,
+    ) -> Self {
+        Self { pencil, known, products: pencil.apply_mass(known.as_ref()), factor, accuracy }
     }
 
     /// X <- (I - P P'M) X.
@@ -119,7 +136,7 @@ impl<'a> Responses<'a> {
         self.equilibrate(&mut loads);
         let mut x = Mat::zeros(loads.nrows(), loads.ncols());
         let mut residual = loads.clone();
-        for _ in 0..CYCLES {
+        for _ in 0..self.accuracy.cycles {
             x += self.cycle(residual, counters);
             self.deflate(&mut x);
             counters.stiffness_columns += x.ncols() as u64;
@@ -129,7 +146,7 @@ impl<'a> Responses<'a> {
         let rounding = rounding_residual(self.pencil.stiffness(), x.as_ref());
         for (j, rounding) in rounding.iter().enumerate() {
             let (left, load) = (residual.col(j).norm_l2(), loads.col(j).norm_l2());
-            if left.is_nan() || left > (ACCEPTED * load).max(30.0 * rounding) {
+            if left.is_nan() || left > (self.accuracy.accepted * load).max(30.0 * rounding) {
                 return Err(EigenFailure::Inaccurate { residual: left / load });
             }
         }
@@ -151,7 +168,7 @@ impl<'a> Responses<'a> {
         let start = column_products(residual.as_ref(), direction.as_ref());
         let mut energy = start.clone();
         for _ in 0..ITERATIONS {
-            if energy.iter().zip(&start).all(|(e, s)| *e <= REACHED * REACHED * s) {
+            if energy.iter().zip(&start).all(|(e, s)| *e <= self.accuracy.reached.powi(2) * s) {
                 break;
             }
             counters.stiffness_columns += columns as u64;

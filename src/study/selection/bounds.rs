@@ -59,6 +59,8 @@ pub struct Driven {
     pub loads: Vec<ModalLoad>,
     /// Modes at the start.
     pub start: Start,
+    /// Whether the deformation starts in equilibrium with the loads.
+    pub settled: bool,
     /// |D|.
     pub damping: f64,
 }
@@ -110,11 +112,14 @@ struct Operator {
     coupling: f64,
     first: f64,
     rotation: Rotation,
+    /// Whether responses start in equilibrium with the load.
+    settled: bool,
 }
 
 impl Operator {
     /// `None` where the spin takes all stiffness of some motion.
-    fn new(kept: Groups, norms: &Norms, rotation: &Rotation) -> Option<Self> {
+    fn new(kept: Groups, norms: &Norms, driven: &Driven) -> Option<Self> {
+        let rotation = &driven.rotation;
         let softening = if kept.w2 { norms.softening } else { 0.0 };
         let coupling = if kept.w3 { norms.coupling } else { 0.0 };
         let margin = 1.0 - rotation.largest.powi(2) * softening;
@@ -123,10 +128,12 @@ impl Operator {
         }
         let growth = coupling / (margin.sqrt() * norms.first) + rotation.largest * softening / margin;
         let growth = (rotation.variation * growth).exp();
-        Some(Self { margin, growth, softening, coupling, first: norms.first, rotation: *rotation })
+        let settled = driven.settled;
+        Some(Self { margin, growth, softening, coupling, first: norms.first, rotation: *rotation, settled })
     }
 
-    /// sqrt(2 H) of the response to a load, from rest without deformation.
+    /// sqrt(2 H) of the response to a load, from rest without deformation; or from its static response, about which it then moves by what is
+    /// not more, but of which an impulse says nothing.
     fn response(&self, load: &LoadSizes) -> f64 {
         let (m, r) = (self.margin, &self.rotation);
         let impulse = product(self.growth, load.impulse);
@@ -134,7 +141,7 @@ impl Operator {
         let moved = load.moved + 2.0 * r.largest * r.variation * self.softening * load.largest / m;
         let turned = r.variation * self.coupling * load.largest / (m * self.first);
         let varied = product(self.growth, (load.begun + moved) / m.sqrt() + turned) + load.largest / m.sqrt();
-        impulse.min(varied)
+        if self.settled { varied } else { impulse.min(varied) }
     }
 }
 
@@ -147,7 +154,7 @@ impl Driven {
 
     /// Bounds of the motion of the body with the groups that are kept. `None` where the spin takes all stiffness of some motion.
     pub fn amplitude(&self, kept: Groups, norms: &Norms) -> Option<Amplitude> {
-        let operator = Operator::new(kept, norms, &self.rotation)?;
+        let operator = Operator::new(kept, norms, self)?;
         let mut loads = self.loads.clone();
         if kept.w1 {
             loads.push(self.centrifugal(norms));
@@ -222,7 +229,7 @@ impl Driven {
     /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads. `None` where the spin may take
     /// all stiffness of some motion.
     pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<ErrorBound> {
-        let operator = Operator::new(Groups::ALL, norms, &self.rotation)?;
+        let operator = Operator::new(Groups::ALL, norms, self)?;
         let r = &self.rotation;
         let energy: f64 = residual.iter().map(|load| operator.response(load)).sum();
         let root = operator.margin.sqrt();

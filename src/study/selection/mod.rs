@@ -20,7 +20,7 @@ pub use basis::{BEYOND_BAND, WantedResponses, largest_eigenvalue};
 pub use bounds::{Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Start, TorqueDefect};
 pub use norms::Norms;
 pub use participation::{Participation, participations};
-pub use select::{Selection, rule_out, select};
+pub use select::{Selection, rule_out, select, select_from};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};

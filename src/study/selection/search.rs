@@ -32,17 +32,20 @@ pub(super) struct Search<'s> {
     pub cases: &'s [(TrialRuns<'s>, Measure<'s>)],
     /// Whether terms were dropped by bounds already.
     pub by_bounds: bool,
+    /// Part of the tolerances that the whole body lacks of the model.
+    pub reserved: f64,
 }
 
 impl Search<'_> {
-    /// What bounds leave of the tolerances.
+    /// What the body itself and bounds leave of the tolerances.
     pub fn budget(&self) -> f64 {
+        let left = (1.0 - self.reserved).max(0.0);
         if !self.by_bounds {
-            return 1.0;
+            return left;
         }
         // What is measured is relative to a motion that may be larger than that of the whole body by as much as bounds allow.
         let Tolerance { deflection, stress, reaction, .. } = self.cases[0].0.scene.requirements.tolerance;
-        (1.0 - PART_OF_BOUNDS) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
+        (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
     }
 
     fn body(&self) -> &FlexBody {

@@ -9,11 +9,15 @@ use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
 use super::trial::{ModeShare, Trial, multiplications};
 use super::warnings::{growth_of, phase_drifts, resonances};
-use crate::base::diagnostic::Diagnostic;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::{FlexBody, Groups, TermDecision};
 use crate::motion::scene::{Measure, Scene, Stage, Trace, damped, points_of};
+use crate::study::reference::{PART_OF_REFERENCE, ReferenceError};
+
+/// Part of the tolerances that a body may lack of the model and still be a reference: trials get the rest.
+const MOST_RESERVED: f64 = 0.5;
 
 /// What was decided, and on what grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,16 +56,21 @@ pub struct Selection {
     pub guideline: &'static str,
     /// The cost that the scene allows, where that decides.
     pub most_multiplications: Option<usize>,
+    /// What the body, and those before it that were enriched, lack of the model, the last one the body itself; empty where only a file is at
+    /// hand, or nothing can be estimated.
+    pub lacks: Vec<ReferenceError>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Selection {
-    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured.
+    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured, against a body that lacks no more than
+    /// half of them itself.
     pub fn holds(&self) -> bool {
+        let is_reference = self.lacks.last().is_none_or(|own| own.worst <= MOST_RESERVED);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
             Some(most) => chosen.multiplications <= most,
-            None => chosen.passed(),
+            None => chosen.passed() && is_reference,
         })
     }
 }
@@ -95,6 +104,20 @@ pub fn rule_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<V
 /// # Errors
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
 pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<'_>) -> Result<Selection> {
+    select_from(body, &[], scene, memory, watch)
+}
+
+/// The same where it is known what `body`, and those before it, lack of the model in this scene: what is left of the tolerances.
+///
+/// # Errors
+/// As [`select`].
+pub fn select_from(
+    body: &FlexBody,
+    lacks: &[ReferenceError],
+    scene: &Scene,
+    memory: Option<u64>,
+    watch: Watch<'_>,
+) -> Result<Selection> {
     let stage = Stage::new(body, scene)?;
     let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
     let (loads, _) = points_of(body, scene)?;
@@ -105,6 +128,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
 
     watch(Event::Phase("bounds"));
     let mut deciding = Deciding::new(body, scene, &cases, stage.found.clone())?;
+    deciding.lacks(lacks);
     let mode_reason = match scene.run.duration {
         None => deciding.choose_by_band(),
         Some(_) => deciding.choose_by_motion(&situation.spin, watch)?,
@@ -129,6 +153,7 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
         chosen: choice.chosen,
         most_multiplications: scene.requirements.multiplications,
         trials,
+        lacks: lacks.to_vec(),
         diagnostics: once(diagnostics),
     })
 }
@@ -142,6 +167,8 @@ struct Deciding<'s> {
     by_bounds: Option<Groups>,
     choice: Choice,
     trials: Vec<Trial>,
+    /// Part of the tolerances that the body itself lacks of the model.
+    reserved: f64,
     /// The largest rotation of the runs and that which the scene allows, where the runs stay behind it.
     short_of: Option<(f64, f64)>,
     diagnostics: Vec<Diagnostic>,
@@ -164,7 +191,29 @@ impl<'s> Deciding<'s> {
             shares: Vec::new(),
             chosen: None,
         };
-        Ok(Self { body, scene, cases, by_bounds, choice, trials, short_of: None, diagnostics })
+        Ok(Self { body, scene, cases, by_bounds, choice, trials, reserved: 0.0, short_of: None, diagnostics })
+    }
+
+    /// Reserves what the body lacks of the model.
+    fn lacks(&mut self, rounds: &[ReferenceError]) {
+        let Some(own) = rounds.last() else { return };
+        self.reserved = if own.worst <= MOST_RESERVED { own.worst } else { 0.0 };
+        if own.worst <= PART_OF_REFERENCE {
+            return;
+        }
+        let message = format!(
+            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.3e}",
+            own.modes,
+            100.0 * own.worst,
+            own.time
+        );
+        let mut warning = Diagnostic::new(Code::ReferenceLacks, message);
+        if own.time == 0.0 && !self.scene.initial.settled {
+            warning = warning.with_help(
+                "what acts at time 0 begins with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
+            );
+        }
+        self.diagnostics.push(warning);
     }
 
     /// Chooses the modes of the band of the scene, all without one; gives the reason.
@@ -202,7 +251,8 @@ impl<'s> Deciding<'s> {
             self.short_of = Some((largest, spin.value));
         }
         watch(Event::Phase("trials"));
-        let search = Search { cases: &measured, by_bounds: self.by_bounds.is_some() };
+        let search =
+            Search { cases: &measured, by_bounds: self.by_bounds.is_some(), reserved: self.reserved };
         let reason = self.search(&search)?;
         self.measure_choice(&search)?;
         Ok(reason)

@@ -219,6 +219,7 @@ fn driven(
     let damping = damping_norm(body, &root);
     Ok(Driven {
         loads: modal_loads(body, scene, points, &rotation, &root),
+        settled: scene.initial.settled,
         start: start_of_modes(scene, damping, &root),
         rotation,
         damping,

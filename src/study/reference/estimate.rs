@@ -1,0 +1,251 @@
+//! What a body lacks of the model that it was made of, estimated along its motion in a scene.
+
+use super::compressed::{Compressed, principal};
+use super::residual::NodalView;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::body::basis::{free_static_responses, interface_loads};
+use crate::body::flex_body::FlexBody;
+use crate::model::FeModel;
+use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, instants, trace};
+use crate::numerics::linalg::{combine, gram, larger, multiply, subtract_combination};
+use faer::{Mat, MatRef};
+
+/// Instants that the motion is looked at.
+const INSTANTS: usize = 120;
+
+/// The elastic energy of what the body lacks, after so many responses of the motion joined it, is below this part of what is allowed.
+const PART_OF_RESPONSES: f64 = 0.1;
+
+/// Responses that may join the body at once.
+const MOST_RESPONSES: usize = 12;
+
+/// What a body lacks of the model that it was made of, in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceError {
+    /// Number of modes of the body.
+    pub modes: usize,
+    /// Its errors against the motion of all nodes, estimated: the static responses to what the equations of all nodes leave unbalanced along its
+    /// motion. Nothing is estimated of attitude and reaction.
+    pub errors: OutputErrors,
+    /// The larger of both over its tolerance.
+    pub worst: f64,
+    /// When the estimate of the elastic energy is largest.
+    pub time: f64,
+}
+
+/// An estimate, and what would improve the body.
+pub(super) struct Estimate {
+    pub error: ReferenceError,
+    /// Nodal forces (N x k) whose static responses the body lacks most, so many as it takes to come within what is allowed.
+    pub missing: Mat<f64>,
+}
+
+impl Estimate {
+    /// Estimates what `body`, made of `model`, lacks in `scene`. `allowed` is the part of the tolerances that it may lack. `None` where nothing
+    /// can be said: for a scene without a duration, and a body that is carried.
+    ///
+    /// # Errors
+    /// Those of [`trace`] and [`free_static_responses`].
+    pub fn new(
+        model: &FeModel,
+        body: &FlexBody,
+        scene: &Scene,
+        allowed: f64,
+        memory: Option<u64>,
+    ) -> Result<Option<Self>> {
+        let Some(duration) = scene.run.duration.filter(|_| scene.carried.is_none()) else { return Ok(None) };
+        let stage = Stage::new(body, scene)?;
+        let (body, scene) = (&*stage.body, &*stage.scene);
+        let at = |point: &Point| point_loads(model, point);
+        let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
+        let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
+        let Some(view) = NodalView::new(model, body, loads) else { return Ok(None) };
+        let (motion, _) = trace(body, scene, memory, |_| ())?;
+        let times: Vec<f64> = (0..=INSTANTS).map(|i| duration * (i as f64 / INSTANTS as f64)).collect();
+        let mut same_steps = scene.clone();
+        same_steps.run.scheme = motion.scheme;
+        let residual = view.residual(&instants(body, &same_steps, &times)?);
+        let missed = Missed::new(&view, body, residual)?;
+        let errors = missed.errors(&view, body, &motion, &watched, &times);
+        let tolerance = &scene.requirements.tolerance;
+        let error = ReferenceError {
+            modes: body.n_modes(),
+            worst: errors.worst(tolerance),
+            time: times[missed.instant()],
+            errors,
+        };
+        let enough = PART_OF_RESPONSES * allowed * tolerance.stress.min(tolerance.deflection);
+        let missing = missed.dominant(enough * energy_scale(&motion));
+        Ok(Some(Self { error, missing }))
+    }
+}
+
+/// Nodal forces of unit forces and torques at a point.
+fn point_loads(model: &FeModel, point: &Point) -> Result<Mat<f64>> {
+    let (d, n) = (model.dimension(), model.rows().len());
+    let found = match point {
+        Point::Interface(name) => interface_loads(model, name)?,
+        Point::Node(number) => model.nodes().ids.iter().position(|id| id == number).map(|node| {
+            let rigid = if d == 2 { 3 } else { 6 };
+            let mut loads = Mat::zeros(n, rigid);
+            (0..d).for_each(|k| loads[(d * node + k, k)] = 1.0);
+            let first = model.rows().displacements();
+            for (row, &(of, axis)) in (first..).zip(model.rows().rotations()) {
+                if of as usize == node {
+                    loads[(row, if d == 2 { 2 } else { d + usize::from(axis) })] = 1.0;
+                }
+            }
+            loads
+        }),
+    };
+    found.ok_or_else(|| Diagnostic::new(Code::SceneBody, format!("the model has no {point}")).into())
+}
+
+/// Root of the largest elastic energy of a motion, or the least that counts.
+fn energy_scale(motion: &Trace) -> f64 {
+    let roots = motion.elastic.iter().map(|energy| energy.max(0.0).sqrt());
+    Peak::of(&motion.time, roots).value.max(motion.resolution.root_energy)
+}
+
+/// The static responses E c(t) that a body lacks.
+struct Missed {
+    /// Compressed residual.
+    forces: Compressed,
+    /// E = K^+ B (N x k), beside the modes.
+    responses: Mat<f64>,
+    /// E'K E.
+    energy: Mat<f64>,
+}
+
+impl Missed {
+    fn new(view: &NodalView<'_>, body: &FlexBody, residual: Mat<f64>) -> Result<Self> {
+        let model = view.model;
+        let nothing = || Compressed {
+            basis: Mat::zeros(residual.nrows(), 0),
+            amplitudes: Mat::zeros(0, residual.ncols()),
+        };
+        let forces = Compressed::new(model, &residual).unwrap_or_else(nothing);
+        if forces.basis.ncols() == 0 {
+            return Ok(Self { responses: forces.basis.clone(), energy: Mat::zeros(0, 0), forces });
+        }
+        let mut responses = free_static_responses(model, forces.basis.clone(), body.modes().eigenvalue[0])?;
+        // The part in the modes is that of rounding.
+        let weighted = strained(model, view.vectors.as_ref());
+        let shared = gram(weighted.as_ref(), responses.as_ref());
+        let amplitudes =
+            Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / body.modes().eigenvalue[p]);
+        subtract_combination(responses.as_mut(), view.vectors.as_ref(), amplitudes.as_ref());
+        let energy = gram(responses.as_ref(), strained(model, responses.as_ref()).as_ref());
+        let energy =
+            Mat::from_fn(energy.nrows(), energy.ncols(), |i, j| 0.5 * (energy[(i, j)] + energy[(j, i)]));
+        Ok(Self { forces, responses, energy })
+    }
+
+    /// The root of the elastic energy of what is missed, at every instant.
+    fn root_energies(&self) -> Vec<f64> {
+        let c = &self.forces.amplitudes;
+        let product = combine(self.energy.as_ref(), c.as_ref());
+        let square = |i: usize| (0..c.nrows()).map(|k| c[(k, i)] * product[(k, i)]).sum::<f64>();
+        (0..c.ncols()).map(|i| (0.5 * square(i).max(0.0)).sqrt()).collect()
+    }
+
+    /// The instant at which that is largest.
+    fn instant(&self) -> usize {
+        let energies = self.root_energies();
+        (0..energies.len()).fold(0, |at, i| if energies[i] > energies[at] { i } else { at })
+    }
+
+    /// Errors relative to the motion of the body.
+    fn errors(
+        &self,
+        view: &NodalView<'_>,
+        body: &FlexBody,
+        motion: &Trace,
+        watched: &[Mat<f64>],
+        times: &[f64],
+    ) -> OutputErrors {
+        let c = &self.forces.amplitudes;
+        let stress = Peak::of(times, self.root_energies().into_iter()).value / energy_scale(motion);
+        let moved = match watched {
+            [] => longest_of_nodes(view.model, &combine(self.responses.as_ref(), c.as_ref())),
+            points => longest_of_points(view.model, points, self.responses.as_ref(), c.as_ref()),
+        };
+        let largest = match motion.deflections.is_empty() {
+            true => motion.extremes.deflection.value * body.extent(),
+            false => {
+                let norms =
+                    |path: &Vec<_>| Peak::of(&motion.time, path.iter().map(nalgebra::Vector3::norm)).value;
+                motion.deflections.iter().map(norms).fold(0.0, larger)
+            }
+        };
+        let scale = largest.max(motion.resolution.deflection);
+        OutputErrors {
+            attitude: 0.0,
+            deflection: (scale > 0.0).then(|| Peak::of(times, moved.into_iter()).value / scale),
+            stress: Some(stress),
+            reaction: None,
+        }
+    }
+
+    /// The fewest forces B y (N x p) whose responses leave, at every instant, no more than `enough` of the root of the elastic energy.
+    fn dominant(&self, enough: f64) -> Mat<f64> {
+        let none = || Mat::zeros(self.forces.basis.nrows(), 0);
+        let Some((turned, roots)) = principal(self.energy.clone(), 0.0, usize::MAX) else { return none() };
+        // z = T'c with E'K E = T T': the elastic energy is |z|^2 / 2.
+        let z = |k: usize, i: usize| -> f64 {
+            roots[k]
+                * (0..turned.nrows())
+                    .map(|row| turned[(row, k)] * self.forces.amplitudes[(row, i)])
+                    .sum::<f64>()
+        };
+        let z = Mat::from_fn(roots.len(), self.forces.amplitudes.ncols(), z);
+        let covariance = combine(z.as_ref(), z.transpose().to_owned().as_ref());
+        let Some((directions, _)) = principal(covariance, 0.0, MOST_RESPONSES) else { return none() };
+        let along = gram(directions.as_ref(), z.as_ref());
+        let left = |count: usize, i: usize| -> f64 {
+            let whole: f64 = (0..z.nrows()).map(|k| z[(k, i)].powi(2)).sum();
+            let taken: f64 = (0..count).map(|k| along[(k, i)].powi(2)).sum();
+            (0.5 * (whole - taken).max(0.0)).sqrt()
+        };
+        let worst = |count: &usize| (0..z.ncols()).map(|i| left(*count, i)).fold(0.0, larger);
+        let count =
+            (0..directions.ncols()).find(|count| worst(count) <= enough).unwrap_or(directions.ncols());
+        let y = Mat::from_fn(turned.nrows(), count, |row, p| {
+            (0..roots.len()).map(|k| turned[(row, k)] / roots[k] * directions[(k, p)]).sum()
+        });
+        combine(self.forces.basis.as_ref(), y.as_ref())
+    }
+}
+
+/// K X.
+fn strained(model: &FeModel, x: MatRef<'_, f64>) -> Mat<f64> {
+    let mut product = Mat::zeros(x.nrows(), x.ncols());
+    multiply(model.stiffness(), 1, x, product.as_mut());
+    product
+}
+
+/// Length of the longest displacement of a node, for every column.
+fn longest_of_nodes(model: &FeModel, u: &Mat<f64>) -> Vec<f64> {
+    let (d, n) = (model.dimension(), model.nodes().len());
+    let length = |i: usize, node: usize| (0..d).map(|k| u[(d * node + k, i)].powi(2)).sum::<f64>();
+    (0..u.ncols()).map(|i| (0..n).map(|node| length(i, node)).fold(0.0, larger).sqrt()).collect()
+}
+
+/// Length of the longest displacement of the watched points, at every instant.
+fn longest_of_points(
+    model: &FeModel,
+    points: &[Mat<f64>],
+    responses: MatRef<'_, f64>,
+    amplitudes: MatRef<'_, f64>,
+) -> Vec<f64> {
+    let d = model.dimension();
+    let mut longest = vec![0.0; amplitudes.ncols()];
+    for point in points {
+        let moved = combine(gram(point.as_ref().subcols(0, d), responses).as_ref(), amplitudes);
+        for (i, longest) in longest.iter_mut().enumerate() {
+            *longest = larger(*longest, (0..d).map(|k| moved[(k, i)].powi(2)).sum::<f64>().sqrt());
+        }
+    }
+    longest
+}

@@ -1,0 +1,10 @@
+//! The body that a study measures against: what it lacks of the model that it was made of, estimated along its motion, and a body that is
+//! enriched until that no longer counts. No files.
+
+mod compressed;
+mod enrich;
+mod estimate;
+mod residual;
+
+pub use enrich::{Enriched, MOST_ROUNDS, PART_OF_REFERENCE, enrich};
+pub use estimate::ReferenceError;

@@ -1,0 +1,199 @@
+//! What a body lacks of its model, as it is estimated, against the motion of all nodes; bodies that are enriched; starts without a shock.
+
+use crate::support::elements::{Kind as Element, MassRule, Material};
+use crate::support::mesh::{Mesh, grid};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::model::FeModel;
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{
+    Axes, History, Initial, Load, Point, Run, Scene, Scheme, Spin, Stage, simulate, trace,
+};
+use flexbody::numerics::eigen::{Resume, Wanted};
+use flexbody::study::reference::{Enriched, PART_OF_REFERENCE, ReferenceError, enrich};
+use flexbody::study::tailoring::Tailoring;
+use flexbody::study::trade::NodalReference;
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// A rubber beam of some bricks, askew.
+fn model() -> FeModel {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Element::Hex8, &grid([4, 1, 1]), |[x, y, z]| {
+        [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
+    });
+    FeModel::from_raw(mesh.assemble(&rubber, MassRule::Consistent).raw_model()).expect("a sound model").model
+}
+
+fn settings(modes: usize) -> ConvertSettings {
+    ConvertSettings {
+        modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
+        lumped: Vec::new(),
+        ..ConvertSettings::default()
+    }
+}
+
+fn body(model: &FeModel, modes: usize) -> FlexBody {
+    convert(model, &settings(modes), SILENT).expect("a body").body
+}
+
+/// The first circular frequency of the model.
+fn first_rate(model: &FeModel) -> f64 {
+    body(model, 1).modes().eigenvalue[0].sqrt()
+}
+
+/// A free body that turns and is pulled at a node by a force that swings from zero, for some of its first periods.
+fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: Vector3<f64>) -> Scene {
+    let rate = first_rate(model);
+    Scene {
+        name: "pulled".to_owned(),
+        run: Run {
+            duration: Some(2.0 * std::f64::consts::TAU / rate),
+            outputs: 60,
+            most_steps: Run::MOST_STEPS,
+            scheme: Scheme::Adaptive { tolerance: 1e-9 },
+            terms: Terms::ALL,
+        },
+        initial: Initial {
+            angular_velocity: spin * rate,
+            axes: Axes::Body,
+            settled: true,
+            ..Initial::default()
+        },
+        gravity: None,
+        loads: vec![Load {
+            at: Point::Node(model.nodes().ids[node]),
+            force,
+            torque: Vector3::zeros(),
+            axes: Axes::Body,
+            history: History::Sine {
+                amplitude: 1.0,
+                frequency: swing * rate / std::f64::consts::TAU,
+                phase: 0.0,
+            },
+        }],
+        spin: None,
+        carried: None,
+        watched: Vec::new(),
+        requirements: Default::default(),
+        source: None,
+        resolved: false,
+    }
+}
+
+/// The estimate for a body as it is.
+fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError {
+    let found =
+        enrich(model, scene, None, false, SILENT, |_| Ok(body.clone()), |body| body).expect("an estimate");
+    found.error().expect("an estimate").clone()
+}
+
+/// The error against the motion of all nodes: of deflection and stress.
+fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
+    let stage = Stage::new(body, scene).expect("a stage");
+    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ()).expect("a motion");
+    let nodal =
+        NodalReference::new(model, &stage.body, &stage.scene, &motion, None, SILENT).expect("a reference");
+    let errors = nodal.errors(&stage.body, &motion).expect("of one model").largest();
+    [errors.deflection, errors.stress].map(|error| error.expect("a deformed body"))
+}
+
+#[test]
+fn a_body_with_all_modes_lacks_nothing() {
+    let model = model();
+    let whole = body(&model, usize::MAX);
+    let scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::new(0.02, 0.03, 0.01));
+    let lack = estimated(&model, &whole, &scene);
+    // What double precision leaves of residuals in the norm of K^+.
+    assert!(lack.worst < 1e-6, "{lack:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The estimate is quasi-static: it holds to a factor where what excites the body is slower than what it lacks.
+    #[test]
+    fn the_estimate_is_near_the_true_error(
+        (modes, node) in (3usize..9, 0usize..20),
+        force in prop::array::uniform3(-0.02f64..0.02),
+        (swing, spin) in (0.2f64..1.5, prop::array::uniform3(-0.05f64..0.05)),
+    ) {
+        let model = model();
+        let scene = pulled(&model, node, force.into(), swing, spin.into());
+        let body = body(&model, modes);
+        let lack = estimated(&model, &body, &scene);
+        let [deflection, stress] = true_errors(&model, &body, &scene);
+        let effectivity = lack.errors.stress.expect("a deformed body") / stress;
+        prop_assert!((0.4..2.5).contains(&effectivity), "stress: {:?} is {} of {}", lack, effectivity, stress);
+        let effectivity = lack.errors.deflection.expect("a deformed body") / deflection;
+        prop_assert!((0.2..5.0).contains(&effectivity), "deflection: {:?} is {} of {}", lack, effectivity, deflection);
+    }
+}
+
+#[test]
+fn responses_join_until_what_is_lacking_does_not_count() {
+    let model = model();
+    let mut scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::new(0.02, 0.03, 0.01));
+    scene.requirements.tolerance.stress = 0.05;
+    scene.requirements.tolerance.deflection = 0.05;
+    let tailoring = Tailoring { settings: settings(4), by_band: false };
+    let Enriched { made, rounds } =
+        tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
+    assert!(first.modes == 4 && first.worst > 1.0, "{rounds:?}");
+    assert!(last.modes == made.body.n_modes() && last.worst <= PART_OF_REFERENCE, "{rounds:?}");
+    // As all nodes tell, whom nobody asked.
+    let [_, before] = true_errors(&model, &body(&model, 4), &scene);
+    let [deflection, after] = true_errors(&model, &made.body, &scene);
+    assert!(before > 0.05 && after < 0.01 && deflection < 0.01, "{before} {after} {deflection}");
+    // Every one of them says where it comes from.
+    let provenance = &made.body.modes().provenance;
+    assert!(provenance.iter().any(|from| from.contains("motion 1")), "{provenance:?}");
+}
+
+#[test]
+fn a_shock_is_no_reason_for_modes_without_end() {
+    let model = model();
+    let mut scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::zeros());
+    scene.loads[0].history = History::Constant(1.0);
+    scene.initial.settled = false;
+    scene.requirements.tolerance.stress = 1e-3;
+    scene.requirements.tolerance.deflection = 1e-3;
+    let tailoring = Tailoring { settings: settings(6), by_band: false };
+    let shocked = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    let lack = shocked.error().expect("an estimate");
+    assert!(lack.worst > 1.0 && lack.modes == shocked.made.body.n_modes(), "{:?}", shocked.rounds);
+    // The same load is there before.
+    scene.initial.settled = true;
+    let calm = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    assert!(calm.error().expect("an estimate").worst < PART_OF_REFERENCE, "{:?}", calm.rounds);
+}
+
+#[test]
+fn a_static_start_stays_as_it_is() {
+    let model = model();
+    let body = body(&model, 8);
+    let rate = first_rate(&model);
+    let mut scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::zeros());
+    scene.loads[0].history = History::Constant(1.0);
+    scene.spin = Some(Spin {
+        axis: Vector3::new(0.2, 0.3, 1.0).normalize(),
+        axes: Axes::Model,
+        rate: History::Constant(0.2 * rate),
+        hold: true,
+    });
+    let energies = |scene: &Scene| -> Vec<f64> {
+        let (recording, _) = simulate(&body, scene, None, |_| ()).expect("a motion");
+        recording.balances.iter().map(|balance| balance.elastic).collect()
+    };
+    let spread = |energies: &[f64]| {
+        let largest = energies.iter().copied().fold(0.0, f64::max);
+        energies.iter().map(|energy| (energy / largest - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let calm = energies(&scene);
+    assert!(calm[0] > 0.0 && spread(&calm) < 1e-7, "{calm:?}");
+    scene.initial.settled = false;
+    assert!(spread(&energies(&scene)) > 0.5);
+}
