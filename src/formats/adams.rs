@@ -91,7 +91,7 @@ fn quantities(body: &FlexBody) -> Vec<Quantity> {
     });
     let i7: Vec<f64> = told.i7.transpose().iter().copied().collect();
     let damping = losses::is_damped(body).then(|| rows(&body.damping()));
-    let stiffness = rows(&body.invariants().modal_stiffness());
+    let stiffness = rows(body.invariants().modal_stiffness());
     let one = |name, title, formula, units, shape: &[usize], values| Quantity {
         name,
         title,

@@ -152,7 +152,7 @@ impl Deck {
         deck.remark("mass of the local modes");
         deck.numbers(diagonal(&invariants.modal_mass()));
         deck.remark("stiffness of the local modes");
-        deck.numbers(diagonal(&invariants.modal_stiffness()));
+        deck.numbers(diagonal(invariants.modal_stiffness()));
         deck.products(body, 3 * sets);
         deck
     }

@@ -63,7 +63,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
         array("trigList", Hdf5Contents::Integers(vec![0, 3], Vec::new())),
         Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
         modal_mass(body, &told),
-        array("stiffnessMatrixReduced", Hdf5Contents::matrix(&body.invariants().modal_stiffness())),
+        array("stiffnessMatrixReduced", Hdf5Contents::matrix(body.invariants().modal_stiffness())),
         array("infoList", Hdf5Contents::Integers(vec![6], info)),
         text("NodeType.RotationEulerParameters").named("rigidBodyNodeType").with("datatype", "str"),
         array("xRef", Hdf5Contents::list(body.nodes().positions.as_flattened())),

@@ -80,7 +80,7 @@ impl ExportFormat for Mbdyn {
         let told = inertia(body);
         file.nodes(&places, body.n_modes());
         file.matrix(9, "MODAL MASS MATRIX", &told.i6);
-        file.matrix(10, "MODAL STIFFNESS MATRIX", &body.invariants().modal_stiffness());
+        file.matrix(10, "MODAL STIFFNESS MATRIX", body.invariants().modal_stiffness());
         file.rigid(&told);
         if losses::is_damped(body) {
             file.matrix(13, "MODAL DAMPING MATRIX", &body.damping());

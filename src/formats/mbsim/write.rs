@@ -114,7 +114,7 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
         Hdf5Contents::list(told.i2.as_slice()).named("position integral"),
         Hdf5Contents::from_fn(3, 3, |i, j| second[(i, j)]).named("position position integral"),
         Hdf5Contents::matrix(&told.i3).named("shape function integral"),
-        Hdf5Contents::matrix(&invariants.modal_stiffness()).named("stiffness matrix"),
+        Hdf5Contents::matrix(invariants.modal_stiffness()).named("stiffness matrix"),
         Hdf5Contents::from_fn(9, nf, |row, j| invariants.ibar_or_half_c2()[row / 3][row % 3][j])
             .named("position shape function integral"),
         Hdf5Contents::from_fn(6 * nf, nf, |row, k| s(row / nf, row % nf, k))

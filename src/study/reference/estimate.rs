@@ -166,7 +166,7 @@ impl Missed {
         times: &[f64],
     ) -> OutputErrors {
         let c = &self.forces.amplitudes;
-        let stress = Peak::of(times, self.root_energies().into_iter()).value / energy_scale(motion);
+        let stress = Peak::of(times, self.root_energies()).value / energy_scale(motion);
         let moved = match watched {
             [] => longest_of_nodes(view.model, &combine(self.responses.as_ref(), c.as_ref())),
             points => longest_of_points(view.model, points, self.responses.as_ref(), c.as_ref()),
@@ -182,7 +182,7 @@ impl Missed {
         let scale = largest.max(motion.resolution.deflection);
         OutputErrors {
             attitude: 0.0,
-            deflection: (scale > 0.0).then(|| Peak::of(times, moved.into_iter()).value / scale),
+            deflection: (scale > 0.0).then(|| Peak::of(times, moved).value / scale),
             stress: Some(stress),
             reaction: None,
         }
