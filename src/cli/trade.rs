@@ -15,6 +15,7 @@ use crate::input::{read_manifest, read_model};
 use crate::model::FeModel;
 use crate::motion::scene::read_scene;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
+use crate::study::reference::ReferenceError;
 use crate::study::trade::{Settings, Source, conversions, trade};
 
 pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
@@ -31,22 +32,22 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let scene = read_scene(&arguments.scene)?;
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();
-    let (model, sources) = if is_manifest {
+    let (model, sources, lacks) = if is_manifest {
         let files = read_manifest(&arguments.body)?;
         refuse_replacing(files.paths().into_iter(), outputs())?;
         let checked = FeModel::from_raw(read_model(&files)?)?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
-        let (sources, found) =
-            conversions(&checked.model, modes, memory, longest(arguments.allow_long), &|event| {
-                watcher.hear(event)
-            })?;
-        diagnostics.extend(found);
-        (Some(checked.model), sources)
+        let longest = longest(arguments.allow_long);
+        let watch = |event: Event<'_>| watcher.hear(event);
+        let made = conversions(&checked.model, &scene, modes, memory, longest, &watch)
+            .map_err(|error| error.in_file(&arguments.scene))?;
+        diagnostics.extend(made.diagnostics);
+        (Some(checked.model), made.sources, made.lacks)
     } else {
         let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
         diagnostics.extend(notes);
-        (None, vec![Source::new("file", body, None)?])
+        (None, vec![Source::new("file", body, None)?], Vec::new())
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
     let settings = Settings { repeat: arguments.repeat.into(), memory: memory_left(None) };
@@ -55,7 +56,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
-    let facts = TradeFacts::new(&study, &run);
+    let facts = TradeFacts::new(&study, &lacks, &run);
 
     if let Some(slot) = &table {
         slot.fill(trade_csv(&study).as_bytes())?;
@@ -65,7 +66,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     }
     // Nothing appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports))?;
-    let passed = study.recommended.row().is_some();
+    let is_reference = nodal.is_some() || lacks.last().is_none_or(ReferenceError::is_reference);
+    let passed = study.recommended.row().is_some() && is_reference;
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
 }

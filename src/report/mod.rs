@@ -12,6 +12,7 @@ mod geometric_stiffness;
 mod guarantee;
 mod html;
 mod identities;
+mod lacks;
 mod line_chart;
 mod lumped;
 mod markup;

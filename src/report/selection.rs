@@ -1,6 +1,7 @@
 //! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
 
 use super::Format;
+use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
@@ -10,7 +11,6 @@ use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::{Group, TermDecision};
 use crate::motion::scene::OutputErrors;
-use crate::study::reference::ReferenceError;
 use crate::study::selection::{Participation, Selection, Trial};
 use serde::Serialize;
 use std::fmt::Write;
@@ -36,36 +36,6 @@ pub struct SelectionFacts<'a> {
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,
     diagnostics: &'a [Diagnostic],
-}
-
-/// What a body lacks of its model.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct LackFacts {
-    modes: usize,
-    deflection: Option<f64>,
-    stress: Option<f64>,
-    worst: f64,
-    time: f64,
-}
-
-impl LackFacts {
-    fn new(lack: &ReferenceError) -> Self {
-        let OutputErrors { deflection, stress, .. } = lack.errors;
-        Self { modes: lack.modes, deflection, stress, worst: lack.worst, time: lack.time }
-    }
-
-    fn in_words(&self) -> String {
-        let part = |name: &str, value: Option<f64>| {
-            value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
-        };
-        let parts = [part("deflection", self.deflection), part("stress", self.stress)];
-        let parts = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
-        format!(
-            "{} modes lack {parts} of the FE model, most at t = {}",
-            self.modes,
-            significant(self.time, 3)
-        )
-    }
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -295,15 +265,6 @@ impl<'a> SelectionFacts<'a> {
         ))
     }
 
-    /// What everything was measured against.
-    fn reference_in_words(&self) -> String {
-        match &self.reference[..] {
-            [] => "the modes of the body; what these lack of an FE model is not known".to_owned(),
-            [own] => format!("{} (estimated)", own.in_words()),
-            [first, .., own] => format!("{} (estimated; {} at first)", own.in_words(), first.in_words()),
-        }
-    }
-
     fn modes_in_words(&self) -> String {
         format!("{} of {}: {}", self.modes.kept.len(), self.modes.of, self.modes.reason)
     }
@@ -321,7 +282,7 @@ impl<'a> SelectionFacts<'a> {
         }
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
             page.entry("Errors", &format!("{}, measured against everything", Self::errors_in_words(errors)));
-            page.entry("Reference", &self.reference_in_words());
+            page.entry("Reference", &reference_in_words(&self.reference));
         }
         if let Some(cost) = self.cost_in_words() {
             page.entry("Cost", &cost);
@@ -354,7 +315,7 @@ impl<'a> SelectionFacts<'a> {
         items.push(("Kept", ranges(&self.modes.kept)));
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
             items.push(("Errors", format!("{}, measured", Self::errors_in_words(errors))));
-            items.push(("Reference", escape(&self.reference_in_words())));
+            items.push(("Reference", escape(&reference_in_words(&self.reference))));
         }
         terms(&mut html, items);
         section(&mut html, "Inputs");

@@ -1,6 +1,7 @@
 //! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
 
 use super::Format;
+use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{bytes, counted, duration, plain, significant};
 use super::render::json;
@@ -11,6 +12,7 @@ use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::Storage;
 use crate::motion::scene::{OutputErrors, Tolerance};
+use crate::study::reference::ReferenceError;
 use crate::study::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Times, Trade};
 use serde::Serialize;
 use std::fmt::Write;
@@ -31,6 +33,8 @@ pub struct TradeFacts<'a> {
     scene: &'a str,
     body: &'a str,
     reference: ReferenceKind,
+    /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only a file is at hand.
+    reference_lacks: Vec<LackFacts>,
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
     verdict: String,
@@ -134,8 +138,8 @@ impl<'a> RowFacts<'a> {
 }
 
 impl<'a> TradeFacts<'a> {
-    /// Facts of a study, and of the run that made it.
-    pub fn new(trade: &'a Trade, run: &'a RunData) -> Self {
+    /// Facts of a study whose reference `lacks` something of the model, and of the run that made it.
+    pub fn new(trade: &'a Trade, lacks: &[ReferenceError], run: &'a RunData) -> Self {
         let rows: Vec<RowFacts<'a>> =
             trade.rows.iter().enumerate().map(|(at, row)| RowFacts::new(at + 1, row)).collect();
         Self {
@@ -146,6 +150,7 @@ impl<'a> TradeFacts<'a> {
             scene: &trade.scene,
             body: &trade.body,
             reference: trade.reference,
+            reference_lacks: lacks.iter().map(LackFacts::new).collect(),
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
             verdict: verdict(trade, &rows),
@@ -200,6 +205,7 @@ impl<'a> TradeFacts<'a> {
             "Trade",
             &format!("{}: {}, {count} against {}", plain(self.scene), plain(self.body), self.against()),
         );
+        page.entry("Whole body", &reference_in_words(&self.reference_lacks));
         page.entry("Tolerances", &self.tolerances_in_words());
         if let Some(allowed) = self.allowed_multiplications {
             page.entry("Cost", &format!("at most {allowed} multiplications per evaluation"));
@@ -245,6 +251,7 @@ impl<'a> TradeFacts<'a> {
             [
                 ("Body", escape(self.body)),
                 ("Reference", self.against().to_owned()),
+                ("Whole body", escape(&reference_in_words(&self.reference_lacks))),
                 ("Tolerances", escape(&self.tolerances_in_words())),
                 (
                     "Candidates",

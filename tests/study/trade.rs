@@ -12,7 +12,7 @@ use flexbody::model::FeModel;
 use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{Axes, Initial, ModeStart, Run, Scene, Scheme, simulate};
 use flexbody::study::trade::{
-    Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
+    Conversions, Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -213,10 +213,32 @@ fn model() -> FeModel {
     FeModel::from_raw(mesh.assemble(&rubber, MassRule::Consistent).raw_model()).expect("a body").model
 }
 
+/// Conversions of which nothing is known that they are for.
+fn without_scene(model: &FeModel, modes: usize) -> Conversions {
+    let mut scene = tumble(1.0, 1.0);
+    scene.run.duration = None;
+    conversions(model, &scene, modes, None, None, SILENT).expect("bodies")
+}
+
+#[test]
+fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
+    let model = model();
+    let rate = first_rate(without_scene(&model, 4).sources[0].body());
+    let scene = tumble(0.15 * rate, 0.5);
+    let made = conversions(&model, &scene, 4, None, None, SILENT).expect("bodies");
+    let own = made.lacks.last().expect("an estimate");
+    assert_eq!(own.modes, made.sources[0].body().n_modes());
+    let found = trade(&made.sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
+    let whole = found.rows[0].outcome.as_ref().expect("a motion").errors.stress.expect("a deformed body");
+    let effectivity = own.errors.stress.expect("a deformed body") / whole;
+    assert!((0.3..3.0).contains(&effectivity), "{:?} {whole}", made.lacks);
+}
+
 #[test]
 fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let model = model();
-    let (sources, _) = conversions(&model, 4, None, None, SILENT).expect("bodies");
+    let Conversions { sources, lacks, .. } = without_scene(&model, 4);
+    assert!(lacks.is_empty());
     assert!(sources.iter().all(|source| source.preprocessing().is_some_and(|seconds| seconds > 0.0)));
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.15 * rate, 0.5);
@@ -249,7 +271,7 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
 #[test]
 fn what_nodal_equations_do_not_have_is_refused() {
     let model = model();
-    let (sources, _) = conversions(&model, 2, None, None, SILENT).expect("bodies");
+    let Conversions { sources, .. } = without_scene(&model, 2);
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.1 * rate, 0.1);
     scene.requirements.damping = Some(0.01);

@@ -1,6 +1,6 @@
 //! A body that is enriched for a scene until what it lacks of its model no longer counts.
 
-use super::estimate::{Estimate, ReferenceError};
+use super::estimate::{Estimate, PART_OF_REFERENCE, ReferenceError};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::FlexBody;
@@ -8,9 +8,6 @@ use crate::model::FeModel;
 use crate::motion::scene::Scene;
 use crate::numerics::linalg::side_by_side;
 use faer::Mat;
-
-/// Part of the tolerances that the reference of a study may lack of the model.
-pub const PART_OF_REFERENCE: f64 = 0.1;
 
 /// What a body still lacks, relative to the one before it, for its modes to be worth their cost.
 const WORTH: f64 = 0.7;

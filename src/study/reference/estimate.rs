@@ -11,6 +11,12 @@ use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, insta
 use crate::numerics::linalg::{combine, gram, larger, multiply, subtract_combination};
 use faer::{Mat, MatRef};
 
+/// Part of the tolerances that the reference of a study may lack of the model without a word.
+pub const PART_OF_REFERENCE: f64 = 0.1;
+
+/// Part of the tolerances that a body may lack of the model and still be a reference: others get the rest.
+const MOST_LACKING: f64 = 0.5;
+
 /// Instants that the motion is looked at.
 const INSTANTS: usize = 120;
 
@@ -32,6 +38,34 @@ pub struct ReferenceError {
     pub worst: f64,
     /// When the estimate of the elastic energy is largest.
     pub time: f64,
+}
+
+impl ReferenceError {
+    /// Whether others may be measured against the body: against what is left of the tolerances.
+    pub fn is_reference(&self) -> bool {
+        self.worst <= MOST_LACKING
+    }
+
+    /// The warning about a body that lacks what counts.
+    pub fn warning(&self, scene: &Scene) -> Option<Diagnostic> {
+        if self.worst <= PART_OF_REFERENCE {
+            return None;
+        }
+        let message = format!(
+            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.3e}",
+            self.modes,
+            100.0 * self.worst,
+            self.time
+        );
+        let warning = Diagnostic::new(Code::ReferenceLacks, message);
+        let begins_with_shock = scene.loads.iter().any(|load| load.history.at(0.0).0 != 0.0);
+        Some(match begins_with_shock && !scene.initial.settled {
+            true => warning.with_help(
+                "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
+            ),
+            false => warning,
+        })
+    }
 }
 
 /// An estimate, and what would improve the body.

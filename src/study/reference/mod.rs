@@ -6,5 +6,5 @@ mod enrich;
 mod estimate;
 mod residual;
 
-pub use enrich::{Enriched, MOST_ROUNDS, PART_OF_REFERENCE, enrich};
-pub use estimate::ReferenceError;
+pub use enrich::{Enriched, MOST_ROUNDS, enrich};
+pub use estimate::{PART_OF_REFERENCE, ReferenceError};

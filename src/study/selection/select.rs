@@ -9,15 +9,12 @@ use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
 use super::trial::{ModeShare, Trial, multiplications};
 use super::warnings::{growth_of, phase_drifts, resonances};
-use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::{FlexBody, Groups, TermDecision};
 use crate::motion::scene::{Measure, Scene, Stage, Trace, damped, points_of};
-use crate::study::reference::{PART_OF_REFERENCE, ReferenceError};
-
-/// Part of the tolerances that a body may lack of the model and still be a reference: trials get the rest.
-const MOST_RESERVED: f64 = 0.5;
+use crate::study::reference::ReferenceError;
 
 /// What was decided, and on what grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +64,7 @@ impl Selection {
     /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured, against a body that lacks no more than
     /// half of them itself.
     pub fn holds(&self) -> bool {
-        let is_reference = self.lacks.last().is_none_or(|own| own.worst <= MOST_RESERVED);
+        let is_reference = self.lacks.last().is_none_or(ReferenceError::is_reference);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
             Some(most) => chosen.multiplications <= most,
             None => chosen.passed() && is_reference,
@@ -197,24 +194,8 @@ impl<'s> Deciding<'s> {
     /// Reserves what the body lacks of the model.
     fn lacks(&mut self, rounds: &[ReferenceError]) {
         let Some(own) = rounds.last() else { return };
-        self.reserved = if own.worst <= MOST_RESERVED { own.worst } else { 0.0 };
-        if own.worst <= PART_OF_REFERENCE {
-            return;
-        }
-        let message = format!(
-            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.3e}",
-            own.modes,
-            100.0 * own.worst,
-            own.time
-        );
-        let mut warning = Diagnostic::new(Code::ReferenceLacks, message);
-        let begun = self.scene.loads.iter().any(|load| load.history.at(0.0).0 != 0.0);
-        if begun && !self.scene.initial.settled {
-            warning = warning.with_help(
-                "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
-            );
-        }
-        self.diagnostics.push(warning);
+        self.reserved = if own.is_reference() { own.worst } else { 0.0 };
+        self.diagnostics.extend(own.warning(self.scene));
     }
 
     /// Chooses the modes of the band of the scene, all without one; gives the reason.

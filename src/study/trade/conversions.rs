@@ -7,29 +7,46 @@ use crate::base::progress::Watch;
 use crate::body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use crate::body::convert::{ConvertSettings, Lumping, convert};
 use crate::model::FeModel;
+use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, Wanted};
+use crate::study::reference::{Enriched, ReferenceError, enrich};
+use faer::Mat;
 use std::time::Instant;
 
-/// Every conversion of a study, the reference first, and what was said about that.
+/// The bodies of a study.
+pub struct Conversions {
+    /// The reference first.
+    pub sources: Vec<Source>,
+    /// What the reference, and bodies before it that were enriched, lack of the model in the scene; the last one is the reference.
+    pub lacks: Vec<ReferenceError>,
+    /// What was said about the reference.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Every conversion of a study in `scene`.
 ///
-/// The reference has twice as many `modes` and residual vectors of spin and interfaces. Beside it stand `modes`, their half and their
-/// quarter with residual vectors and without, and `modes` at the other levels of accuracy. Each is timed.
+/// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what [`enrich`] finds lacking. Beside it stand
+/// `modes`, their half and their quarter with residual vectors and without, and `modes` at the other levels of accuracy. Each is timed.
 ///
 /// # Errors
-/// Those of [`convert`]. Accuracy `certified` is left out where it does not cover the model.
+/// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
 pub fn conversions(
     model: &FeModel,
+    scene: &Scene,
     modes: usize,
     memory: Option<u64>,
     longest: Option<f64>,
     watch: Watch<'_>,
-) -> Result<(Vec<Source>, Vec<Diagnostic>)> {
+) -> Result<Conversions> {
     let making = Making::new(model, memory, longest, watch);
     let reference = Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard };
-    let (reference, diagnostics) = making.make(&reference, ConvertSettings::default().lumped)?;
+    let make = |loads: &Mat<f64>| making.make(&reference, loads, ConvertSettings::default().lumped);
+    let enriched = enrich(model, scene, memory, true, watch, make, |(source, _)| source.body())?;
+    let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
+    diagnostics.extend(lacks.last().and_then(|own| own.warning(scene)));
     let mut sources = vec![reference];
     for wish in wishes(modes) {
-        let source = match making.make(&wish, Vec::new()) {
+        let source = match making.make(&wish, &Mat::new(), Vec::new()) {
             Ok((source, _)) => source,
             Err(error)
                 if wish.accuracy == Accuracy::Certified && error.diagnostics()[0].code() == Code::Usage =>
@@ -41,7 +58,7 @@ pub fn conversions(
         let beside = source.beside(sources[0].body(), model);
         sources.push(beside.expect("bodies that were made of the model"));
     }
-    Ok((sources, diagnostics))
+    Ok(Conversions { sources, lacks, diagnostics })
 }
 
 /// A body that is wanted.
@@ -102,9 +119,17 @@ impl<'m> Making<'m> {
         Self { model, loads, memory, longest, watch }
     }
 
-    /// Converts the model, and takes the time of it.
-    fn make(&self, wish: &Wish, lumped: Vec<Lumping>) -> Result<(Source, Vec<Diagnostic>)> {
-        let residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
+    /// Converts the model, with the static responses to `motion` as well, and takes the time of it.
+    fn make(
+        &self,
+        wish: &Wish,
+        motion: &Mat<f64>,
+        lumped: Vec<Lumping>,
+    ) -> Result<(Source, Vec<Diagnostic>)> {
+        let mut residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
+        if motion.ncols() > 0 {
+            residual_vectors.push(Loads::Motion(motion.clone()));
+        }
         let settings = ConvertSettings {
             modes: ModeSettings {
                 wanted: Wanted::Lowest(wish.count),

@@ -10,7 +10,7 @@ mod study;
 mod timing;
 
 pub use candidate::{Candidate, Kind};
-pub use conversions::conversions;
+pub use conversions::{Conversions, conversions};
 pub use front::{Recommendation, front};
 pub use nodal::NodalReference;
 pub use row::{Failed, Measured, Row, Times};

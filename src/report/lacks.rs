@@ -1,0 +1,45 @@
+//! What a body lacks of the model that it was made of.
+
+use super::numbers::significant;
+use crate::motion::scene::OutputErrors;
+use crate::study::reference::ReferenceError;
+use serde::Serialize;
+
+/// What a body lacks of its model.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct LackFacts {
+    modes: usize,
+    deflection: Option<f64>,
+    stress: Option<f64>,
+    worst: f64,
+    time: f64,
+}
+
+impl LackFacts {
+    pub fn new(lack: &ReferenceError) -> Self {
+        let OutputErrors { deflection, stress, .. } = lack.errors;
+        Self { modes: lack.modes, deflection, stress, worst: lack.worst, time: lack.time }
+    }
+
+    fn in_words(&self) -> String {
+        let part = |name: &str, value: Option<f64>| {
+            value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
+        };
+        let parts = [part("deflection", self.deflection), part("stress", self.stress)];
+        let parts = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        format!(
+            "{} modes lack {parts} of the FE model, most at t = {}",
+            self.modes,
+            significant(self.time, 3)
+        )
+    }
+}
+
+/// What everything was measured against: the last of `lacks`, the first of which was that before anything was enriched.
+pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
+    match lacks {
+        [] => "the modes of the body; what these lack of an FE model is not known".to_owned(),
+        [own] => format!("{} (estimated)", own.in_words()),
+        [first, .., own] => format!("{} (estimated; {} at first)", own.in_words(), first.in_words()),
+    }
+}
