@@ -70,15 +70,18 @@ const TERMS: [Term; 8] = [
         Group::W3,
         "IV",
     ),
-    term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "IV"),
+    term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "III"),
     term(
         "Coriolis torque 2 w (sqrt(tr J) + |q|) |qd|",
         "I0 w per unit of time",
         "2 Omega_1 |q| (sqrt(tr J) + |q|) / I0",
         Group::W1,
-        "III",
+        "IV",
     ),
 ];
+
+/// Terms of [`TERMS`] that the norms of the invariants say nothing of: the Coriolis torque has components across the axis.
+const WITHOUT_NORM: usize = TERMS.len() - 1;
 
 /// Sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
 fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] {
@@ -127,7 +130,7 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
         group: term.group,
         guideline: term.guideline,
         bound: bound[i],
-        of_body: own.map(|own| own[i]),
+        of_body: own.filter(|_| i < WITHOUT_NORM).map(|own| own[i]),
     };
     TERMS.into_iter().enumerate().map(significance).collect()
 }
