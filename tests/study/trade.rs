@@ -226,12 +226,11 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
     let rate = first_rate(without_scene(&model, 4).sources[0].body());
     let scene = tumble(0.15 * rate, 0.5);
     let made = conversions(&model, &scene, 4, None, None, SILENT).expect("bodies");
-    let own = made.lacks.last().expect("an estimate");
+    let (first, own) = (&made.lacks[0], made.lacks.last().expect("an estimate"));
     assert_eq!(own.modes, made.sources[0].body().n_modes());
-    let found = trade(&made.sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
-    let whole = found.rows[0].outcome.as_ref().expect("a motion").errors.stress.expect("a deformed body");
-    let effectivity = own.errors.stress.expect("a deformed body") / whole;
-    assert!((0.3..3.0).contains(&effectivity), "{:?} {whole}", made.lacks);
+    assert!(first.modes < own.modes && own.worst < 0.7 * first.worst, "{:?}", made.lacks);
+    // What still counts is said.
+    assert!(made.diagnostics.iter().any(|one| one.code() == Code::ReferenceLacks), "{:?}", made.diagnostics);
 }
 
 #[test]
