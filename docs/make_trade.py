@@ -1,20 +1,24 @@
 #!/usr/bin/env python3
 """Writes docs/trade.md and docs/images/trade_*.svg: what each scene of fixtures/scenes needs, and what accuracy costs there.
 
-    pip install numpy scipy h5py
+    pip install numpy scipy h5py exudyn==1.13.6
     cargo build --release --locked
     python3 docs/make_trade.py
+
+Seconds are those of the processor in Exudyn and in a C program (docs/trade_seconds.py); it takes about an hour, since all of them are measured five
+times, one after the other. `--only SCENE` tries it.
 """
 
 import argparse
 import csv
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
+import time
 from concurrent.futures import ProcessPoolExecutor
+from importlib import metadata
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process per core instead
@@ -22,38 +26,44 @@ import numpy as np  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs"))
+from trade_figure import figure  # noqa: E402
 from trade_guidelines import GUIDELINES, Body, read_scene, study  # noqa: E402
+from trade_seconds import PER_PERIOD, TURNS, InC, InExudyn, Task  # noqa: E402
 
-# Scene, model, modes of its body, residual vectors.
+# Scene, model, modes of a usual conversion: the reference has twice as many, residual vectors, and what the scene's motion lacks.
 SCENES = [
-    ("tumbling", "bracket_hex20", 12, ""),
-    ("connecting_rod_8000rpm", "connecting_rod", 20, ""),
-    ("car_frame_road", "car_frame", 30, ""),
-    ("satellite_tumbling", "satellite", 20, "centrifugal"),
-    ("turbine_blade_runup", "turbine_blade", 15, "centrifugal"),
-    ("mems_gyroscope", "mems_gyroscope", 20, ""),
-    ("robot_link", "robot_link", 10, "interfaces"),
-    ("gear_disc", "gear_disc", 30, ""),
-    ("conveyor_plate", "conveyor_plate", 20, ""),
+    ("tumbling", "bracket_hex20", 12),
+    ("connecting_rod_8000rpm", "connecting_rod", 20),
+    ("car_frame_road", "car_frame", 30),
+    ("satellite_tumbling", "satellite", 20),
+    ("turbine_blade_runup", "turbine_blade", 15),
+    ("mems_gyroscope", "mems_gyroscope", 20),
+    ("robot_link", "robot_link", 10),
+    ("gear_disc", "gear_disc", 30),
+    ("conveyor_plate", "conveyor_plate", 20),
 ]
 COUNTER = ("block_79_periods", "cube_hex8", 12)
 # Lowest modes that the guidelines are tried with.
 FEW = 6
 INSTANTS = 300
-STYLE = (
-    "text { font: 12px system-ui, sans-serif; fill: #1a1d21; } .tick { fill: #5a6370; } .grid { stroke: #d5dae1; } "
-    "polyline { fill: none; stroke-width: 1.4; } .s0 { fill: #1f5fa8; } .s1 { fill: #b4560d; } .s2 { fill: #4f7a28; } "
-    ".l0 { stroke: #1f5fa8; } .l1 { stroke: #b4560d; stroke-dasharray: 7 3; }"
-)
 HEAD = """<!-- Written by docs/make_trade.py -->
 
 # What accuracy costs
 
-For each scene of `fixtures/scenes`: what `flexbody {version} select` decides, and what `flexbody trade` measures of candidate bodies, against the whole body:
-`convert MODEL --modes N --residual-vectors ...`, then `trade BODY --scene SCENE`. *Work* are multiplications of one evaluation of the equations of motion, *error* is the
-largest error of attitude, deflection, stress and reaction over its tolerance: 1 is what the scene allows. In the figures the front joins the candidates that
-none is as cheap and as accurate as; the ring is the one to take. All candidates of a scene are integrated with the steps of the reference, so that errors are those of
-the model. Times are of this machine; everything else is the same everywhere. Written by `python3 docs/make_trade.py`.
+For each scene of `fixtures/scenes`: the body that it needs, its error against the finite element model, and the seconds that it takes in two programs that are
+not ours. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `python3 docs/make_trade.py`.
+
+* **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
+  responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](theory.md), (8.16)). What the reference itself lacks of the FE model is
+  estimated by the same forces and told beside.
+* **Seconds**: of the processor, medians of {turns} runs in turns. *Exudyn*: generalised alpha with one step for all candidates of a scene, {per_period} steps per period of the highest
+  frequency that the scene asks about. *C*: the header of `export --to embedded` in a Runge-Kutta program of order 4, whose step is as long as that frequency and the highest mode of the
+  body allow: a high mode that is not needed costs steps.
+* **Whole body**: N free modes with residual vectors and all terms, what one would convert without knowing the scene.
+
+{table}
+
+Terms alone save nothing in Exudyn, whose object has no form without them (`export` writes zeros); there it is the modes that count. The C program leaves out what a body does not hold.
 
 """
 GUIDE = """## Guidelines I to IV
@@ -88,80 +98,185 @@ def number(value, digits=2):
     return "0" if value == 0 else f"{value:.{digits}g}" if 1e-3 <= abs(value) < 1e4 else f"{value:.{digits - 1}e}"
 
 
-def convert(program, folder, model, modes, residual):
+def convert(program, folder, model, modes):
     words = ["convert", ROOT / "fixtures/models" / model / "model.toml", "--modes", modes, "-o", "body.flex.h5", "--quiet"]
-    run(program, *words, *(["--residual-vectors", residual] if residual else []), folder=folder)
+    run(program, *words, folder=folder)
 
 
-def decided(program, folder, scene):
-    """What `select` decides, in words."""
-    told = json.loads(run(program, "select", "body.flex.h5", "--scene", scene, "--json", folder=folder))["results"]
-    kept = [term["group"] for term in told["terms"] if term["kept"]]
-    def proof(term):
-        if not term["limit"]:
-            return term["reason"]
-        return f"{term['reason']}: {'without it' if term['kept'] else 'at most'} {number(term['bound'], 3)}, allowed {number(term['limit'], 3)}"
-
-    lines = [f"* {'keeps' if term['kept'] else 'drops'} {term['group']} (tier {term['tier']}): {proof(term)}" for term in told["terms"]]
-    modes = told["modes"]
-    chosen = told["chosen"]
-    cost = f", {chosen['multiplications']:,} of {told['multiplications_before']:,} multiplications" if chosen else ""
-    lines.append(f"* {len(modes['kept'])} of {modes['of']} modes: {modes['reason']}{cost}")
-    return f"`select` decides ({told['guideline']}): " + (", ".join(kept) or "no group") + "\n\n" + "\n".join(lines)
+def decided(program, folder, scene, *body):
+    """What `select` decides, in its five lines."""
+    told = json.loads(run(program, "select", *body, "--scene", scene, "--json", folder=folder, passes=(0, 1)))["results"]["verdict"]
+    lines = [f"* {label}: {told[key]}" for label, key in (("take", "take"), ("why", "why"), ("error", "error"), ("saves", "saves"))]
+    return "`select`:\n\n" + "\n".join(lines)
 
 
 def described(row):
     words = f"{row['modes']} mode{'s' if row['modes'] > 1 else ''}, {' '.join(row['groups']) or 'no group'}"
     if row["mode_numbers"][-1] != row["modes"]:
         words += " (the liveliest)"
-    return words + (f", {row['lumped']}" if row["lumped"] else "") + (", f32" if row["storage"] == "f32" else "")
+    lumped = {"couplings": "lumped couplings", "whole": "lumped mass", None: None}[row["lumped_part"]]
+    return words + (f", {lumped} ({row['lumped']})" if lumped else "") + (", f32" if row["storage"] == "f32" else "")
 
 
-def measured(told):
-    """The front and what is to be learnt from the rest, as a table."""
-    rows = {row["number"]: row for row in told["rows"]}
-    shown = [(number, "") for number in told["front"]]
-    if told["recommended"] and told["recommended"] not in told["front"]:
-        shown.append((told["recommended"], ""))
-    whole = rows[1]["modes"]
-    for row in told["rows"][1:]:
-        alone = row["modes"] == whole and row["kind"] in ("lumped", "single") or row["modes"] == whole and row["kind"] == "groups" and len(row["groups"]) == 2
-        if alone and row["number"] not in [number for number, _ in shown]:
-            shown.append((row["number"], "beside"))
-    out = ["| candidate | work | evaluation (us) | simulation (ms) | steps | file (kB) | error / tolerance |", "|---|---|---|---|---|---|---|"]
-    for at, _ in sorted(shown, key=lambda one: (one[1], rows[one[0]]["measured"]["multiplications"] if rows[one[0]]["measured"] else 0)):
-        row, own = rows[at], rows[at]["measured"]
-        name = f"**{described(row)}**" if at == told["recommended"] else described(row)
-        if own is None:
-            out.append(f"| {name} | | | | | | {row['failed']['message']} |")
-            continue
-        seconds = own["seconds"]
-        cells = [f"{own['multiplications']:,}", number(1e6 * seconds["evaluation"], 3), number(1e3 * seconds["integration"], 3), f"{own['steps']:,}", number(own["file_bytes"] / 1e3, 3), number(own["worst"], 3)]
-        out.append(f"| {name} | " + " | ".join(cells) + " |")
+def worst_error(row, tolerance):
+    """The error that is largest beside its tolerance: its name, its size and the tolerance, of the attitude in radians, else relative."""
+    errors = {key: value for key, value in row["measured"]["errors"].items() if key in tolerance and value is not None}
+    name = max(errors, key=lambda key: errors[key] / tolerance[key])
+    return name, errors[name], tolerance[name]
+
+
+def in_words(name, value):
+    return f"{number(value)} rad" if name == "attitude" else f"{number(100 * value)} %"
+
+
+def shown(told):
+    """Numbers of the rows that the page shows: the front, what is recommended, the usual body, lumped masses and two sets of groups."""
+    rows = told["rows"]
+    numbers = list(told["front"]) + ([told["recommended"]] if told["recommended"] else []) + [usual(told)]
+    whole = rows[0]["modes"]
+    for row in rows:
+        alone = row["lumped"] or row["modes"] == whole and row["kind"] == "groups" and len(row["groups"]) == 2
+        if alone and row["measured"]:
+            numbers.append(row["number"])
+    unique = sorted(set(numbers), key=lambda at: rows[at - 1]["measured"]["multiplications"])
+    return [rows[at - 1] for at in unique if rows[at - 1]["measured"]]
+
+
+def usual(told):
+    """The row of N free modes with residual vectors and all terms: the first conversion after the reference that has both."""
+    usual = [row for row in told["rows"] if row["source"].endswith("free modes, residual vectors") and row["source"] != told["rows"][0]["source"] and len(row["groups"]) == 3]
+    return usual[0]["number"]
+
+
+class Timed:
+    """A candidate in both programs."""
+
+    def __init__(self, program, folder, row, scene, start):
+        own = folder / f"{row['number']:03}"
+        own.mkdir()
+        path = folder / f"candidate_{row['number']:03}.flex.h5"
+        kept = [mode - 1 for mode in row["mode_numbers"]]
+        task = Task(path, scene, None if start is None else tuple(part[kept] for part in start))
+        self.programs, self.seconds, self.steps, self.why = {}, {}, {}, {}
+        for name, kind in (("exudyn", InExudyn), ("c", InC)):
+            try:
+                self.programs[name] = kind(program, task, own)
+                self.seconds[name], self.steps[name] = [], (task if name == "exudyn" else self.programs[name]).steps
+            except (RuntimeError, ValueError) as error:
+                self.why[name] = str(error).splitlines()[0]
+
+    def run(self):
+        for name, program in list(self.programs.items()):
+            try:
+                seconds, path = program.run()
+                self.seconds[name].append(seconds)
+                self.path = path if name == "exudyn" else getattr(self, "path", None)
+            except (RuntimeError, ValueError) as error:
+                self.why[name] = str(error).splitlines()[0]
+                del self.programs[name]
+
+    def median(self, name):
+        return float(np.median(self.seconds[name])) if self.seconds.get(name) and name not in self.why else None
+
+
+def timed(program, folder, told, scene):
+    """Seconds of the rows that are shown, taken in turns."""
+    q, qd, _ = simulated_modes(program, folder, folder / "candidate_001.flex.h5", scene[0])
+    first = told["rows"][0]["source"]
+    found = {}
+    for row in shown(told):
+        start = (q[0], qd) if row["source"] == first else None
+        found[row["number"]] = Timed(program, folder, row, scene[1], start)
+    for _ in range(TURNS):
+        for one in found.values():
+            one.run()
+    return found
+
+
+def measured(told, times):
+    """What is shown, as a table."""
+    out = ["| candidate | error | of what is allowed | Exudyn (s) | C (ms) | steps in C | file (kB) |", "|---|---|---|---|---|---|---|"]
+    for row in shown(told):
+        own, one = row["measured"], times[row["number"]]
+        name, error, _ = worst_error(row, told["tolerance"])
+        label = f"**{described(row)}**" if row["number"] == told["recommended"] else described(row)
+        label += " (whole body)" if row["number"] == usual(told) else ""
+        seconds, milliseconds = one.median("exudyn"), one.median("c")
+        cells = [f"{name} {in_words(name, error)}", f"{number(100 * own['worst'])} %", number(seconds) if seconds else one.why.get("exudyn", ""), number(1e3 * milliseconds) if milliseconds else one.why.get("c", "")]
+        cells += [f"{one.steps['c']:,}" if "c" in one.steps else "", number(own["file_bytes"] / 1e3, 3)]
+        out.append(f"| {label} | " + " | ".join(cells) + " |")
     return "\n".join(out)
 
 
-def figure(folder, name):
-    """The plot of the report as a picture of its own."""
-    [(inside,)] = [(m,) for m in re.findall(r"<svg[^>]*>(.*?)</svg>", (folder / "trade.html").read_text(), re.S)]
-    width, height = re.search(r'viewBox="0 0 (\S+) (\S+)"', (folder / "trade.html").read_text()).groups()
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" role="img">'
-    text = f'{head}\n<style>{STYLE}</style><rect width="{width}" height="{height}" fill="#fff"/>\n{inside}</svg>\n'
-    (ROOT / "docs/images" / f"trade_{name}.svg").write_text(text)
+def drawn(told, times, name):
+    """The figure: error of deflection, stress and reaction over seconds in Exudyn."""
+    tolerance = {key: value for key, value in told["tolerance"].items() if key in ("deflection", "stress", "reaction")}
+    points = []
+    for row in shown(told):
+        seconds = times[row["number"]].median("exudyn")
+        errors = [value for key, value in row["measured"]["errors"].items() if key in tolerance and value is not None]
+        if seconds and errors and max(errors) > 0:
+            points.append((seconds, 100 * max(errors), described(row), bool(row["lumped"]), row["number"] == told["recommended"], row["number"] in told["front"]))
+    (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points, 100 * min(tolerance.values())))
 
 
-def scene_part(program, name, model, modes, residual):
-    scene = ROOT / "fixtures/scenes" / f"{name}.toml"
+def summary(told, times):
+    """The row of the table on top."""
+    lacks = told["reference_lacks"]
+    reference = ", ".join(f"{key} {in_words(key, lacks[-1][key])}" for key in ("deflection", "stress") if lacks and lacks[-1][key] is not None)
+    whole = times[usual(told)]
+    if not told["recommended"]:
+        return f"| {told['scene']} | none within the tolerances | | {reference} | | |"
+    row = told["rows"][told["recommended"] - 1]
+    own = times[told["recommended"]]
+    name, error, allowed = worst_error(row, told["tolerance"])
+
+    def saved(kind, unit):
+        before, after = whole.median(kind), own.median(kind)
+        if not before or not after:
+            return whole.why.get(kind) or own.why.get(kind) or ""
+        return f"{number(unit * before)} to {number(unit * after)}: **{number(before / after)} times**"
+
+    return f"| {told['scene']} | {described(row)} | {name} {in_words(name, error)} (allowed {in_words(name, allowed)}) | {reference} | {saved('exudyn', 1)} | {saved('c', 1e3)} |"
+
+
+def scene_part(program, name, model, modes):
+    """The part of a scene, and its row of the table on top."""
+    path = ROOT / "fixtures/scenes" / f"{name}.toml"
+    manifest = ROOT / "fixtures/models" / model / "model.toml"
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        convert(program, folder, model, modes, residual)
-        decision = decided(program, folder, scene)
-        run(program, "trade", "body.flex.h5", "--scene", scene, "--repeat", 1, "--report", "trade.html", "--report", "trade.json", "--quiet", folder=folder, passes=(0, 1))
+        words = ["trade", manifest, "--modes", modes, "--scene", path, "--repeat", 1, "--bodies", folder, "--report", "trade.json", "--quiet"]
+        begin = time.perf_counter()
+        run(program, *words, folder=folder, passes=(0, 1))
+        took = time.perf_counter() - begin
         told = json.loads((folder / "trade.json").read_text())
-        figure(folder, name)
-    options = f"--modes {modes}" + (f" --residual-vectors {residual}" if residual else "")
-    parts = [f"## {told['scene']}", f"`{model}`, `{options}`; {len(told['rows'])} candidates. {told['verdict'][0].upper() + told['verdict'][1:]}.", decision, measured(told), f"![error against work](images/trade_{name}.svg)"]
-    return "\n\n".join(parts) + "\n\n"
+        times = timed(program, folder, told, (path, read_scene(path)))
+        agree = agreement(program, folder, path, times[told["rows"][0]["number"]])
+    drawn(told, times, name)
+    verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:])
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy."
+    parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](images/trade_{name}.svg)"]
+    return "\n\n".join(parts) + "\n\n", summary(told, times)
+
+
+def agreement(program, folder, scene, one):
+    """Largest difference of the motion of the reference in Exudyn to `simulate`, in the root of the elastic energy."""
+    task = one.programs["exudyn"].task
+    q, _, instants = simulated_modes(program, folder, task.path, scene)
+    own = np.array([np.interp(instants, one.programs["exudyn"].instants, column) for column in one.path.T]).T
+    root = np.sqrt(task.eigenvalue)
+    return np.linalg.norm((own - q) * root, axis=1).max() / np.linalg.norm(q * root, axis=1).max()
+
+
+def simulated_modes(program, folder, body, scene):
+    """Modal coordinates of `flexbody simulate` (instants x modes), their first rates, and the instants."""
+    run(program, "simulate", body, "--scene", scene, "--csv", "modes.csv", "--quiet", folder=folder)
+    with open(folder / "modes.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    count = sum(key.startswith("q_") for key in rows[0])
+    q = np.array([[float(row[f"q_{j + 1}"]) for j in range(count)] for row in rows])
+    return q, np.array([float(rows[0][f"qd_{j + 1}"]) for j in range(count)]), np.array([float(row["time"]) for row in rows])
 
 
 def simulated(program, folder, scene, body):
@@ -180,7 +295,7 @@ def guidelines(job):
     scene = read_scene(path)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        convert(program, folder, model, FEW, "")
+        convert(program, folder, model, FEW)
         body = Body(folder / "body.flex.h5")
         if not body.solid:
             return name, None
@@ -221,13 +336,10 @@ def counter_part(program):
     scene = read_scene(path)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        convert(program, folder, model, modes, "")
+        convert(program, folder, model, modes)
         body = Body(folder / "body.flex.h5")
         instants, own = simulated(program, folder, path, body)
-        decision = decided(program, folder, path)
-        run(program, "trade", "body.flex.h5", "--scene", path, "--repeat", 1, "--report", "trade.html", "--report", "trade.json", "--quiet", folder=folder, passes=(0, 1))
-        told = json.loads((folder / "trade.json").read_text())
-        figure(folder, name)
+        decision = decided(program, folder, path, "body.flex.h5")
     every = max(1, len(instants) // INSTANTS)
     whole, errors = study(body, scene, instants[::every])
     q = np.linalg.norm(own[7:7 + body.nf], axis=0).max()
@@ -236,8 +348,8 @@ def counter_part(program):
     facts = f"eta = |q| / sqrt(I0) = {100 * q / np.sqrt(np.diag(body.I0).min()):.1f} %, omega / Omega1 = {omega / first:.3f}, {first * instants[-1] / (2 * np.pi):.0f} periods of the first mode"
     lines = [f"| {key} | " + " | ".join(f"{100 * errors[key][what]:.2g} %" if errors[key] else "does not run" for what in ("omega", "modes")) + f" | {number(errors[key]['attitude'])} |" for key in errors if errors[key]]
     table = "\n".join(["| guideline | angular velocity | modal coordinates | attitude (rad) |", "|---|---|---|---|", *lines])
-    said = "Small deformations and a slow spin, for which guidelines I and II are meant; over many periods they are not enough. `trade` finds what is:"
-    parts = ["## A block that tumbles while it vibrates", f"`fixtures/scenes/{name}.toml` with `{model}`: {facts}.", table, said, decision, measured(told), f"![error against work](images/trade_{name}.svg)"]
+    said = "Small deformations and a slow spin, for which guidelines I and II are meant; over many periods they are not enough. What is enough:"
+    parts = ["## A block that tumbles while it vibrates", f"`fixtures/scenes/{name}.toml` with `{model}`: {facts}.", table, said, decision]
     return "\n\n".join(parts) + "\n\n"
 
 
@@ -261,6 +373,12 @@ def conversion_part(program):
     return "## Settings of the conversion\n\n" + said + "\n\n" + "\n".join(lines) + "\n\n"
 
 
+def processor():
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{len(names)} cores, {names[0]}" if names else "processor not known"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
@@ -273,10 +391,12 @@ def main():
     scenes = [one for one in SCENES if not args.only or one[0] in args.only]
     # One after the other: the times are measured.
     parts = [scene_part(program, *one) for one in scenes]
+    head = ["| scene | body | its error | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|"]
+    top = "\n".join(head + [row for _, row in parts])
     counter = counter_part(program) + conversion_part(program)
     with ProcessPoolExecutor() as pool:
         found = list(pool.map(guidelines, [(program, name, model) for name, model, *_ in scenes]))
-    args.output.write_text(HEAD.format(version=version) + "".join(parts) + guide_part(found) + counter.rstrip() + "\n", encoding="utf-8")
+    args.output.write_text(HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top) + "".join(part for part, _ in parts) + guide_part(found) + counter.rstrip() + "\n", encoding="utf-8")
     print(args.output)
 
 

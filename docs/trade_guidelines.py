@@ -137,7 +137,20 @@ class Motion:
         for mode in first.get("mode", []):
             if mode["number"] <= self.body.nf:
                 q[mode["number"] - 1], qd[mode["number"] - 1] = mode.get("amplitude", 0.0), mode.get("rate", 0.0)
-        return np.concatenate([e, omega, q, qd])
+        start = np.concatenate([e, omega, q, qd])
+        return self.settled(start) if first.get("deformation") == "static" else start
+
+    def settled(self, start):
+        """The start with the deformation at which the modes are not accelerated, by all terms."""
+        nf, whole = self.body.nf, Motion(self.body, self.scene, GUIDELINES["IV"])
+        if self.spin is not None:
+            start[4:7] = self.spin[0] * self.spin[1](0.0)[0]
+        for _ in range(100):
+            step = whole.rates(0.0, start)[7 + nf:] / self.body.eigenvalue
+            start[7:7 + nf] += step
+            if np.abs(step).max() <= 1e-13 * np.abs(start[7:7 + nf]).max():
+                break
+        return start
 
     def rates(self, t, y):
         body, kept, nf = self.body, self.kept, self.body.nf
@@ -186,9 +199,9 @@ class Motion:
 
     def static_response(self, instants):
         """The largest modal coordinate that the loads and the spin of some instants would hold."""
-        y = self.start()
-        y[7:] = 0.0
         whole = Motion(self.body, self.scene, GUIDELINES["IV"])
+        y = whole.start()
+        y[7:] = 0.0
         return max(np.abs(whole.rates(t, y)[7 + self.body.nf:] / self.body.eigenvalue).max() for t in instants[:: max(1, len(instants) // 40)])
 
     def states(self, instants, tolerance):

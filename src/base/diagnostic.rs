@@ -175,6 +175,7 @@ codes! {
     CarrierUnresolved = "FB546", Warning, Done, "modes that resolve the carried interface badly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and the interface in the manifest";
     CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness that does not act while the body is carried", "it was given for the free body: trust spins that are slow beside the first frequency only";
     ReferenceLacks = "FB548", Warning, Done, "the body that errors are measured against lacks a part of the model that counts", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where it comes from";
+    LumpedWithoutBody = "FB549", Note, Done, "a lumped mass that gives no body to compare with", "nothing to do: a program that lumps the mass in this way has no body either";
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     // FB6xx: resources

@@ -75,7 +75,7 @@ pub struct ExportArguments {
     /// With --to mbdyn: the last record group that the reader knows; short for --dialect level13 or level19
     #[arg(long, value_name = "LEVEL", value_parser = ["13", "19"], conflicts_with = "dialect")]
     pub mbdyn_level: Option<String>,
-    /// Places of the body to write: nodes, interfaces, or node numbers with commas [default: the interfaces where the format has frames and the body interfaces, else all nodes]
+    /// Places of the body to write: nodes, interfaces, node numbers with commas, or both as in interfaces,17,23 [default: the interfaces where the format has frames and the body interfaces, else all nodes]
     #[arg(long, value_name = "POINTS")]
     pub points: Option<String>,
     /// Units to write in [default: those of the body]
@@ -147,6 +147,9 @@ pub struct TradeArguments {
     /// Table to write the candidates to
     #[arg(long, value_name = "TRADE.csv")]
     pub csv: Option<PathBuf>,
+    /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: to time them in a program of your own
+    #[arg(long, value_name = "FOLDER")]
+    pub bodies: Option<PathBuf>,
     /// Do work that is estimated to take more than half an hour for its number of modes
     #[arg(long)]
     pub allow_long: bool,

@@ -54,18 +54,22 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     })
 }
 
-/// `nodes`, `interfaces`, or node numbers with commas.
+/// `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
 fn points(text: &str) -> Result<Points> {
     match text {
         "nodes" => return Ok(Points::Nodes),
         "interfaces" => return Ok(Points::Interfaces),
         _ => {}
     }
-    let numbers: Option<Vec<i64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
-    numbers.map(Points::Some).ok_or_else(|| {
+    let (numbers, points): (&str, fn(Vec<i64>) -> Points) = match text.strip_prefix("interfaces,") {
+        Some(numbers) => (numbers, Points::InterfacesAnd),
+        None => (text, Points::Some),
+    };
+    let numbers: Option<Vec<i64>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers.map(points).ok_or_else(|| {
         let message = format!("`{text}` names no points of the body");
         Diagnostic::new(Code::Usage, message)
-            .with_help("nodes, interfaces, or node numbers with commas")
+            .with_help("nodes, interfaces, node numbers with commas, or `interfaces,17,23`")
             .into()
     })
 }

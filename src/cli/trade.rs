@@ -16,7 +16,8 @@ use crate::model::FeModel;
 use crate::motion::scene::read_scene;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Settings, Source, conversions, trade};
+use crate::study::trade::{Row, Settings, Source, Trade, conversions, trade};
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -64,12 +65,38 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
+    let bodies = match &arguments.bodies {
+        Some(folder) => {
+            let inputs: Vec<&PathBuf> = outputs().chain([&arguments.body, &arguments.scene]).collect();
+            candidate_bodies(folder, &inputs, &study, &sources)?
+        }
+        None => Vec::new(),
+    };
     // Nothing appears before everything is done.
-    OutputSlot::commit_all(table.into_iter().chain(reports))?;
+    OutputSlot::commit_all(table.into_iter().chain(reports).chain(bodies))?;
     let is_reference = nodal.is_some() || lacks.last().is_none_or(ReferenceError::is_reference);
     let passed = study.recommended.row().is_some() && is_reference;
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
+}
+
+/// The bodies of the candidates that were measured, each in a file of `folder` that is named by its number; none of `taken` is replaced.
+fn candidate_bodies(
+    folder: &Path,
+    taken: &[&PathBuf],
+    study: &Trade,
+    sources: &[Source],
+) -> Result<Vec<OutputSlot>> {
+    let measured = study.rows.iter().enumerate().filter(|(_, row)| row.outcome.is_ok());
+    let named = measured.map(|(at, row)| (folder.join(format!("candidate_{:03}.flex.h5", at + 1)), row));
+    let named: Vec<(PathBuf, &Row)> = named.collect();
+    refuse_replacing(taken.iter().copied(), named.iter().map(|(path, _)| path))?;
+    let written = named.into_iter().map(|(path, row)| {
+        let slot = flex_body_file::prepare_output(path)?;
+        flex_body_file::fill_slot(&row.candidate.body(&sources[row.candidate.source])?, &slot)?;
+        Ok(slot)
+    });
+    written.collect()
 }
 
 /// What a flex-body file cannot be asked for.

@@ -160,7 +160,7 @@ impl Deck {
     /// Products of the rigid modes with the mass, and of both kinds of modes with mass and stiffness.
     fn products(&mut self, body: &FlexBody, rigid: usize) {
         let (nf, invariants) = (body.n_modes(), body.invariants());
-        let (mass, c, moment) = (invariants.mass(), &invariants.first_moment(), &invariants.second_moment());
+        let (mass, c, moment) = (invariants.mass(), invariants.first_moment(), invariants.second_moment());
         let scalar = |p: usize, q: usize| match (p, q) {
             (3, 3) => mass - 2.0 * c.sum() + moment.sum(),
             (3, axis) | (axis, 3) => c[axis] - moment.row(axis).sum(),

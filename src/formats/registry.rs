@@ -80,17 +80,12 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
     if options.points != Points::Usual && !format.has_points() {
         return refuse(format!("{name} has all nodes or none"), "leave --points out".to_owned());
     }
-    if options.points == Points::Interfaces && body.interfaces().is_empty() {
+    if options.points.of_interfaces() && body.interfaces().is_empty() {
         return refuse("the body has no interfaces".to_owned(), "--points nodes, or node numbers".to_owned());
     }
-    if let Points::Some(ids) = &options.points {
-        let strange = ids.iter().find(|&id| !body.nodes().ids.contains(id));
-        if let Some(id) = strange {
-            return refuse(
-                format!("the body has no node {id}"),
-                "flexbody inspect names the nodes".to_owned(),
-            );
-        }
+    if let Some(id) = options.points.named().iter().find(|&id| !body.nodes().ids.contains(id)) {
+        let help = "flexbody inspect names the nodes".to_owned();
+        return refuse(format!("the body has no node {id}"), help);
     }
     Ok(())
 }

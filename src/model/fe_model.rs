@@ -6,7 +6,7 @@ use super::mass_structure::MassForm;
 use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
-use crate::numerics::linalg::{Pencil, SymmetricMatrix};
+use crate::numerics::linalg::{CscMatrix, Pencil, SymmetricMatrix, larger};
 use faer::Mat;
 use std::borrow::Cow;
 
@@ -94,6 +94,30 @@ impl FeModel {
         &self.stiffness
     }
 
+    /// The same model with its whole mass lumped: `masses` (one for each node) at the displacements of the nodes, none at other rows.
+    /// Damping in proportion to the mass follows it.
+    ///
+    /// # Panics
+    /// When there is not one mass for each node.
+    pub fn with_nodal_masses(&self, masses: &[f64]) -> Self {
+        assert_eq!(masses.len(), self.nodes.len(), "one mass for each node");
+        let d = self.dimension();
+        let diagonal = |masses: &mut dyn Iterator<Item = f64>, rows: usize| {
+            let entries: Vec<_> = masses.enumerate().map(|(i, mass)| (i as u32, i as u32, mass)).collect();
+            let matrix = CscMatrix::from_triplets(rows, rows, &entries);
+            SymmetricMatrix::new(matrix).expect("a diagonal matrix is symmetric")
+        };
+        let by_row = &mut masses.iter().flat_map(|mass| std::iter::repeat_n(*mass, d));
+        Self {
+            mean_mass: diagonal(&mut masses.iter().copied(), self.mean_mass.n()),
+            whole_mass: (!self.rows.are_plain()).then(|| diagonal(by_row, self.rows.len())),
+            commutes: true,
+            mass_deviation: 0.0,
+            diagonal_mass: true,
+            ..self.clone()
+        }
+    }
+
     /// What the rows of the matrices are.
     pub fn rows(&self) -> &Rows {
         &self.rows
@@ -136,6 +160,13 @@ impl FeModel {
     /// [`Rows::rigid_fields`].
     pub fn rigid_fields(&self, centre: [f64; 3], length: f64) -> Mat<f64> {
         self.rows.rigid_fields(&self.nodes.positions, centre, length)
+    }
+
+    /// Length of the longest displacement of a node, of the displacements `u` of all rows.
+    pub fn longest_displacement(&self, u: &[f64]) -> f64 {
+        let d = self.dimension();
+        let squares = u[..d * self.nodes.len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());
+        squares.fold(0.0, larger).sqrt()
     }
 
     /// Named node sets.

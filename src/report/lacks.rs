@@ -21,17 +21,18 @@ impl LackFacts {
         Self { modes: lack.modes, deflection, stress, worst: lack.worst, time: lack.time }
     }
 
-    fn in_words(&self) -> String {
+    /// `deflection 0.5 %, stress 8.6 %`.
+    pub fn parts(&self) -> String {
         let part = |name: &str, value: Option<f64>| {
             value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
         };
         let parts = [part("deflection", self.deflection), part("stress", self.stress)];
-        let parts = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
-        format!(
-            "{} modes lack {parts} of the FE model, most at t = {}",
-            self.modes,
-            significant(self.time, 3)
-        )
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    fn in_words(&self) -> String {
+        let (parts, time) = (self.parts(), significant(self.time, 3));
+        format!("{} modes lack {parts} of the FE model, most at t = {time}", self.modes)
     }
 }
 

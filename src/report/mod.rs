@@ -23,11 +23,13 @@ mod render;
 mod run_data;
 mod scatter_chart;
 mod selection;
+mod selection_verdict;
 mod simulation;
 mod term_facts;
 mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
+mod trade_verdict;
 
 pub use audit::{audit_json, audit_text};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};

@@ -6,12 +6,13 @@ use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;
+use super::selection_verdict::SelectionVerdict;
 use super::text::{Page, diagnostics_lines};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::{Group, TermDecision};
 use crate::motion::scene::OutputErrors;
-use crate::study::selection::{Participation, Selection, Trial};
+use crate::study::selection::{Ground, Participation, Selection, Trial};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -24,6 +25,8 @@ pub struct SelectionFacts<'a> {
     generator: String,
     scene: &'a str,
     body: &'a str,
+    /// The selection in five lines.
+    verdict: SelectionVerdict,
     inputs: Vec<InputFacts<'a>>,
     tolerance: ToleranceFacts,
     terms: Vec<TermFacts<'a>>,
@@ -60,6 +63,8 @@ struct TermFacts<'a> {
     tier: u8,
     bound: f64,
     limit: f64,
+    /// Part of the tolerance that `limit` is; 1 where there is none.
+    budget: f64,
     /// limit / bound.
     slack: f64,
     reason: &'a str,
@@ -155,12 +160,13 @@ impl<'a> SelectionFacts<'a> {
     /// Facts of `selection`, and of the run that made it.
     pub fn new(selection: &'a Selection, run: &'a RunData) -> Self {
         let [attitude, deflection, stress, reaction] = selection.tolerance;
-        let term = |decision: &'a TermDecision| TermFacts {
+        let term = |(decision, ground): (&'a TermDecision, &Option<Ground>)| TermFacts {
             group: decision.group.name(),
             kept: decision.kept,
             tier: decision.tier,
             bound: decision.bound,
             limit: decision.limit,
+            budget: ground.map_or(1.0, |ground| ground.budget),
             slack: decision.limit / decision.bound,
             reason: &decision.reason,
         };
@@ -184,13 +190,14 @@ impl<'a> SelectionFacts<'a> {
             generator: generator(),
             scene: &selection.scene,
             body: &selection.body,
+            verdict: SelectionVerdict::new(selection),
             inputs: selection
                 .inputs
                 .iter()
                 .map(|input| InputFacts { name: input.name, value: input.value, source: &input.source })
                 .collect(),
             tolerance: ToleranceFacts { attitude, deflection, stress, reaction },
-            terms: selection.terms.iter().map(term).collect(),
+            terms: selection.terms.iter().zip(&selection.grounds).map(term).collect(),
             guideline: selection.guideline,
             modes: ModesFacts {
                 of: selection.n_modes,
@@ -223,23 +230,22 @@ impl<'a> SelectionFacts<'a> {
         if term.limit > 0.0 {
             let (bound, limit) = (significant(term.bound, 3), significant(term.limit, 3));
             let reach = if term.kept { "without it" } else { "at most" };
-            format!("{verdict} (tier {}): {}: {reach} {bound}, allowed {limit}", term.tier, term.reason)
+            let budget = match term.budget {
+                budget if budget < 1.0 => {
+                    format!(
+                        " ({} % of the tolerance: the rest is for the modes)",
+                        significant(100.0 * budget, 2)
+                    )
+                }
+                _ => String::new(),
+            };
+            format!(
+                "{verdict} (tier {}): {}: {reach} {bound}, allowed {limit}{budget}",
+                term.tier, term.reason
+            )
         } else {
             format!("{verdict}: {}", term.reason)
         }
-    }
-
-    fn errors_in_words(errors: &OutputErrors) -> String {
-        let relative = |name: &str, error: Option<f64>| {
-            error.map(|error| format!("{name} {} %", significant(100.0 * error, 3)))
-        };
-        let all = [
-            Some(format!("attitude {} rad", significant(errors.attitude, 3))),
-            relative("deflection", errors.deflection),
-            relative("stress", errors.stress),
-            relative("reaction", errors.reaction),
-        ];
-        all.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     fn tolerance_in_words(&self) -> String {
@@ -254,17 +260,6 @@ impl<'a> SelectionFacts<'a> {
         )
     }
 
-    fn cost_in_words(&self) -> Option<String> {
-        let chosen = self.chosen.as_ref()?;
-        let ratio = self.multiplications_before as f64 / chosen.multiplications as f64;
-        Some(format!(
-            "{} multiplications per evaluation of {} ({} times fewer)",
-            chosen.multiplications,
-            self.multiplications_before,
-            significant(ratio, 3)
-        ))
-    }
-
     fn modes_in_words(&self) -> String {
         format!("{} of {}: {}", self.modes.kept.len(), self.modes.of, self.modes.reason)
     }
@@ -272,6 +267,10 @@ impl<'a> SelectionFacts<'a> {
     fn text(&self) -> String {
         let mut page = Page(String::new());
         page.entry("Selection", &format!("{}: {}", self.scene, self.body));
+        for (label, line) in self.verdict.lines() {
+            page.entry(label, line);
+        }
+        page.0.push_str("\nDetails\n");
         for term in &self.terms {
             page.entry(term.group, &Self::verdict(term));
         }
@@ -281,11 +280,8 @@ impl<'a> SelectionFacts<'a> {
             page.entry("", &format!("kept: {}", ranges(&self.modes.kept)));
         }
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
-            page.entry("Errors", &format!("{}, measured against everything", Self::errors_in_words(errors)));
+            page.entry("Errors", &format!("{}, measured against everything", errors_in_words(errors)));
             page.entry("Reference", &reference_in_words(&self.reference));
-        }
-        if let Some(cost) = self.cost_in_words() {
-            page.entry("Cost", &cost);
         }
         for (i, input) in self.inputs.iter().enumerate() {
             let label = if i == 0 { "Inputs" } else { "" };
@@ -298,15 +294,10 @@ impl<'a> SelectionFacts<'a> {
 
     fn html(&self) -> String {
         let mut html = String::new();
-        let kept: Vec<&str> = self.terms.iter().filter(|term| term.kept).map(|term| term.group).collect();
-        let groups =
-            if kept.is_empty() { "I0 only".to_owned() } else { format!("I0 and {}", kept.join(", ")) };
-        let _ = writeln!(
-            html,
-            "<p class=\"verdict\"><strong>{groups}, {}.</strong> {}</p>",
-            counted(self.modes.kept.len(), "mode"),
-            self.cost_in_words().map_or_else(String::new, |cost| format!("{cost}."))
-        );
+        let [asked, (label, taken), rest @ ..] = self.verdict.lines();
+        let class = if self.verdict.holds { "" } else { " open" };
+        let _ = writeln!(html, "<p class=\"verdict{class}\"><strong>{label} {}.</strong></p>", escape(taken));
+        terms(&mut html, [asked].into_iter().chain(rest).map(|(label, line)| (label, escape(line))));
         section(&mut html, "Decision");
         let decided = self.terms.iter().map(|term| (term.group, escape(&Self::verdict(term))));
         let mut items: Vec<(&str, String)> = decided.collect();
@@ -314,7 +305,7 @@ impl<'a> SelectionFacts<'a> {
         items.push(("Modes", escape(&self.modes_in_words())));
         items.push(("Kept", ranges(&self.modes.kept)));
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
-            items.push(("Errors", format!("{}, measured", Self::errors_in_words(errors))));
+            items.push(("Errors", format!("{}, measured", errors_in_words(errors))));
             items.push(("Reference", escape(&reference_in_words(&self.reference))));
         }
         terms(&mut html, items);
@@ -440,8 +431,22 @@ impl<'a> SelectionFacts<'a> {
     }
 }
 
+/// `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
+pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
+    let relative = |name: &str, error: Option<f64>| {
+        error.map(|error| format!("{name} {} %", significant(100.0 * error, 3)))
+    };
+    let all = [
+        Some(format!("attitude {} rad", significant(errors.attitude, 3))),
+        relative("deflection", errors.deflection),
+        relative("stress", errors.stress),
+        relative("reaction", errors.reaction),
+    ];
+    all.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
 /// Ascending numbers with runs drawn together: 1-4, 7, 9-10.
-fn ranges(numbers: &[usize]) -> String {
+pub(super) fn ranges(numbers: &[usize]) -> String {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for &number in numbers {
         match runs.last_mut() {

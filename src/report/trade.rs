@@ -8,20 +8,18 @@ use super::render::json;
 use super::run_data::RunData;
 use super::scatter_chart::{Chart, Series, scatter_chart};
 use super::text::{Page, diagnostics_lines};
+use super::trade_verdict::verdict_lines;
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::Storage;
 use crate::motion::scene::{OutputErrors, Tolerance};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Times, Trade};
+use crate::study::trade::{Kind, LumpedMass, Measured, ReferenceKind, Row, Trade};
 use serde::Serialize;
 use std::fmt::Write;
 
 /// Errors below this part of the tolerance are none on the plot.
 const NO_ERROR: f64 = 1e-6;
-
-/// Growth from the first half of the time to the second that is worth a word: that of a phase.
-const GROWING: f64 = 1.8;
 
 /// Facts of a trade study.
 #[derive(Debug, Clone, Serialize)]
@@ -37,7 +35,8 @@ pub struct TradeFacts<'a> {
     reference_lacks: Vec<LackFacts>,
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
-    verdict: String,
+    /// The study in five lines.
+    verdict: Vec<VerdictLine>,
     recommended: Option<usize>,
     front: Vec<usize>,
     rows: Vec<RowFacts<'a>>,
@@ -47,9 +46,16 @@ pub struct TradeFacts<'a> {
     cpu_seconds: f64,
 }
 
+/// A line of the verdict.
+#[derive(Debug, Clone, Serialize)]
+struct VerdictLine {
+    label: &'static str,
+    text: String,
+}
+
 /// A candidate.
 #[derive(Debug, Clone, Serialize)]
-struct RowFacts<'a> {
+pub(super) struct RowFacts<'a> {
     number: usize,
     source: &'a str,
     kind: Kind,
@@ -58,7 +64,10 @@ struct RowFacts<'a> {
     mode_numbers: Vec<usize>,
     last_frequency_hz: f64,
     groups: Vec<&'static str>,
+    /// Scheme by which its mass was lumped.
     lumped: Option<&'a str>,
+    /// What was lumped: the `couplings`, or the `whole` mass before the modes were computed.
+    lumped_part: Option<&'static str>,
     storage: &'static str,
     failed: Option<&'a Diagnostic>,
     measured: Option<MeasuredFacts>,
@@ -72,24 +81,38 @@ struct MeasuredFacts {
     growth: Option<f64>,
     multiplications: usize,
     file_bytes: u64,
-    steps: u64,
-    rejected_steps: u64,
-    evaluations: u64,
-    seconds: Times,
+    /// Nothing of candidates that are not on the front.
+    steps: Option<u64>,
+    rejected_steps: Option<u64>,
+    evaluations: Option<u64>,
+    seconds: Seconds,
+}
+
+/// Unit: s.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Seconds {
+    preprocessing: Option<f64>,
+    evaluation: Option<f64>,
+    integration: Option<f64>,
 }
 
 impl MeasuredFacts {
     fn new(measured: &Measured) -> Self {
+        let timed = measured.timed.as_ref();
         Self {
             errors: measured.errors,
             worst: measured.worst,
             growth: measured.growth,
             multiplications: measured.multiplications,
             file_bytes: measured.bytes,
-            steps: measured.work.steps,
-            rejected_steps: measured.work.rejected,
-            evaluations: measured.work.rates,
-            seconds: measured.times,
+            steps: timed.map(|timed| timed.work.steps),
+            rejected_steps: timed.map(|timed| timed.work.rejected),
+            evaluations: timed.map(|timed| timed.work.rates),
+            seconds: Seconds {
+                preprocessing: measured.preprocessing,
+                evaluation: timed.map(|timed| timed.evaluation),
+                integration: timed.map(|timed| timed.integration),
+            },
         }
     }
 }
@@ -105,7 +128,8 @@ impl<'a> RowFacts<'a> {
             mode_numbers: candidate.modes.iter().map(|mode| mode + 1).collect(),
             last_frequency_hz: row.last_frequency_hz,
             groups: candidate.group_names(),
-            lumped: candidate.lumped.as_deref(),
+            lumped: candidate.lumped.as_ref().map(LumpedMass::scheme),
+            lumped_part: candidate.lumped.as_ref().map(LumpedMass::part),
             storage: candidate.storage.name(),
             failed: row.outcome.as_ref().err().map(|failed| &failed.0),
             measured: row.outcome.as_ref().ok().map(MeasuredFacts::new),
@@ -113,13 +137,13 @@ impl<'a> RowFacts<'a> {
     }
 
     /// `6 modes, W1`: what it has, in words.
-    fn in_words(&self) -> String {
+    pub fn in_words(&self) -> String {
         let mut words = format!("{}, {}", counted(self.modes, "mode"), self.groups_in_words());
         if !self.lowest() {
             words.push_str(", not the lowest");
         }
-        if let Some(scheme) = self.lumped {
-            let _ = write!(words, ", {}", plain(scheme));
+        if let (Some(scheme), Some(part)) = (self.lumped, self.lumped_part) {
+            let _ = write!(words, ", {} {part}", plain(scheme));
         }
         if self.storage == Storage::F32.name() {
             words.push_str(", f32");
@@ -142,9 +166,9 @@ impl<'a> TradeFacts<'a> {
     pub fn new(trade: &'a Trade, lacks: &[ReferenceError], run: &'a RunData) -> Self {
         let rows: Vec<RowFacts<'a>> =
             trade.rows.iter().enumerate().map(|(at, row)| RowFacts::new(at + 1, row)).collect();
-        Self {
+        let mut facts = Self {
             format: "flexbody-trade",
-            format_major: 1,
+            format_major: 2,
             format_minor: 0,
             generator: generator(),
             scene: &trade.scene,
@@ -153,7 +177,7 @@ impl<'a> TradeFacts<'a> {
             reference_lacks: lacks.iter().map(LackFacts::new).collect(),
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
-            verdict: verdict(trade, &rows),
+            verdict: Vec::new(),
             recommended: trade.recommended.row().map(|row| row + 1),
             front: trade.front.iter().map(|row| row + 1).collect(),
             rows,
@@ -161,7 +185,15 @@ impl<'a> TradeFacts<'a> {
             threads: run.threads,
             wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
             cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
-        }
+        };
+        let lines = verdict_lines(&facts, trade).into_iter();
+        facts.verdict = lines.map(|(label, text)| VerdictLine { label, text }).collect();
+        facts
+    }
+
+    /// The candidates, in the order of the study.
+    pub(super) fn rows(&self) -> &[RowFacts<'a>] {
+        &self.rows
     }
 
     /// The facts in a format, ending with a line break.
@@ -173,7 +205,7 @@ impl<'a> TradeFacts<'a> {
         }
     }
 
-    fn tolerances_in_words(&self) -> String {
+    pub(super) fn tolerances_in_words(&self) -> String {
         let Tolerance { attitude, deflection, stress, reaction, .. } = self.tolerance;
         let all = [("deflection", deflection), ("stress", stress), ("reaction", reaction)];
         let relative = all.map(|(name, value)| format!("{name} {} %", significant(100.0 * value, 3)));
@@ -205,12 +237,10 @@ impl<'a> TradeFacts<'a> {
             "Trade",
             &format!("{}: {}, {count} against {}", plain(self.scene), plain(self.body), self.against()),
         );
-        page.entry("Whole body", &reference_in_words(&self.reference_lacks));
-        page.entry("Tolerances", &self.tolerances_in_words());
-        if let Some(allowed) = self.allowed_multiplications {
-            page.entry("Cost", &format!("at most {allowed} multiplications per evaluation"));
+        for line in &self.verdict {
+            page.entry(line.label, &line.text);
         }
-        page.entry("Verdict", &self.verdict);
+        page.entry("Whole body", &reference_in_words(&self.reference_lacks));
         page.0.push_str("\n  multiplications  evaluation  simulation      file  error/tol  what\n");
         for row in self.shown() {
             let Some(measured) = &row.measured else { continue };
@@ -219,8 +249,8 @@ impl<'a> TradeFacts<'a> {
                 page.0,
                 "{taken} {:>15}  {:>10}  {:>10}  {:>8}  {:>9}  {}",
                 measured.multiplications,
-                short(measured.seconds.evaluation),
-                duration(measured.seconds.integration),
+                measured.seconds.evaluation.map_or_else(String::new, short),
+                measured.seconds.integration.map_or_else(String::new, duration),
                 bytes(measured.file_bytes),
                 significant(measured.worst, 3),
                 row.in_words()
@@ -240,11 +270,14 @@ impl<'a> TradeFacts<'a> {
     fn html(&self) -> String {
         let mut html = String::new();
         let class = if self.recommended.is_some() { "" } else { " open" };
+        let [asked, taken, rest @ ..] = &self.verdict[..] else { return html };
         let _ = writeln!(
             html,
-            "<p class=\"verdict{class}\"><strong>{}.</strong></p>",
-            escape(&capital(&self.verdict))
+            "<p class=\"verdict{class}\"><strong>{}: {}.</strong></p>",
+            taken.label,
+            escape(&taken.text)
         );
+        terms(&mut html, [asked].into_iter().chain(rest).map(|line| (line.label, escape(&line.text))));
         section(&mut html, "What is compared");
         terms(
             &mut html,
@@ -328,9 +361,9 @@ impl<'a> TradeFacts<'a> {
                 (Some(m), _) => {
                     cells.extend([
                         m.multiplications.to_string(),
-                        short(m.seconds.evaluation),
-                        duration(m.seconds.integration),
-                        m.steps.to_string(),
+                        m.seconds.evaluation.map_or_else(none, short),
+                        m.seconds.integration.map_or_else(none, duration),
+                        m.steps.map_or_else(none, |steps| steps.to_string()),
                         bytes(m.file_bytes),
                     ]);
                     cells.extend(several.then(|| made_in(m)));
@@ -356,60 +389,6 @@ impl<'a> TradeFacts<'a> {
     }
 }
 
-/// What to take, as a sentence without a full stop.
-fn verdict(trade: &Trade, rows: &[RowFacts<'_>]) -> String {
-    let growth = |measured: &MeasuredFacts| match measured.growth {
-        Some(growth) if growth > GROWING && measured.worst > NO_ERROR => {
-            format!(
-                "; its errors grow with time, {} times from the first half to the second",
-                significant(growth, 2)
-            )
-        }
-        _ => String::new(),
-    };
-    let measured_row = |row: usize| rows[row].measured.as_ref().map(|measured| (&rows[row], measured));
-    let first = rows.first().and_then(|row| row.measured.as_ref()).map_or(0, |m| m.multiplications);
-    match trade.recommended {
-        Recommendation::Cheapest(row) => measured_row(row).map_or_else(String::new, |(row, measured)| {
-            let cheaper = significant(first as f64 / measured.multiplications as f64, 3);
-            let own = if row.number == 1 {
-                "nothing cheaper than the whole body holds every tolerance".to_owned()
-            } else {
-                format!(
-                    "{} holds every tolerance at {cheaper} times less work than the whole body",
-                    row.in_words()
-                )
-            };
-            own + &growth(measured)
-        }),
-        Recommendation::MostAccurate(row) => measured_row(row).map_or_else(String::new, |(row, measured)| {
-            let ratio = significant(measured.worst, 3);
-            let own = format!(
-                "{} is the most accurate for the allowed cost: {ratio} of the tolerance at the worst",
-                row.in_words()
-            );
-            own + &growth(measured)
-        }),
-        Recommendation::None if trade.allowed.is_some() => "no candidate is as cheap as allowed".to_owned(),
-        Recommendation::None => {
-            let worst = rows
-                .iter()
-                .filter_map(|row| Some(row.measured.as_ref()?.worst))
-                .fold(f64::INFINITY, f64::min);
-            if worst.is_finite() {
-                format!("no candidate holds every tolerance: the best is at {} of it", significant(worst, 3))
-            } else {
-                "no candidate could be simulated".to_owned()
-            }
-        }
-    }
-}
-
-fn capital(fragment: &str) -> String {
-    let mut characters = fragment.chars();
-    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
-}
-
 /// A short time.
 fn short(seconds: f64) -> String {
     if seconds < 1e-6 {
@@ -421,7 +400,7 @@ fn short(seconds: f64) -> String {
 
 /// The study as a table of comma-separated values, a row for every candidate; numbers round-trip.
 pub fn trade_csv(trade: &Trade) -> String {
-    let mut out = "number,source,kind,modes,last_frequency_hz,groups,lumped,storage,multiplications,evaluation_seconds,\
+    let mut out = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
                    integration_seconds,preprocessing_seconds,steps,file_bytes,attitude,deflection,stress,reaction,worst,\
                    on_front,recommended,failed\n"
         .to_owned();
@@ -431,7 +410,9 @@ pub fn trade_csv(trade: &Trade) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
         let errors = m.map(|m| m.errors);
-        let count = |number: fn(&MeasuredFacts) -> u64| m.map_or_else(String::new, |m| number(m).to_string());
+        let count = |number: fn(&MeasuredFacts) -> Option<u64>| {
+            m.and_then(number).map_or_else(String::new, |value| value.to_string())
+        };
         let cells = [
             facts.number.to_string(),
             text(facts.source),
@@ -440,13 +421,14 @@ pub fn trade_csv(trade: &Trade) -> String {
             number(Some(facts.last_frequency_hz)),
             facts.groups.join(" "),
             text(facts.lumped.unwrap_or_default()),
+            facts.lumped_part.unwrap_or_default().to_owned(),
             facts.storage.to_owned(),
-            count(|m| m.multiplications as u64),
-            number(m.map(|m| m.seconds.evaluation)),
-            number(m.map(|m| m.seconds.integration)),
+            count(|m| Some(m.multiplications as u64)),
+            number(m.and_then(|m| m.seconds.evaluation)),
+            number(m.and_then(|m| m.seconds.integration)),
             number(m.and_then(|m| m.seconds.preprocessing)),
             count(|m| m.steps),
-            count(|m| m.file_bytes),
+            count(|m| Some(m.file_bytes)),
             number(errors.map(|e| e.attitude)),
             number(errors.and_then(|e| e.deflection)),
             number(errors.and_then(|e| e.stress)),

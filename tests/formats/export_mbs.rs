@@ -580,6 +580,52 @@ fn mbdyn_says_what_its_input_must_have() {
     assert!(nodes.contains("2 or more interface nodes"), "{nodes}");
 }
 
+/// Six nodes on a cross have the place and the rotation of the interface, also of nodal rotations that Exudyn has no other form for.
+#[test]
+fn interfaces_of_exudyn_are_crosses_of_six_nodes_where_places_are_asked_for() {
+    for model in ["bracket_hex20", "frame_beams"] {
+        let body = fixture(model, 4, BodyFrame::Principal);
+        let other = body.nodes().ids[3];
+        let points = Points::InterfacesAnd(vec![other]);
+        let (bytes, losses) = written(&body, "exudyn", &options("", points));
+        assert!(losses.is_empty(), "{losses:?}");
+        let (nodal, turned) = (body.modes().shape.as_ref(), body.modes().rotation.as_ref());
+        opened(&bytes, |file| {
+            let count = 6 * body.interfaces().len() + 1;
+            let (positions, _) = array(file, "xRef");
+            let (shape, size) = array(file, "modeBasis");
+            assert_eq!((positions.len(), size), (3 * count, vec![3 * count, body.n_modes()]), "{model}");
+            let x = |i: usize| Vector3::from_fn(|k, _| positions[3 * i + k]);
+            let u = |i: usize, j: usize| Vector3::from_fn(|k, _| shape[(3 * i + k) * body.n_modes() + j]);
+            for (number, interface) in body.interfaces().iter().enumerate() {
+                let nodes = 6 * number..6 * number + 6;
+                let mean =
+                    |of: &dyn Fn(usize) -> Vector3<f64>| nodes.clone().map(of).sum::<Vector3<f64>>() / 6.0;
+                let reference = Vector3::from(interface.reference.expect("a reference point"));
+                let place = mean(&x);
+                assert!((place - reference).norm() < 1e-12 * (1.0 + reference.norm()), "{place}");
+                let arm = |i: usize| (x(i) - place).cross_matrix();
+                let inertia: Matrix3<f64> = nodes.clone().map(|i| arm(i).transpose() * arm(i)).sum();
+                let inverse = inertia.try_inverse().expect("not on a line");
+                let rows = interface.rows(body.nodes(), nodal, turned.map(Mat::as_ref), 3).expect("rows");
+                let rotation = rows.rotation.as_ref().expect("determined");
+                for j in 0..body.n_modes() {
+                    let theta = inverse * nodes.clone().map(|i| arm(i) * u(i, j)).sum::<Vector3<f64>>();
+                    let moved = mean(&|i| u(i, j));
+                    let size = nodes.clone().map(|i| u(i, j).norm()).fold(0.0, f64::max);
+                    for k in 0..3 {
+                        close(moved[k], rows.translation[(k, j)], size, "translation");
+                        close(theta[k], rotation[(k, j)], size / arm(nodes.start).norm(), "rotation");
+                    }
+                }
+            }
+            let last = body.nodes().ids.iter().position(|id| *id == other).expect("a node");
+            assert_eq!(x(count - 1), Vector3::from(body.nodes().positions[last]));
+            assert_eq!(u(count - 1, 1), Vector3::from_fn(|k, _| nodal[(3 * last + k, 1)]));
+        });
+    }
+}
+
 #[test]
 fn places_are_those_that_were_asked_for() {
     let body = fixture("bracket_hex20", 3, BodyFrame::Principal);
@@ -590,6 +636,7 @@ fn places_are_those_that_were_asked_for() {
             (Points::Interfaces, 2),
             (Points::Nodes, body.n_nodes()),
             (Points::Some(some.clone()), 2),
+            (Points::InterfacesAnd(some.clone()), 4),
         ] {
             let (bytes, losses) = written(&body, format, &options("", points.clone()));
             assert!(losses.is_empty(), "{losses:?}");

@@ -2,14 +2,14 @@
 
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::mesh::{Mesh, grid};
+use crate::support::scenes::nothing_happens;
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::model::FeModel;
-use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
-    Axes, History, Initial, Load, Point, Run, Scene, Scheme, Spin, Stage, simulate, trace,
+    Axes, History, Initial, Load, Point, Scene, Scheme, Spin, Stage, simulate, trace,
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
 use flexbody::study::reference::{Enriched, PART_OF_REFERENCE, ReferenceError, enrich};
@@ -48,21 +48,12 @@ fn first_rate(model: &FeModel) -> f64 {
 fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: Vector3<f64>) -> Scene {
     let rate = first_rate(model);
     Scene {
-        name: "pulled".to_owned(),
-        run: Run {
-            duration: Some(2.0 * std::f64::consts::TAU / rate),
-            outputs: 60,
-            most_steps: Run::MOST_STEPS,
-            scheme: Scheme::Adaptive { tolerance: 1e-9 },
-            terms: Terms::ALL,
-        },
         initial: Initial {
             angular_velocity: spin * rate,
             axes: Axes::Body,
             settled: true,
             ..Initial::default()
         },
-        gravity: None,
         loads: vec![Load {
             at: Point::Node(model.nodes().ids[node]),
             force,
@@ -74,12 +65,7 @@ fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: V
                 phase: 0.0,
             },
         }],
-        spin: None,
-        carried: None,
-        watched: Vec::new(),
-        requirements: Default::default(),
-        source: None,
-        resolved: false,
+        ..nothing_happens("pulled", 2.0 * std::f64::consts::TAU / rate, 1e-9)
     }
 }
 

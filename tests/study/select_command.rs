@@ -49,7 +49,21 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     assert!(wrong.is_empty(), "{wrong:?}");
     let page = fs::read_to_string(place.join("s.html")).expect("a page");
     assert!(page.contains("Sizes of the terms") && !page.contains("NaN"), "{page}");
-    assert!(fs::read_to_string(place.join("s.txt")).expect("a text").starts_with("Selection"));
+    let text = fs::read_to_string(place.join("s.txt")).expect("a text");
+    let (verdict, details) = text.split_once("\nDetails\n").expect("the verdict, then the details");
+    let labels = verdict.lines().filter_map(|line| line.split("  ").next()).filter(|label| !label.is_empty());
+    let expected = ["Selection", "Asked", "Take", "Why", "Error", "Saves"];
+    assert_eq!(labels.collect::<Vec<_>>(), expected, "{verdict}");
+    // What is said in words is what the numbers say; tiers are details.
+    let words = |key: &str| told["verdict"][key].as_str().expect("a sentence");
+    let kept = told["modes"]["kept"].as_array().expect("a list").len();
+    assert!(words("take").starts_with(&format!("{kept} mode")), "{}", words("take"));
+    assert!(!verdict.contains("tier") && details.contains("tier"), "{text}");
+    for term in told["terms"].as_array().expect("terms") {
+        let group = term["group"].as_str().expect("a name");
+        assert!(words("why").contains(&format!("{group} (")), "{}", words("why"));
+        assert_eq!(words("take").contains(group), term["kept"] == true, "{}", words("take"));
+    }
     let chosen = &told["chosen"];
     assert!(chosen["worst"].as_f64().expect("a number") <= 1.0, "{chosen}");
 
@@ -77,7 +91,8 @@ fn a_cost_that_nothing_meets_is_a_check_that_fails() {
     prepare(place, "[cost]\nmultiplications = 5\n");
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml"]);
     assert_eq!(run.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&run.stdout).contains("no model takes 5 multiplications"));
+    let text = String::from_utf8_lossy(&run.stdout);
+    assert!(text.contains("no model takes 5 multiplications") && text.contains("\nBest found  "), "{text}");
     prepare(place, "[cost]\nmultiplications = 900\n");
     let run = flexbody(place, &["select", "whole.flex.h5", "--scene", "scene.toml", "--json"]);
     assert!(run.status.success());

@@ -4,15 +4,19 @@ use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::flexible::{fixture, soft_block};
 use crate::support::mesh::{Mesh, grid};
 use crate::support::program::{fixtures, flexbody};
+use crate::support::scenes::nothing_happens;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
-use flexbody::body::flex_body::{FlexBody, Groups, Storage};
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::{FlexBody, Groups, MassStructure, Storage};
 use flexbody::body::invariants::BodyFrame;
 use flexbody::model::FeModel;
-use flexbody::motion::dynamics::Terms;
-use flexbody::motion::scene::{Axes, Initial, ModeStart, Run, Scene, Scheme, simulate};
+use flexbody::motion::scene::{Axes, Initial, ModeStart, Scene, Scheme, simulate};
+use flexbody::numerics::eigen::Wanted;
 use flexbody::study::trade::{
-    Conversions, Kind, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions, front, trade,
+    Conversions, Kind, LumpedMass, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions,
+    front, trade,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -24,23 +28,8 @@ const QUICK: Settings = Settings { repeat: 1, memory: None };
 fn tumble(spin: f64, turns: f64) -> Scene {
     let axis = Vector3::new(0.2, 1.0, 0.1).normalize();
     Scene {
-        name: "tumble".to_owned(),
-        run: Run {
-            duration: Some(turns * std::f64::consts::TAU / spin),
-            outputs: 60,
-            most_steps: Run::MOST_STEPS,
-            scheme: Scheme::Adaptive { tolerance: 1e-10 },
-            terms: Terms::ALL,
-        },
         initial: Initial { angular_velocity: axis * spin, axes: Axes::Body, ..Initial::default() },
-        gravity: None,
-        loads: Vec::new(),
-        spin: None,
-        carried: None,
-        watched: Vec::new(),
-        requirements: Default::default(),
-        source: None,
-        resolved: false,
+        ..nothing_happens("tumble", turns * std::f64::consts::TAU / spin, 1e-10)
     }
 }
 
@@ -116,7 +105,9 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let lumped =
         body.lumped().iter().find(|lumped| lumped.scheme == "diagonal-scaling").expect("a scheme").clone();
     let mut parts = body.clone().into_parts();
-    parts.invariants = lumped.invariants;
+    // The modes keep their modal mass; all that couples them with the rigid motion is summed over nodal masses.
+    parts.invariants = lumped.invariants.with_modal_mass(body.invariants().modal_mass());
+    parts.source.mass_structure = MassStructure::General;
     let other = FlexBody::new(parts).expect("a body");
     // So many instants that a peak between them is no larger by much.
     let mut often = scene.clone();
@@ -134,7 +125,10 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
         2.0 * dot.abs().min(1.0).acos()
     });
     let attitude = dots.fold(0.0, f64::max);
-    let row = found.rows.iter().find(|row| row.candidate.lumped.as_deref() == Some("diagonal-scaling"));
+    let row = found
+        .rows
+        .iter()
+        .find(|row| row.candidate.lumped == Some(LumpedMass::Couplings("diagonal-scaling".to_owned())));
     let errors = row.expect("a row").outcome.as_ref().expect("a motion").errors;
     assert!(stress > 0.01, "a coarse mesh: {stress}");
     assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 2e-3, "{errors:?} {stress}");
@@ -160,8 +154,13 @@ fn errors_are_the_same_bits_at_one_and_two_threads() {
         let mut found = pool.install(|| study(body.clone(), &scene));
         for row in &mut found.rows {
             let measured = row.outcome.as_mut().expect("a motion");
-            assert!(measured.times.evaluation > 0.0 && measured.times.integration > 0.0);
-            (measured.times.evaluation, measured.times.integration) = (0.0, 0.0);
+            let Some(timed) = &mut measured.timed else { continue };
+            assert!(timed.evaluation > 0.0 && timed.integration > 0.0);
+            (timed.evaluation, timed.integration) = (0.0, 0.0);
+        }
+        for row in found.front.iter().copied().chain(found.recommended.row()).chain([0]) {
+            let measured = found.rows[row].outcome.as_ref().expect("a motion");
+            assert!(measured.timed.is_some(), "what somebody may take is timed");
         }
         found
     };
@@ -191,15 +190,15 @@ fn a_cost_is_kept_by_the_most_accurate() {
 #[test]
 fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
     let mut parts = soft_block(4).into_parts();
-    // The mass of the modes is negative: no motion follows from it.
-    let s = &mut parts.lumped[0].invariants.primary_mut().s;
-    s.iter_mut().flatten().for_each(|s| *s = -&*s);
+    // The modes move the centre of mass by more than their own mass allows: no motion follows from it.
+    let c1 = &mut parts.lumped[0].invariants.primary_mut().c1;
+    c1.fill(1e3);
     let body = FlexBody::new(parts).expect("a body");
     let scheme = body.lumped()[0].scheme.clone();
     let found = study(body.clone(), &tumble(0.1 * first_rate(&body), 0.2));
     let failed: Vec<&Row> = found.rows.iter().filter(|row| row.outcome.is_err()).collect();
     assert_eq!(failed.len(), 1);
-    assert_eq!(failed[0].candidate.lumped.as_ref(), Some(&scheme));
+    assert_eq!(failed[0].candidate.lumped, Some(LumpedMass::Couplings(scheme)));
     assert_eq!(failed[0].outcome.as_ref().err().map(|failed| failed.0.code()), Some(Code::SimulationStopped));
     assert!(found.recommended.row().is_some());
 }
@@ -268,6 +267,32 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
 }
 
 #[test]
+fn a_wholly_lumped_mass_has_modes_of_its_own() {
+    let model = model();
+    let Conversions { sources, diagnostics, .. } = without_scene(&model, 3);
+    assert!(diagnostics.iter().all(|one| one.code() != Code::LumpedWithoutBody), "{diagnostics:?}");
+    let modes = ModeSettings { wanted: Wanted::Lowest(6), ..ModeSettings::default() };
+    let settings = ConvertSettings { modes, lumped_modes: true, ..ConvertSettings::default() };
+    let pipelines = convert(&model, &settings, SILENT).expect("a body").lumped_modes;
+    assert_eq!(pipelines.len(), 2);
+    for pipeline in &pipelines {
+        let of = |source: &&Source| source.lumped_by() == Some(&pipeline.scheme);
+        let own = sources.iter().find(of).expect("a source").body();
+        for (j, eigenvalue) in pipeline.eigenvalues.iter().enumerate() {
+            assert!((own.modes().eigenvalue[j] / eigenvalue - 1.0).abs() < 1e-9, "mode {j} of {pipeline:?}");
+        }
+        // On a coarse mesh they are others than those of the consistent mass.
+        let exact = sources[0].body().modes().eigenvalue[0];
+        assert!((pipeline.eigenvalues[0] / exact - 1.0).abs() > 1e-3, "{pipeline:?}");
+    }
+    let scene = tumble(0.05 * first_rate(sources[0].body()), 0.1);
+    let found = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
+    let whole = found.rows.iter().filter(|row| matches!(row.candidate.lumped, Some(LumpedMass::Whole(_))));
+    assert_eq!(whole.count(), 2);
+    assert!(found.front.iter().all(|&row| found.rows[row].candidate.lumped.is_none()));
+}
+
+#[test]
 fn what_nodal_equations_do_not_have_is_refused() {
     let model = model();
     let Conversions { sources, .. } = without_scene(&model, 2);
@@ -324,7 +349,7 @@ fn the_program_writes_what_its_schema_says() {
     let words = ["trade", "body.flex.h5", "--scene", "scene.toml", "--repeat", "1"];
     let with = |more: &[&str]| flexbody(place, &[&words[..], more].concat());
     let files = ["t.html", "t.json", "t.txt"];
-    let mut more = vec!["--csv", "t.csv", "--threads", "2", "--json"];
+    let mut more = vec!["--csv", "t.csv", "--threads", "2", "--json", "--bodies", "."];
     files.iter().for_each(|file| more.extend(["--report", file]));
     let run = with(&more);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
@@ -335,6 +360,18 @@ fn the_program_writes_what_its_schema_says() {
     let wrong: Vec<String> = schema.iter_errors(&facts).map(|error| error.to_string()).collect();
     assert!(wrong.is_empty(), "{wrong:?}");
     let rows = facts["rows"].as_array().expect("rows");
+    let lines = facts["verdict"].as_array().expect("lines");
+    let labels: Vec<&str> = lines.iter().map(|line| line["label"].as_str().expect("a label")).collect();
+    assert_eq!(labels, ["Asked", "Take", "Why", "Error", "Saves"]);
+    // The candidates that were measured are there as bodies.
+    for (at, row) in rows.iter().enumerate() {
+        let path = place.join(format!("candidate_{:03}.flex.h5", at + 1));
+        assert_eq!(path.exists(), !row["measured"].is_null(), "{row}");
+        if path.exists() {
+            let own = flexbody::formats::flex_body_file::read(&path).expect("a body");
+            assert_eq!(own.n_modes() as u64, row["modes"].as_u64().expect("a number"));
+        }
+    }
     let table = fs::read_to_string(place.join("t.csv")).expect("a table");
     assert_eq!(table.lines().count(), rows.len() + 1);
     let columns = table.lines().next().expect("a head").split(',').count();
@@ -342,9 +379,10 @@ fn the_program_writes_what_its_schema_says() {
     let page = fs::read_to_string(place.join("t.html")).expect("a page");
     assert!(page.contains("<svg") && page.contains("recommended") && !page.contains("NaN"));
     let text = fs::read_to_string(place.join("t.txt")).expect("a text");
-    assert!(text.contains("Verdict") && text.lines().any(|line| line.starts_with('>')), "{text}");
+    assert!(text.contains("\nTake ") && text.lines().any(|line| line.starts_with('>')), "{text}");
     let left: Vec<_> = fs::read_dir(place).expect("a folder").collect();
-    assert_eq!(left.len(), 2 + 4, "{left:?}");
+    let bodies = rows.iter().filter(|row| !row["measured"].is_null()).count();
+    assert_eq!(left.len(), 2 + 4 + bodies, "{left:?}");
 
     // Nothing is that cheap: a tolerance that failed.
     scene("[cost]\nmultiplications = 1\n");

@@ -14,6 +14,29 @@ use proptest::test_runner::RngSeed;
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
+/// A free body for so long, from rest, with nothing that acts on it or is demanded.
+pub fn nothing_happens(name: &str, duration: f64, tolerance: f64) -> Scene {
+    Scene {
+        name: name.to_owned(),
+        run: Run {
+            duration: Some(duration),
+            outputs: 60,
+            most_steps: Run::MOST_STEPS,
+            scheme: Scheme::Adaptive { tolerance },
+            terms: Terms::ALL,
+        },
+        initial: Initial::default(),
+        gravity: None,
+        loads: Vec::new(),
+        spin: None,
+        carried: None,
+        watched: Vec::new(),
+        requirements: Default::default(),
+        source: None,
+        resolved: false,
+    }
+}
+
 /// Solids, soft and stiff, and a plane body.
 pub fn bodies() -> &'static [FlexBody] {
     static BODIES: OnceLock<Vec<FlexBody>> = OnceLock::new();

@@ -82,19 +82,8 @@ pub fn free_surface_of(
     settings: &ModeSettings,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    assert_eq!(masses.len(), model.nodes().len(), "one mass per node");
-    let d = model.dimension();
-    let diagonal = |n: usize, per_row: usize| {
-        let entries = masses.iter().flat_map(|m| std::iter::repeat_n(*m, per_row)).enumerate();
-        let entries: Vec<(u32, u32, f64)> = entries.map(|(i, m)| (i as u32, i as u32, m)).collect();
-        SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries))
-            .expect("a diagonal matrix is symmetric")
-    };
-    let (mass, block) = match model.rows().are_plain() {
-        true => (diagonal(masses.len(), 1), d),
-        false => (diagonal(model.rows().len(), d), 1),
-    };
-    compute(model, Pencil::new(model.stiffness(), &mass, block), settings, Resume::default(), watch)
+    let lumped = model.with_nodal_masses(masses);
+    compute(&lumped, lumped.pencil(), settings, Resume::default(), watch)
 }
 
 fn compute(

@@ -3,6 +3,7 @@
 use crate::body::flex_body::{FlexBody, Frame, InternalRows};
 use crate::body::invariants::{
     Invariants, RigidMotion, condense, condense_general, condense_general_linear, condense_linear,
+    symmetric_part,
 };
 use crate::model::{FeModel, rigid_count};
 use crate::numerics::eigen::canonical_basis;
@@ -39,8 +40,7 @@ pub(crate) fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
 pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
     multiply(a, 1, vectors, product.as_mut());
-    let k = gram(vectors, product.as_ref());
-    Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+    symmetric_part(&gram(vectors, product.as_ref()))
 }
 
 /// The modes of a body.

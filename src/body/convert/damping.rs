@@ -53,7 +53,7 @@ pub(crate) fn modal_damping(
             of_ratios(hertz.map(|f| ratio_at(bands, f)).collect())
         }
         Damping::Rayleigh { alpha, beta } => {
-            let (m, k) = (invariants.modal_mass(), &invariants.modal_stiffness());
+            let (m, k) = (invariants.modal_mass(), invariants.modal_stiffness());
             of_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
         }
         Damping::Matrix(d) => {

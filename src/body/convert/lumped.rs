@@ -36,7 +36,7 @@ impl Lumping {
     ///
     /// # Errors
     /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes.
-    pub(super) fn masses(&self, model: &FeModel) -> Result<LumpedMasses> {
+    pub fn masses(&self, model: &FeModel) -> Result<LumpedMasses> {
         match self {
             Lumping::RowSum => Ok(LumpedMasses::row_sum(&model.nodal_mass())),
             Lumping::DiagonalScaling => LumpedMasses::diagonal_scaling(&model.nodal_mass()),

@@ -144,7 +144,7 @@ impl FlexBody {
             return None;
         }
         let (stiffness, c1, c2) =
-            (&self.invariants().modal_stiffness(), &self.invariants().c1(), self.invariants().c2());
+            (self.invariants().modal_stiffness(), self.invariants().c1(), self.invariants().c2());
         let nf = self.n_modes();
         let energy = |row: usize, modes: usize| -> f64 {
             let load = |j: usize| if row < 3 { c1[(row, j)] } else { c2[(row - 3, j)] };

@@ -332,6 +332,23 @@ fn lamina(about_z: f64) -> Matrix3<f64> {
 }
 
 impl Invariants {
+    /// These invariants with another modal mass m_ff (nf x nf), everything else as it is: what a program computes with that takes the
+    /// modal mass of the FE program and sums the couplings over nodal masses. S no longer tells m_ff, so that the mass is a general one.
+    ///
+    /// # Panics
+    /// When the modal mass has another number of modes.
+    pub fn with_modal_mass(mut self, modal_mass: Mat<f64>) -> Self {
+        let nf = self.n_modes();
+        assert_eq!((modal_mass.nrows(), modal_mass.ncols()), (nf, nf), "modal mass");
+        if let Some(general) = &mut self.0.general {
+            general.modal_mass = modal_mass;
+        } else {
+            let w3 = self.w3().unwrap_or_else(|| Mat::zeros(3 * nf, nf));
+            self.0.general = Some(GeneralTerms { w0: self.w0(), w3, modal_mass, plane: false });
+        }
+        self
+    }
+
     /// The same body with nothing but its rotation about z: J, Ibar and S of a lamina that has the same I0, W1, W2, C2 about z.
     /// What a plane body is compared with whose mass does not commute with rotations.
     pub fn about_z(mut self) -> Self {

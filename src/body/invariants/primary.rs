@@ -2,7 +2,7 @@
 
 use super::Groups;
 use faer::Mat;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Constant inertia data of a body about its frame origin, in frame axes (theory section 2).
 ///
@@ -100,6 +100,12 @@ impl Invariants {
     /// K_ff (nf x nf) = Psi' K Psi.
     pub fn modal_stiffness(&self) -> &Mat<f64> {
         &self.0.modal_stiffness
+    }
+
+    /// The symmetric part of K_ff, which is what rounding leaves of it.
+    pub(crate) fn symmetric_stiffness(&self) -> DMatrix<f64> {
+        let k = &self.0.modal_stiffness;
+        DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
     }
 
     /// Whether the mass commutes with rotations, and what else is known of one that does not.

@@ -38,7 +38,7 @@ impl ExportFormat for Embedded {
         let frames = frames(body, &options.points);
         let held: Vec<_> = frames.iter().flat_map(|frame| loads(body, &frames, frame)).collect();
         // Interfaces may be left out.
-        let asked = matches!(options.points, Points::Usual | Points::Interfaces);
+        let asked = options.points == Points::Usual || options.points.of_interfaces();
         let holds = |load: &UnitLoad| match load.kind.interface() {
             Some(_) => !asked || held.iter().any(|(_, one)| one.load == *load),
             None => !matches!(load.kind, LoadKind::Named(_)),

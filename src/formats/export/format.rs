@@ -58,8 +58,25 @@ pub enum Points {
     Nodes,
     /// The reference points of the interfaces and the nodes of free ones.
     Interfaces,
+    /// Those of the interfaces, and the nodes with these numbers.
+    InterfacesAnd(Vec<i64>),
     /// Nodes with these numbers.
     Some(Vec<i64>),
+}
+
+impl Points {
+    /// Whether they are those of the interfaces, others beside them or not.
+    pub fn of_interfaces(&self) -> bool {
+        matches!(self, Self::Interfaces | Self::InterfacesAnd(_))
+    }
+
+    /// Numbers of nodes that are named one by one.
+    pub fn named(&self) -> &[i64] {
+        match self {
+            Self::Some(ids) | Self::InterfacesAnd(ids) => ids,
+            Self::Usual | Self::Nodes | Self::Interfaces => &[],
+        }
+    }
 }
 
 /// What an export makes: the file, and others that belong beside it.

@@ -28,12 +28,21 @@ pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
     match points {
         Points::Usual if body.interfaces().is_empty() => all(),
         Points::Usual | Points::Interfaces => interfaces(body),
+        Points::InterfacesAnd(ids) => {
+            let mut found = interfaces(body);
+            let others = named_nodes(body, ids).filter(|own| found.iter().all(|frame| frame.id != own.id));
+            let others: Vec<ExportFrame> = others.collect();
+            found.extend(others);
+            found
+        }
         Points::Nodes => all(),
-        Points::Some(ids) => (0..body.n_nodes())
-            .filter(|&i| ids.contains(&body.nodes().ids[i]))
-            .map(|i| node(body, i))
-            .collect(),
+        Points::Some(ids) => named_nodes(body, ids).collect(),
     }
+}
+
+/// The nodes with these numbers, in the order of the body.
+pub fn named_nodes(body: &FlexBody, ids: &[i64]) -> impl Iterator<Item = ExportFrame> {
+    (0..body.n_nodes()).filter(|&i| ids.contains(&body.nodes().ids[i])).map(|i| node(body, i))
 }
 
 fn node(body: &FlexBody, i: usize) -> ExportFrame {
@@ -51,21 +60,24 @@ fn node(body: &FlexBody, i: usize) -> ExportFrame {
 }
 
 fn interfaces(body: &FlexBody) -> Vec<ExportFrame> {
-    let above = body.nodes().ids.iter().copied().max().unwrap_or(0);
     let mut found: Vec<ExportFrame> = Vec::new();
     for (number, interface) in body.interfaces().iter().enumerate() {
-        let reference = reference(body, interface, above.saturating_add(1 + number as i64));
-        let nodes = || {
-            interface
-                .nodes
-                .iter()
-                .map(|&i| ExportFrame { name: Some(interface.name.clone()), ..node(body, i) })
-        };
-        let frames: Vec<ExportFrame> = reference.map_or_else(|| nodes().collect(), |frame| vec![frame]);
         let ids: Vec<i64> = found.iter().map(|frame| frame.id).collect();
+        let frames = interface_frames(body, interface, number);
         found.extend(frames.into_iter().filter(|frame| !ids.contains(&frame.id)));
     }
     found
+}
+
+/// The reference point of the interface with this `number` (from 0); of a free interface, and of one whose nodes determine no motion of a
+/// reference point, all nodes.
+pub fn interface_frames(body: &FlexBody, interface: &Interface, number: usize) -> Vec<ExportFrame> {
+    let above = body.nodes().ids.iter().copied().max().unwrap_or(0);
+    let named = |i: usize| ExportFrame { name: Some(interface.name.clone()), ..node(body, i) };
+    match reference(body, interface, above.saturating_add(1 + number as i64)) {
+        Some(frame) => vec![frame],
+        None => interface.nodes.iter().map(|&i| named(i)).collect(),
+    }
 }
 
 /// The reference point of an interface: the node itself where it is a single one that lies there.

@@ -3,9 +3,9 @@
 //! `MarkerSuperElementRigid` takes the weighted mean of the nodes as its place and, by its "alternative approach", the rotation that fits their
 //! displacements best. With equal weights this is the motion of our interfaces; `offset` leads from the mean to the reference point.
 
+use super::mesh::{Mesh, MeshInterface};
 use crate::body::flex_body::{FlexBody, Interface};
 use crate::formats::export::hdf5_contents::{Hdf5Contents, Hdf5Entry};
-use faer::Mat;
 use nalgebra::Vector3;
 
 /// The program beside the file: loads the body, puts a joint at each interface and drives one.
@@ -15,18 +15,17 @@ pub(crate) const SCRIPT: &str = include_str!("run.py");
 pub(crate) const SCRIPT_NAME: &str = "_exudyn.py";
 
 /// The numbers that nodes have in the FE model, and the interfaces in their order; Exudyn's loader passes over both.
-pub(crate) fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
-    let numbers = integers("nodeNumbers", body.nodes().ids.clone());
-    let interfaces = body.interfaces().iter().enumerate().map(|(i, one)| interface(body, i, one)).collect();
+pub(crate) fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
+    let held = body.interfaces().iter().zip(&mesh.interfaces).enumerate();
+    let interfaces = held.map(|(number, (own, nodes))| interface(number, own, nodes, mesh)).collect();
+    let numbers = integers("nodeNumbers", mesh.numbers.clone());
     vec![numbers, Hdf5Contents::Group(interfaces).named("interfaces").with("datatype", "dict")]
 }
 
-fn interface(body: &FlexBody, number: usize, interface: &Interface) -> Hdf5Entry {
-    let (nodes, count) = (&interface.nodes, interface.nodes.len());
-    let mean =
-        nodes.iter().map(|&i| Vector3::from(body.nodes().positions[i])).sum::<Vector3<f64>>() / count as f64;
-    // A free interface has no reference point of its own.
-    let reference = interface.reference.map_or(mean, Vector3::from);
+fn interface(number: usize, interface: &Interface, own: &MeshInterface, mesh: &Mesh) -> Hdf5Entry {
+    let count = own.nodes.len();
+    let sum: Vector3<f64> = own.nodes.iter().map(|&i| Vector3::from(mesh.positions[i])).sum();
+    let mean = sum / count as f64;
     let text =
         |name: &str, text: &str| Hdf5Contents::Text(text.to_owned()).named(name).with("datatype", "str");
     let list =
@@ -34,22 +33,15 @@ fn interface(body: &FlexBody, number: usize, interface: &Interface) -> Hdf5Entry
     let members = vec![
         text("name", &interface.name),
         text("coupling", interface.coupling.map_or("not stated", |coupling| coupling.name())),
-        text("marker", if turns(body, interface) { "rigid" } else { "position" }),
-        integers("nodeNumbers", nodes.iter().map(|&i| body.nodes().ids[i]).collect()),
-        integers("meshNodeNumbers", nodes.iter().map(|&i| i as i64).collect()),
+        text("marker", if own.turns { "rigid" } else { "position" }),
+        integers("nodeNumbers", own.nodes.iter().map(|&i| mesh.numbers[i]).collect()),
+        integers("meshNodeNumbers", own.nodes.iter().map(|&i| i as i64).collect()),
         list("weights", &vec![1.0 / count as f64; count]),
-        list("referencePoint", reference.as_slice()),
-        list("offset", (reference - mean).as_slice()),
+        list("referencePoint", own.reference.as_slice()),
+        list("offset", (own.reference - mean).as_slice()),
     ];
     // The order of links in HDF5 is that of their names.
     Hdf5Contents::Group(members).named(format!("interface{number:04}")).with("datatype", "dict")
-}
-
-/// Whether the positions of the nodes determine a rotation: Exudyn's bodies have no others.
-fn turns(body: &FlexBody, interface: &Interface) -> bool {
-    let about = Interface { reference: interface.reference.or(Some([0.0; 3])), ..interface.clone() };
-    let still = Mat::zeros(3 * body.n_nodes(), 1);
-    about.rows(body.nodes(), still.as_ref(), None, 3).is_some_and(|rows| rows.rotation.is_some())
 }
 
 fn integers(name: &str, values: Vec<i64>) -> Hdf5Entry {

@@ -6,6 +6,7 @@
 //! mXRefTildePsiTilde = int x~' S_j~ = I8.
 
 use super::interfaces;
+use super::mesh::Mesh;
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::Numbered;
@@ -26,14 +27,19 @@ impl ExportFormat for Exudyn {
         "Exudyn, ObjectFFRFreducedOrderInterface.LoadFromFile"
     }
 
-    fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
+    fn has_points(&self) -> bool {
+        true
+    }
+
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         [
             losses::plane(body),
             losses::general_w0(body),
             losses::general_w3(body),
             losses::geometric_stiffness(body, |_| false),
             losses::damping(body),
-            losses::rotations(body),
+            // An interface as a cross of nodes turns as it does in the body.
+            losses::rotations(body).filter(|_| !options.points.of_interfaces()),
             losses::internal_rows(body),
         ]
         .into_iter()
@@ -41,24 +47,25 @@ impl ExportFormat for Exudyn {
         .collect()
     }
 
-    fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {
-        let file = hdf5_bytes(&entries(body))?;
-        let script = (!body.interfaces().is_empty())
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        let mesh = Mesh::new(body, &options.points);
+        let file = hdf5_bytes(&entries(body, &mesh))?;
+        let script = (!mesh.interfaces.is_empty())
             .then(|| (interfaces::SCRIPT_NAME, interfaces::SCRIPT.as_bytes().to_vec()));
         Ok(Exported { file, beside: script.into_iter().collect() })
     }
 }
 
 /// Contents of the file, in the order of the program's own writer. The attribute `datatype` is the Python type.
-fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
-    let (n, nf) = (body.n_nodes(), body.n_modes());
+fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
+    let (n, nf) = (mesh.numbers.len(), body.n_modes());
     let told = inertia(body);
     let center = told.i2 / told.i1;
     let [info, version] = [vec![nf, n, 3, 4, 7, 7 + nf], vec![1]]
         .map(|counts| counts.into_iter().map(|count| count as i64).collect::<Vec<_>>());
     let text = |text: &str| Hdf5Contents::Text(text.to_owned());
     let mut all = vec![
-        array("modeBasis", Hdf5Contents::matrix(&body.modes().shape)),
+        array("modeBasis", Hdf5Contents::matrix(&mesh.shape)),
         // Triangles are for pictures; a body knows no elements.
         array("trigList", Hdf5Contents::Integers(vec![0, 3], Vec::new())),
         Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
@@ -66,7 +73,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
         array("stiffnessMatrixReduced", Hdf5Contents::matrix(body.invariants().modal_stiffness())),
         array("infoList", Hdf5Contents::Integers(vec![6], info)),
         text("NodeType.RotationEulerParameters").named("rigidBodyNodeType").with("datatype", "str"),
-        array("xRef", Hdf5Contents::list(body.nodes().positions.as_flattened())),
+        array("xRef", Hdf5Contents::list(mesh.positions.as_flattened())),
         array("inertiaLocal", square(&told.i7)),
         array("Mtt", square(&(Matrix3::identity() * told.i1))),
         Hdf5Contents::number(told.i1).named("totalMass").with("datatype", "float64"),
@@ -74,7 +81,7 @@ fn entries(body: &FlexBody) -> Vec<Hdf5Entry> {
         array("chiUtilde", square(&center.cross_matrix())),
     ];
     all.extend(coupling(&told, nf));
-    all.extend(interfaces::entries(body));
+    all.extend(interfaces::entries(body, mesh));
     all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
     all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
     all

@@ -152,7 +152,7 @@ fn of_identity(check: IdentityCheck) -> AuditCheck {
 
 /// Mass and stiffness of the modes.
 fn modal_checks(invariants: &Invariants) -> Vec<AuditCheck> {
-    let (mass, stiffness) = (invariants.modal_mass(), &invariants.modal_stiffness());
+    let (mass, stiffness) = (invariants.modal_mass(), invariants.modal_stiffness());
     let check = |name, formula, value, code, meaning: &str| AuditCheck {
         name,
         formula,

@@ -3,7 +3,9 @@
 use super::any_body::{ANY_BODY, DIGITS};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::body::invariants::{Expected, GeneralTerms, IdentityCheck, Invariants, identities};
+use crate::body::invariants::{
+    Expected, GeneralTerms, IdentityCheck, Invariants, identities, symmetric_part,
+};
 use crate::numerics::linalg::{dense_cholesky, larger, solve_lower, solve_upper, symmetric_eigen};
 use faer::Mat;
 
@@ -23,7 +25,7 @@ pub(crate) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
         .map(|check| check.value)
         .fold(0.0, larger);
     let beside = beside_diagonal(invariants);
-    let k = &invariants.modal_stiffness();
+    let k = invariants.modal_stiffness();
     let nearly = |j: usize| k[(j - 1, j - 1)] - k[(j, j)] <= DIGITS * k[(j, j)];
     let ascending = k[(0, 0)] > 0.0 && (1..k.ncols()).all(nearly);
     let diagonal = beside <= NEARLY_DIAGONAL;
@@ -98,8 +100,7 @@ impl FreeSurface {
 
     /// X'A X.
     pub(crate) fn congruent(&self, a: &Mat<f64>) -> Mat<f64> {
-        let full = self.modes.transpose() * a * &self.modes;
-        Mat::from_fn(full.nrows(), full.ncols(), |i, j| 0.5 * (full[(i, j)] + full[(j, i)]))
+        symmetric_part(&(self.modes.transpose() * a * &self.modes))
     }
 
     /// A X: what is taken from each new mode.

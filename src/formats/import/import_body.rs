@@ -261,7 +261,7 @@ fn eigenvalues(invariants: &Invariants) -> Vec<f64> {
 
 /// |K x - lambda x| of each unit vector x, relative to lambda.
 fn residuals(invariants: &Invariants, eigenvalue: &[f64]) -> Vec<f64> {
-    let k = &invariants.modal_stiffness();
+    let k = invariants.modal_stiffness();
     let beside = |j: usize| (0..eigenvalue.len()).filter(|i| *i != j).map(|i| k[(i, j)].powi(2)).sum::<f64>();
     eigenvalue.iter().enumerate().map(|(j, l)| beside(j).sqrt() / (2.0 * l)).collect()
 }

@@ -103,7 +103,7 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
         (a, b) if a == b => s_aa[a][(j, k)],
         (a, b) => told.i9.as_ref().map_or(0.0, |i9| i9[(b * nf + j, a * nf + k)]),
     };
-    let second = &invariants.second_moment();
+    let second = invariants.second_moment();
     let positions: Vec<f64> = places.iter().flat_map(|place| place.position).collect();
     let numbers = places.iter().map(|place| place.id).collect();
     let turn = |row: usize, j: usize| {

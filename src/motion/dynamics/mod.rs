@@ -26,6 +26,7 @@ pub use evaluation::Evaluation;
 pub(crate) use geometric::geometric_stiffness;
 pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Surroundings};
+pub(crate) use nodal::add_turned;
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
     ReferenceConditions,

@@ -15,6 +15,12 @@ const NO_TORQUE: f64 = 1e-10;
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
 pub(crate) const LEAST_REACTION: f64 = 1e-3;
 
+/// Errors of the second half of a run over those of the first, beyond the growth of the motion, from which on they are said to grow.
+const GROWING: f64 = 1.8;
+
+/// Errors below this part of their tolerance do not matter yet, though they grow.
+const MATTERS: f64 = 0.1;
+
 /// Force and torque.
 type Reaction = (Vector3<f64>, Vector3<f64>);
 
@@ -94,16 +100,23 @@ impl ErrorHistory {
         }
     }
 
-    /// The largest error in the second half of the run relative to that in the first half, of the output where this is most; about 1
-    /// for errors that stay bounded, 2 and more for a phase that runs away. `None` without an error in the first half.
-    pub fn growth(&self) -> Option<f64> {
-        let growth = |history: &Vec<f64>| {
-            let (before, after) = self.halves(history);
-            (before > 0.0).then_some(after / before)
+    /// How much more the errors grow from the first half of the run to the second than `motion`, that of the reference, does: about 1 for
+    /// errors that stay in step with the motion, 2 and more where phases run apart. `None` where they do not grow so much that it is worth a
+    /// word ([`GROWING`]), or where those of the second half do not matter yet ([`MATTERS`]).
+    pub fn growth(&self, motion: &Trace, tolerance: &Tolerance) -> Option<f64> {
+        let growth = |(first, second): (f64, f64), allowed: f64| {
+            (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
         };
-        let others = [&self.deflection, &self.stress, &self.reaction];
-        let all = others.into_iter().flatten().chain([&self.attitude]);
-        all.filter_map(growth).reduce(f64::max)
+        let energies: Vec<f64> = motion.elastic.iter().map(|energy| not_negative(*energy).sqrt()).collect();
+        let motion = growth(self.halves(&energies), 0.0)?;
+        // The attitude has no amplitude: it grows when it grows.
+        let attitude = growth(self.halves(&self.attitude), tolerance.attitude);
+        let deformation = [(&self.deflection, tolerance.deflection), (&self.stress, tolerance.stress)];
+        let beyond_motion = deformation.into_iter().filter_map(|(errors, allowed)| {
+            Some(growth(self.halves(errors.as_ref()?), allowed)? / motion.max(1.0))
+        });
+        let most = beyond_motion.chain(attitude).reduce(f64::max);
+        most.filter(|growth| *growth > GROWING)
     }
 
     /// The largest of `values` along the motion in the first half of the run, and in the second.
@@ -236,7 +249,7 @@ impl<'r> Measure<'r> {
     /// # Panics
     /// When the reference has no such modes, or the motions were not looked at in the same places.
     pub fn of_subset(&self, candidate: &Trace, kept: &[usize]) -> ErrorHistory {
-        let energy = &self.body.invariants().modal_stiffness();
+        let energy = self.body.invariants().modal_stiffness();
         let apart = self.apart(candidate, |reference, own| {
             let mut difference: Vec<f64> = reference.iter().map(|q| -q).collect();
             kept.iter().zip(own).for_each(|(&mode, q)| difference[mode] += q);
@@ -252,7 +265,7 @@ impl<'r> Measure<'r> {
     /// When the motions were not looked at in the same places.
     pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
         let (energy, rows) =
-            (&self.body.invariants().modal_stiffness(), LivelyNodes::new(modes.body, &self.nodes));
+            (self.body.invariants().modal_stiffness(), LivelyNodes::new(modes.body, &self.nodes));
         let apart = self.apart(candidate, |reference, own| {
             let q = DVector::from_column_slice(own);
             let difference = &modes.map * &q - DVector::from_column_slice(reference);
@@ -296,10 +309,7 @@ impl<'c> OtherModes<'c> {
         if !same || (shared.nrows(), shared.ncols()) != (nc, nr) {
             return None;
         }
-        let stiffness = |body: &FlexBody| {
-            let k = &body.invariants().modal_stiffness();
-            DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
-        };
+        let stiffness = |body: &FlexBody| body.invariants().symmetric_stiffness();
         let transposed = DMatrix::from_fn(nr, nc, |i, j| shared[(j, i)]);
         let map = stiffness(reference).cholesky()?.solve(&transposed);
         let outside = stiffness(candidate) - transposed.tr_mul(&map);

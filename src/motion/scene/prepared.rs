@@ -194,8 +194,7 @@ fn settle(
     start: &mut Configuration,
 ) -> Result<()> {
     let (invariants, n) = (body.invariants(), body.n_modes());
-    let k = invariants.modal_stiffness();
-    let stiffness = DMatrix::from_fn(n, n, |i, j| 0.5 * (k[(i, j)] + k[(j, i)])).cholesky();
+    let stiffness = invariants.symmetric_stiffness().cholesky();
     let m = invariants.modal_mass();
     let mass = DMatrix::from_fn(n, n, |i, j| m[(i, j)]);
     let none = |why: &str| {

@@ -13,7 +13,7 @@ use faer::Mat;
 const WORTH: f64 = 0.7;
 
 /// How often a body is enriched at the most.
-pub const MOST_ROUNDS: usize = 4;
+const MOST_ROUNDS: usize = 4;
 
 /// A body with what it lacks of its model in a scene.
 #[derive(Debug, Clone)]

@@ -6,9 +6,10 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::{free_static_responses, interface_loads};
 use crate::body::flex_body::FlexBody;
+use crate::body::invariants::symmetric_part;
 use crate::model::FeModel;
 use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, instants, trace};
-use crate::numerics::linalg::{combine, gram, larger, multiply, subtract_combination};
+use crate::numerics::linalg::{combine, gram, larger, not_negative, subtract_combination};
 use faer::{Mat, MatRef};
 
 /// Part of the tolerances that the reference of a study may lack of the model without a word.
@@ -101,12 +102,14 @@ impl Estimate {
         same_steps.run.scheme = motion.scheme;
         let residual = view.residual(&instants(body, &same_steps, &times)?);
         let missed = Missed::new(&view, body, residual)?;
-        let errors = missed.errors(&view, body, &motion, &watched, &times);
+        let energies = missed.root_energies();
+        let largest = (0..energies.len()).fold(0, |at, i| if energies[i] > energies[at] { i } else { at });
+        let errors = missed.errors(&view, body, &energies, &motion, &watched, &times);
         let tolerance = &scene.requirements.tolerance;
         let error = ReferenceError {
             modes: body.n_modes(),
             worst: errors.worst(tolerance),
-            time: times[missed.instant()],
+            time: times[largest],
             errors,
         };
         let enough = PART_OF_RESPONSES * allowed * tolerance.stress.min(tolerance.deflection);
@@ -165,14 +168,13 @@ impl Missed {
         }
         let mut responses = free_static_responses(model, forces.basis.clone(), body.modes().eigenvalue[0])?;
         // The part in the modes is that of rounding.
-        let weighted = strained(model, view.vectors.as_ref());
+        let weighted = model.pencil().apply_stiffness(view.vectors.as_ref());
         let shared = gram(weighted.as_ref(), responses.as_ref());
         let amplitudes =
             Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / body.modes().eigenvalue[p]);
         subtract_combination(responses.as_mut(), view.vectors.as_ref(), amplitudes.as_ref());
-        let energy = gram(responses.as_ref(), strained(model, responses.as_ref()).as_ref());
-        let energy =
-            Mat::from_fn(energy.nrows(), energy.ncols(), |i, j| 0.5 * (energy[(i, j)] + energy[(j, i)]));
+        let energy = gram(responses.as_ref(), model.pencil().apply_stiffness(responses.as_ref()).as_ref());
+        let energy = symmetric_part(&energy);
         Ok(Self { forces, responses, energy })
     }
 
@@ -181,28 +183,26 @@ impl Missed {
         let c = &self.forces.amplitudes;
         let product = combine(self.energy.as_ref(), c.as_ref());
         let square = |i: usize| (0..c.nrows()).map(|k| c[(k, i)] * product[(k, i)]).sum::<f64>();
-        (0..c.ncols()).map(|i| (0.5 * square(i).max(0.0)).sqrt()).collect()
+        (0..c.ncols()).map(|i| not_negative(0.5 * square(i)).sqrt()).collect()
     }
 
-    /// The instant at which that is largest.
-    fn instant(&self) -> usize {
-        let energies = self.root_energies();
-        (0..energies.len()).fold(0, |at, i| if energies[i] > energies[at] { i } else { at })
-    }
-
-    /// Errors relative to the motion of the body.
+    /// Errors relative to the motion of the body; `energies` are those of [`Missed::root_energies`].
     fn errors(
         &self,
         view: &NodalView<'_>,
         body: &FlexBody,
+        energies: &[f64],
         motion: &Trace,
         watched: &[Mat<f64>],
         times: &[f64],
     ) -> OutputErrors {
         let c = &self.forces.amplitudes;
-        let stress = Peak::of(times, self.root_energies()).value / energy_scale(motion);
+        let stress = Peak::of(times, energies.iter().copied()).value / energy_scale(motion);
         let moved = match watched {
-            [] => longest_of_nodes(view.model, &combine(self.responses.as_ref(), c.as_ref())),
+            [] => {
+                let u = combine(self.responses.as_ref(), c.as_ref());
+                (0..u.ncols()).map(|i| view.model.longest_displacement(u.col_as_slice(i))).collect()
+            }
             points => longest_of_points(view.model, points, self.responses.as_ref(), c.as_ref()),
         };
         let largest = match motion.deflections.is_empty() {
@@ -240,7 +240,7 @@ impl Missed {
         let left = |count: usize, i: usize| -> f64 {
             let whole: f64 = (0..z.nrows()).map(|k| z[(k, i)].powi(2)).sum();
             let taken: f64 = (0..count).map(|k| along[(k, i)].powi(2)).sum();
-            (0.5 * (whole - taken).max(0.0)).sqrt()
+            not_negative(0.5 * (whole - taken)).sqrt()
         };
         let worst = |count: &usize| (0..z.ncols()).map(|i| left(*count, i)).fold(0.0, larger);
         let count =
@@ -250,20 +250,6 @@ impl Missed {
         });
         combine(self.forces.basis.as_ref(), y.as_ref())
     }
-}
-
-/// K X.
-fn strained(model: &FeModel, x: MatRef<'_, f64>) -> Mat<f64> {
-    let mut product = Mat::zeros(x.nrows(), x.ncols());
-    multiply(model.stiffness(), 1, x, product.as_mut());
-    product
-}
-
-/// Length of the longest displacement of a node, for every column.
-fn longest_of_nodes(model: &FeModel, u: &Mat<f64>) -> Vec<f64> {
-    let (d, n) = (model.dimension(), model.nodes().len());
-    let length = |i: usize, node: usize| (0..d).map(|k| u[(d * node + k, i)].powi(2)).sum::<f64>();
-    (0..u.ncols()).map(|i| (0..n).map(|node| length(i, node)).fold(0.0, larger).sqrt()).collect()
 }
 
 /// Length of the longest displacement of the watched points, at every instant.

@@ -6,5 +6,5 @@ mod enrich;
 mod estimate;
 mod residual;
 
-pub use enrich::{Enriched, MOST_ROUNDS, enrich};
+pub use enrich::{Enriched, enrich};
 pub use estimate::{PART_OF_REFERENCE, ReferenceError};

@@ -2,10 +2,11 @@
 
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
+use crate::motion::dynamics::add_turned;
 use crate::motion::scene::Instant;
-use crate::numerics::linalg::{combine, gram, multiply, subtract_combination};
-use faer::{Mat, MatRef};
-use nalgebra::Vector3;
+use crate::numerics::linalg::{combine, gram, subtract_combination};
+use faer::Mat;
+use nalgebra::{Matrix3, Vector3};
 
 /// Instants that are computed together.
 const BLOCK: usize = 32;
@@ -19,7 +20,7 @@ pub(super) struct NodalView<'m> {
     /// Rigid motions about the origin of the frame (N x 6, in the plane N x 3), axes of the model.
     rigid: Mat<f64>,
     /// Axes of the frame in the model.
-    axes: nalgebra::Matrix3<f64>,
+    axes: Matrix3<f64>,
     /// Nodal forces of unit forces and torques where each load of the scene acts (N x 6, in the plane N x 3).
     loads: Vec<Mat<f64>>,
 }
@@ -51,19 +52,17 @@ impl<'m> NodalView<'m> {
         let udd = self.displacements(motion, |now| &now.qdd);
         let omega = |now: &Instant| self.axes * now.omega;
         let mut velocity = self.rigid_part(motion, |now| (now.velocity, now.omega)) + &ud;
-        self.add_turned(1.0, motion, omega, u.as_ref(), &mut velocity);
+        self.add_turned(motion, omega, &u, &mut velocity);
         let momentum = self.model.pencil().apply_mass(velocity.as_ref());
 
         // Gravity is an acceleration that is not there.
         let free = |now: &Instant| (now.velocity_rate - now.gravity, now.omega_rate);
         let mut acceleration = self.rigid_part(motion, free) + udd;
-        self.add_turned(1.0, motion, |now| self.axes * now.omega_rate, u.as_ref(), &mut acceleration);
-        self.add_turned(1.0, motion, omega, ud.as_ref(), &mut acceleration);
+        self.add_turned(motion, |now| self.axes * now.omega_rate, &u, &mut acceleration);
+        self.add_turned(motion, omega, &ud, &mut acceleration);
         let mut residual = self.model.pencil().apply_mass(acceleration.as_ref());
-        self.add_turned(1.0, motion, omega, momentum.as_ref(), &mut residual);
-        let mut elastic = Mat::zeros(u.nrows(), u.ncols());
-        multiply(self.model.stiffness(), 1, u.as_ref(), elastic.as_mut());
-        residual += elastic;
+        self.add_turned(motion, omega, &momentum, &mut residual);
+        residual += self.model.pencil().apply_stiffness(u.as_ref());
         let mut residual = self.loads_of(motion) - residual;
         let in_modes = gram(self.vectors.as_ref(), residual.as_ref());
         subtract_combination(residual.as_mut(), self.weighted.as_ref(), in_modes.as_ref());
@@ -105,24 +104,16 @@ impl<'m> NodalView<'m> {
         both
     }
 
-    /// y += factor omega x x at displacements.
+    /// y += omega x x at displacements.
     fn add_turned(
         &self,
-        factor: f64,
         motion: &[Instant],
         omega: impl Fn(&Instant) -> Vector3<f64>,
-        x: MatRef<'_, f64>,
+        x: &Mat<f64>,
         y: &mut Mat<f64>,
     ) {
-        let d = self.model.dimension();
-        let end = self.model.rows().displacements();
         for (i, now) in motion.iter().enumerate() {
-            let w = omega(now) * factor;
-            for first in (0..end).step_by(d) {
-                let along = |k: usize| if k < d { x[(first + k, i)] } else { 0.0 };
-                let turned = w.cross(&Vector3::new(along(0), along(1), along(2)));
-                (0..d).for_each(|k| y[(first + k, i)] += turned[k]);
-            }
+            add_turned(self.model, 1.0, &omega(now), x.col_as_slice(i), y.col_as_slice_mut(i));
         }
     }
 

@@ -6,7 +6,22 @@ use super::trial::Trial;
 use crate::body::flex_body::{FlexBody, Group, Groups, TermDecision};
 use crate::motion::scene::Scene;
 
-/// The decision about every group, and the trial that it rests on.
+/// The error that a decision about a group rests on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// The output whose error is largest beside its tolerance: attitude, deflection, stress or reaction.
+    pub output: &'static str,
+    /// Its error without the group: of the attitude in radians, else relative. A bound, or measured over a run (`tier` 2).
+    pub error: f64,
+    /// The tolerance of the scene.
+    pub tolerance: f64,
+    /// The part of the tolerance that may be spent on dropping groups.
+    pub budget: f64,
+    /// 0: bound from I0 and the frequencies; 1: bound with the norms of the invariants; 2: measured.
+    pub tier: u8,
+}
+
+/// The decision about every group, and the error that it rests on where there is one.
 pub(super) fn decisions(
     body: &FlexBody,
     scene: &Scene,
@@ -14,7 +29,7 @@ pub(super) fn decisions(
     choice: &Choice,
     trials: &[Trial],
     short_of: Option<(f64, f64)>,
-) -> Vec<TermDecision> {
+) -> Vec<(TermDecision, Option<Ground>)> {
     let held = body.invariants().groups();
     let last_with = |kept: Groups| trials.iter().rfind(move |trial| trial.kept == kept);
     let first_passed = |kept: Groups| trials.iter().find(move |trial| trial.kept == kept && trial.passed());
@@ -29,17 +44,17 @@ pub(super) fn decisions(
             reason: reason.to_owned(),
         };
         if !held.has(group) {
-            let earlier = body.terms().iter().find(|decision| decision.group == group);
-            return earlier.cloned().unwrap_or_else(|| undecided(false, "the body does not hold it"));
+            let earlier = body.terms().iter().find(|decision| decision.group == group).cloned();
+            return (earlier.unwrap_or_else(|| undecided(false, "the body does not hold it")), None);
         }
         let basis = if kept {
             last_with(choice.groups.and(Groups::without(group)))
         } else {
             first_passed(choice.groups).or(choice.chosen.as_ref())
         };
-        let mut decided = match basis {
-            Some(trial) => decision(group, kept, trial, scene, rotation),
-            None => undecided(kept, "nothing shows that it may be dropped"),
+        let (mut decided, ground) = match basis {
+            Some(trial) => (decision(group, kept, trial, scene, rotation), ground(trial, scene)),
+            None => (undecided(kept, "nothing shows that it may be dropped"), None),
         };
         if let Some((reached, allowed)) = short_of.filter(|_| kept) {
             decided.reason = format!(
@@ -47,9 +62,16 @@ pub(super) fn decisions(
                 decided.reason
             );
         }
-        decided
+        (decided, ground)
     };
     Group::ALL.into_iter().map(decide).collect()
+}
+
+/// What is largest beside its tolerance in a trial; `None` where its errors are not known.
+fn ground(trial: &Trial, scene: &Scene) -> Option<Ground> {
+    let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite())?;
+    let (output, error, tolerance) = errors.decisive(&scene.requirements.tolerance);
+    Some(Ground { output, error, tolerance, budget: trial.budget, tier: trial.tier })
 }
 
 /// The decision that a trial without `group` leads to.
@@ -60,19 +82,18 @@ pub(super) fn decision(
     scene: &Scene,
     rotation: &Input,
 ) -> TermDecision {
-    let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite());
-    let decisive = errors.map(|errors| errors.decisive(&scene.requirements.tolerance));
+    let ground = ground(trial, scene);
     let how = match trial.tier {
         2 => "measured over the run",
         1 => "bound with the norms of the invariants",
         _ => "bound from I0 and the frequencies",
     };
-    let reason = match (&decisive, trial.remark.as_str()) {
-        (Some((output, ..)), _) => format!("error of {output}, {how}; rotation from {}", rotation.source),
+    let reason = match (&ground, trial.remark.as_str()) {
+        (Some(ground), _) => format!("error of {}, {how}; rotation from {}", ground.output, rotation.source),
         (None, "") => format!("no finite {how}"),
         (None, remark) => remark.to_owned(),
     };
-    let (bound, limit) = decisive.map_or((0.0, 0.0), |(_, error, allowed)| (error, allowed * trial.budget));
+    let (bound, limit) = ground.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
     TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
 }
 

@@ -18,6 +18,7 @@ mod warnings;
 
 pub use basis::{BEYOND_BAND, WantedResponses, largest_eigenvalue};
 pub use bounds::{Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Start, TorqueDefect};
+pub use decisions::Ground;
 pub use norms::Norms;
 pub use participation::{Participation, participations};
 pub use select::{Selection, rule_out, select, select_from};

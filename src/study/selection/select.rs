@@ -2,13 +2,13 @@
 
 use super::basis::BEYOND_BAND;
 use super::cases::{Case, SLACK_OF_RANGE, bounded, scenes, worst};
-use super::decisions::{decision, decisions, guideline};
+use super::decisions::{Ground, decision, decisions, guideline};
 use super::participation::{Participation, participations};
 use super::search::{Choice, Search};
 use super::significance::{Significance, significances};
 use super::situation::{Input, Situation};
 use super::trial::{ModeShare, Trial, multiplications};
-use super::warnings::{growth_of, phase_drifts, resonances};
+use super::warnings::{phase_drifts, resonances};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
@@ -33,10 +33,14 @@ pub struct Selection {
     pub trials: Vec<Trial>,
     /// The decision about every group.
     pub terms: Vec<TermDecision>,
+    /// The error that each of these decisions rests on.
+    pub grounds: Vec<Option<Ground>>,
     /// Groups that are kept.
     pub groups: Groups,
     /// Modes that the body has.
     pub n_modes: usize,
+    /// Frequency of each of them in hertz.
+    pub frequencies_hz: Vec<f64>,
     /// Modes that are kept (from 0).
     pub modes: Vec<usize>,
     /// What every mode of the body does, where a motion was integrated.
@@ -132,6 +136,8 @@ pub fn select_from(
     };
     let Deciding { choice, trials, diagnostics, short_of, .. } = deciding;
     let tolerance = scene.requirements.tolerance;
+    let decided = decisions(body, scene, &situation.spin, &choice, &trials, short_of);
+    let (terms, grounds) = decided.into_iter().unzip();
     Ok(Selection {
         scene: scene.name.clone(),
         body: body.source().name.clone(),
@@ -139,10 +145,12 @@ pub fn select_from(
         tolerance: [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction],
         significances,
         multiplications: multiplications(body, body.invariants().groups()),
-        terms: decisions(body, scene, &situation.spin, &choice, &trials, short_of),
+        terms,
+        grounds,
         guideline: guideline(choice.groups),
         groups: choice.groups,
         n_modes: body.n_modes(),
+        frequencies_hz: body.frequencies_hz(),
         participations: participations(body, scene, &loads, &choice.modes),
         modes: choice.modes,
         shares: choice.shares,
@@ -279,7 +287,8 @@ impl<'s> Deciding<'s> {
         for (runs, measure) in search.cases {
             let (modes, groups) = (&self.choice.modes, self.choice.groups);
             let (trial, history) = runs.measured(measure, modes, groups, search.budget())?;
-            let own = history.and_then(|history| growth_of(runs, measure, &history));
+            let tolerance = &self.scene.requirements.tolerance;
+            let own = history.and_then(|history| history.growth(measure.trace(), tolerance));
             growth = [growth, own].into_iter().flatten().reduce(f64::max);
             self.diagnostics.extend(resonances(runs, measure, modes));
             chosen.push(trial);

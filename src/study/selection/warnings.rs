@@ -3,33 +3,11 @@
 use super::rows::PointRows;
 use super::trial::TrialRuns;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::motion::scene::{Axes, ErrorHistory, History, Measure};
+use crate::motion::scene::{Axes, History, Measure};
 use std::f64::consts::TAU;
-
-/// Errors of the second half of a run over those of the first from which on they are said to grow.
-const GROWING: f64 = 1.8;
-
-/// Errors below this part of their tolerance do not matter yet, though they grow.
-const MATTERS: f64 = 0.1;
 
 /// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths of its resonance.
 const NEAR: f64 = 0.1;
-
-/// How much more the errors of a model grow from the first half of the run to the second than the motion does, where those of the second
-/// matter: about 1 for errors that stay in step with the motion, more where phases run apart.
-pub(super) fn growth_of(runs: &TrialRuns<'_>, measure: &Measure<'_>, errors: &ErrorHistory) -> Option<f64> {
-    let growth = |(first, second): (f64, f64), allowed: f64| {
-        (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
-    };
-    let energies = measure.trace().elastic.iter().map(|energy| energy.max(0.0).sqrt());
-    let motion = growth(errors.halves(&energies.collect::<Vec<_>>()), 0.0)?;
-    let tolerance = &runs.scene.requirements.tolerance;
-    // The attitude has no amplitude: it grows when it grows.
-    let attitude = growth(errors.halves(&errors.attitude), tolerance.attitude);
-    let stress = errors.stress.as_ref().and_then(|stress| growth(errors.halves(stress), tolerance.stress));
-    let stress_beyond_motion = stress.map(|growth| growth / motion.max(1.0));
-    [attitude, stress_beyond_motion].into_iter().flatten().reduce(f64::max).filter(|growth| *growth > GROWING)
-}
 
 /// The warning that the errors of the selected model grow faster than its motion, by this factor.
 pub(super) fn phase_drifts(growth: f64) -> Diagnostic {

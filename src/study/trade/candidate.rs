@@ -16,7 +16,7 @@ pub enum Kind {
     Modes,
     /// Some groups.
     Groups,
-    /// Invariants of a lumped mass, with the modes of the consistent one.
+    /// A lumped mass, as multibody programs have it.
     Lumped,
     /// Single precision.
     Single,
@@ -37,6 +37,33 @@ impl Kind {
     }
 }
 
+/// What was lumped of the mass, and by which scheme: the two ways of multibody programs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LumpedMass {
+    /// Modes and modal mass are those of the consistent mass; the rigid body and all couplings are summed over nodal masses. This is made
+    /// of a modal neutral file, which holds modes, generalised masses and nodal masses.
+    Couplings(String),
+    /// The whole mass was lumped before the modes were computed: an FE model with a lumped mass matrix.
+    Whole(String),
+}
+
+impl LumpedMass {
+    /// Name of the scheme.
+    pub fn scheme(&self) -> &str {
+        match self {
+            Self::Couplings(scheme) | Self::Whole(scheme) => scheme,
+        }
+    }
+
+    /// `couplings` or `whole`: what was lumped.
+    pub fn part(&self) -> &'static str {
+        match self {
+            Self::Couplings(_) => "couplings",
+            Self::Whole(_) => "whole",
+        }
+    }
+}
+
 /// A body that could be used for a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -46,8 +73,8 @@ pub struct Candidate {
     pub modes: Vec<usize>,
     /// Groups of the kinetic energy that it has.
     pub groups: Groups,
-    /// Lumping scheme whose invariants it has.
-    pub lumped: Option<String>,
+    /// What was lumped of its mass.
+    pub lumped: Option<LumpedMass>,
     /// Precision of its numbers.
     pub storage: Storage,
 }
@@ -75,11 +102,11 @@ impl Candidate {
     /// The body.
     ///
     /// # Errors
-    /// None for candidates of [`candidates`]; those of [`FlexBody::new`].
-    pub(super) fn body(&self, source: &Source) -> Result<FlexBody> {
+    /// Those of [`FlexBody::new`], which only lumped masses have.
+    pub fn body(&self, source: &Source) -> Result<FlexBody> {
         let mut body = match &self.lumped {
-            Some(scheme) => source.with_lumped_mass(scheme)?,
-            None => source.body().clone(),
+            Some(LumpedMass::Couplings(scheme)) => source.with_lumped_couplings(scheme)?,
+            Some(LumpedMass::Whole(_)) | None => source.body().clone(),
         };
         let all = self.modes.len() == body.n_modes();
         if !all || self.groups != body.groups() {
@@ -100,41 +127,71 @@ impl Candidate {
     }
 }
 
-/// Every candidate of the sources, the first of which is the reference; `motion` is that of the reference. Bodies that are `carried` keep all
-/// groups.
-pub(super) fn candidates(sources: &[Source], motion: &Trace, carried: bool) -> Vec<Candidate> {
+/// Groups that a ladder of modes is tried with, the cheapest first.
+const SETS: [Groups; 3] = [Groups::NONE, Groups { w1: true, ..Groups::NONE }, Groups::ALL];
+
+/// Errors over their tolerances of a set of groups with all modes: beyond the first it is hopeless, and below the second dearer sets cannot
+/// be told from it.
+const HOPELESS: f64 = 10.0;
+const PERFECT: f64 = 0.01;
+
+/// The candidates that have all modes of a source, the first of which is the reference. Bodies that are `carried` keep all groups.
+pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {
-        let nf = of.body().n_modes();
-        let whole = Candidate::whole(source, nf);
-        let sensible = [Groups::ALL, Groups { w1: true, ..Groups::NONE }, Groups::NONE];
-        if source > 0 {
-            // Their modes are those of the reference, or others: what counts is how many and which.
-            all.extend(sensible.map(|groups| Candidate { groups, ..whole.clone() }));
+        let whole = Candidate::whole(source, of.body().n_modes());
+        if let Some(scheme) = of.lumped_by() {
+            all.push(Candidate { lumped: Some(LumpedMass::Whole(scheme.to_owned())), ..whole });
             continue;
         }
-        all.push(whole.clone());
+        if source > 0 {
+            // Their modes are those of the reference, or others: what counts is how many and which.
+            all.extend(SETS.into_iter().rev().map(|groups| Candidate { groups, ..whole.clone() }));
+            continue;
+        }
         let subsets =
-            (0..7).rev().map(|bits| Groups { w1: bits & 4 != 0, w2: bits & 2 != 0, w3: bits & 1 != 0 });
+            (0..8).rev().map(|bits| Groups { w1: bits & 4 != 0, w2: bits & 2 != 0, w3: bits & 1 != 0 });
         all.extend(subsets.map(|groups| Candidate { groups, ..whole.clone() }));
-        all.extend(of.lumped().map(|scheme| Candidate { lumped: Some(scheme.to_owned()), ..whole.clone() }));
-        all.push(Candidate { storage: Storage::F32, ..whole.clone() });
-        let by_energy = by_energy(of.body(), motion);
-        for &count in LADDER.iter().filter(|&&count| count < nf).rev() {
-            let lowest: Vec<usize> = (0..count).collect();
-            let mut liveliest = by_energy[..count].to_vec();
-            liveliest.sort_unstable();
-            let mut orders = vec![lowest];
-            orders.extend((liveliest != orders[0]).then_some(liveliest));
-            for modes in orders {
-                all.extend(sensible.map(|groups| Candidate {
-                    modes: modes.clone(),
-                    groups,
-                    ..whole.clone()
-                }));
-            }
+        let couplings = |scheme: &str| Some(LumpedMass::Couplings(scheme.to_owned()));
+        all.extend(of.lumped().map(|scheme| Candidate { lumped: couplings(scheme), ..whole.clone() }));
+        all.push(Candidate { storage: Storage::F32, ..whole });
+    }
+    held(all, sources, carried)
+}
+
+/// The candidates that have some modes of the reference, the lowest and the liveliest in its `motion`, with the sets of groups that
+/// are worth it: `worst_of` answers the largest error over its tolerance of a set with all modes.
+pub(super) fn ladder(
+    sources: &[Source],
+    motion: &Trace,
+    carried: bool,
+    worst_of: impl Fn(Groups) -> f64,
+) -> Vec<Candidate> {
+    let body = sources[0].body();
+    let mut sets = Vec::new();
+    for groups in SETS {
+        let worst = worst_of(groups.and(body.groups()));
+        sets.extend((worst <= HOPELESS || groups == Groups::ALL).then_some(groups));
+        if worst <= PERFECT {
+            break;
         }
     }
+    let whole = Candidate::whole(0, body.n_modes());
+    let by_energy = by_energy(body, motion);
+    let mut all = Vec::new();
+    for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
+        let mut liveliest = by_energy[..count].to_vec();
+        liveliest.sort_unstable();
+        for modes in [(0..count).collect(), liveliest] {
+            let with = |groups: &Groups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
+            all.extend(sets.iter().rev().map(with));
+        }
+    }
+    held(all, sources, carried)
+}
+
+/// Each candidate once, with the groups that its source holds.
+fn held(mut all: Vec<Candidate>, sources: &[Source], carried: bool) -> Vec<Candidate> {
     for candidate in &mut all {
         let held = sources[candidate.source].body().groups();
         candidate.groups = if carried { held } else { candidate.groups.and(held) };

@@ -11,6 +11,7 @@ use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, Wanted};
 use crate::study::reference::{Enriched, ReferenceError, enrich};
 use faer::Mat;
+use std::fmt::Write;
 use std::time::Instant;
 
 /// The bodies of a study.
@@ -26,7 +27,8 @@ pub struct Conversions {
 /// Every conversion of a study in `scene`.
 ///
 /// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what [`enrich`] finds lacking. Beside it stand
-/// `modes`, their half and their quarter with residual vectors and without, and `modes` at the other levels of accuracy. Each is timed.
+/// `modes`, their half and their quarter with residual vectors and without, `modes` at the other levels of accuracy, and what the settings
+/// of the reference make of the model with its whole mass lumped. Each is timed.
 ///
 /// # Errors
 /// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
@@ -39,8 +41,13 @@ pub fn conversions(
     watch: Watch<'_>,
 ) -> Result<Conversions> {
     let making = Making::new(model, memory, longest, watch);
-    let reference = Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard };
-    let make = |loads: &Mat<f64>| making.make(&reference, loads, ConvertSettings::default().lumped);
+    let finest =
+        Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard, lumped: None };
+    let mut responses = Mat::new();
+    let make = |loads: &Mat<f64>| {
+        responses.clone_from(loads);
+        making.make(&finest, loads, ConvertSettings::default().lumped)
+    };
     let enriched = enrich(model, scene, memory, true, watch, make, |(source, _)| source.body())?;
     let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
     diagnostics.extend(lacks.last().and_then(|own| own.warning(scene)));
@@ -56,9 +63,26 @@ pub fn conversions(
             Err(error) => return Err(error),
         };
         let beside = source.beside(sources[0].body(), model);
-        sources.push(beside.expect("bodies that were made of the model"));
+        sources.push(beside.expect(OF_THE_MODEL));
+    }
+    for lumping in lumpings(model) {
+        match making.make_lumped(&finest, &responses, &lumping)? {
+            Ok(source) => sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL)),
+            Err(reason) => diagnostics.push(reason),
+        }
     }
     Ok(Conversions { sources, lacks, diagnostics })
+}
+
+const OF_THE_MODEL: &str = "bodies that were made of the model";
+
+/// Schemes that lump the whole mass of `model`; none where it is lumped already, or where rows without a place carry mass that belongs to
+/// no node.
+fn lumpings(model: &FeModel) -> Vec<Lumping> {
+    match model.has_diagonal_mass() || model.rows().vectors() > 0 {
+        true => Vec::new(),
+        false => ConvertSettings::default().lumped,
+    }
 }
 
 /// A body that is wanted.
@@ -69,6 +93,8 @@ struct Wish {
     /// Whether it has residual vectors.
     residual: bool,
     accuracy: Accuracy,
+    /// Scheme by which the mass is lumped before.
+    lumped: Option<&'static str>,
 }
 
 impl Wish {
@@ -76,6 +102,9 @@ impl Wish {
         let mut name = format!("{} free mode{}", self.count, if self.count == 1 { "" } else { "s" });
         if self.residual {
             name.push_str(", residual vectors");
+        }
+        if let Some(scheme) = self.lumped {
+            let _ = write!(name, ", of a mass lumped by {scheme}");
         }
         if self.accuracy != Accuracy::Standard {
             name.push_str(&format!(", {}", self.accuracy.name()));
@@ -86,12 +115,12 @@ impl Wish {
 
 /// The bodies beside the reference, each once.
 fn wishes(modes: usize) -> Vec<Wish> {
-    let other = |accuracy| Wish { count: modes, residual: false, accuracy };
+    let other = |accuracy| Wish { count: modes, residual: false, accuracy, lumped: None };
     let mut wishes = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
     for part in [1, 2, 4] {
         let count = (modes / part).max(1);
         for residual in [true, false] {
-            let wish = Wish { count, residual, accuracy: Accuracy::Standard };
+            let wish = Wish { count, residual, accuracy: Accuracy::Standard, lumped: None };
             if !wishes.contains(&wish) {
                 wishes.push(wish);
             }
@@ -126,10 +155,8 @@ impl<'m> Making<'m> {
         motion: &Mat<f64>,
         lumped: Vec<Lumping>,
     ) -> Result<(Source, Vec<Diagnostic>)> {
-        let mut residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
-        if motion.ncols() > 0 {
-            residual_vectors.push(Loads::Motion(motion.clone()));
-        }
+        let residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
+        let basis = BasisChoice::Free(FreeSurface { residual_vectors });
         let settings = ConvertSettings {
             modes: ModeSettings {
                 wanted: Wanted::Lowest(wish.count),
@@ -138,7 +165,7 @@ impl<'m> Making<'m> {
                 longest: self.longest,
                 ..ModeSettings::default()
             },
-            basis: BasisChoice::Free(FreeSurface { residual_vectors }),
+            basis: basis.with_motion(motion).expect("free modes take responses"),
             lumped,
             ..ConvertSettings::default()
         };
@@ -146,5 +173,30 @@ impl<'m> Making<'m> {
         let conversion = convert(self.model, &settings, self.watch)?;
         let seconds = start.elapsed().as_secs_f64();
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
+    }
+
+    /// The same of the model with its whole mass lumped; the reason where this has no modes.
+    fn make_lumped(
+        &self,
+        wish: &Wish,
+        motion: &Mat<f64>,
+        lumping: &Lumping,
+    ) -> Result<std::result::Result<Source, Diagnostic>> {
+        let masses = lumping.masses(self.model)?;
+        let scheme = masses.scheme().name();
+        let no_body = |why: String| {
+            let message = format!("no candidate whose whole mass is lumped by {scheme}: {why}");
+            Ok(Err(Diagnostic::new(Code::LumpedWithoutBody, message)))
+        };
+        if masses.negative() > 0 {
+            return no_body(format!("{} nodal masses are negative", masses.negative()));
+        }
+        let lumped = self.model.with_nodal_masses(masses.masses());
+        let name = Wish { lumped: Some(scheme), ..wish.clone() };
+        let own = Making { model: &lumped, loads: self.loads.clone(), ..*self };
+        match own.make(&name, motion, Vec::new()) {
+            Ok((source, _)) => Ok(Ok(source.of_lumped_mass(scheme))),
+            Err(error) => no_body(error.diagnostics()[0].message().to_owned()),
+        }
     }
 }

@@ -55,10 +55,11 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
     points(rows).into_iter().filter(better).map(|point| point.2).collect()
 }
 
-/// (multiplications, worst ratio, row) of what was measured, ascending.
+/// (multiplications, worst ratio, row) of what was measured, ascending. A lumped mass is there to be compared with: it costs what the
+/// consistent one does.
 fn points(rows: &[Row]) -> Vec<(usize, f64, usize)> {
     let point = |(at, row): (usize, &Row)| {
-        let measured = row.outcome.as_ref().ok()?;
+        let measured = row.outcome.as_ref().ok().filter(|_| row.candidate.lumped.is_none())?;
         Some((measured.multiplications, measured.worst, at))
     };
     let mut points: Vec<_> = rows.iter().enumerate().filter_map(point).collect();

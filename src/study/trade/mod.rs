@@ -9,10 +9,10 @@ mod source;
 mod study;
 mod timing;
 
-pub use candidate::{Candidate, Kind};
+pub use candidate::{Candidate, Kind, LumpedMass};
 pub use conversions::{Conversions, conversions};
 pub use front::{Recommendation, front};
 pub use nodal::NodalReference;
-pub use row::{Failed, Measured, Row, Times};
+pub use row::{Failed, Measured, Row, Timed};
 pub use source::Source;
 pub use study::{ReferenceKind, Settings, Trade, trade};

@@ -12,7 +12,7 @@ use crate::motion::dynamics::{
 };
 use crate::motion::scene::{Apart, Axes, ErrorHistory, Extremes, Load, Peak, Point, Scene, Scheme, Trace};
 use crate::numerics::integration::{Explicit, Failure, Method, Work, integrate};
-use crate::numerics::linalg::{combine, larger, multiply, not_negative};
+use crate::numerics::linalg::{combine, multiply, not_negative};
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -111,7 +111,8 @@ impl<'m> NodalReference<'m> {
             extremes: Extremes { spin: spin.value, internal: internal.value.powi(2), ..Extremes::default() },
             ..motion.clone()
         };
-        let lengths = (0..displacements.ncols()).map(|i| longest(model, displacements.col_as_slice(i)));
+        let lengths =
+            (0..displacements.ncols()).map(|i| model.longest_displacement(displacements.col_as_slice(i)));
         let largest_deflection = Peak::of(&trace.time, lengths).value;
         Ok(Self { model, trace, displacements, largest_deflection })
     }
@@ -132,7 +133,8 @@ impl<'m> NodalReference<'m> {
                 0.5 * pairs.map(|(u, f)| u * f).sum::<f64>()
             };
             energy.extend((0..count).map(|i| not_negative(product(i))));
-            deflection.extend((0..count).map(|i| longest(self.model, difference.col_as_slice(i))));
+            deflection
+                .extend((0..count).map(|i| self.model.longest_displacement(difference.col_as_slice(i))));
         }
         let apart = Apart { energy, deflection, largest_deflection: self.largest_deflection };
         Some(ErrorHistory::new(&self.trace, candidate, &apart))
@@ -257,13 +259,6 @@ fn fastest(model: &FeModel) -> f64 {
 /// Number of entries of K.
 fn entries_of(model: &FeModel) -> f64 {
     (0..model.rows().len()).map(|row| model.stiffness().row(row).0.len()).sum::<usize>() as f64
-}
-
-/// Length of the longest displacement of a node.
-fn longest(model: &FeModel, u: &[f64]) -> f64 {
-    let d = model.dimension();
-    let squares = u[..d * model.nodes().len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());
-    squares.fold(0.0, larger).sqrt()
 }
 
 /// Displacements and rotations of the nodes in body axes, as modes have them: a column for every instant.

@@ -5,15 +5,15 @@ use crate::base::diagnostic::Diagnostic;
 use crate::motion::scene::OutputErrors;
 use crate::numerics::integration::Work;
 
-/// Times of a candidate. Unit: s.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Times {
-    /// Time to make the body that it is of, where that is known.
-    pub preprocessing: Option<f64>,
-    /// Time of one evaluation of the equations.
+/// What a candidate takes, one run after the other on one thread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timed {
+    /// Time of one evaluation of the equations. Unit: s.
     pub evaluation: f64,
-    /// Time of the simulation.
+    /// Time of the simulation. Unit: s.
     pub integration: f64,
+    /// Work of the simulation, with the steps that a scene without a given step takes for the candidate.
+    pub work: Work,
 }
 
 /// Errors, cost and times of a candidate.
@@ -29,10 +29,10 @@ pub struct Measured {
     pub multiplications: usize,
     /// Size of its file. Unit: bytes.
     pub bytes: u64,
-    /// Work of its simulation, with the steps that a scene without a given step takes for it.
-    pub work: Work,
-    /// Times.
-    pub times: Times,
+    /// Time to make the body that it is of, where that is known. Unit: s.
+    pub preprocessing: Option<f64>,
+    /// Of those that somebody may take: the reference, the front and the recommended one.
+    pub timed: Option<Timed>,
 }
 
 /// The diagnostic for a candidate that could not be measured.

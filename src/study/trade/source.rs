@@ -7,7 +7,7 @@ use crate::motion::dynamics::Configuration;
 use crate::motion::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
 use crate::numerics::linalg::{gram, multiply};
 use faer::Mat;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// A body, and how its modes are seen from those of the reference.
 #[derive(Debug, Clone)]
@@ -16,6 +16,8 @@ pub struct Source {
     /// Without lumped comparators.
     body: FlexBody,
     lumped: Vec<LumpedBody>,
+    /// Scheme by which the mass of the model was lumped before this body was made of it.
+    lumped_by: Option<String>,
     /// What it took to make it. Unit: s.
     preprocessing: Option<f64>,
     /// G = Psi'K Psi_r (nf x nr) with the modes Psi_r of the reference; none of the reference itself.
@@ -30,7 +32,13 @@ impl Source {
     pub fn new(name: impl Into<String>, body: FlexBody, preprocessing: Option<f64>) -> Result<Self> {
         let mut parts = body.into_parts();
         let lumped = std::mem::take(&mut parts.lumped);
-        Ok(Self { name: name.into(), body: FlexBody::new(parts)?, lumped, preprocessing, shared: None })
+        let (name, body) = (name.into(), FlexBody::new(parts)?);
+        Ok(Self { name, body, lumped, lumped_by: None, preprocessing, shared: None })
+    }
+
+    /// The same, as a body of a model whose mass was lumped by a scheme.
+    pub fn of_lumped_mass(self, scheme: &str) -> Self {
+        Self { lumped_by: Some(scheme.to_owned()), ..self }
     }
 
     /// The same as a candidate beside the body `reference` of the same model; `None` when one of them is not of `model`.
@@ -75,14 +83,18 @@ impl Source {
         self.lumped.iter().map(|lumped| lumped.scheme.as_str())
     }
 
-    /// The body with the invariants of a lumping scheme; its own where there is none of that name.
-    pub(super) fn with_lumped_mass(&self, scheme: &str) -> Result<FlexBody> {
+    /// The scheme by which the mass was lumped before the modes were computed; `None` of a consistent mass.
+    pub fn lumped_by(&self) -> Option<&str> {
+        self.lumped_by.as_deref()
+    }
+
+    /// The body with its own modal mass and everything else summed over the nodal masses of a scheme; itself where there is none of that
+    /// name.
+    pub(super) fn with_lumped_couplings(&self, scheme: &str) -> Result<FlexBody> {
         let mut parts = self.body.clone().into_parts();
         if let Some(lumped) = self.lumped.iter().find(|lumped| lumped.scheme == scheme) {
-            parts.invariants = lumped.invariants.clone();
-            if parts.invariants.general().is_none() {
-                parts.source.mass_structure = MassStructure::Diagonal;
-            }
+            parts.invariants = lumped.invariants.clone().with_modal_mass(self.body.invariants().modal_mass());
+            parts.source.mass_structure = MassStructure::General;
         }
         FlexBody::new(parts)
     }
@@ -103,9 +115,7 @@ impl Source {
         if own.initial.modes.is_empty() {
             return own;
         }
-        let k = &body.invariants().modal_stiffness();
-        let stiffness =
-            DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)])).cholesky();
+        let stiffness = body.invariants().symmetric_stiffness().cholesky();
         let part = |q: &[f64]| {
             let product = |&mode: &usize| q.iter().enumerate().map(|(j, q)| shared[(mode, j)] * q).sum();
             let sides = DVector::from_iterator(modes.len(), modes.iter().map(product));

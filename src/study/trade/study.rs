@@ -1,12 +1,12 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
-use super::candidate::candidates;
-use super::{Candidate, Failed, Measured, NodalReference, Recommendation, Row, Source, Times, front, timing};
+use super::candidate::{ladder, whole_candidates};
+use super::{Candidate, Failed, Measured, NodalReference, Recommendation, Row, Source, Timed, front, timing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::memory::refuse_beyond;
 use crate::base::progress::{Event, Watch};
-use crate::body::flex_body::FlexBody;
+use crate::body::flex_body::{FlexBody, Groups, Storage};
 use crate::formats::flex_body_file;
 use crate::model::FeModel;
 use crate::motion::dynamics::{EquationsOfMotion, Terms};
@@ -69,7 +69,7 @@ pub struct Trade {
 /// Measures every candidate of `sources` in `scene`. The first source is the reference; others are [`Source::beside`] it.
 ///
 /// Errors are those of the model: all candidates are integrated with the method and the step of the reference. They are found on all
-/// threads; the times afterwards, one after the other. Everything but the times is the same at any number of threads.
+/// threads; the times of those that somebody may take afterwards, one after the other. Everything but the times is the same at any number of threads.
 ///
 /// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
 ///
@@ -151,24 +151,42 @@ struct Job<'j> {
 }
 
 impl Job<'_> {
-    /// Every candidate: what can be found on all threads, then the times, one after the other.
+    /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one after the other.
     fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<Row>> {
-        let all = candidates(self.sources, self.motion, self.scene.carried.is_some());
-        let count = all.len();
-        let progress = Progress::new(watch, "errors", count);
+        let carried = self.scene.carried.is_some();
+        let whole = whole_candidates(self.sources, carried);
+        let mut rows = self.errors(whole, "errors of whole bodies", watch)?;
+        let worst_of = |groups: Groups| {
+            let of_groups = |row: &&Row| {
+                let own = &row.candidate;
+                own.source == 0 && own.groups == groups && own.lumped.is_none() && own.storage == Storage::F64
+            };
+            let measured = rows.iter().find(of_groups).and_then(|row| row.outcome.as_ref().ok());
+            measured.map_or(f64::INFINITY, |measured| measured.worst)
+        };
+        let some_modes = ladder(self.sources, self.motion, carried, worst_of);
+        rows.extend(self.errors(some_modes, "errors of fewer modes", watch)?);
+        let recommended = Recommendation::new(&rows, self.scene.requirements.multiplications).row();
+        let mut worth_it: Vec<usize> = front(&rows).into_iter().chain(recommended).chain([0]).collect();
+        worth_it.sort_unstable();
+        worth_it.dedup();
+        let progress = Progress::new(watch, "times", worth_it.len());
+        for at in worth_it {
+            self.time(&mut rows[at], repeat)?;
+            progress.step();
+        }
+        Ok(rows)
+    }
+
+    /// The rows of candidates, without times.
+    fn errors(&self, all: Vec<Candidate>, phase: &'static str, watch: Watch<'_>) -> Result<Vec<Row>> {
+        let progress = Progress::new(watch, phase, all.len());
         let measured = |candidate| {
             let row = self.measure(candidate);
             progress.step();
             row
         };
-        let found = all.into_par_iter().map(measured).collect::<Result<Vec<_>>>()?;
-        let progress = Progress::new(watch, "times", count);
-        let timed = |mut row: Row| {
-            self.time(&mut row, repeat)?;
-            progress.step();
-            Ok(row)
-        };
-        found.into_iter().map(timed).collect()
+        all.into_par_iter().map(measured).collect()
     }
 
     /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
@@ -177,7 +195,10 @@ impl Job<'_> {
         let last = candidate.modes.last().copied().unwrap_or(0);
         let outcome = match self.measured(source, &candidate) {
             Ok(measured) => Ok(measured),
-            Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
+            // A lumped mass need not be the mass of anything: that is what the row says then.
+            Err(error)
+                if candidate.lumped.is_some() || error.diagnostics().iter().all(|d| ends_a_run(d.code())) =>
+            {
                 Err(Failed(error.diagnostics()[0].clone()))
             }
             Err(error) => return Err(error),
@@ -208,11 +229,11 @@ impl Job<'_> {
         Ok(Measured {
             errors,
             worst: errors.worst(&scene.requirements.tolerance),
-            growth: history.growth(),
+            growth: history.growth(self.motion, &scene.requirements.tolerance),
             multiplications: EquationsOfMotion::new(&body, scene.run.terms).multiplications(),
             bytes: file_size(&body)?,
-            work: motion.work,
-            times: Times { preprocessing: source.preprocessing(), evaluation: 0.0, integration: 0.0 },
+            preprocessing: source.preprocessing(),
+            timed: None,
         })
     }
 
@@ -224,8 +245,7 @@ impl Job<'_> {
         let timed = timing::integration(&body, &scene, repeat);
         match (timed, timing::evaluation(&body, scene.run.terms)) {
             (Ok((integration, work)), Ok(evaluation)) => {
-                measured.work = work;
-                (measured.times.integration, measured.times.evaluation) = (integration, evaluation);
+                measured.timed = Some(Timed { evaluation, integration, work });
             }
             (Err(error), _) => row.outcome = Err(Failed(error.diagnostics()[0].clone())),
             (_, Err(reason)) => {

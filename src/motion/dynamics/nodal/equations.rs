@@ -165,20 +165,7 @@ impl<'m> NodalEquations<'m> {
 
     /// y += factor omega x x, at displacements.
     pub(super) fn add_turned(&self, factor: f64, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
-        let end = self.model.rows().displacements();
-        let w = omega * factor;
-        if self.model.dimension() == 2 {
-            for (x, y) in x[..end].as_chunks::<2>().0.iter().zip(y[..end].as_chunks_mut::<2>().0) {
-                y[0] -= w.z * x[1];
-                y[1] += w.z * x[0];
-            }
-            return;
-        }
-        for (x, y) in x[..end].as_chunks::<3>().0.iter().zip(y[..end].as_chunks_mut::<3>().0) {
-            y[0] += w.y * x[2] - w.z * x[1];
-            y[1] += w.z * x[0] - w.x * x[2];
-            y[2] += w.x * x[1] - w.y * x[0];
-        }
+        add_turned(self.model, factor, omega, x, y);
     }
 
     /// sum_i x_i x y_i over displacements: B(x)'y.
@@ -266,6 +253,24 @@ impl<'m> NodalEquations<'m> {
         let (linear, angular) = (self.frame.axes * linear, self.frame.axes * angular);
         let both = Vector6::from_iterator(linear.iter().chain(&angular).copied());
         Vector6::from_fn(|k, _| if self.moving.contains(&k) { both[k] } else { 0.0 })
+    }
+}
+
+/// y += factor omega x x, at the displacements of the rows of `model`.
+pub(crate) fn add_turned(model: &FeModel, factor: f64, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
+    let end = model.rows().displacements();
+    let w = omega * factor;
+    if model.dimension() == 2 {
+        for (x, y) in x[..end].as_chunks::<2>().0.iter().zip(y[..end].as_chunks_mut::<2>().0) {
+            y[0] -= w.z * x[1];
+            y[1] += w.z * x[0];
+        }
+        return;
+    }
+    for (x, y) in x[..end].as_chunks::<3>().0.iter().zip(y[..end].as_chunks_mut::<3>().0) {
+        y[0] += w.y * x[2] - w.z * x[1];
+        y[1] += w.z * x[0] - w.x * x[2];
+        y[2] += w.x * x[1] - w.y * x[0];
     }
 }
 

@@ -1,0 +1,451 @@
+"""Seconds that a body of a trade study takes in two programs that are not ours: Exudyn, with the body as `export --to exudyn` writes it, and a
+program in C around the header of `export --to embedded`.
+
+Both simulate the scene with a step of their own choice, which is stated: Exudyn with generalised alpha, implicit, as long as the highest frequency that
+the scene asks about allows, the same for every body; the C program with the classical Runge-Kutta method, explicit, as long as that frequency and the
+highest mode of the body allow.
+"""
+
+import subprocess
+import time
+
+import h5py
+import numpy as np
+
+from trade_guidelines import history, kinks, skew
+
+# Steps per period of the highest frequency that the scene asks about (`[band]`), and how many there are at the least and at the most.
+PER_PERIOD, FEWEST, MOST = 30, 500, 20000
+# The Runge-Kutta method of order 4 is stable up to 2.83 / omega.
+STABLE = 2.5
+TURNS = 5
+
+
+def rotation(vector):
+    """The rotation matrix of a rotation vector."""
+    angle = np.linalg.norm(vector)
+    if angle == 0.0:
+        return np.eye(3)
+    axis = skew(vector / angle)
+    return np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+
+
+class Task:
+    """A body in a scene, along the axes of the frame of its file."""
+
+    def __init__(self, path, scene, start=None):
+        with h5py.File(path) as file:
+            self.axes = file["frame/axes"][()]
+            self.eigenvalue = file["modes/eigenvalue"][()]
+            self.interfaces = list(file.get("interfaces", {}))
+        self.path, self.scene, self.nf = path, scene, len(self.eigenvalue)
+        self.duration = scene["run"]["duration"]
+        self.ratio = scene.get("damping", {}).get("ratio", 0.0)
+        self.gravity = np.array(scene.get("gravity", [0, 0, 0]), float)
+        first = scene.get("initial", {})
+        self.attitude = rotation(np.array(first.get("rotation", [0, 0, 0]), float)) @ self.axes
+        self.velocity = np.array(first.get("velocity", [0, 0, 0]), float)
+        self.omega = self.in_body(first.get("angular_velocity", [0, 0, 0]), first.get("axes", "model"))
+        self.q, self.qd = start if start is not None else (np.zeros(self.nf), np.zeros(self.nf))
+        spin = scene.get("spin")
+        self.spin = None
+        if spin is not None:
+            axis = self.in_body(spin["axis"], spin.get("axes", "model"))
+            self.spin = axis / np.linalg.norm(axis), history(spin["rate"]), bool(spin.get("hold"))
+            self.omega = self.spin[0] * self.spin[1](0.0)[0]
+        self.loads = self.grouped()
+        frequency = scene.get("band", {}).get("frequency", 0.0)
+        wanted = PER_PERIOD * frequency * self.duration
+        self.steps = int(np.clip(np.ceil(wanted), FEWEST, MOST))
+
+    def in_body(self, vector, axes):
+        """Components along the axes of the frame of a vector that turns with the body."""
+        vector = np.array(vector, float)
+        return vector if axes == "body" else self.axes.T @ vector
+
+    def grouped(self):
+        """Loads by the place where they act and by whether they keep their direction in the world: [(place, in world, [(force, torque, history)])]."""
+        groups = {}
+        for load in self.scene.get("load", []):
+            axes = load.get("axes", "world")
+            place = ("node", load["node"]) if "node" in load else ("interface", load["interface"])
+            vectors = [np.array(load.get(name, [0, 0, 0]), float) for name in ("force", "torque")]
+            if axes != "world":
+                vectors = [self.in_body(vector, axes) for vector in vectors]
+            groups.setdefault((place, axes == "world"), []).append((*vectors, load.get("history", 1.0)))
+        return [(place, world, members) for (place, world), members in groups.items()]
+
+    def force_and_torque(self, members, instants):
+        """Sums of the loads of a group at the instants (n x 6)."""
+        total = np.zeros((len(instants), 6))
+        for force, torque, value in members:
+            factor = history(value)
+            total += np.outer([factor(t)[0] for t in instants], np.concatenate([force, torque]))
+        return total
+
+    def angles(self, instants):
+        """Integral of the rate of the spin, by Gauss points in every interval."""
+        rate = self.spin[1]
+        points, weights = np.polynomial.legendre.leggauss(4)
+        total = [0.0]
+        for a, b in zip(instants[:-1], instants[1:]):
+            total.append(total[-1] + 0.5 * (b - a) * sum(w * rate(0.5 * (a + b + (b - a) * x))[0] for x, w in zip(points, weights)))
+        return np.array(total)
+
+
+def export(program, path, kind, target, *options):
+    done = subprocess.run([program, "export", path, "--to", kind, "-o", target, "--allow-loss", "--quiet", *options], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(done.stderr)
+
+
+# Exudyn
+
+
+class InExudyn:
+    """The body in Exudyn, made anew for every run since a run changes it."""
+
+    def __init__(self, program, task, folder):
+        import exudyn
+        from exudyn.FEM import ObjectFFRFreducedOrderInterface
+
+        exudyn.SetWriteToConsole(False)
+        self.task, self.file = task, folder / "body.hdf5"
+        points = [str(name) for (kind, name), *_ in task.loads if kind == "node"]
+        # Markers look at six nodes of an interface instead of all.
+        export(program, task.path, "exudyn", self.file, "--points", ",".join(["interfaces", *points]) if task.interfaces else ",".join(points) or "nodes")
+        self.body = ObjectFFRFreducedOrderInterface()
+        self.body.LoadFromFile(str(self.file))
+        with h5py.File(self.file) as file:
+            self.places = {}
+            self.numbers = file["nodeNumbers"][()]
+            for group in file.get("interfaces", {}).values():
+                name = group["name"][()]
+                self.places[name.decode()] = (group["meshNodeNumbers"][()].tolist(), group["weights"][()].tolist(), group["marker"][()] == b"rigid")
+        self.instants = np.linspace(0.0, task.duration, task.steps + 1)
+
+    def marker(self, system, made, place):
+        from exudyn import itemInterface as items
+
+        kind, name = place
+        if kind == "node":
+            node = int(np.flatnonzero(self.numbers == name)[0])
+            return system.AddMarker(items.MarkerSuperElementPosition(bodyNumber=made["oFFRFreducedOrder"], meshNodeNumbers=[node], weightingFactors=[1.0])), False
+        nodes, weights, turns = self.places[name]
+        whole = {"bodyNumber": made["oFFRFreducedOrder"], "meshNodeNumbers": nodes, "weightingFactors": weights}
+        if not turns:
+            return system.AddMarker(items.MarkerSuperElementPosition(**whole)), False
+        return system.AddMarker(items.MarkerSuperElementRigid(**whole, useAlternativeApproach=True)), True
+
+    def system(self):
+        """The multibody system, the loads that change with time and the sensor of the modes."""
+        import exudyn
+        from exudyn import itemInterface as items
+
+        task = self.task
+        container = exudyn.SystemContainer()
+        system = container.AddSystem()
+        self.body.rigidBodyNodeType = exudyn.NodeType.RotationEulerParameters
+        omega = task.attitude @ task.omega
+        made = self.body.AddObjectFFRFreducedOrder(system, initialVelocity=list(task.velocity), rotationMatrixRef=task.attitude, initialAngularVelocity=list(omega), gravity=list(task.gravity))
+        system.SetNodeParameter(made["nGenericODE2"], "initialCoordinates", list(task.q))
+        system.SetNodeParameter(made["nGenericODE2"], "initialCoordinates_t", list(task.qd))
+        if task.ratio > 0:
+            damping = exudyn.MatrixContainer()
+            damping.SetWithDenseMatrix(np.diag(2 * task.ratio * np.sqrt(task.eigenvalue)), useDenseMatrix=False)
+            system.SetObjectParameter(made["oFFRFreducedOrder"], "dampingMatrixReduced", damping)
+        changing = self.loads(system, made) + self.driven(system, made)
+        system.SetPreStepUserFunction(self.before_step(changing))
+        sensor = system.AddSensor(items.SensorNode(nodeNumber=made["nGenericODE2"], outputVariableType=exudyn.OutputVariableType.Coordinates, storeInternal=True))
+        system.Assemble()
+        return container, system, sensor
+
+    def loads(self, system, made):
+        """[(set a value of the system, values at the ends of the steps)]"""
+        from exudyn import itemInterface as items
+
+        changing = []
+        for place, world, members in self.task.loads:
+            values = self.task.force_and_torque(members, self.instants)
+            marker, turns = self.marker(system, made, place)
+            for part, kind in ((values[:, :3], items.LoadForceVector), (values[:, 3:], items.LoadTorqueVector)):
+                if not part.any():
+                    continue
+                # A force at a single node that turns with the body has no form in Exudyn: it is given the axes of the start, turned by the spin.
+                fixed = turns and not world
+                load = system.AddLoad(kind(markerNumber=marker, loadVector=list(part[0]), bodyFixed=fixed))
+                rows = part if world or turns else self.turned(part)
+                changing.append((lambda value, load=load: system.SetLoadParameter(load, "loadVector", value), rows.tolist()))
+        return changing
+
+    def turned(self, vectors):
+        axis = self.task.spin[0]
+        return np.array([self.task.attitude @ rotation(angle * axis) @ vector for angle, vector in zip(self.task.angles(self.instants), vectors)])
+
+    def driven(self, system, made):
+        """The joint that gives the frame its rotation."""
+        from exudyn import itemInterface as items
+
+        task = self.task
+        if task.spin is None:
+            return []
+        axis, _, hold = task.spin
+        ground = system.AddObject(items.ObjectGround())
+        markers = [system.AddMarker(items.MarkerBodyRigid(bodyNumber=ground)), system.AddMarker(items.MarkerNodeRigid(nodeNumber=made["nRigidBody"]))]
+        joint = system.AddObject(items.GenericJoint(markerNumbers=markers, constrainedAxes=[int(hold)] * 3 + [1] * 3, rotationMarker0=task.attitude))
+        rotations = [task.attitude @ rotation(angle * axis) for angle in task.angles(self.instants)]
+        return [(lambda value: system.SetObjectParameter(joint, "rotationMarker0", value), rotations)]
+
+    def before_step(self, changing):
+        """What sets the values for the end of a step."""
+        width, last = self.task.duration / self.task.steps, self.task.steps
+
+        def set_values(system, t):
+            at = min(int(t / width + 0.5), last)
+            for give, values in changing:
+                give(values[at])
+            return True
+
+        return set_values
+
+    def run(self):
+        """(seconds of the integration, modal coordinates at the ends of the steps)"""
+        import exudyn
+
+        container, system, sensor = self.system()
+        settings = exudyn.SimulationSettings()
+        integration = settings.timeIntegration
+        integration.numberOfSteps, integration.endTime = self.task.steps, self.task.duration
+        integration.verboseMode, integration.adaptiveStep = 0, False
+        integration.generalizedAlpha.spectralRadius = 0.9
+        integration.newton.useModifiedNewton = True
+        settings.solutionSettings.writeSolutionToFile = False
+        settings.solutionSettings.sensorsWritePeriod = 0.5 * self.task.duration / self.task.steps
+        begin = time.process_time()
+        system.SolveDynamic(settings)
+        seconds = time.process_time() - begin
+        return seconds, system.GetSensorStoredData(sensor)[:, 1:]
+
+
+# C
+
+DRIVER = """
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "body.h"
+
+enum { NF = FLEXBODY_BODY_MODES, NV = FLEXBODY_BODY_VELOCITIES, RIGID = NV - NF, SIZE = 4 + RIGID + 2 * NF };
+static flexbody_body_evaluation e;
+static const double gravity[3] = {@GRAVITY@};
+static const double damping[NF] = {@DAMPING@};
+
+static double ramp(double t, double from, double to, double start, double duration)
+{
+    double x = (t - start) / duration;
+    x = x < 0 ? 0 : x > 1 ? 1 : x;
+    return from + (to - from) * (x - sin(2 * M_PI * x) / (2 * M_PI));
+}
+
+static double ramp_rate(double t, double from, double to, double start, double duration)
+{
+    double x = (t - start) / duration;
+    return x < 0 || x > 1 ? 0 : (to - from) * (1 - cos(2 * M_PI * x)) / duration;
+}
+
+static double table(double t, int n, const double *times, const double *values)
+{
+    int i = 0;
+    if (t < times[0]) return values[0];
+    while (i + 2 < n && t >= times[i + 1]) i++;
+    if (n < 2 || t >= times[n - 1]) return values[n - 1];
+    return values[i] + (values[i + 1] - values[i]) * (t - times[i]) / (times[i + 1] - times[i]);
+}
+
+/* The axes of the world along those of the body: world = A body. */
+static void axes_of(const double *p, double A[3][3])
+{
+    double n = 1 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+    double a = n * p[0], x = n * p[1], y = n * p[2], z = n * p[3];
+    A[0][0] = 1 - 2 * (y * y + z * z); A[0][1] = 2 * (x * y - a * z); A[0][2] = 2 * (x * z + a * y);
+    A[1][0] = 2 * (x * y + a * z); A[1][1] = 1 - 2 * (x * x + z * z); A[1][2] = 2 * (y * z - a * x);
+    A[2][0] = 2 * (x * z - a * y); A[2][1] = 2 * (y * z + a * x); A[2][2] = 1 - 2 * (x * x + y * y);
+}
+
+static void into_body(double A[3][3], const double *v, double *out)
+{
+    for (int k = 0; k < 3; k++) out[k] = A[0][k] * v[0] + A[1][k] * v[1] + A[2][k] * v[2];
+}
+
+/* State: Euler parameters, V and omega along the axes of the body, qd, q. */
+static int rates(double t, const double *y, double *d)
+{
+    double nu[NV], applied[NV] = {0}, A[3][3], v[3];
+    const double *p = y, *q = y + 4 + NV;
+    memcpy(nu, y + 4, sizeof nu);
+@SPIN@
+    axes_of(p, A);
+    flexbody_body_set(&e, q, nu);
+    into_body(A, gravity, v);
+    flexbody_body_add_gravity(&e, v, applied);
+    for (int j = 0; j < NF; j++) applied[RIGID + j] -= damping[j] * nu[RIGID + j];
+@LOADS@
+    const double *w = nu + 3;
+    d[0] = -0.5 * (p[1] * w[0] + p[2] * w[1] + p[3] * w[2]);
+    d[1] = 0.5 * (p[0] * w[0] + p[2] * w[2] - p[3] * w[1]);
+    d[2] = 0.5 * (p[0] * w[1] + p[3] * w[0] - p[1] * w[2]);
+    d[3] = 0.5 * (p[0] * w[2] + p[1] * w[1] - p[2] * w[0]);
+    memcpy(d + 4 + NV, nu + RIGID, NF * sizeof(double));
+@SOLVE@
+}
+
+int main(int argc, char **argv)
+{
+    long steps = atol(argv[2]);
+    double h = @DURATION@ / (double)steps, y[SIZE] = {@START@}, k[4][SIZE], s[SIZE];
+    FILE *file = fopen(argv[1], "rb");
+    static _Alignas(64) unsigned char data[FLEXBODY_BODY_BYTES];
+    if (argc < 3 || !file || fread(data, 1, sizeof data, file) != sizeof data || flexbody_body_open(&e, data, sizeof data)) return 2;
+    clock_t begin = clock();
+    for (long i = 0; i < steps; i++) {
+        double t = h * (double)i;
+        if (rates(t, y, k[0])) return 3;
+        for (int j = 0; j < SIZE; j++) s[j] = y[j] + 0.5 * h * k[0][j];
+        if (rates(t + 0.5 * h, s, k[1])) return 3;
+        for (int j = 0; j < SIZE; j++) s[j] = y[j] + 0.5 * h * k[1][j];
+        if (rates(t + 0.5 * h, s, k[2])) return 3;
+        for (int j = 0; j < SIZE; j++) s[j] = y[j] + h * k[2][j];
+        if (rates(t + h, s, k[3])) return 3;
+        for (int j = 0; j < SIZE; j++) y[j] += h / 6 * (k[0][j] + 2 * k[1][j] + 2 * k[2][j] + k[3][j]);
+    }
+    printf("%.9g", (double)(clock() - begin) / CLOCKS_PER_SEC);
+    for (int j = 0; j < NF; j++) printf(" %.9g", y[4 + NV + j]);
+    printf("\\n");
+    return 0;
+}
+"""
+
+
+def numbers(values):
+    return ", ".join(repr(float(value)) for value in np.ravel(values))
+
+
+def in_c(value, rate=False):
+    """A history of a scene, or its rate, as an expression of t."""
+    if isinstance(value, (int, float)):
+        return "0.0" if rate else repr(float(value))
+    if "times" in value:
+        assert not rate, "a spin by a table"
+        count = len(value["times"])
+        return f"table(t, {count}, (const double[]){{{numbers(value['times'])}}}, (const double[]){{{numbers(value['values'])}}})"
+    if "amplitude" in value:
+        omega, phase = 2 * np.pi * value["frequency"], value.get("phase", 0.0)
+        size, shape = (value["amplitude"] * omega, "cos") if rate else (value["amplitude"], "sin")
+        return f"{size!r} * {shape}({omega!r} * t + {float(phase)!r})"
+    arguments = [value.get("from", 0.0), value["to"], value.get("start", 0.0), value["duration"]]
+    return f"{'ramp_rate' if rate else 'ramp'}(t, {numbers(arguments)})"
+
+
+class InC:
+    """The body in a C program that is compiled for it."""
+
+    def __init__(self, program, task, folder):
+        self.task, self.folder = task, folder
+        points = [str(name) for (kind, name), *_ in task.loads if kind == "node"]
+        # The header has the name of the model, which is put aside for one that all bodies share.
+        options = ["--points", ",".join(["interfaces", *points]) if task.interfaces else ",".join(points)] if points else []
+        export(program, task.path, "embedded", folder / "body.bin", *options)
+        self.source()
+        done = subprocess.run(["cc", "-O3", "-march=native", "-std=gnu11", "driver.c", "-o", "driver", "-lm"], cwd=folder, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr)
+        highest = np.sqrt(task.eigenvalue.max())
+        self.steps = max(task.steps, int(np.ceil(task.duration * highest / STABLE)))
+
+    def source(self):
+        import re
+
+        header = (self.folder / "body.h").read_text()
+        prefix = re.search(r"\b(flexbody_\w+)_evaluation\b", header).group(1)
+        header = header.replace(prefix, "flexbody_body").replace(prefix.upper(), "FLEXBODY_BODY")
+        (self.folder / "body.h").write_text(header)
+        size = (self.folder / "body.bin").stat().st_size
+        text = DRIVER.replace("FLEXBODY_BODY_BYTES", str(size))
+        task = self.task
+        parameters = euler_parameters(task.attitude)
+        start = np.concatenate([parameters, task.attitude.T @ task.velocity, task.omega, task.qd, task.q])
+        parts = {
+            "GRAVITY": numbers(task.gravity), "DAMPING": numbers(2 * task.ratio * np.sqrt(task.eigenvalue)), "START": numbers(start),
+            "DURATION": repr(float(task.duration)), "LOADS": self.loads(header), "SPIN": self.spin(), "SOLVE": self.solve(),
+        }
+        for name, value in parts.items():
+            text = text.replace(f"@{name}@", value)
+        (self.folder / "driver.c").write_text(text)
+
+    def loads(self, header):
+        lines = []
+        for (kind, name), world, members in self.task.loads:
+            frame = f"FLEXBODY_BODY_FRAME_{str(name).upper()}" if kind == "interface" else f"flexbody_body_frame(&e, {name})"
+            assert kind == "node" or frame in header, frame
+            parts = [("force", 0), ("torque", 1)]
+            lines.append("    {")
+            lines += [f"        const double c{i} = {in_c(value)};" for i, (_, _, value) in enumerate(members)]
+            for part, at in parts:
+                if not any(member[at].any() for member in members):
+                    continue
+                sums = [" + ".join(f"c{i} * {float(member[at][k])!r}" for i, member in enumerate(members) if member[at][k] != 0.0) or "0.0" for k in range(3)]
+                lines.append(f"        const double {part}[3] = {{{', '.join(sums)}}};")
+                lines.append(f"        into_body(A, {part}, v);" if world else f"        memcpy(v, {part}, sizeof v);")
+                lines.append(f"        flexbody_body_add_{part}(&e, {frame}, v, applied);")
+            lines.append("    }")
+        return "\n".join(lines)
+
+    def spin(self):
+        if self.task.spin is None:
+            return ""
+        axis, _, hold = self.task.spin
+        rate = in_c(self.task.scene["spin"]["rate"])
+        lines = [f"    const double axis[3] = {{{numbers(axis)}}}, rate = {rate};", "    for (int k = 0; k < 3; k++) nu[3 + k] = rate * axis[k];"]
+        if hold:
+            lines.append("    nu[0] = nu[1] = nu[2] = 0;")
+        return "\n".join(lines)
+
+    def solve(self):
+        if self.task.spin is None:
+            return "    return flexbody_body_accelerations(&e, applied, d + 4) != FLEXBODY_BODY_OK;"
+        # The modal mass is the identity, and free modes do not move the centre of mass: what is driven takes no part in the solution.
+        slope = in_c(self.task.scene["spin"]["rate"], rate=True)
+        return f"""    double prescribed[NV] = {{0}}, force[NV];
+    for (int k = 0; k < 3; k++) prescribed[3 + k] = axis[k] * ({slope});
+    flexbody_body_balance(&e, prescribed, force);
+    memset(d + 4, 0, RIGID * sizeof(double));
+    for (int j = 0; j < NF; j++) d[4 + RIGID + j] = applied[RIGID + j] - force[RIGID + j];
+    return 0;"""
+
+    def run(self):
+        """(seconds of the integration, modal coordinates at its end)"""
+        done = subprocess.run(["./driver", "body.bin", str(self.steps)], cwd=self.folder, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(f"the C program ended with {done.returncode}")
+        values = np.array([float(value) for value in done.stdout.split()])
+        return values[0], values[1:]
+
+
+def euler_parameters(a):
+    """Of a rotation matrix, by its largest parameter."""
+    squares = 0.25 * np.array([1 + a[0, 0] + a[1, 1] + a[2, 2], 1 + a[0, 0] - a[1, 1] - a[2, 2], 1 - a[0, 0] + a[1, 1] - a[2, 2], 1 - a[0, 0] - a[1, 1] + a[2, 2]])
+    largest = int(np.argmax(squares))
+    p = np.zeros(4)
+    p[largest] = np.sqrt(squares[largest])
+    skew_part = [a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]]
+    if largest == 0:
+        p[1:] = np.array(skew_part) / (4 * p[0])
+        return p
+    k = largest - 1
+    p[0] = skew_part[k] / (4 * p[largest])
+    for other in range(3):
+        if other != k:
+            p[1 + other] = (a[k, other] + a[other, k]) / (4 * p[largest])
+    return p

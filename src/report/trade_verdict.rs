@@ -1,0 +1,98 @@
+//! A trade study in five lines: what was asked, what to take, why, the error, and what it saves.
+
+use super::numbers::{duration, significant};
+use super::selection::errors_in_words;
+use super::trade::{RowFacts, TradeFacts};
+use crate::study::trade::{Measured, Recommendation, Row, Trade};
+
+/// The five lines, with their labels.
+pub(super) fn verdict_lines(facts: &TradeFacts<'_>, trade: &Trade) -> Vec<(&'static str, String)> {
+    let asked = format!("{}: {}", trade.scene, asked(facts, trade));
+    let Some(at) = trade.recommended.row() else {
+        return vec![("Asked", asked), ("Result", nothing(trade))];
+    };
+    let row = &trade.rows[at];
+    let Ok(measured) = &row.outcome else { return vec![("Asked", asked)] };
+    let whole = trade.rows.first().and_then(|row| row.outcome.as_ref().ok());
+    vec![
+        ("Asked", asked),
+        ("Take", taken(&facts.rows()[at], row)),
+        ("Why", why(facts, trade, measured)),
+        ("Error", error(measured)),
+        ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
+    ]
+}
+
+fn asked(facts: &TradeFacts<'_>, trade: &Trade) -> String {
+    match trade.allowed {
+        Some(allowed) => format!("the most accurate of at most {allowed} multiplications per evaluation"),
+        None => format!("errors of at most {}", facts.tolerances_in_words()),
+    }
+}
+
+fn nothing(trade: &Trade) -> String {
+    if trade.allowed.is_some() {
+        return "no candidate is as cheap as allowed".to_owned();
+    }
+    let worst = trade.rows.iter().filter_map(|row| Some(row.outcome.as_ref().ok()?.worst));
+    match worst.fold(f64::INFINITY, f64::min) {
+        worst if worst.is_finite() => {
+            let worst = significant(worst, 3);
+            format!(
+                "no candidate is within the tolerances: the best has {worst} times the error that is allowed"
+            )
+        }
+        _ => "no candidate could be simulated".to_owned(),
+    }
+}
+
+fn taken(facts: &RowFacts<'_>, row: &Row) -> String {
+    format!("{} (to {} Hz), of: {}", facts.in_words(), significant(row.last_frequency_hz, 3), row.source)
+}
+
+/// The next cheaper one on the front shows what one would pay for less.
+fn why(facts: &TradeFacts<'_>, trade: &Trade, measured: &Measured) -> String {
+    let count = trade.rows.len();
+    let first = match trade.recommended {
+        Recommendation::MostAccurate(_) => {
+            format!("the most accurate of {count} candidates that is as cheap as allowed")
+        }
+        _ => format!("the cheapest of {count} candidates with every error within the tolerances"),
+    };
+    let cheaper = trade.front.iter().rev().find_map(|&at| {
+        let own = trade.rows[at].outcome.as_ref().ok()?;
+        (own.multiplications < measured.multiplications).then_some((at, own))
+    });
+    let Some((at, own)) = cheaper else { return first };
+    let (output, error, allowed) = own.errors.decisive(&trade.tolerance);
+    let times = significant(error / allowed, 2);
+    format!(
+        "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed",
+        facts.rows()[at].in_words()
+    )
+}
+
+fn error(measured: &Measured) -> String {
+    let growth = measured.growth.map_or_else(String::new, |growth| {
+        format!(
+            "; grows with time, {} times more than the motion from the first half to the second",
+            significant(growth, 2)
+        )
+    });
+    let worst = significant(100.0 * measured.worst, 2);
+    format!("{}: {worst} % of what is allowed{growth}", errors_in_words(&measured.errors))
+}
+
+fn saves(whole: &Measured, own: &Measured) -> String {
+    let ratio = |whole: f64, own: f64| significant(whole / own, 2);
+    let work = ratio(whole.multiplications as f64, own.multiplications as f64);
+    if whole.multiplications == own.multiplications {
+        return "nothing: no cheaper candidate is within the tolerances".to_owned();
+    }
+    let times = whole.timed.zip(own.timed).map(|(before, after)| (before.integration, after.integration));
+    let seconds = times.map_or_else(String::new, |(before, after)| {
+        let (own, all) = (duration(after), duration(before));
+        format!("; {own} instead of {all} for this run in flexbody, {} times less", ratio(before, after))
+    });
+    format!("{work} times fewer multiplications per evaluation{seconds}")
+}
