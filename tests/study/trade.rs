@@ -14,6 +14,7 @@ use flexbody::body::invariants::BodyFrame;
 use flexbody::model::FeModel;
 use flexbody::motion::scene::{Axes, Initial, ModeStart, Scene, Scheme, simulate};
 use flexbody::numerics::eigen::Wanted;
+use flexbody::study::selection::select;
 use flexbody::study::trade::{
     Conversions, Kind, LumpedMass, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions,
     front, trade,
@@ -22,7 +23,7 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs;
 
-const QUICK: Settings = Settings { repeat: 1, memory: None };
+const QUICK: Settings = Settings { repeat: 1, memory: None, reserved: 0.0 };
 
 /// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns` turns.
 fn tumble(spin: f64, turns: f64) -> Scene {
@@ -310,6 +311,30 @@ fn what_nodal_equations_do_not_have_is_refused() {
     // Long before the motion of the bodies is computed.
     scene.run.scheme = Scheme::Conserving { order: 2, step: Some(1e11 / rate) };
     assert!(refused(&scene).contains("multiplications"));
+}
+
+/// The same modes by the same search: what `trade` recommends and what `select` takes.
+#[test]
+fn a_study_and_a_selection_take_the_same_modes() {
+    let body = soft_block(9);
+    let scene = tumble(0.01 * first_rate(&body), 0.3);
+    let found = study(body.clone(), &scene);
+    let row = recommended(&found);
+    let taken = select(&body, &scene, None, SILENT).expect("a selection");
+    assert!(taken.holds() && taken.modes.len() < 9, "{:?}", taken.modes);
+    assert!(row.candidate.modes.len() < 9 && row.candidate.modes.len() <= taken.modes.len(), "{row:?}");
+    if row.candidate.groups == taken.groups {
+        assert_eq!(row.candidate.modes, taken.modes);
+    }
+    // One mode fewer of the same order is not enough.
+    let fewer = found.rows.iter().filter(|one| {
+        one.candidate.groups == row.candidate.groups
+            && one.candidate.modes.len() + 1 == row.candidate.modes.len()
+            && one.candidate.kind() == row.candidate.kind()
+    });
+    let worst: Vec<f64> = fewer.map(|one| one.outcome.as_ref().expect("a motion").worst).collect();
+    assert!(row.candidate.modes.len() == 1 || worst.iter().all(|worst| *worst > 1.0), "{worst:?}");
+    assert!(row.candidate.modes.len() == 1 || !worst.is_empty());
 }
 
 #[test]

@@ -21,6 +21,7 @@ pub use bounds::{Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Start, Tor
 pub use decisions::Ground;
 pub use norms::Norms;
 pub use participation::{Participation, participations};
+pub use search::liveliest_modes;
 pub use select::{Selection, rule_out, select, select_from};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};

@@ -1,10 +1,10 @@
 //! The search for a cheaper model, by measured motion.
 
-use super::cases::{PART_OF_BOUNDS, sets_in, worst};
+use super::cases::{Case, PART_OF_BOUNDS, sets_in, worst};
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Groups};
-use crate::motion::scene::{Measure, Tolerance};
+use crate::motion::scene::{Measure, Scene, Tolerance, Trace};
 
 /// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are kept.
 const PART_OF_TERMS: f64 = 0.5;
@@ -25,6 +25,26 @@ impl Choice {
         }
         self.modes = modes;
     }
+}
+
+/// Modes by what they do beside the tolerances, most first.
+fn by_share(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<usize> {
+    let weight = |j: &usize| {
+        let share = &shares[*j];
+        (share.deflection / tolerance.deflection).max(share.stress / tolerance.stress)
+    };
+    let mut ranked: Vec<usize> = (0..shares.len()).collect();
+    ranked.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.cmp(b)));
+    ranked
+}
+
+/// Modes of `body` by what they do in its `motion` in `scene`, most first: the order in which [`select`](super::select) keeps them.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body.
+pub fn liveliest_modes(body: &FlexBody, scene: &Scene, motion: &Trace) -> Result<Vec<usize>> {
+    let case = Case::new(body, scene, None)?;
+    Ok(by_share(&case.runs().shares(motion), &scene.requirements.tolerance))
 }
 
 /// The scenes with their reference motions.
@@ -96,14 +116,7 @@ impl Search<'_> {
                 share.stress = share.stress.max(other.stress);
             }
         }
-        let tolerance = &self.cases[0].0.scene.requirements.tolerance;
-        let weight = |j: &usize| {
-            let share = &choice.shares[*j];
-            (share.deflection / tolerance.deflection).max(share.stress / tolerance.stress)
-        };
-        let mut ranked: Vec<usize> = (0..choice.shares.len()).collect();
-        ranked.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.cmp(b)));
-        ranked
+        by_share(&choice.shares, &self.cases[0].0.scene.requirements.tolerance)
     }
 
     /// The fewest modes, in the order of what they do, whose motion is within the tolerances.

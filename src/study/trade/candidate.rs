@@ -3,7 +3,6 @@
 use super::Source;
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Group, Groups, Storage, TermDecision};
-use crate::motion::scene::Trace;
 
 /// Mode counts of a ladder: about three to a doubling of the work.
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
@@ -159,11 +158,11 @@ pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candida
     held(all, sources, carried)
 }
 
-/// The candidates that have some modes of the reference, the lowest and the liveliest in its `motion`, with the sets of groups that
-/// are worth it: `worst_of` answers the largest error over its tolerance of a set with all modes.
+/// The candidates that have some modes of the reference, the lowest and the `liveliest`, with the sets of groups that are worth it:
+/// `worst_of` answers the largest error over its tolerance of a set with all modes.
 pub(super) fn ladder(
     sources: &[Source],
-    motion: &Trace,
+    liveliest: &[usize],
     carried: bool,
     worst_of: impl Fn(Groups) -> f64,
 ) -> Vec<Candidate> {
@@ -177,17 +176,21 @@ pub(super) fn ladder(
         }
     }
     let whole = Candidate::whole(0, body.n_modes());
-    let by_energy = by_energy(body, motion);
     let mut all = Vec::new();
     for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
-        let mut liveliest = by_energy[..count].to_vec();
-        liveliest.sort_unstable();
-        for modes in [(0..count).collect(), liveliest] {
+        for modes in [(0..count).collect(), first_of(liveliest, count)] {
             let with = |groups: &Groups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
             all.extend(sets.iter().rev().map(with));
         }
     }
     held(all, sources, carried)
+}
+
+/// So many modes of an order, ascending.
+pub(super) fn first_of(order: &[usize], count: usize) -> Vec<usize> {
+    let mut modes = order[..count].to_vec();
+    modes.sort_unstable();
+    modes
 }
 
 /// Each candidate once, with the groups that its source holds.
@@ -203,17 +206,4 @@ fn held(mut all: Vec<Candidate>, sources: &[Source], carried: bool) -> Vec<Candi
         }
     }
     distinct
-}
-
-/// Modes by the largest elastic energy that they have in a motion, the largest first.
-fn by_energy(body: &FlexBody, motion: &Trace) -> Vec<usize> {
-    let energy: Vec<f64> = (0..body.n_modes())
-        .map(|j| {
-            let most = motion.extremes.amplitudes[j];
-            body.modes().eigenvalue[j] * most * most
-        })
-        .collect();
-    let mut order: Vec<usize> = (0..energy.len()).collect();
-    order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]));
-    order
 }

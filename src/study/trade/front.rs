@@ -23,8 +23,8 @@ impl Recommendation {
         }
     }
 
-    /// Of `rows`, with the multiplications that the scene allows instead of tolerances.
-    pub(super) fn new(rows: &[Row], allowed: Option<usize>) -> Self {
+    /// Of `rows`, whose errors may be `most` times their tolerances, with the multiplications that the scene allows instead.
+    pub(super) fn new(rows: &[Row], most: f64, allowed: Option<usize>) -> Self {
         let points = points(rows);
         match allowed {
             Some(allowed) => {
@@ -33,9 +33,10 @@ impl Recommendation {
                     within.min_by(|a, b| (a.1.total_cmp(&b.1)).then(a.0.cmp(&b.0)).then(a.2.cmp(&b.2)));
                 best.map_or(Self::None, |point| Self::MostAccurate(point.2))
             }
-            None => {
-                points.iter().find(|point| point.1 <= 1.0).map_or(Self::None, |point| Self::Cheapest(point.2))
-            }
+            None => points
+                .iter()
+                .find(|point| point.1 <= most)
+                .map_or(Self::None, |point| Self::Cheapest(point.2)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
-use super::candidate::{ladder, whole_candidates};
+use super::candidate::{first_of, ladder, whole_candidates};
 use super::{Candidate, Failed, Measured, NodalReference, Recommendation, Row, Source, Timed, front, timing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -11,6 +11,7 @@ use crate::formats::flex_body_file;
 use crate::model::FeModel;
 use crate::motion::dynamics::{EquationsOfMotion, Terms};
 use crate::motion::scene::{Measure, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at};
+use crate::study::selection::liveliest_modes;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -41,6 +42,8 @@ pub struct Settings {
     pub repeat: usize,
     /// Bytes that there are; `None` where it is not known.
     pub memory: Option<u64>,
+    /// Part of the tolerances that the reference lacks of its model itself: candidates get the rest.
+    pub reserved: f64,
 }
 
 /// A finished study.
@@ -106,7 +109,8 @@ pub fn trade(
         None => None,
     };
     let measure = Measure::new(source.body(), &motion);
-    let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref() };
+    let most = (1.0 - settings.reserved).max(0.0);
+    let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref(), most };
     let rows = job.rows(settings.repeat, watch)?;
     let allowed = scene.requirements.multiplications;
     Ok(Trade {
@@ -116,7 +120,7 @@ pub fn trade(
         tolerance: scene.requirements.tolerance,
         allowed,
         front: front(&rows),
-        recommended: Recommendation::new(&rows, allowed),
+        recommended: Recommendation::new(&rows, most, allowed),
         rows,
         diagnostics,
     })
@@ -148,6 +152,8 @@ struct Job<'j> {
     motion: &'j Trace,
     measure: &'j Measure<'j>,
     nodal: Option<&'j NodalReference<'j>>,
+    /// Largest error over its tolerance that a candidate may have.
+    most: f64,
 }
 
 impl Job<'_> {
@@ -164,10 +170,50 @@ impl Job<'_> {
             let measured = rows.iter().find(of_groups).and_then(|row| row.outcome.as_ref().ok());
             measured.map_or(f64::INFINITY, |measured| measured.worst)
         };
-        let some_modes = ladder(self.sources, self.motion, carried, worst_of);
+        let liveliest = liveliest_modes(self.sources[0].body(), self.scene, self.motion)?;
+        let some_modes = ladder(self.sources, &liveliest, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", watch)?);
-        let recommended = Recommendation::new(&rows, self.scene.requirements.multiplications).row();
-        let mut worth_it: Vec<usize> = front(&rows).into_iter().chain(recommended).chain([0]).collect();
+        self.refine(&liveliest, &mut rows)?;
+        self.time_what_is_worth_it(&mut rows, repeat, watch)?;
+        Ok(rows)
+    }
+
+    /// Bisects between the recommended rung of the ladder and the highest one below it that is not good enough, as a selection does.
+    fn refine(&self, liveliest: &[usize], rows: &mut Vec<Row>) -> Result<()> {
+        let Recommendation::Cheapest(at) = self.recommended(rows) else { return Ok(()) };
+        let best = rows[at].candidate.clone();
+        let count = best.modes.len();
+        let lowest: Vec<usize> = (0..liveliest.len()).collect();
+        let order = if best.modes == lowest[..count] { &lowest[..] } else { liveliest };
+        if best.source > 0 || first_of(order, count) != best.modes {
+            return Ok(());
+        }
+        let with = |count: usize| Candidate { modes: first_of(order, count), ..best.clone() };
+        let is_rung = |row: &&Row| row.candidate == with(row.candidate.modes.len());
+        let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
+        let (mut too_few, mut enough) =
+            (fewer.map(|row| row.candidate.modes.len()).max().unwrap_or(0), count);
+        while too_few + 1 < enough {
+            let count = too_few.midpoint(enough);
+            let row = self.measure(with(count))?;
+            let passed = row.outcome.as_ref().is_ok_and(|measured| measured.worst <= self.most);
+            if passed {
+                enough = count
+            } else {
+                too_few = count
+            }
+            rows.push(row);
+        }
+        Ok(())
+    }
+
+    fn recommended(&self, rows: &[Row]) -> Recommendation {
+        Recommendation::new(rows, self.most, self.scene.requirements.multiplications)
+    }
+
+    fn time_what_is_worth_it(&self, rows: &mut [Row], repeat: usize, watch: Watch<'_>) -> Result<()> {
+        let recommended = self.recommended(rows).row();
+        let mut worth_it: Vec<usize> = front(rows).into_iter().chain(recommended).chain([0]).collect();
         worth_it.sort_unstable();
         worth_it.dedup();
         let progress = Progress::new(watch, "times", worth_it.len());
@@ -175,7 +221,7 @@ impl Job<'_> {
             self.time(&mut rows[at], repeat)?;
             progress.step();
         }
-        Ok(rows)
+        Ok(())
     }
 
     /// The rows of candidates, without times.
