@@ -13,6 +13,9 @@ const BESIDE: f64 = 1e-6;
 /// Resonances with more damping than this have a peak that is looked at; others are sampled on both sides of their pole.
 const DAMPED: f64 = 1e-5;
 
+/// How near to a pole without damping, relative, no response is evaluated.
+const POLE: f64 = 1e-4;
+
 /// Places around a resonance, in half widths, that only the curves of modes are evaluated at.
 const AROUND: [f64; 8] = [-8.0, -4.0, -2.0, -0.5, 0.5, 2.0, 4.0, 8.0];
 
@@ -100,7 +103,8 @@ impl Band {
         let spread: Vec<f64> = self.even(free.max(1)).filter(|_| free > 0).collect();
         let solved = close.into_iter().chain(spread).map(|hertz| Frequency { hertz, solved: true });
         let others = around.chain(self.even(points)).map(|hertz| Frequency { hertz, solved: false });
-        let mut all: Vec<Frequency> = solved.chain(others).filter(|f| within(f.hertz)).collect();
+        let looked_at = |f: &Frequency| within(f.hertz) && !inside.iter().any(|r| r.is_pole_at(f.hertz));
+        let mut all: Vec<Frequency> = solved.chain(others).filter(looked_at).collect();
         all.sort_by(|a, b| a.hertz.total_cmp(&b.hertz).then(b.solved.cmp(&a.solved)));
         all.dedup_by(|next, kept| next.hertz == kept.hertz);
         all
@@ -111,6 +115,11 @@ impl Resonance {
     /// Relative to its frequency.
     fn half_width(&self) -> f64 {
         self.ratio.clamp(NARROWEST, 0.1)
+    }
+
+    /// Whether the response has no finite value worth a look there.
+    fn is_pole_at(&self, hertz: f64) -> bool {
+        self.ratio <= DAMPED && (hertz / self.hertz - 1.0).abs() < POLE
     }
 
     /// The peak, and both sides of it, the most telling first.

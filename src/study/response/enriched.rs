@@ -1,6 +1,7 @@
 //! The response with what the equations of all nodes leave unbalanced added to the modes: the estimate of what the modes lack (theory section 8).
 
 use super::modal_sum::ModalSum;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::free_static_responses;
 use crate::body::flex_body::FlexBody;
@@ -39,12 +40,18 @@ impl NodalModes<'_> {
     /// to what they leave unbalanced, with the damping C of the modes: D = M Psi C (M Psi)'. `None` where nothing is left.
     ///
     /// # Errors
-    /// Those of [`free_static_responses`].
+    /// Those of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) where the span has no basis.
     pub fn enriched(&self, body: &FlexBody, damping: Option<&Mat<f64>>) -> Result<Option<ModalSum>> {
         let Some(static_responses) = self.static_responses(body)? else { return Ok(None) };
         let stiff = normalised(&self.vectors, &self.elastic);
         let all = side_by_side(&[stiff.as_ref(), static_responses.as_ref()]);
-        Ok(self.in_span(&all, damping))
+        let dependent = || {
+            Diagnostic::new(
+                Code::FactorizationFailed,
+                "the static responses that an estimate needs depend on the modes",
+            )
+        };
+        Ok(Some(self.in_span(&all, damping).ok_or_else(dependent)?))
     }
 
     /// E (N x k): orthonormal in K.
