@@ -395,13 +395,18 @@ fn curves(
 /// What came out, as a sentence without a full stop.
 fn verdict(pairs: &[PairFacts], settings: &Settings, passed: Option<bool>) -> String {
     let tolerance = percent(settings.tolerance);
+    let how = |pair: &PairFacts| match pair.errors.as_ref().map(|errors| errors.worst == errors.largest) {
+        Some(false) => " (estimated)",
+        _ => "",
+    };
     let worst = pairs.iter().filter_map(|pair| Some((pair, pair.errors.as_ref()?.worst?)));
     let worst = worst.reduce(|most, next| if next.1.value <= most.1.value { most } else { next });
     match (passed, worst) {
-        (Some(true), Some((_, worst))) => format!(
-            "The reduced body answers as all nodes do, within {tolerance}: the largest error in the band is {} at {} Hz",
+        (Some(true), Some((pair, worst))) => format!(
+            "The reduced body answers as all nodes do, within {tolerance}: the largest error in the band is {} at {} Hz{}",
             percent(worst.value),
-            significant(worst.hertz, 4)
+            significant(worst.hertz, 4),
+            how(pair)
         ),
         (Some(_), Some((pair, worst))) => {
             let ends =
@@ -414,9 +419,10 @@ fn verdict(pairs: &[PairFacts], settings: &Settings, passed: Option<bool>) -> St
                 false => format!("it is nowhere accurate to {tolerance}"),
             };
             format!(
-                "The reduced body does not answer as all nodes do: {until}, and off by {} at {} Hz, {}",
+                "The reduced body does not answer as all nodes do: {until}, and off by {} at {} Hz{}, {}",
                 percent(worst.value),
                 significant(worst.hertz, 4),
+                how(pair),
                 pair.name()
             )
         }

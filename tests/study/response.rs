@@ -9,7 +9,7 @@ use flexbody::body::basis::{BasisChoice, CraigBampton, FreeSurface, Loads, ModeS
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::model::{Damping, FeModel, NodeSet, RawModel};
+use flexbody::model::{Damping, FeModel, NodeSet, RawMatrix, RawModel};
 use flexbody::motion::scene::Point;
 use flexbody::numerics::eigen::Wanted;
 use flexbody::study::response::{Band, Complex, Direction, Pair, Place, Response, Settings, respond};
@@ -250,7 +250,7 @@ fn a_mode_that_the_body_lacks_in_the_band_is_seen() {
 #[test]
 fn models_with_rotations_and_in_the_plane_answer() {
     for (name, from, to) in [("frame_beams", "1:x,ry", "2:y,rx"), ("plane_frame", "1:x,rz", "2:y,rz")] {
-        let files = read_manifest(&fixtures().join(format!("models/{name}/model.toml"))).expect("a manifest");
+        let files = read_manifest(fixtures().join(format!("models/{name}/model.toml"))).expect("a manifest");
         let model = FeModel::from_raw(read_model(&files).expect("files")).expect("a model").model;
         let (first, second) = (model.nodes().ids[0], model.nodes().ids[model.nodes().len() - 1]);
         let at = |text: &str| text.replace("1:", &format!("{first}:")).replace("2:", &format!("{second}:"));

@@ -16,6 +16,9 @@ const DAMPED: f64 = 1e-5;
 /// How near to a pole without damping, relative, no response is evaluated.
 const POLE: f64 = 1e-4;
 
+/// Natural frequencies of one cluster differ by less, relative.
+const SAME: f64 = 1e-6;
+
 /// Places around a resonance, in half widths, that only the curves of modes are evaluated at.
 const AROUND: [f64; 8] = [-8.0, -4.0, -2.0, -0.5, 0.5, 2.0, 4.0, 8.0];
 
@@ -96,6 +99,14 @@ impl Band {
         let within = |f: f64| f >= self.low && f <= self.high && f > 0.0;
         let mut inside: Vec<Resonance> = resonances.iter().copied().filter(|r| within(r.hertz)).collect();
         inside.sort_by(|a, b| a.hertz.total_cmp(&b.hertz));
+        // One of each cluster, that with the least damping.
+        inside.dedup_by(|next, kept| {
+            let same = next.hertz <= kept.hertz * (1.0 + SAME);
+            if same {
+                kept.ratio = kept.ratio.min(next.ratio);
+            }
+            same
+        });
         inside.truncate(MOST_RESONANCES);
         let close = if solves == 0 { Vec::new() } else { closely(&inside, solves / 2) };
         let around = inside.iter().flat_map(|r| AROUND.map(|at| r.hertz * (1.0 + at * r.half_width())));
@@ -158,6 +169,9 @@ mod tests {
         assert!(found.iter().all(|f| (f.hertz - 80.0).abs() > 1e-3));
         assert!(solved.iter().any(|f| (f - 80.0).abs() < 0.05));
         assert!(band.frequencies(50, 0, &resonances).iter().all(|f| !f.solved));
+        // A repeated frequency is looked at once.
+        let twice = [resonances[0], resonances[0], resonances[1], resonances[2]];
+        assert_eq!(band.frequencies(50, 20, &twice), found);
     }
 
     #[test]

@@ -67,7 +67,7 @@ impl PairErrors {
             .map(|i| At { hertz: compared[i].hertz, value: measured[i].unwrap_or(estimated[i]) })
             .collect();
         // What is not a number is no accuracy.
-        let first_bad = both.iter().position(|at| !(at.value <= tolerance));
+        let first_bad = both.iter().position(|at| at.value.is_nan() || at.value > tolerance);
         let accurate_to = match first_bad {
             None => both.last().map(|at| at.hertz),
             Some(bad) => bad.checked_sub(1).map(|last| both[last].hertz),
@@ -100,7 +100,7 @@ fn norm(a: &DMatrix<Complex<f64>>) -> f64 {
 /// The largest magnitude; NaN is larger than any number.
 fn largest(errors: impl Iterator<Item = At>) -> Option<At> {
     errors.reduce(|most, next| {
-        let larger = !most.value.is_nan() && !(next.value.abs() <= most.value.abs());
+        let larger = !most.value.is_nan() && (next.value.is_nan() || next.value.abs() > most.value.abs());
         if larger { next } else { most }
     })
 }

@@ -64,6 +64,13 @@ pub struct Place {
     pub directions: Vec<Direction>,
 }
 
+/// A point of a body: where it is, and its displacements and rotations in the modes (3 x nf), the latter where something determines them.
+struct PointMotion {
+    position: Vector3<f64>,
+    translation: Mat<f64>,
+    rotation: Option<Mat<f64>>,
+}
+
 /// What a place is to the modes of a body.
 pub(super) struct PlaceRows {
     /// Displacements and rotations of the modes along the directions (nf x k).
@@ -112,7 +119,7 @@ impl Place {
     /// [`PlaceUnknown`](Code::PlaceUnknown).
     pub(super) fn rows(&self, body: &FlexBody) -> Result<PlaceRows> {
         let (nf, d) = (body.n_modes(), body.dimension());
-        let (position, translation, rotation) = self.motion(body)?;
+        let PointMotion { position, translation, rotation } = self.motion(body)?;
         let directions = self.directions_of(d);
         for direction in &directions {
             if direction.column(d).is_none() {
@@ -136,8 +143,7 @@ impl Place {
         Ok(PlaceRows { modal, rigid })
     }
 
-    /// Position, and displacements and rotations (3 x nf) that the modes have there.
-    fn motion(&self, body: &FlexBody) -> Result<(Vector3<f64>, Mat<f64>, Option<Mat<f64>>)> {
+    fn motion(&self, body: &FlexBody) -> Result<PointMotion> {
         let (modes, nf) = (body.modes(), body.n_modes());
         match &self.point {
             Point::Node(number) => {
@@ -147,7 +153,8 @@ impl Place {
                 // Nodes without rotations have zeros in their place.
                 let turns = |rows: &Mat<f64>| (0..nf).any(|j| (0..3).any(|k| rows[(k, j)] != 0.0));
                 let rotation = modes.rotation.as_ref().map(of).filter(turns);
-                Ok((Vector3::from(body.nodes().positions[node]), of(&modes.shape), rotation))
+                let position = Vector3::from(body.nodes().positions[node]);
+                Ok(PointMotion { position, translation: of(&modes.shape), rotation })
             }
             Point::Interface(name) => {
                 let found = body.interfaces().iter().find(|interface| interface.name == *name);
@@ -155,9 +162,11 @@ impl Place {
                 let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
                 let rows = interface.rows(body.nodes(), modes.shape.as_ref(), rotation, body.dimension());
                 match (rows, interface.reference) {
-                    (Some(rows), Some(reference)) => {
-                        Ok((Vector3::from(reference), rows.translation, rows.rotation))
-                    }
+                    (Some(rows), Some(reference)) => Ok(PointMotion {
+                        position: Vector3::from(reference),
+                        translation: rows.translation,
+                        rotation: rows.rotation,
+                    }),
                     _ => {
                         let message =
                             format!("{} has no reference point: a free one has nodes only", self.point);

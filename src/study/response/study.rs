@@ -161,7 +161,12 @@ pub fn respond(
     let resonances: Vec<Resonance> = resonances.map(|found| in_hertz(body.units(), found)).collect();
     let solves = if known.is_some() { settings.solves } else { 0 };
     let frequencies = settings.band.frequencies(settings.points, solves, &resonances);
-    let curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units(), watch)?;
+    let blocks = blocks(from, to, body.dimension());
+    let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units());
+    if let Some(known) = &known {
+        curves.look_closer(&blocks, settings.tolerance, solves.div_ceil(4));
+        curves.solve(known, body.units(), watch)?;
+    }
     let [low, high] = settings.band.ends();
     let in_band = |f: &f64| *f >= low && *f <= high;
     Ok(Response {
@@ -169,7 +174,7 @@ pub fn respond(
         units: body.units().clone(),
         modes: body.n_modes(),
         damped: damping.is_some(),
-        pairs: curves.pairs(from, to, body.dimension(), settings.tolerance),
+        pairs: blocks.iter().map(|block| curves.pair(block, settings.tolerance)).collect(),
         body_modes_in_band: body.frequencies_hz().iter().filter(|f| in_band(f)).count(),
         solved: known.as_ref().map(|known| curves.solved(known, low)),
         frequencies: curves.frequencies.iter().map(|f| f.hertz).collect(),
@@ -232,8 +237,7 @@ struct Known<'m> {
     /// The estimate: the response with static responses beside the modes; `None` where the modes leave nothing to respond to.
     enriched: Option<ModalSum>,
     damping: Option<Mat<f64>>,
-    /// About as many solves, and memory and time that they may take.
-    solves: usize,
+    /// Memory and time that solutions may take.
     limits: (Option<u64>, Option<f64>),
 }
 
@@ -250,19 +254,13 @@ impl<'m> Known<'m> {
         watch(Event::Phase("estimate of the error"));
         let nodal = nodal_modes(model, body, from, to)?;
         let enriched = nodal.enriched(body, damping)?;
-        Ok(Self {
-            nodal,
-            enriched,
-            damping: damping.cloned(),
-            solves: settings.solves,
-            limits: (settings.memory, settings.longest),
-        })
+        Ok(Self { nodal, enriched, damping: damping.cloned(), limits: (settings.memory, settings.longest) })
     }
 
-    fn direct_solver(&self) -> Result<DirectSolver<'_>> {
+    fn direct_solver(&self, solves: usize) -> Result<DirectSolver<'_>> {
         let NodalModes { model, rigid, inertial, loads, measured, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
-        DirectSolver::new(model, rigid, [loads, measured], damping, self.solves, self.limits)
+        DirectSolver::new(model, rigid, [loads, measured], damping, solves, self.limits)
     }
 }
 
@@ -311,13 +309,13 @@ struct Curves {
 }
 
 impl Curves {
+    /// What modes tell; nothing is solved yet.
     fn new(
         reduced: &ModalSum,
         known: Option<&Known<'_>>,
         frequencies: Vec<Frequency>,
         units: &UnitSystem,
-        watch: Watch<'_>,
-    ) -> Result<Self> {
+    ) -> Self {
         let omega = |f: &Frequency| units.eigenvalue_of(f.hertz).sqrt();
         let of = |sum: &ModalSum| frequencies.par_iter().map(|f| sum.at(omega(f))).collect::<Vec<_>>();
         let own = of(reduced);
@@ -325,23 +323,47 @@ impl Curves {
             Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), of),
             None => Vec::new(),
         };
-        let (mut full, mut flops) = (frequencies.iter().map(|_| None).collect::<Vec<_>>(), 0.0);
-        if let Some(known) = known {
-            watch(Event::Phase("equations of all nodes"));
-            let solver = known.direct_solver()?;
-            flops = solver.flops();
-            for (i, frequency) in frequencies.iter().enumerate().filter(|(_, f)| f.solved) {
-                full[i] = Some(solver.at(omega(frequency))?);
-                watch(Event::Fraction((i + 1) as f64 / frequencies.len() as f64));
+        let full = frequencies.iter().map(|_| None).collect();
+        Self { frequencies, reduced: own, enriched, full, flops: 0.0 }
+    }
+
+    /// Has the equations of all nodes solved also where the estimate of a block is largest and where it first is above the tolerance, at up to
+    /// `most` frequencies: what is said of them shall be measured.
+    fn look_closer(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
+        let mut found = Vec::new();
+        for errors in blocks.iter().filter_map(|(_, _, block)| self.errors(block, tolerance)) {
+            let estimated = &errors.estimated;
+            let first = estimated.iter().position(|error| *error > tolerance);
+            let largest = (0..estimated.len()).filter(|&i| estimated[i].is_finite());
+            found.extend(largest.max_by(|&a, &b| estimated[a].total_cmp(&estimated[b])));
+            found.extend(first);
+        }
+        let mut marked = 0;
+        for i in found {
+            if marked < most && !self.frequencies[i].solved {
+                self.frequencies[i].solved = true;
+                marked += 1;
             }
         }
-        Ok(Self { frequencies, reduced: own, enriched, full, flops })
+    }
+
+    /// Solves the equations of all nodes.
+    fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, watch: Watch<'_>) -> Result<()> {
+        watch(Event::Phase("equations of all nodes"));
+        let solver = known.direct_solver(self.frequencies.iter().filter(|f| f.solved).count())?;
+        self.flops = solver.flops();
+        let count = self.frequencies.len() as f64;
+        for (i, frequency) in self.frequencies.iter().enumerate().filter(|(_, f)| f.solved) {
+            self.full[i] = Some(solver.at(units.eigenvalue_of(frequency.hertz).sqrt())?);
+            watch(Event::Fraction((i + 1) as f64 / count));
+        }
+        Ok(())
     }
 
     fn solved(&self, known: &Known<'_>, low: f64) -> Solved {
         let mut below = self.full.iter().flatten().map(|solution| solution.modes_below);
         let first = below.next().unwrap_or(0);
-        let last = below.last().unwrap_or(first);
+        let last = below.next_back().unwrap_or(first);
         Solved {
             rows: known.nodal.model.rows().len(),
             solves: self.full.iter().flatten().count(),
@@ -351,29 +373,13 @@ impl Curves {
         }
     }
 
-    /// Blocks of the responses from each place to each other: forces and torques apart, and displacements and rotations.
-    fn pairs(&self, from: &[Place], to: &[Place], dimension: usize, tolerance: f64) -> Vec<Pair> {
-        let mut pairs = Vec::new();
-        for (source, columns) in numbered(from, dimension) {
-            for (target, rows) in numbered(to, dimension) {
-                for turns in [(false, false), (false, true), (true, false), (true, true)] {
-                    let of_kind = |all: &[(usize, Direction)], turns: bool| {
-                        all.iter().copied().filter(|(_, d)| d.turns() == turns).collect::<Vec<_>>()
-                    };
-                    let block = Block { columns: of_kind(&columns, turns.0), rows: of_kind(&rows, turns.1) };
-                    if block.columns.is_empty() || block.rows.is_empty() {
-                        continue;
-                    }
-                    pairs.push(Pair {
-                        from: source.clone(),
-                        to: target.clone(),
-                        functions: self.functions(&block),
-                        errors: self.errors(&block, tolerance),
-                    });
-                }
-            }
+    fn pair(&self, (from, to, block): &(&Place, &Place, Block), tolerance: f64) -> Pair {
+        Pair {
+            from: (*from).clone(),
+            to: (*to).clone(),
+            functions: self.functions(block),
+            errors: self.errors(block, tolerance),
         }
-        pairs
     }
 
     fn functions(&self, block: &Block) -> Vec<Function> {
@@ -422,6 +428,25 @@ fn numbered(places: &[Place], dimension: usize) -> impl Iterator<Item = (&Place,
         });
         (place, numbered.collect())
     })
+}
+
+/// From each place to each other: forces and torques apart, and displacements and rotations.
+fn blocks<'p>(from: &'p [Place], to: &'p [Place], dimension: usize) -> Vec<(&'p Place, &'p Place, Block)> {
+    let mut blocks = Vec::new();
+    for (source, columns) in numbered(from, dimension) {
+        for (target, rows) in numbered(to, dimension) {
+            for turns in [(false, false), (false, true), (true, false), (true, true)] {
+                let of_kind = |all: &[(usize, Direction)], turns: bool| {
+                    all.iter().copied().filter(|(_, d)| d.turns() == turns).collect::<Vec<_>>()
+                };
+                let block = Block { columns: of_kind(&columns, turns.0), rows: of_kind(&rows, turns.1) };
+                if !block.columns.is_empty() && !block.rows.is_empty() {
+                    blocks.push((source, target, block));
+                }
+            }
+        }
+    }
+    blocks
 }
 
 /// Rows and columns of a pair of places, with their directions.
