@@ -137,7 +137,7 @@ fn model_and_body(
 fn settings(arguments: &ResponseArguments, scene: Option<&Scene>, body: &FlexBody) -> Result<Settings> {
     let of_scene = scene.and_then(|scene| Band::new(0.0, scene.requirements.band? * body.units().hertz()));
     let band = arguments.band.or(of_scene).ok_or_else(|| {
-        Diagnostic::new(Code::Usage, "no band of frequencies")
+        Diagnostic::new(Code::Usage, "nothing says which frequencies are looked at")
             .with_help("give --band 0..2000, or a --scene with a [band]")
     })?;
     Ok(Settings {
@@ -166,7 +166,10 @@ fn places(arguments: &ResponseArguments, scene: Option<&Scene>) -> Result<[Vec<P
             }
         });
         if once.is_empty() {
-            let message = format!("no place {option}");
+            let message = match option {
+                "from" => "nothing says where forces act",
+                _ => "nothing says where displacements are read",
+            };
             let help = format!("give --{option} INTERFACE or --{option} NODE, or a --scene with [[{key}]]");
             return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
         }
