@@ -106,21 +106,33 @@ fn receptances_are_reciprocal() {
     let functions = |response: &Response| -> Vec<_> {
         response.pairs.iter().flat_map(|pair| pair.functions.clone()).collect()
     };
+    // Places that are looked at since the estimate is largest there differ by its rounding.
+    let at_both = there
+        .frequencies
+        .iter()
+        .enumerate()
+        .filter_map(|(i, f)| Some((i, back.frequencies.iter().position(|other| other == f)?)));
+    let at_both: Vec<(usize, usize)> = at_both.collect();
     let (there, back) = (functions(&there), functions(&back));
     assert_eq!(there.len(), 9);
+    let (mut reduced, mut full) = (0, 0);
     for one in &there {
         let other =
             back.iter().find(|other| (other.from, other.to) == (one.to, one.from)).expect("the other");
-        let scale = largest(one.reduced.iter().map(|z| z.norm()));
-        for i in 0..one.reduced.len() {
-            let same = |a: Complex<f64>, b: Complex<f64>| (a - b).norm() < 1e-9 * (a.norm() + 1e-6 * scale);
-            assert!(same(one.reduced[i], other.reduced[i]));
-            match (one.full[i], other.full[i]) {
-                (Some(a), Some(b)) => assert!(same(a, b), "{a} {b}"),
-                (a, b) => assert_eq!(a, b),
+        for &(i, j) in &at_both {
+            // Of the size of the functions of the same kind: some are zero but for rounding.
+            let alike = there.iter().filter(|f| f.kind() == one.kind());
+            let scale = largest(alike.map(|f| f.reduced[i].norm()));
+            let same = |a: Complex<f64>, b: Complex<f64>| (a - b).norm() < 1e-8 * scale;
+            assert!(same(one.reduced[i], other.reduced[j]));
+            reduced += 1;
+            if let (Some(a), Some(b)) = (one.full[i], other.full[j]) {
+                assert!(same(a, b), "{a} {b}");
+                full += 1;
             }
         }
     }
+    assert!(reduced > 9 * 50 && full > 9 * 8, "{reduced} {full}");
 }
 
 /// A bar of bricks without transverse strain (Poisson's ratio zero) is, under forces that are even over its ends, a chain of rod elements.
@@ -186,8 +198,10 @@ fn more_modes_and_residual_vectors_come_closer() {
     let basis = |loads| BasisChoice::Free(FreeSurface { residual_vectors: vec![loads] });
     let with_vectors = error(&body_of(&model, 8, basis(Loads::Interfaces)));
     assert!(with_vectors < 0.05 * plain[0], "{with_vectors:e} {plain:?}");
-    let fixed = error(&body_of(&model, 8, BasisChoice::CraigBampton(CraigBampton)));
-    assert!(fixed < 0.2 * plain[0], "{fixed:e} {plain:?}");
+    // A Craig-Bampton body answers at frequencies of its own until there are enough modes with the interfaces held.
+    let fixed =
+        [6, 20, 34].map(|modes| error(&body_of(&model, modes, BasisChoice::CraigBampton(CraigBampton))));
+    assert!(fixed[0] > fixed[1] && fixed[1] > fixed[2] && fixed[2] < 0.05 * fixed[0], "{fixed:?}");
 }
 
 #[test]
@@ -209,7 +223,8 @@ fn residual_vectors_make_the_static_limit_exact() {
     assert!(with < 1e-4 * without && without > 0.0, "{with:e} {without:e}");
 }
 
-/// What the estimate is worth, over bases and bands, at the solves: near resonances and antiresonances included.
+/// What the estimate is worth, over bases and bands, at the solves, near resonances and antiresonances included: it is the error up to half the
+/// first frequency that the bodies lack, and on the whole; where a mode is missing next to the band it is too small.
 #[test]
 fn the_estimate_is_near_the_error() {
     let model = block(Some(0.01));
@@ -220,15 +235,20 @@ fn the_estimate_is_near_the_error() {
         ("residual vectors", body_of(&model, 8, basis(vec![Loads::Interfaces]))),
         ("craig-bampton", body_of(&model, 8, BasisChoice::CraigBampton(CraigBampton))),
     ];
+    let missing = free(&model, 9).frequencies_hz()[8];
     for (name, body) in &bodies {
         for (from, to) in [("left", "right"), ("left:y", "17:y"), ("1:z", "right:z")] {
             let band = over(50.0, free(&model, 8).frequencies_hz()[5], 60);
             let response = study(&model, body, from, to, &band);
             let errors = response.pairs[0].errors.as_ref().expect("errors");
             let Some(effectivity) = errors.effectivity else { continue };
-            println!("{name} {from} {to}: {effectivity:?}, error {:?}", errors.largest);
-            assert!((0.8..1.25).contains(&effectivity.median), "{name} {from} {to}: {effectivity:?}");
-            assert!(effectivity.least > 0.3 && effectivity.most < 3.0, "{name} {from} {to}: {effectivity:?}");
+            assert!((0.9..1.1).contains(&effectivity.median), "{name} {from} {to}: {effectivity:?}");
+            assert!(effectivity.least > 0.1 && effectivity.most < 3.0, "{name} {from} {to}: {effectivity:?}");
+            for (i, f) in response.frequencies.iter().enumerate().filter(|(_, f)| **f < 0.5 * missing) {
+                let Some(measured) = errors.measured[i].filter(|error| *error > 1e-6) else { continue };
+                let ratio = errors.estimated[i] / measured;
+                assert!((0.8..1.25).contains(&ratio), "{name} {from} {to}, {f} Hz: {ratio}");
+            }
         }
     }
 }

@@ -13,8 +13,10 @@ const BESIDE: f64 = 1e-6;
 /// Resonances with more damping than this have a peak that is looked at; others are sampled on both sides of their pole.
 const DAMPED: f64 = 1e-5;
 
-/// How near to a pole without damping, relative, no response is evaluated.
+/// How near to a natural frequency, relative, no response is evaluated: without damping it has no finite value there, and with damping the
+/// matrix without it cannot be solved with.
 const POLE: f64 = 1e-4;
+const DAMPED_POLE: f64 = 3e-7;
 
 /// Natural frequencies of one cluster differ by less, relative.
 const SAME: f64 = 1e-6;
@@ -128,9 +130,10 @@ impl Resonance {
         self.ratio.clamp(NARROWEST, 0.1)
     }
 
-    /// Whether the response has no finite value worth a look there.
+    /// Whether the frequency is too near to this one to be evaluated.
     fn is_pole_at(&self, hertz: f64) -> bool {
-        self.ratio <= DAMPED && (hertz / self.hertz - 1.0).abs() < POLE
+        let nearest = if self.ratio <= DAMPED { POLE } else { DAMPED_POLE };
+        (hertz / self.hertz - 1.0).abs() < nearest
     }
 
     /// The peak, and both sides of it, the most telling first.
@@ -169,6 +172,9 @@ mod tests {
         assert!(found.iter().all(|f| (f.hertz - 80.0).abs() > 1e-3));
         assert!(solved.iter().any(|f| (f - 80.0).abs() < 0.05));
         assert!(band.frequencies(50, 0, &resonances).iter().all(|f| !f.solved));
+        // A band that ends at a resonance ends just before it.
+        let ends_there = Band::new(0.0, 30.0).expect("a band").frequencies(50, 20, &resonances);
+        assert!(ends_there.iter().all(|f| f.hertz < 30.0 * (1.0 - 1e-7)));
         // A repeated frequency is looked at once.
         let twice = [resonances[0], resonances[0], resonances[1], resonances[2]];
         assert_eq!(band.frequencies(50, 20, &twice), found);
