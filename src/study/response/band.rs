@@ -116,7 +116,8 @@ impl Band {
         let spread: Vec<f64> = self.even(free.max(1)).filter(|_| free > 0).collect();
         let solved = close.into_iter().chain(spread).map(|hertz| Frequency { hertz, solved: true });
         let others = around.chain(self.even(points)).map(|hertz| Frequency { hertz, solved: false });
-        let looked_at = |f: &Frequency| within(f.hertz) && !inside.iter().any(|r| r.is_pole_at(f.hertz));
+        // Those just outside the band too: a band may end at a resonance.
+        let looked_at = |f: &Frequency| within(f.hertz) && !resonances.iter().any(|r| r.is_pole_at(f.hertz));
         let mut all: Vec<Frequency> = solved.chain(others).filter(looked_at).collect();
         all.sort_by(|a, b| a.hertz.total_cmp(&b.hertz).then(b.solved.cmp(&a.solved)));
         all.dedup_by(|next, kept| next.hertz == kept.hertz);
@@ -173,8 +174,10 @@ mod tests {
         assert!(solved.iter().any(|f| (f - 80.0).abs() < 0.05));
         assert!(band.frequencies(50, 0, &resonances).iter().all(|f| !f.solved));
         // A band that ends at a resonance ends just before it.
-        let ends_there = Band::new(0.0, 30.0).expect("a band").frequencies(50, 20, &resonances);
-        assert!(ends_there.iter().all(|f| f.hertz < 30.0 * (1.0 - 1e-7)));
+        for end in [30.0, 30.0 * (1.0 - 1e-12)] {
+            let ends_there = Band::new(0.0, end).expect("a band").frequencies(50, 20, &resonances);
+            assert!(ends_there.iter().all(|f| f.hertz < 30.0 * (1.0 - 1e-7)));
+        }
         // A repeated frequency is looked at once.
         let twice = [resonances[0], resonances[0], resonances[1], resonances[2]];
         assert_eq!(band.frequencies(50, 20, &twice), found);
