@@ -347,17 +347,24 @@ impl Curves {
         }
     }
 
-    /// Solves the equations of all nodes.
+    /// Solves the equations of all nodes. Frequencies where the solution has too few digits, at a natural frequency, are left out.
     fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, watch: Watch<'_>) -> Result<()> {
         watch(Event::Phase("equations of all nodes"));
         let solver = known.direct_solver(self.frequencies.iter().filter(|f| f.solved).count())?;
         self.flops = solver.flops();
-        let count = self.frequencies.len() as f64;
+        let (count, mut failed) = (self.frequencies.len() as f64, None);
         for (i, frequency) in self.frequencies.iter().enumerate().filter(|(_, f)| f.solved) {
-            self.full[i] = Some(solver.at(units.eigenvalue_of(frequency.hertz).sqrt())?);
+            match solver.at(units.eigenvalue_of(frequency.hertz).sqrt()) {
+                Ok(solution) => self.full[i] = Some(solution),
+                Err(error) if error.has(Code::FactorizationFailed) => failed = Some(error),
+                Err(error) => return Err(error),
+            }
             watch(Event::Fraction((i + 1) as f64 / count));
         }
-        Ok(())
+        match failed {
+            Some(error) if self.full.iter().all(Option::is_none) => Err(error),
+            _ => Ok(()),
+        }
     }
 
     fn solved(&self, known: &Known<'_>, low: f64) -> Solved {
