@@ -243,7 +243,7 @@ fn residual_vectors(
 }
 
 /// Loads of residual vectors as named on the command line.
-fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
+pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
     let mut sets = Vec::new();
     let mut names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
     for name in &names {

@@ -12,6 +12,7 @@ mod outcome;
 mod output;
 mod places;
 mod resources;
+mod response;
 mod select;
 mod simulate;
 mod trade;

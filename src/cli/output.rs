@@ -3,7 +3,7 @@
 use super::arguments::{Arguments, Command, Printing};
 use super::outcome::{Outcome, warnings};
 use super::resources::use_threads;
-use super::{audit, check, compare, convert, export, inspect, select, simulate, trade};
+use super::{audit, check, compare, convert, export, inspect, response, select, simulate, trade};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{ExitCode, Result};
 use crate::report::output_json;
@@ -51,6 +51,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Trade(arguments) => arguments.threads,
         Command::Select(arguments) => arguments.threads,
         Command::Simulate(arguments) => arguments.threads,
+        Command::Response(arguments) => arguments.threads,
         _ => None,
     });
     let (name, printing) = command_of(arguments);
@@ -62,6 +63,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Select(arguments) => select::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Trade(arguments) => trade::run(arguments),
+        Command::Response(arguments) => response::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Audit(arguments) => audit::run(arguments),
     };
@@ -77,6 +79,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Select(arguments) => ("select", arguments.printing),
         Command::Simulate(arguments) => ("simulate", arguments.printing),
         Command::Trade(arguments) => ("trade", arguments.printing),
+        Command::Response(arguments) => ("response", arguments.printing),
         Command::Export(arguments) => ("export", arguments.printing),
         Command::Audit(arguments) => ("audit", arguments.printing),
     }

@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies; audits.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies; frequency responses; audits.
 
 mod audit;
 mod bar_chart;
@@ -8,6 +8,7 @@ mod comparison;
 mod completeness;
 mod craig_bampton;
 mod facts;
+mod frequency_chart;
 mod geometric_stiffness;
 mod guarantee;
 mod html;
@@ -20,6 +21,7 @@ mod mass_properties;
 mod numbers;
 mod output;
 mod render;
+mod response;
 mod run_data;
 mod scatter_chart;
 mod selection;
@@ -37,6 +39,7 @@ pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use output::output_json;
 pub use render::{Format, render};
+pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};

@@ -80,6 +80,12 @@ fn every_command_prints_an_object_of_the_schema() {
         ("simulate b.h5 --scene scene.toml", 0),
         ("simulate b.h5 --scene model.toml", 2),
         ("trade b.h5 --scene scene.toml --repeat 1", 0),
+        ("response b.h5 --band 0..1000 --from 1 --to 2", 0),
+        (
+            "response model.toml b.h5 --band 10..20 --from 1 --to 1:z --solves 2 --points 4 --tolerance 1000",
+            0,
+        ),
+        ("response b.h5 --band 0..1000 --from nowhere --to 2", 2),
         ("export b.h5 --to sid -o b.sid --allow-loss", 0),
         ("export b.h5 --to nothing -o b.x", 2),
         ("audit b.sid", 0),

@@ -5,6 +5,7 @@ mod support;
 
 mod output_errors;
 mod reference;
+mod response;
 mod select_command;
 mod selection_bounds;
 mod selection_verdicts;

@@ -27,3 +27,4 @@ pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
 pub use residual_vectors::{Loads, UserLoads, free_static_responses, interface_loads};
+pub use rigid_modes::rigid_modes;

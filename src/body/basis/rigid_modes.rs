@@ -6,8 +6,11 @@ use crate::model::{FeModel, centre_and_length};
 use crate::numerics::linalg::{Pencil, combine, gram, symmetric_eigen};
 use faer::Mat;
 
-/// The rigid modes of a model from its node positions: six, in the plane three; orthonormal in the mass of `pencil`.
-pub(super) fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
+/// The rigid modes of a model from its node positions (N x 6, in the plane N x 3); orthonormal in the mass of `pencil`.
+///
+/// # Errors
+/// [`BodyDegenerate`](Code::BodyDegenerate) where the nodes or the mass lie on one line.
+pub fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
     let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
     let fields = model.rigid_fields(centre, length);

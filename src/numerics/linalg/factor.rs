@@ -113,7 +113,7 @@ pub(super) struct Scaled<'a> {
     analysis: &'a Analysis,
     pencil: &'a Pencil<'a>,
     sigma: f64,
-    scale: Vec<f64>,
+    pub(super) scale: Vec<f64>,
 }
 
 impl Scaled<'_> {
@@ -205,67 +205,81 @@ impl<'a, T: Real> Cholesky<'a, T> {
     }
 
     /// Solves for the columns of `x`, of which there are at most `K`, in the precision of the factor.
-    fn solve_block<const K: usize>(&self, mut x: MatMut<'_, f64>) {
-        let (analysis, tree, block) = (self.analysis, &self.analysis.tree, self.analysis.block);
-        // Row of the pencil at each row of the elimination order.
-        let row = |i: usize| tree.order()[i / block] as usize * block + i % block;
-        let mut values = vec![[T::default(); K]; x.nrows()];
-        for (i, to) in values.iter_mut().enumerate() {
-            let from = row(i);
-            for (j, to) in to.iter_mut().take(x.ncols()).enumerate() {
-                *to = T::of(x[(from, j)] * self.scale[from]);
-            }
+    fn solve_block<const K: usize>(&self, x: MatMut<'_, f64>) {
+        let forward = |s: usize, front: &mut [[T; K]]| substitution::forward(&self.fronts[s], front);
+        let backward = |s: usize, front: &mut [[T; K]]| substitution::backward(&self.fronts[s], front);
+        substitute(self.analysis, &self.scale, x, forward, backward);
+    }
+}
+
+/// Substitution over the tree, up and down, for the columns of `x`, of which there are at most `K`, with the scale of each row.
+/// `forward` eliminates the leading rows of the front of a supernode, `backward` finds them from those below.
+pub(super) fn substitute<T: Real, const K: usize>(
+    analysis: &Analysis,
+    scale: &[f64],
+    mut x: MatMut<'_, f64>,
+    forward: impl Fn(usize, &mut [[T; K]]) + Sync,
+    backward: impl Fn(usize, &mut [[T; K]]) + Sync,
+) {
+    let (tree, block) = (&analysis.tree, analysis.block);
+    // Row of the pencil at each row of the elimination order.
+    let row = |i: usize| tree.order()[i / block] as usize * block + i % block;
+    let mut values = vec![[T::default(); K]; x.nrows()];
+    for (i, to) in values.iter_mut().enumerate() {
+        let from = row(i);
+        for (j, to) in to.iter_mut().take(x.ncols()).enumerate() {
+            *to = T::of(x[(from, j)] * scale[from]);
         }
-        let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
-        let mut rest = values.as_mut_slice();
-        for s in 0..tree.len() {
-            let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block);
-            slots.push(own);
-            rest = tail;
-        }
-        let forward = |s: usize, own: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
-            let l = &self.fronts[s];
-            let mut front = vec![[T::default(); K]; l.height()];
-            front[..own.len()].copy_from_slice(own);
-            for (&c, update) in tree.children(s).iter().zip(&children) {
-                for (&place, update) in tree.places(c as usize).iter().zip(update.chunks_exact(block)) {
-                    for (to, from) in front[place as usize * block..].iter_mut().zip(update) {
-                        to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
-                    }
+    }
+    let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
+    let mut rest = values.as_mut_slice();
+    for s in 0..tree.len() {
+        let (own, tail) = rest.split_at_mut(tree.columns(s).len() * block);
+        slots.push(own);
+        rest = tail;
+    }
+    let up = |s: usize, own: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
+        let (width, below) = tree.front(s, block);
+        let mut front = vec![[T::default(); K]; width + below];
+        front[..own.len()].copy_from_slice(own);
+        for (&c, update) in tree.children(s).iter().zip(&children) {
+            for (&place, update) in tree.places(c as usize).iter().zip(update.chunks_exact(block)) {
+                for (to, from) in front[place as usize * block..].iter_mut().zip(update) {
+                    to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
                 }
             }
-            substitution::forward(l, &mut front);
-            own.copy_from_slice(&front[..own.len()]);
-            Ok::<_, Infallible>(front.split_off(own.len()))
-        };
-        let Ok(()) = analysis.walk.up(tree, &mut slots, &forward);
-        let backward = |s: usize, own: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
-            let mut front = own.to_vec();
-            front.extend(below.unwrap_or_default());
-            substitution::backward(&self.fronts[s], &mut front);
-            own.copy_from_slice(&front[..own.len()]);
-            let message = |c: u32| {
-                let places = tree.places(c as usize);
-                let mut rows = Vec::with_capacity(places.len() * block);
-                for &place in places {
-                    rows.extend_from_slice(&front[place as usize * block..][..block]);
-                }
-                rows
-            };
-            tree.children(s).iter().map(|&c| message(c)).collect()
-        };
-        analysis.walk.down(tree, &mut slots, &backward);
-        for (i, from) in values.iter().enumerate() {
-            let to = row(i);
-            for (j, from) in from.iter().take(x.ncols()).enumerate() {
-                x[(to, j)] = from.wide() * self.scale[to];
+        }
+        forward(s, &mut front);
+        own.copy_from_slice(&front[..own.len()]);
+        Ok::<_, Infallible>(front.split_off(own.len()))
+    };
+    let Ok(()) = analysis.walk.up(tree, &mut slots, &up);
+    let down = |s: usize, own: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
+        let mut front = own.to_vec();
+        front.extend(below.unwrap_or_default());
+        backward(s, &mut front);
+        own.copy_from_slice(&front[..own.len()]);
+        let message = |c: u32| {
+            let places = tree.places(c as usize);
+            let mut rows = Vec::with_capacity(places.len() * block);
+            for &place in places {
+                rows.extend_from_slice(&front[place as usize * block..][..block]);
             }
+            rows
+        };
+        tree.children(s).iter().map(|&c| message(c)).collect()
+    };
+    analysis.walk.down(tree, &mut slots, &down);
+    for (i, from) in values.iter().enumerate() {
+        let to = row(i);
+        for (j, from) in from.iter().take(x.ncols()).enumerate() {
+            x[(to, j)] = from.wide() * scale[to];
         }
     }
 }
 
 /// Columns solved at once: the factor is streamed once for all of them.
-const COLUMNS: usize = 8;
+pub(super) const COLUMNS: usize = 8;
 
 impl<T: Real> Solve for Cholesky<'_, T> {
     fn shift(&self) -> f64 {

@@ -1,7 +1,7 @@
-//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front; the factor is not kept.
+//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front; who only counts does not keep the factor.
 
 use super::Pencil;
-use super::factor::Analysis;
+use super::factor::{Analysis, Scaled};
 use super::front::{
     PANEL, Trapezoid, by_rows, divide_rows, extend_add, subtract_eliminated, subtract_from_rest,
 };
@@ -26,10 +26,51 @@ pub struct Inertia {
 }
 
 /// What a front hands to its parent.
-struct Contribution {
+pub(super) struct Contribution {
     schur: Trapezoid<f64>,
     /// Diagonal of |L| |B| |L|' so far, for its rows.
     growth: Vec<f64>,
+}
+
+/// The columns of a front after their elimination.
+pub(super) struct Eliminated {
+    /// L below the leading squares of the panels.
+    pub columns: Trapezoid<f64>,
+    /// The leading squares, one per panel.
+    pub blocks: Vec<Blocks>,
+    /// Largest diagonal entry of |L| |B| |L|' in these columns.
+    pub growth: f64,
+}
+
+impl Eliminated {
+    /// Numbers of negative and of zero pivots.
+    pub fn signs(&self) -> (usize, usize) {
+        self.blocks.iter().fold((0, 0), |(n, z), block| (n + block.negative, z + block.zero))
+    }
+}
+
+/// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and eliminates its columns.
+pub(super) fn eliminate_front(
+    analysis: &Analysis,
+    matrix: &Scaled<'_>,
+    s: usize,
+    children: Vec<Contribution>,
+) -> (Eliminated, Contribution) {
+    let (mut columns, mut rest) = analysis.new_front::<f64>(s);
+    matrix.assemble(s, &mut columns);
+    let mut growth = vec![0.0; columns.height()];
+    for (&c, child) in analysis.tree.children(s).iter().zip(children) {
+        let places = analysis.places(c as usize);
+        extend_add(&mut columns, &mut rest, &child.schur, &places);
+        for (&place, g) in places.iter().zip(&child.growth) {
+            growth[place] += g;
+        }
+    }
+    let width = columns.width();
+    let blocks = eliminate(&mut columns, &mut rest, &mut growth);
+    let own = largest(growth[..width].iter().copied());
+    let handed_on = Contribution { schur: rest, growth: growth.split_off(width) };
+    (Eliminated { columns, blocks, growth: own }, handed_on)
 }
 
 impl Inertia {
@@ -39,37 +80,33 @@ impl Inertia {
         let matrix = analysis.scaled(pencil, sigma);
         let mut counts = vec![(0usize, 0usize, 0.0f64); tree.len()];
         let visit = |s: usize, count: &mut (usize, usize, f64), children: Vec<Contribution>| {
-            let (mut pivots, mut rest) = analysis.new_front::<f64>(s);
-            matrix.assemble(s, &mut pivots);
-            let mut growth = vec![0.0; pivots.height()];
-            for (&c, child) in tree.children(s).iter().zip(children) {
-                let places = analysis.places(c as usize);
-                extend_add(&mut pivots, &mut rest, &child.schur, &places);
-                for (&place, g) in places.iter().zip(&child.growth) {
-                    growth[place] += g;
-                }
-            }
-            let width = pivots.width();
-            let (negative, zero) = eliminate(&mut pivots, &mut rest, &mut growth);
-            *count = (negative, zero, largest(growth[..width].iter().copied()));
-            Ok::<_, Infallible>(Contribution { schur: rest, growth: growth.split_off(width) })
+            let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
+            let (negative, zero) = eliminated.signs();
+            *count = (negative, zero, eliminated.growth);
+            Ok::<_, Infallible>(handed_on)
         };
         let Ok(()) = analysis.walk.up(tree, &mut counts, &visit);
-        let growth = largest(counts.iter().map(|count| count.2));
-        Self {
-            negative: counts.iter().map(|c| c.0).sum(),
-            zero: counts.iter().map(|c| c.1).sum(),
-            backward_error: growth * f64::EPSILON,
+        Self::of_fronts(counts)
+    }
+
+    /// Of the negative pivots, the zero pivots and the growth of every front.
+    pub(super) fn of_fronts(counts: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
+        let (mut negative, mut zero, mut growth) = (0, 0, Vec::new());
+        for (n, z, g) in counts {
+            negative += n;
+            zero += z;
+            growth.push(g);
         }
+        Self { negative, zero, backward_error: largest(growth) * f64::EPSILON }
     }
 }
 
-/// Eliminates the columns `pivots` of a front. Returns the numbers of negative and of zero pivots.
-fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mut [f64]) -> (usize, usize) {
+/// Eliminates the columns `pivots` of a front. Returns the leading squares of its panels, factored.
+fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mut [f64]) -> Vec<Blocks> {
     let (height, width) = (pivots.height(), pivots.width());
     // L B beside L.
     let mut scaled = Trapezoid::zeros(height, width);
-    let (mut negative, mut zero) = (0, 0);
+    let mut squares = Vec::with_capacity(pivots.panels.len());
     for p in 0..pivots.panels.len() {
         let (first, width) = (p * PANEL, pivots.panel_width(p));
         let mut panel = std::mem::take(&mut pivots.panels[p]);
@@ -78,8 +115,6 @@ fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mu
         subtract_eliminated(&mut panel, width, &left, &right);
         let (square, below) = panel.split_at_mut(width * width);
         let blocks = Blocks::new(MatRef::from_row_major_slice(&*square, width, width));
-        negative += blocks.negative;
-        zero += blocks.zero;
         by_rows(below, width, 0, |_, rows| {
             let mut old = vec![0.0; width];
             for row in rows.chunks_exact_mut(width) {
@@ -102,17 +137,18 @@ fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mu
             growth[first + place] += blocks.growth(&row);
         }
         pivots.panels[p] = panel;
+        squares.push(blocks);
     }
     subtract_from_rest(pivots, &scaled, rest);
-    (negative, zero)
+    squares
 }
 
 /// P A P' = L B L' of the leading square of a panel.
-struct Blocks {
+pub(super) struct Blocks {
     /// Unit lower triangle below the diagonal.
-    l: Mat<f64>,
+    pub l: Mat<f64>,
     /// Row of A at each place.
-    order: Vec<usize>,
+    pub order: Vec<usize>,
     diagonal: Vec<f64>,
     /// Nonzero where a 2x2 block of B starts.
     coupling: Vec<f64>,
@@ -143,8 +179,8 @@ impl Blocks {
         Self { l, order, diagonal, coupling, negative, zero }
     }
 
-    /// Row of L from a row of L B.
-    fn divide(&self, row: &mut [f64]) {
+    /// Row of L from a row of L B: the row times B^-1.
+    pub fn divide(&self, row: &mut [f64]) {
         let mut j = 0;
         while j < row.len() {
             let off = self.coupling[j];

@@ -9,6 +9,7 @@ mod dense;
 mod elimination;
 mod factor;
 mod front;
+mod indefinite;
 mod inertia;
 mod largest;
 mod ldl;
@@ -27,6 +28,7 @@ pub use dense::{SymmetricEigen, dense_cholesky, solve_lower, solve_upper, symmet
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
+pub use indefinite::Indefinite;
 pub use inertia::Inertia;
 pub(crate) use largest::{larger, largest, largest_entry, not_negative};
 pub use ldl::SparseLdl;

@@ -1,0 +1,181 @@
+//! `flexbody response`.
+
+use super::arguments::{BasisName, ResponseArguments};
+use super::convert::load_sources;
+use super::outcome::{Outcome, refuse_warnings};
+use super::places::{format_of, refuse_replacing};
+use super::resources::{longest, memory_left, use_threads};
+use super::watcher::Watcher;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::base::output::OutputSlot;
+use crate::base::progress::{Event, Watch};
+use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ModeSettings};
+use crate::body::convert::{ConvertSettings, convert};
+use crate::body::flex_body::FlexBody;
+use crate::formats::flex_body_file;
+use crate::input::{LoadSource, read_manifest, read_model};
+use crate::model::FeModel;
+use crate::motion::scene::{Point, Scene, read_scene};
+use crate::numerics::eigen::Wanted;
+use crate::report::{Format, ResponseFacts, RunData, response_csv};
+use crate::study::response::{Band, Place, Settings, respond};
+use crate::study::tailoring::read_loads;
+use std::path::PathBuf;
+
+pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
+    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    let inputs = || std::iter::once(&arguments.model).chain(&arguments.body).chain(&arguments.scene);
+    refuse_replacing(inputs(), outputs(arguments))?;
+    let is_manifest = arguments.model.extension().is_some_and(|extension| extension == "toml");
+    refuse_contradictions(arguments, is_manifest)?;
+    let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
+    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let threads = use_threads(arguments.threads);
+
+    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
+    let watch = |event: Event<'_>| watcher.hear(event);
+    let scene = arguments.scene.as_ref().map(read_scene).transpose()?;
+    let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
+    let (model, body, diagnostics) = if is_manifest {
+        let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
+        (Some(model), body, diagnostics)
+    } else {
+        let (body, notes) = flex_body_file::read_with_notes(&arguments.model)?;
+        (None, body, notes)
+    };
+    let settings = settings(arguments, scene.as_ref(), &body)?;
+    let [from, to] = places(arguments, scene.as_ref())?;
+    let response = respond(model.as_ref(), &body, &from, &to, &settings, &watch)?;
+    let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
+    refuse_warnings(arguments.printing, &run.diagnostics)?;
+    let facts = ResponseFacts::new(&response, &settings, &run);
+    if let Some(slot) = &table {
+        slot.fill(response_csv(&response).as_bytes())?;
+    }
+    for (slot, format) in reports.iter().zip(formats) {
+        slot.fill(facts.render(format).as_bytes())?;
+    }
+    // Nothing appears before everything is done.
+    OutputSlot::commit_all(table.into_iter().chain(reports))?;
+    Ok(Outcome {
+        text: facts.render(Format::Text),
+        json: facts.render(Format::Json),
+        diagnostics: run.diagnostics.clone(),
+        passed: response.holds(settings.tolerance),
+    })
+}
+
+fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> {
+    arguments.csv.iter().chain(&arguments.report)
+}
+
+/// Options that say nothing together.
+fn refuse_contradictions(arguments: &ResponseArguments, is_manifest: bool) -> Result<()> {
+    let converts =
+        arguments.modes.is_some() || arguments.basis.is_some() || arguments.residual_vectors.is_some();
+    let message = match arguments {
+        ResponseArguments { body: Some(_), .. } if !is_manifest => {
+            "the model comes first, as a manifest (.toml), and then the body that was made of it"
+        }
+        _ if converts && !(is_manifest && arguments.body.is_none()) => {
+            "--modes, --basis and --residual-vectors are for a model without a body: a file has the modes that it has"
+        }
+        ResponseArguments { basis: Some(BasisName::Imported), .. } => {
+            "imported shapes are for convert: convert the model, and give the body beside it"
+        }
+        ResponseArguments { basis: Some(BasisName::CraigBampton), residual_vectors: Some(_), .. } => {
+            "residual vectors need --basis free or craig-chang"
+        }
+        _ => return Ok(()),
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
+}
+
+/// The model with the body that was made of it, or that is made of it now.
+fn model_and_body(
+    arguments: &ResponseArguments,
+    asked: Option<Vec<LoadSource>>,
+    watch: Watch<'_>,
+) -> Result<(FeModel, FlexBody, Vec<Diagnostic>)> {
+    let files = read_manifest(&arguments.model)?;
+    refuse_replacing(files.paths().into_iter(), outputs(arguments))?;
+    let checked = FeModel::from_raw(read_model(&files)?)?;
+    let (model, mut diagnostics) = (checked.model, checked.diagnostics);
+    if let Some(path) = &arguments.body {
+        let (body, notes) = flex_body_file::read_with_notes(path)?;
+        diagnostics.extend(notes);
+        return Ok((model, body, diagnostics));
+    }
+    let loads = asked.unwrap_or_else(|| files.residual_vectors.clone());
+    let basis = match arguments.basis {
+        Some(BasisName::CraigBampton) => BasisChoice::CraigBampton(CraigBampton),
+        Some(BasisName::CraigChang) => {
+            BasisChoice::CraigChang(CraigChang { residual_vectors: read_loads(&loads, &model)? })
+        }
+        _ => BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),
+    };
+    let settings = ConvertSettings {
+        modes: ModeSettings {
+            wanted: Wanted::Lowest(
+                arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize),
+            ),
+            memory: memory_left(None),
+            longest: longest(arguments.allow_long),
+            ..ModeSettings::default()
+        },
+        basis,
+        lumped: Vec::new(),
+        ..ConvertSettings::default()
+    };
+    let made = convert(&model, &settings, watch)?;
+    diagnostics.extend(made.diagnostics);
+    Ok((model, made.body, diagnostics))
+}
+
+/// What the command line says, and what the scene says where it says nothing.
+fn settings(arguments: &ResponseArguments, scene: Option<&Scene>, body: &FlexBody) -> Result<Settings> {
+    let of_scene = scene.and_then(|scene| Band::new(0.0, scene.requirements.band? * body.units().hertz()));
+    let band = arguments.band.or(of_scene).ok_or_else(|| {
+        Diagnostic::new(Code::Usage, "nothing says which frequencies are looked at")
+            .with_help("give --band 0..2000, or a --scene with a [band]")
+    })?;
+    Ok(Settings {
+        band,
+        points: arguments.points as usize,
+        solves: arguments.solves as usize,
+        damping: arguments.damping.or_else(|| scene?.requirements.damping),
+        tolerance: arguments.tolerance,
+        memory: memory_left(None),
+        longest: longest(arguments.allow_long),
+    })
+}
+
+/// Where forces act and where displacements are read.
+fn places(arguments: &ResponseArguments, scene: Option<&Scene>) -> Result<[Vec<Place>; 2]> {
+    let chosen = |named: &[String], of_scene: Vec<&Point>, option: &str, key: &str| -> Result<Vec<Place>> {
+        let mut places: Vec<Place> = named.iter().map(|text| Place::parse(text)).collect();
+        if places.is_empty() {
+            places.extend(of_scene.into_iter().cloned().map(Place::of));
+        }
+        // Each once: a scene may load a point twice.
+        let mut once: Vec<Place> = Vec::new();
+        places.into_iter().for_each(|place| {
+            if !once.contains(&place) {
+                once.push(place)
+            }
+        });
+        if once.is_empty() {
+            let message = match option {
+                "from" => "nothing says where forces act",
+                _ => "nothing says where displacements are read",
+            };
+            let help = format!("give --{option} INTERFACE or --{option} NODE, or a --scene with [[{key}]]");
+            return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+        }
+        Ok(once)
+    };
+    let loaded = scene.map_or_else(Vec::new, |scene| scene.loads.iter().map(|load| &load.at).collect());
+    let watched = scene.map_or_else(Vec::new, |scene| scene.watched.iter().collect());
+    Ok([chosen(&arguments.from, loaded, "from", "load")?, chosen(&arguments.to, watched, "to", "watch")?])
+}

@@ -1,0 +1,203 @@
+//! Frequencies at which a response is looked at.
+
+/// A band over which frequencies are spaced by ratio spans at least this ratio.
+const WIDE: f64 = 20.0;
+
+/// Half the width of a resonance, relative, where damping makes it no wider.
+const NARROWEST: f64 = 1e-3;
+
+/// How far from the natural frequency, relative, the peak of a damped resonance is looked for at least: at the frequency itself the dynamic
+/// stiffness without damping is singular.
+const BESIDE: f64 = 1e-6;
+
+/// Resonances with more damping than this have a peak that is looked at; others are sampled on both sides of their pole.
+const DAMPED: f64 = 1e-5;
+
+/// How near to a natural frequency, relative, no response is evaluated: without damping it has no finite value there, and with damping the
+/// matrix without it cannot be solved with.
+const POLE: f64 = 1e-4;
+const DAMPED_POLE: f64 = 3e-7;
+
+/// Natural frequencies of one cluster differ by less, relative.
+const SAME: f64 = 1e-6;
+
+/// Places around a resonance, in half widths, that only the curves of modes are evaluated at.
+const AROUND: [f64; 8] = [-8.0, -4.0, -2.0, -0.5, 0.5, 2.0, 4.0, 8.0];
+
+/// Most resonances that are looked at closely.
+const MOST_RESONANCES: usize = 60;
+
+/// A range of frequencies in hertz, 0 <= low < high.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Band {
+    low: f64,
+    high: f64,
+}
+
+/// How frequencies are spaced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spacing {
+    /// By equal differences.
+    Linear,
+    /// By equal ratios.
+    Logarithmic,
+}
+
+/// A natural frequency in hertz, and the damping ratio there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resonance {
+    /// Natural frequency.
+    pub hertz: f64,
+    /// Damping ratio.
+    pub ratio: f64,
+}
+
+/// A frequency in hertz, and whether the equations of all nodes are solved there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Frequency {
+    pub hertz: f64,
+    pub solved: bool,
+}
+
+impl Band {
+    /// `None` where it is no range of frequencies.
+    pub fn new(low: f64, high: f64) -> Option<Self> {
+        (low >= 0.0 && high.is_finite() && low < high).then_some(Self { low, high })
+    }
+
+    /// The lowest and the highest frequency.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.low, self.high]
+    }
+
+    /// By ratio over a band that is wide enough and does not begin at zero.
+    pub fn spacing(&self) -> Spacing {
+        if self.low > 0.0 && self.high / self.low >= WIDE { Spacing::Logarithmic } else { Spacing::Linear }
+    }
+
+    /// `count` frequencies of even spacing up to the end of the band; at zero a free body has no response, so a band from there begins one
+    /// step above it.
+    fn even(&self, count: usize) -> impl Iterator<Item = f64> + '_ {
+        let steps = if self.low > 0.0 { count.max(2) - 1 } else { count.max(1) };
+        let first = usize::from(self.low == 0.0);
+        (first..=steps).map(move |i| {
+            let part = i as f64 / steps as f64;
+            match self.spacing() {
+                _ if i == steps => self.high,
+                Spacing::Linear => self.low + (self.high - self.low) * part,
+                Spacing::Logarithmic => self.low * (self.high / self.low).powf(part),
+            }
+        })
+    }
+
+    /// About `points` frequencies, ascending, at about `solves` of which (none where that is zero) the equations of all nodes are solved: half
+    /// of these at the resonances, the rest spread evenly.
+    pub(super) fn frequencies(
+        &self,
+        points: usize,
+        solves: usize,
+        resonances: &[Resonance],
+    ) -> Vec<Frequency> {
+        let within = |f: f64| f >= self.low && f <= self.high && f > 0.0;
+        let mut inside: Vec<Resonance> = resonances.iter().copied().filter(|r| within(r.hertz)).collect();
+        inside.sort_by(|a, b| a.hertz.total_cmp(&b.hertz));
+        // One of each cluster, that with the least damping.
+        inside.dedup_by(|next, kept| {
+            let same = next.hertz <= kept.hertz * (1.0 + SAME);
+            if same {
+                kept.ratio = kept.ratio.min(next.ratio);
+            }
+            same
+        });
+        inside.truncate(MOST_RESONANCES);
+        let close = if solves == 0 { Vec::new() } else { closely(&inside, solves / 2) };
+        let around = inside.iter().flat_map(|r| AROUND.map(|at| r.hertz * (1.0 + at * r.half_width())));
+        let free = if solves == 0 { 0 } else { solves.saturating_sub(close.len()).max(2) };
+        let spread: Vec<f64> = self.even(free.max(1)).filter(|_| free > 0).collect();
+        let solved = close.into_iter().chain(spread).map(|hertz| Frequency { hertz, solved: true });
+        let others = around.chain(self.even(points)).map(|hertz| Frequency { hertz, solved: false });
+        // Those just outside the band too: a band may end at a resonance.
+        let looked_at = |f: &Frequency| within(f.hertz) && !resonances.iter().any(|r| r.is_pole_at(f.hertz));
+        let mut all: Vec<Frequency> = solved.chain(others).filter(looked_at).collect();
+        all.sort_by(|a, b| a.hertz.total_cmp(&b.hertz).then(b.solved.cmp(&a.solved)));
+        all.dedup_by(|next, kept| next.hertz == kept.hertz);
+        all
+    }
+}
+
+impl Resonance {
+    /// Relative to its frequency.
+    fn half_width(&self) -> f64 {
+        self.ratio.clamp(NARROWEST, 0.1)
+    }
+
+    /// Whether the frequency is too near to this one to be evaluated.
+    fn is_pole_at(&self, hertz: f64) -> bool {
+        let nearest = if self.ratio <= DAMPED { POLE } else { DAMPED_POLE };
+        (hertz / self.hertz - 1.0).abs() < nearest
+    }
+
+    /// The peak, and both sides of it, the most telling first.
+    fn looked_at(&self) -> [f64; 3] {
+        let side = self.half_width();
+        let peak = if self.ratio > DAMPED { (self.ratio * self.ratio).max(BESIDE) } else { 0.3 * side };
+        [-peak, side, -side].map(|at| self.hertz * (1.0 + at))
+    }
+}
+
+/// At most `most` frequencies at resonances: all three of each, or the peaks, or the peaks of some of them.
+fn closely(resonances: &[Resonance], most: usize) -> Vec<f64> {
+    let of_each = if 3 * resonances.len() <= most { 3 } else { 1 };
+    let stride = resonances.len().div_ceil(most.max(1)).max(1);
+    let looked_at = resonances.iter().step_by(stride).flat_map(|r| r.looked_at().into_iter().take(of_each));
+    looked_at.take(most).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_lie_in_the_band_and_at_its_resonances() {
+        let band = Band::new(0.0, 100.0).expect("a band");
+        let resonances =
+            [(30.0, 0.02), (80.0, 0.0), (400.0, 0.01)].map(|(hertz, ratio)| Resonance { hertz, ratio });
+        let found = band.frequencies(50, 20, &resonances);
+        assert!(found.windows(2).all(|pair| pair[0].hertz < pair[1].hertz));
+        assert!(found.iter().all(|f| f.hertz > 0.0 && f.hertz <= 100.0));
+        let solved: Vec<f64> = found.iter().filter(|f| f.solved).map(|f| f.hertz).collect();
+        assert_eq!(solved.len(), 20);
+        assert_eq!(solved.last(), Some(&100.0));
+        // The damped peak, and nothing at the pole without damping.
+        assert!(solved.contains(&(30.0 * (1.0 - 0.02 * 0.02))));
+        assert!(found.iter().all(|f| (f.hertz - 80.0).abs() > 1e-3));
+        assert!(solved.iter().any(|f| (f - 80.0).abs() < 0.05));
+        assert!(band.frequencies(50, 0, &resonances).iter().all(|f| !f.solved));
+        // A band that ends at a resonance ends just before it.
+        for end in [30.0, 30.0 * (1.0 - 1e-12)] {
+            let ends_there = Band::new(0.0, end).expect("a band").frequencies(50, 20, &resonances);
+            assert!(ends_there.iter().all(|f| f.hertz < 30.0 * (1.0 - 1e-7)));
+        }
+        // A repeated frequency is looked at once.
+        let twice = [resonances[0], resonances[0], resonances[1], resonances[2]];
+        assert_eq!(band.frequencies(50, 20, &twice), found);
+    }
+
+    #[test]
+    fn more_resonances_than_solves_leave_some_of_them() {
+        let band = Band::new(1.0, 1000.0).expect("a band");
+        assert_eq!(band.spacing(), Spacing::Logarithmic);
+        let resonances: Vec<Resonance> =
+            (1..50).map(|i| Resonance { hertz: 20.0 * f64::from(i), ratio: 0.01 }).collect();
+        let found = band.frequencies(100, 10, &resonances);
+        assert_eq!(found.iter().filter(|f| f.solved).count(), 10);
+        assert_eq!((found[0].hertz, found.last().map(|f| f.hertz)), (1.0, Some(1000.0)));
+    }
+
+    #[test]
+    fn what_is_no_band_is_none() {
+        for (low, high) in [(1.0, 1.0), (2.0, 1.0), (-1.0, 1.0), (0.0, f64::INFINITY), (f64::NAN, 1.0)] {
+            assert_eq!(Band::new(low, high), None);
+        }
+    }
+}
