@@ -29,7 +29,7 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
     scene.requirements.motion = MotionRange::default();
     scene.initial.angular_velocity *= factor;
     if let Some(spin) = &mut scene.spin {
-        spin.rate = spin.rate.scaled(factor);
+        spin.velocity = spin.velocity.scaled(factor);
     }
     scene
 }
@@ -126,6 +126,7 @@ fn idle(requirements: Requirements) -> Scene {
         watched: Vec::new(),
         requirements,
         source: None,
+        series: Vec::new(),
         resolved: false,
     }
 }

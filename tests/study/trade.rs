@@ -40,6 +40,7 @@ fn tumble(spin: f64, turns: f64) -> Scene {
         watched: Vec::new(),
         requirements: Default::default(),
         source: None,
+        series: Vec::new(),
         resolved: false,
     }
 }
