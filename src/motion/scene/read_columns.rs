@@ -84,25 +84,26 @@ impl HistoryFiles {
         Some(file)
     }
 
-    /// Complains where a history with these first and last times does not cover the run.
+    /// Complains where the `name`d file with these first and last times does not cover the run.
     fn check_covered(
         &self,
         walk: &mut Walk<'_>,
         span: &Range<usize>,
+        name: &str,
         (first, last): (f64, f64),
     ) -> Option<()> {
-        let message = match self.needed {
+        let (what, help) = match self.needed {
             Needed::Until(end) if first > ROUNDING * end || last < end - ROUNDING * end => {
-                format!("the file has the times {first} to {last} of the run, which goes from 0 to {end}")
+                (format!("the run goes from 0 to {end}"), Code::SeriesRange.help())
             }
             Needed::NotSaid => {
-                format!(
-                    "the file has the times {first} to {last}, and [run] has no `duration` to compare with"
-                )
+                ("the scene does not say how long it lasts".to_owned(), "give `duration` in [run]")
             }
             Needed::Until(_) | Needed::NotKnown => return Some(()),
         };
-        walk.complain(Code::SeriesRange, span.clone(), message);
+        let message = format!("{name} has the times {first} to {last} of the scene, {what}");
+        let uncovered = walk.at(Code::SeriesRange, span.clone(), message);
+        walk.found.push(uncovered.with_help(help));
         None
     }
 }
@@ -217,8 +218,15 @@ fn series(
     };
     times.iter_mut().for_each(|time| *time = (*time - reading.time_zero) * reading.time_scale);
     columns.iter_mut().flatten().for_each(|value| *value *= reading.scale);
+    let ascend = times.windows(2).all(|pair| pair[0] < pair[1]);
+    if !ascend || !times.iter().chain(columns.iter().flatten()).all(|value| value.is_finite()) {
+        let message = "times or values are beyond all numbers with `scale`, `time_scale` and `time_zero`";
+        walk.wrong(span.clone(), message.to_owned());
+        return None;
+    }
     if !reading.held {
-        files.check_covered(walk, span, (times[0], times[times.len() - 1]))?;
+        let name = walk.string(table, "file")?;
+        files.check_covered(walk, span, &name, (times[0], times[times.len() - 1]))?;
     }
     Some(FromFile { times, columns, lines, file })
 }
