@@ -123,7 +123,9 @@ fn a_free_motion_that_is_fed_back_is_reproduced_without_a_torque() {
     for (way, (few, many)) in ways.iter().zip(few.iter().zip(&many)) {
         let order = |k: usize| (few[k] / many[k]).log2();
         assert!(many[0] < 1e-4 && many[1] < 1e-4 && many[2] < 1e-6, "{way}: {few:?}, {many:?}");
-        assert!(order(0) > 2.7 && order(1) > 2.7, "{way}: {few:?}, {many:?}");
+        // Attitudes are differentiated twice, beside the ends of the file with one order less.
+        let of_torque = if way.contains("attitude_from") { 1.8 } else { 2.7 };
+        assert!(order(0) > 2.7 && order(1) > of_torque, "{way}: {few:?}, {many:?}");
     }
 }
 

@@ -64,7 +64,7 @@ proptest! {
         scene.requirements.tolerance =
             Tolerance { attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None };
         let own = match &scene.spin {
-            Some(spin) => flexbody::study::selection::Variation::of(&spin.rate, scene.run.duration.expect("given")).largest,
+            Some(spin) => spin.velocity.largest_until(scene.run.duration.expect("given")).0,
             None => scene.initial.angular_velocity.norm(),
         };
         scene.requirements.motion.angular_velocity = range.map(|range| Range::Any(range * own));

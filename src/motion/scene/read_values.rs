@@ -111,7 +111,9 @@ pub(super) fn history(
             return number.map(History::Constant);
         }
     };
-    let kind = HISTORIES.iter().position(|(_, keys)| keys.iter().any(|key| table.contains_key(*key)));
+    // The kind that most of the keys belong to, the first of several.
+    let fitting = |kind: usize| HISTORIES[kind].1.iter().filter(|key| table.contains_key(**key)).count();
+    let kind = (0..HISTORIES.len()).rev().max_by_key(|&kind| fitting(kind)).filter(|&kind| fitting(kind) > 0);
     let Some(kind) = kind else {
         walk.wrong(value.span(), format!("`{key}` is empty, expected {EXPECTED}"));
         return None;
