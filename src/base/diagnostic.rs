@@ -92,7 +92,10 @@ codes! {
     SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "flexbody inspect shows the modes and interfaces of the body";
     SceneContradicts = "FB213", Error, BadInput, "scene contradicts itself", "leave one of the two out";
     CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried there", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with all terms";
-    PlaceUnknown = "FB215", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
+    SeriesColumn = "FB215", Error, BadInput, "column of a history is not in its file", "name a column of the file, or give its number, from 1";
+    SeriesRow = "FB216", Error, BadInput, "file of a history cannot be read as columns over time", "write one row per instant, with ascending times and decimal points";
+    SeriesRange = "FB217", Error, BadInput, "file of a history does not cover the run", "shorten the run, or say with `outside` = \"hold\" that the first and the last value hold outside of the file";
+    PlaceUnknown = "FB218", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";

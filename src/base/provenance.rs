@@ -3,7 +3,7 @@
 /// One input file of a model.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SourceFile {
-    /// `manifest`, `stiffness`, `mass`, `nodes`, `dofs`, `interface`.
+    /// `manifest`, `stiffness`, `mass`, `nodes`, `dofs`, `interface`, `scene`, `history`.
     pub role: String,
     /// File name without folders: results do not depend on where the model lies.
     pub name: String,

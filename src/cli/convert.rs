@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     refuse_contradictions(arguments, &loads)?;
     // How many bodies there are is known after reading; that outputs can be written, before.
     let places = Places::of(arguments, arguments.split.then_some(1));
-    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads)?;
+    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, scene.as_ref())?;
     let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
 
@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
-    refuse_overwriting(arguments, &all, &files, &schemes, &loads)?;
+    refuse_overwriting(arguments, &all, &files, &schemes, &loads, scene)?;
     let mut slots = vec![reserved];
     for places in &all[1..] {
         slots.push(places.reserve()?);
@@ -396,6 +396,7 @@ fn refuse_overwriting(
     files: &ModelFiles,
     schemes: &[Scheme],
     loads: &[LoadSource],
+    scene: Option<&Scene>,
 ) -> Result<()> {
     let masses = schemes.iter().filter_map(|scheme| match scheme {
         Scheme::User(path) => Some(path),
@@ -407,7 +408,8 @@ fn refuse_overwriting(
         _ => None,
     });
     let inputs = files.paths().into_iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
-    refuse_replacing(inputs, outputs.iter().flat_map(Places::all))
+    let series = scene.into_iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    refuse_replacing(inputs.chain(series), outputs.iter().flat_map(Places::all))
 }
 
 fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {

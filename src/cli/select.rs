@@ -30,6 +30,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
+    refuse_replacing(scene.series.iter().map(|file| &file.path), arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let is_manifest = arguments.body.extension().is_some_and(|extension| extension == "toml");
     let (body, lacks, mut diagnostics) = if is_manifest {

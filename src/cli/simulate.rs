@@ -23,6 +23,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
+    refuse_replacing(scene.series.iter().map(|file| &file.path), outputs())?;
     let (body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     watcher.hear(Event::Phase("simulation"));
     let (recording, found) =

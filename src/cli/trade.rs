@@ -31,6 +31,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let scene = read_scene(&arguments.scene)?;
+    refuse_replacing(scene.series.iter().map(|file| &file.path), outputs())?;
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();
     let (model, sources, lacks) = if is_manifest {

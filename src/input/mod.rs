@@ -18,6 +18,7 @@ mod npy;
 mod read_model;
 mod reader;
 mod readers;
+mod series;
 mod shapes;
 mod table;
 mod tables;
@@ -31,5 +32,6 @@ pub use model_files::{InterfaceNodes, InterfaceSource, LoadSource, MatrixLocatio
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
 pub use readers::READERS;
+pub(crate) use series::{ColumnKey, Series, read_series};
 pub use shapes::read_shapes;
 pub(crate) use walk::{Table, Value, Walk, integer, read_toml, real};

@@ -146,6 +146,7 @@ pub fn convert_for_scene(
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
     let mut parts = reduced.into_parts();
     parts.source.files.extend(scene.source.clone());
+    parts.source.files.extend(scene.series.iter().map(|file| file.source.clone()));
     conversion.body = FlexBody::new(parts)?;
     Ok((conversion, selection))
 }

@@ -8,7 +8,7 @@ use flexbody::body::flex_body::FlexBody;
 use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
     Axes, History, Initial, Load, Point, Recording, Requirements, Run, Scene, Scheme, Stage, Tolerance,
-    simulate,
+    VectorHistory, simulate,
 };
 use flexbody::study::selection::select;
 use nalgebra::Vector3;
@@ -23,10 +23,12 @@ fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Sc
     let ids = &body.nodes().ids;
     let load = |id: i64| Load {
         at: Point::Node(id),
-        force: Vector3::new(0.3, 0.2, 1.0) * force,
-        torque: Vector3::zeros(),
+        force: VectorHistory::Along {
+            direction: Vector3::new(0.3, 0.2, 1.0) * force,
+            factor: history.clone(),
+        },
+        torque: VectorHistory::nothing(),
         axes: Axes::Body,
-        history: history.clone(),
     };
     let ends = [ids[0], ids[ids.len() - 1]];
     Scene {
@@ -46,6 +48,7 @@ fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Sc
         watched: ends.map(Point::Node).to_vec(),
         requirements: Requirements { damping: Some(0.05), ..Requirements::default() },
         source: None,
+        series: Vec::new(),
         resolved: false,
     }
 }

@@ -11,6 +11,7 @@ mod dynamics_forms;
 mod dynamics_geometric;
 mod dynamics_loads;
 mod general_equations;
+mod histories;
 mod motion;
 mod nodal_equations;
 mod nodal_motion;

@@ -10,7 +10,7 @@ use flexbody::motion::dynamics::{
     Prescribed, Surroundings, Terms,
 };
 use flexbody::numerics::integration::Method;
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DVector, Matrix3, Vector3};
 
 /// Spin about an axis near the middle one with `spin` of the first circular frequency, bent, flying.
 fn tumbling(body: &FlexBody, spin: f64) -> Configuration {
@@ -218,7 +218,7 @@ struct SpinUp {
 impl Surroundings for SpinUp {
     fn add_forces(&self, _: f64, _: &Place, _: &Evaluation<'_>, _: &mut [f64]) {}
 
-    fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
+    fn prescribed(&self, time: f64, _: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         let phase = std::f64::consts::TAU * (time / self.duration).min(1.0);
         let rate = self.rate * (phase - phase.sin()) / std::f64::consts::TAU;
         let slope = self.rate / self.duration * (1.0 - phase.cos());

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use std::fs;
 
 /// A rubber-like block without any symmetry, turned and far from the model's origin, with an interface.
-fn block() -> RawModel {
+pub(super) fn block() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(Kind::Hex8, &grid([4, 2, 2]), |[x, y, z]| {
         [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]

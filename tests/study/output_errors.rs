@@ -11,7 +11,7 @@ use flexbody::model::FeModel;
 use flexbody::motion::dynamics::{EulerParameters, Orientation};
 use flexbody::motion::scene::{
     Axes, History, Initial, Measure, OtherModes, OutputErrors, Resolution, Scene, Spin, Stage, Tolerance,
-    Trace, trace, trace_at,
+    Trace, VectorHistory, trace, trace_at,
 };
 use flexbody::numerics::eigen::Wanted;
 use flexbody::numerics::linalg::{gram, multiply};
@@ -120,9 +120,12 @@ fn modes_that_are_not_there_are_missing() {
 fn watched_points_and_reactions_count_relative_to_their_largest() {
     let body = soft_block(4);
     let spin = Spin {
-        axis: Vector3::z(),
+        velocity: VectorHistory::Along {
+            direction: Vector3::z(),
+            factor: History::Sine { amplitude: 0.05, frequency: 0.1, phase: 0.0 },
+        },
         axes: Axes::Body,
-        rate: History::Sine { amplitude: 0.05, frequency: 0.1, phase: 0.0 },
+        start: None,
         hold: true,
     };
     let recording = motion(&body, &Scene { spin: Some(spin), ..scene(20.0) });

@@ -9,7 +9,7 @@ use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::model::FeModel;
 use flexbody::motion::scene::{
-    Axes, History, Initial, Load, Point, Scene, Scheme, Spin, Stage, simulate, trace,
+    Axes, History, Initial, Load, Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate, trace,
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
 use flexbody::study::reference::{Enriched, PART_OF_REFERENCE, ReferenceError, enrich};
@@ -56,14 +56,16 @@ fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: V
         },
         loads: vec![Load {
             at: Point::Node(model.nodes().ids[node]),
-            force,
-            torque: Vector3::zeros(),
-            axes: Axes::Body,
-            history: History::Sine {
-                amplitude: 1.0,
-                frequency: swing * rate / std::f64::consts::TAU,
-                phase: 0.0,
+            force: VectorHistory::Along {
+                direction: force,
+                factor: History::Sine {
+                    amplitude: 1.0,
+                    frequency: swing * rate / std::f64::consts::TAU,
+                    phase: 0.0,
+                },
             },
+            torque: VectorHistory::nothing(),
+            axes: Axes::Body,
         }],
         ..nothing_happens("pulled", 2.0 * std::f64::consts::TAU / rate, 1e-9)
     }
@@ -145,8 +147,9 @@ fn responses_join_until_what_is_lacking_does_not_count() {
 #[test]
 fn a_shock_is_no_reason_for_modes_without_end() {
     let model = model();
-    let mut scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::zeros());
-    scene.loads[0].history = History::Constant(1.0);
+    let force = Vector3::new(1e-4, 2e-4, -1e-4);
+    let mut scene = pulled(&model, 7, force, 0.7, Vector3::zeros());
+    scene.loads[0].force = VectorHistory::constant(force);
     scene.initial.settled = false;
     scene.requirements.tolerance.stress = 1e-3;
     scene.requirements.tolerance.deflection = 1e-3;
@@ -165,12 +168,13 @@ fn a_static_start_stays_as_it_is() {
     let model = model();
     let body = body(&model, 8);
     let rate = first_rate(&model);
-    let mut scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::zeros());
-    scene.loads[0].history = History::Constant(1.0);
+    let force = Vector3::new(1e-4, 2e-4, -1e-4);
+    let mut scene = pulled(&model, 7, force, 0.7, Vector3::zeros());
+    scene.loads[0].force = VectorHistory::constant(force);
     scene.spin = Some(Spin {
-        axis: Vector3::new(0.2, 0.3, 1.0).normalize(),
+        velocity: VectorHistory::constant(Vector3::new(0.2, 0.3, 1.0).normalize() * (0.2 * rate)),
         axes: Axes::Model,
-        rate: History::Constant(0.2 * rate),
+        start: None,
         hold: true,
     });
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-12 };

@@ -29,7 +29,7 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
     scene.requirements.motion = MotionRange::default();
     scene.initial.angular_velocity *= factor;
     if let Some(spin) = &mut scene.spin {
-        spin.rate = spin.rate.scaled(factor);
+        spin.velocity = spin.velocity.scaled(factor);
     }
     scene
 }
@@ -64,7 +64,7 @@ proptest! {
         scene.requirements.tolerance =
             Tolerance { attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None };
         let own = match &scene.spin {
-            Some(spin) => flexbody::study::selection::Variation::of(&spin.rate, scene.run.duration.expect("given")).largest,
+            Some(spin) => spin.velocity.largest_until(scene.run.duration.expect("given")).0,
             None => scene.initial.angular_velocity.norm(),
         };
         scene.requirements.motion.angular_velocity = range.map(|range| Range::Any(range * own));
@@ -126,6 +126,7 @@ fn idle(requirements: Requirements) -> Scene {
         watched: Vec::new(),
         requirements,
         source: None,
+        series: Vec::new(),
         resolved: false,
     }
 }

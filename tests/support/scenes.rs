@@ -6,7 +6,7 @@ use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
-    Axes, History, Initial, Load, ModeStart, Point, Requirements, Run, Scene, Scheme, Spin,
+    Axes, History, Initial, Load, ModeStart, Point, Requirements, Run, Scene, Scheme, Spin, VectorHistory,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -33,6 +33,7 @@ pub fn nothing_happens(name: &str, duration: f64, tolerance: f64) -> Scene {
         watched: Vec::new(),
         requirements: Default::default(),
         source: None,
+        series: Vec::new(),
         resolved: false,
     }
 }
@@ -184,10 +185,12 @@ impl Doing {
             let along = Vector3::new(along[0], along[1], if plane { 0.0 } else { along[2] });
             Load {
                 at: node(*at),
-                force: along * (part * force),
-                torque: Vector3::zeros(),
+                force: VectorHistory::Along {
+                    direction: along * (part * force),
+                    factor: over.history(1.0, duration, &rates),
+                },
+                torque: VectorHistory::nothing(),
                 axes: if *fixed { Axes::World } else { Axes::Body },
-                history: over.history(1.0, duration, &rates),
             }
         };
         let mut modes: Vec<ModeStart> = Vec::new();
@@ -218,9 +221,12 @@ impl Doing {
             gravity: None,
             loads: self.pushes.iter().map(load).collect(),
             spin: (!free).then(|| Spin {
-                axis,
+                velocity: VectorHistory::Along {
+                    direction: axis,
+                    factor: self.spin.history(rate, duration, &rates),
+                },
                 axes: Axes::Body,
-                rate: self.spin.history(rate, duration, &rates),
+                start: None,
                 hold: true,
             }),
             carried: None,
@@ -230,6 +236,7 @@ impl Doing {
                 ..Default::default()
             },
             source: None,
+            series: Vec::new(),
             resolved: false,
         }
     }

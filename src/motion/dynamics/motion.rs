@@ -4,7 +4,7 @@ use super::{
     Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Prescribed, Snapshot,
 };
 use crate::numerics::integration::{Failure, Oscillator, System};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Deformations below this part of the size of the body count as this much, so that a body at rest has a scale.
 const LEAST_DEFORMATION: f64 = 1e-6;
@@ -17,8 +17,9 @@ pub trait Surroundings {
     /// Adds the generalised forces (F, tau, Q) in body axes at the state of `evaluation` ([`EquationsOfMotion`]).
     fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]);
 
-    /// Rigid motion that is prescribed: velocities (V, omega), and their rates. Nothing unless said.
-    fn prescribed(&self, _time: f64) -> (Prescribed, Prescribed) {
+    /// Rigid motion that is prescribed of a frame with these axes: velocities (V, omega) along them, and the rates of their components.
+    /// Nothing unless said.
+    fn prescribed(&self, _time: f64, _axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         (Prescribed::NOTHING, Prescribed::NOTHING)
     }
 }
@@ -260,7 +261,7 @@ impl<'a> Motion<'a> {
         let (rigid, modal) = self.momenta.split_at_mut(equations.n_rigid());
         equations.put_rigid(place.axes.tr_mul(&linear), place.axes.tr_mul(&angular), rigid);
         modal.copy_from_slice(&state[layout.modal()..layout.offset()]);
-        let (velocities, rates) = self.surroundings.prescribed(time);
+        let (velocities, rates) = self.surroundings.prescribed(time, &place.axes);
         self.evaluation
             .set_momenta(&state[Layout::MODES..layout.linear()], &self.momenta, &velocities)
             .map_err(|_| not_positive_definite())?;

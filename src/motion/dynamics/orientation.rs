@@ -59,9 +59,43 @@ impl EulerParameters {
         Self(self.0.map(|p| p / length))
     }
 
+    /// Those of the rotation with these axes as columns, from the largest of the four (Shepperd, J. Guidance and Control 1, 1978).
+    pub fn of_axes(axes: &Matrix3<f64>) -> Self {
+        let a = |i: usize, j: usize| axes[(i, j)];
+        let trace = axes.trace();
+        // 4 p_i p_j in row i, for the row of the largest square.
+        let squares = [
+            1.0 + trace,
+            1.0 - trace + 2.0 * a(0, 0),
+            1.0 - trace + 2.0 * a(1, 1),
+            1.0 - trace + 2.0 * a(2, 2),
+        ];
+        let skew = [a(2, 1) - a(1, 2), a(0, 2) - a(2, 0), a(1, 0) - a(0, 1)];
+        let sum = |i: usize, j: usize| a(i, j) + a(j, i);
+        let products = [
+            [squares[0], skew[0], skew[1], skew[2]],
+            [skew[0], squares[1], sum(0, 1), sum(0, 2)],
+            [skew[1], sum(0, 1), squares[2], sum(1, 2)],
+            [skew[2], sum(0, 2), sum(1, 2), squares[3]],
+        ];
+        let largest = (1..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+        Self(products[largest]).normalised()
+    }
+
     /// p' = G'omega / 4.
     pub fn rate(&self, omega: &Vector3<f64>) -> [f64; 4] {
         (self.map().tr_mul(omega) * 0.25).into()
+    }
+}
+
+impl From<EulerParameters> for RotationVector {
+    /// The shortest one: 2 e / |e| atan2(|e|, p0) with p0 >= 0.
+    fn from(EulerParameters([p0, p1, p2, p3]): EulerParameters) -> Self {
+        let sign = if p0 < 0.0 { -1.0 } else { 1.0 };
+        let e = Vector3::new(p1, p2, p3) * sign;
+        let sin = e.norm();
+        let angle = 2.0 * sin.atan2(sign * p0);
+        Self(if sin > 0.0 { e * (angle / sin) } else { e * 2.0 })
     }
 }
 
@@ -109,6 +143,11 @@ const SMALL: f64 = 1.0;
 const TERMS: u32 = 10;
 
 impl RotationVector {
+    /// The shortest one of the rotation with these axes as columns.
+    pub fn of_axes(axes: &Matrix3<f64>) -> Self {
+        Self::from(EulerParameters::of_axes(axes))
+    }
+
     /// sin f / f, b = (1 - cos f) / f^2, c = (f - sin f) / f^3 and b'/f, c'/f with b' = db/df.
     fn coefficients(&self) -> [f64; 5] {
         let square = self.0.norm_squared();

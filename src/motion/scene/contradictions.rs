@@ -28,6 +28,12 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
             }
         };
         refuse("angular_velocity", by);
+        let carried_spin = table_of(top, "carried").and_then(|carried| table_of(carried, "spin"));
+        let has_attitude =
+            |table: Option<&Table>| table.is_some_and(|table| table.contains_key("attitude_from"));
+        let by_attitude = (has_attitude(spin) || has_attitude(carried_spin))
+            .then_some("`attitude_from` says which attitude the body starts with");
+        refuse("rotation", by_attitude);
         refuse("velocity", by.filter(|_| carried).or(holds.then_some("`hold` of [spin] holds the body")));
         if !initial.contains_key("angular_velocity") {
             refuse("axes", Some("there is no `angular_velocity` along them"));

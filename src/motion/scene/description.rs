@@ -1,9 +1,10 @@
 //! A scene as data. Numbers are in the units of the body that it is for.
 
-use super::{Axes, History, Requirements};
+use super::{Axes, Requirements, VectorHistory};
 use crate::base::provenance::SourceFile;
-use crate::motion::dynamics::Terms;
-use nalgebra::Vector3;
+use crate::motion::dynamics::{RotationVector, Terms};
+use nalgebra::{Matrix3, Vector3};
+use std::path::PathBuf;
 
 /// A scene: start, loads and prescribed motion of a body, and how that is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,8 @@ pub struct Scene {
     pub requirements: Requirements,
     /// The file that it was read from.
     pub source: Option<SourceFile>,
+    /// The files that its histories were read from.
+    pub series: Vec<SeriesFile>,
     /// Whether its vectors are along the axes of a body in its [`Stage`](super::Stage), and its start is that of this body's frame.
     pub resolved: bool,
 }
@@ -44,8 +47,8 @@ impl Scene {
 
     /// Times at which something is not smooth, ascending.
     pub fn breaks(&self) -> Vec<f64> {
-        let loads = self.loads.iter().map(|load| &load.history);
-        let mut times: Vec<f64> = loads.chain(self.driving()).flat_map(History::breaks).collect();
+        let mut times: Vec<f64> =
+            self.acting().chain(self.driving()).flat_map(VectorHistory::breaks).collect();
         times.sort_by(f64::total_cmp);
         times.dedup();
         times
@@ -53,11 +56,11 @@ impl Scene {
 }
 
 impl Scene {
-    /// Axis and angular velocity of a prescribed rotation, of the frame or of the interface that carries the body.
-    pub fn rotation(&self) -> Option<(&Vector3<f64>, &History)> {
+    /// Angular velocity of a prescribed rotation, of the frame or of the interface that carries the body.
+    pub fn rotation(&self) -> Option<&VectorHistory> {
         let carried = self.carried.as_ref().and_then(|carried| carried.spin.as_ref());
-        let spin = self.spin.as_ref().map(|spin| (&spin.axis, &spin.rate));
-        spin.or(carried.map(|spin| (&spin.axis, &spin.rate)))
+        let spin = self.spin.as_ref().map(|spin| &spin.velocity);
+        spin.or(carried.map(|spin| &spin.velocity))
     }
 
     /// Whether the motion of the frame, or of the interface that carries the body, is prescribed.
@@ -69,17 +72,22 @@ impl Scene {
     pub fn turning_faster(&self, factor: f64) -> Self {
         let mut scene = self.clone();
         let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
-        for rate in scene.spin.iter_mut().map(|s| &mut s.rate).chain(carried.map(|s| &mut s.rate)) {
-            *rate = rate.scaled(factor);
+        let velocities = scene.spin.iter_mut().map(|spin| &mut spin.velocity);
+        for velocity in velocities.chain(carried.map(|spin| &mut spin.velocity)) {
+            *velocity = velocity.scaled(factor);
         }
         scene
     }
 
+    /// Histories of loads.
+    pub fn acting(&self) -> impl Iterator<Item = &VectorHistory> {
+        self.loads.iter().flat_map(|load| [&load.force, &load.torque])
+    }
+
     /// Histories of prescribed motion.
-    pub fn driving(&self) -> impl Iterator<Item = &History> {
+    pub fn driving(&self) -> impl Iterator<Item = &VectorHistory> {
         let translation = self.carried.as_ref().and_then(|carried| carried.translation.as_ref());
-        let rate = self.rotation().map(|(_, rate)| rate);
-        rate.into_iter().chain(translation.map(|translation| translation.drive.history()))
+        self.rotation().into_iter().chain(translation.map(Drive::history))
     }
 }
 
@@ -171,32 +179,70 @@ impl std::fmt::Display for Point {
     }
 }
 
-/// A force and a torque at a place, each times the history.
+/// A file that a history was read from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SeriesFile {
+    /// Where it lies.
+    pub path: PathBuf,
+    /// Its name and fingerprint.
+    pub source: SourceFile,
+}
+
+/// A force and a torque at a place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
     /// Where it acts.
     pub at: Point,
     /// Force.
-    pub force: Vector3<f64>,
+    pub force: VectorHistory,
     /// Torque.
-    pub torque: Vector3<f64>,
+    pub torque: VectorHistory,
     /// Axes of both.
     pub axes: Axes,
-    /// Factor over time.
-    pub history: History,
+}
+
+impl Load {
+    /// Force and torque at a time, along the axes of the load.
+    pub fn at_time(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
+        (self.force.at(time).0, self.torque.at(time).0)
+    }
 }
 
 /// Prescribed angular velocity of the body frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spin {
-    /// Direction, of length one.
-    pub axis: Vector3<f64>,
-    /// Axes of the direction, which turns with the body.
+    /// Angular velocity.
+    pub velocity: VectorHistory,
+    /// Its axes. Those of the world are, of a direction that does not change, the axes of the world at time zero, with which it turns; of
+    /// columns, axes that are fixed in space.
     pub axes: Axes,
-    /// Angular velocity about it.
-    pub rate: History,
+    /// The attitude at time zero of the model, or where `axes` are those of the body of its frame, instead of that of [`Initial`].
+    pub start: Option<RotationVector>,
     /// Whether the centre of mass of the undeformed body is held where it is.
     pub hold: bool,
+}
+
+impl Spin {
+    /// Angular velocity and acceleration at a time along axes of the model that have the `attitude`, of a scene that is on its
+    /// [`Stage`](super::Stage).
+    pub fn at(&self, time: f64, attitude: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        turning(&self.velocity, self.axes, time, attitude)
+    }
+}
+
+/// Angular velocity and acceleration along axes of the model that have the `attitude`. Turned with the body, the rate of an angular velocity is the
+/// same vector as seen from the world: omega x omega = 0.
+fn turning(
+    velocity: &VectorHistory,
+    axes: Axes,
+    time: f64,
+    attitude: &Matrix3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let (omega, alpha) = velocity.at(time);
+    match axes {
+        Axes::World => (attitude.tr_mul(&omega), attitude.tr_mul(&alpha)),
+        Axes::Model | Axes::Body => (omega, alpha),
+    }
 }
 
 /// An interface, or a node with rotations, whose motion is prescribed; the rest of the body hangs from it. Without motion it is held.
@@ -204,57 +250,58 @@ pub struct Spin {
 pub struct Carried {
     /// The interface or node that carries the body.
     pub by: Point,
-    /// Rotation about an axis.
+    /// Rotation.
     pub spin: Option<CarriedSpin>,
-    /// Motion along a direction.
-    pub translation: Option<Translation>,
+    /// Motion along with that.
+    pub translation: Option<Drive>,
 }
 
-/// Rotation of what carries a body, about an axis that is fixed to it.
+/// Rotation of what carries a body, about a point that is fixed to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CarriedSpin {
-    /// Direction, of length one.
-    pub axis: Vector3<f64>,
-    /// Axes of the direction.
+    /// Angular velocity.
+    pub velocity: VectorHistory,
+    /// Its axes, as those of a [`Spin`].
     pub axes: Axes,
+    /// The attitude at time zero, as that of a [`Spin`].
+    pub start: Option<RotationVector>,
     /// A point of the axis in model coordinates; `None`: the reference point of what is carried.
     pub through: Option<Vector3<f64>>,
-    /// Angular velocity.
-    pub rate: History,
 }
 
-/// Motion of what carries a body, axis of rotation and all, along a direction that is fixed in space.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Translation {
-    /// Direction, of length one, world axes.
-    pub direction: Vector3<f64>,
-    /// How far, how fast or with what acceleration.
-    pub drive: Drive,
+impl CarriedSpin {
+    /// As [`Spin::at`].
+    pub fn at(&self, time: f64, attitude: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        turning(&self.velocity, self.axes, time, attitude)
+    }
 }
 
-/// A motion along a line, given by one of its derivatives. It starts at zero.
+/// Motion of what carries a body, axis of rotation and all, along axes of the world, given by one of its derivatives. It starts at zero.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
     /// The way, of two continuous derivatives.
-    Displacement(History),
+    Displacement(VectorHistory),
     /// The velocity.
-    Velocity(History),
+    Velocity(VectorHistory),
     /// The acceleration of a motion that starts at rest.
-    Acceleration(History),
+    Acceleration(VectorHistory),
 }
 
 impl Drive {
     /// The history of the way, the velocity or the acceleration, whichever is given.
-    pub fn history(&self) -> &History {
+    pub fn history(&self) -> &VectorHistory {
         match self {
             Self::Displacement(history) | Self::Velocity(history) | Self::Acceleration(history) => history,
         }
     }
 
     /// Velocity and acceleration at a time.
-    pub fn at(&self, time: f64) -> (f64, f64) {
+    pub fn at(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
         match self {
-            Self::Displacement(way) => (way.at(time).1, way.curvature(time)),
+            Self::Displacement(way) => {
+                let [_, velocity, acceleration] = way.derivatives(time);
+                (velocity, acceleration)
+            }
             Self::Velocity(velocity) => velocity.at(time),
             Self::Acceleration(acceleration) => (acceleration.integral(time), acceleration.at(time).0),
         }

@@ -1,6 +1,6 @@
 //! How long the steps of an integration may be, and how many there are, before it begins.
 
-use super::{History, Scene, Scheme};
+use super::{Scene, Scheme};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
@@ -15,19 +15,14 @@ const STEPS_PER_OSCILLATION: f64 = 2.0;
 /// Longest explicit step that is stable, as the angle that the fastest mode turns in it.
 const STABLE: f64 = 6.0;
 
-/// Frequency of the fastest history, in oscillations per time; zero without any that oscillates.
-fn fastest_history(scene: &Scene) -> f64 {
-    let histories = scene.loads.iter().map(|load| &load.history);
-    let frequency = |history: &History| match history {
-        History::Sine { amplitude, frequency, .. } if *amplitude != 0.0 => frequency.abs(),
-        _ => 0.0,
-    };
-    histories.chain(scene.driving()).map(frequency).fold(0.0, f64::max)
+/// Frequency of the fastest history of a scene that lasts `duration`, in oscillations per time; zero without any that oscillates.
+fn fastest_history(scene: &Scene, duration: f64) -> f64 {
+    scene.acting().chain(scene.driving()).map(|history| history.frequency_until(duration)).fold(0.0, f64::max)
 }
 
 /// Longest explicit step for the histories of a scene that lasts `duration`.
 pub(super) fn longest_step(scene: &Scene, duration: f64) -> f64 {
-    duration.min(1.0 / (STEPS_PER_OSCILLATION * fastest_history(scene)))
+    duration.min(1.0 / (STEPS_PER_OSCILLATION * fastest_history(scene, duration)))
 }
 
 /// Steps that an integration takes at the least.
@@ -45,7 +40,7 @@ impl Effort {
     /// FB551 where the step is given and longer than half a period of a load.
     pub fn plan(body: &FlexBody, scene: &Scene, duration: f64) -> Result<(Scheme, Self)> {
         let fastest_mode = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt() / TAU;
-        let fastest_load = fastest_history(scene);
+        let fastest_load = fastest_history(scene, duration);
         let load_in_words = format!("a load or spin oscillates {fastest_load:.3e} times per time");
         let mode_in_words = format!("the fastest mode oscillates {fastest_mode:.3e} times per time");
         match scene.run.scheme {

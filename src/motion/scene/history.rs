@@ -1,5 +1,7 @@
 //! Values that change with time.
 
+use super::samples::{Samples, Sizes};
+use nalgebra::Vector1;
 use std::f64::consts::TAU;
 
 /// A value as a function of time.
@@ -35,6 +37,8 @@ pub enum History {
         /// Duration of the ramp.
         duration: f64,
     },
+    /// Given at many times.
+    Samples(Samples<1>),
 }
 
 impl History {
@@ -61,6 +65,10 @@ impl History {
                 let x = ((time - start) / duration).clamp(0.0, 1.0);
                 let (sin, cos) = (TAU * x).sin_cos();
                 (from + (to - from) * (x - sin / TAU), (to - from) * (1.0 - cos) / duration)
+            }
+            Self::Samples(samples) => {
+                let sample = samples.at(time);
+                (sample.value[0], sample.rate[0])
             }
         }
     }
@@ -92,6 +100,7 @@ impl History {
                 };
                 from * time + (to - from) * (risen(time) - risen(0.0))
             }
+            Self::Samples(samples) => samples.integral(time)[0],
         }
     }
 
@@ -104,11 +113,16 @@ impl History {
                 let x = ((time - start) / duration).clamp(0.0, 1.0);
                 (to - from) * TAU * (TAU * x).sin() / (duration * duration)
             }
+            Self::Samples(samples) => samples.at(time).second[0],
         }
     }
 
     /// The largest magnitude of the value and of the rate from time zero to a time; of a sine at any time.
     pub fn largest_until(&self, end: f64) -> (f64, f64) {
+        if let Self::Samples(samples) = self {
+            let Sizes { largest, rate, .. } = samples.sizes_until(end);
+            return (largest, rate);
+        }
         let inner = self.breaks().into_iter().filter(|&time| 0.0 < time && time < end);
         let ends = [0.0].into_iter().chain(inner).chain(end.is_finite().then_some(end));
         let (mut value, mut rate) = (0.0f64, 0.0f64);
@@ -132,6 +146,7 @@ impl History {
         match self {
             Self::Sine { amplitude, .. } => *amplitude == 0.0,
             Self::Ramp { from, to, start, .. } => *from == 0.0 && (*to == 0.0 || *start >= end),
+            Self::Samples(samples) => samples.is_zero_until(end),
             _ => {
                 let inner = self.breaks().into_iter().filter(|&time| 0.0 < time && time < end);
                 [0.0, end].into_iter().chain(inner).all(|time| self.at(time).0 == 0.0)
@@ -153,6 +168,7 @@ impl History {
             Self::Ramp { from, to, start, duration } => {
                 Self::Ramp { from: factor * from, to: factor * to, start: *start, duration: *duration }
             }
+            Self::Samples(samples) => Self::Samples(samples.scaled(factor)),
         }
     }
 
@@ -162,12 +178,38 @@ impl History {
             Self::Constant(_) | Self::Sine { .. } => Vec::new(),
             Self::Table { times, .. } => times.clone(),
             Self::Ramp { start, duration, .. } => vec![*start, start + duration],
+            Self::Samples(samples) => samples.breaks(),
         }
+    }
+
+    /// Whether it has two derivatives everywhere, but for ends outside of which it holds.
+    pub fn is_smooth(&self) -> bool {
+        match self {
+            Self::Table { .. } => false,
+            Self::Samples(samples) => samples.is_smooth(),
+            Self::Constant(_) | Self::Sine { .. } | Self::Ramp { .. } => true,
+        }
+    }
+
+    /// Oscillations per time from time zero to a time; zero of what does not oscillate.
+    pub fn frequency_until(&self, end: f64) -> f64 {
+        match self {
+            Self::Sine { amplitude, frequency, .. } if *amplitude != 0.0 => frequency.abs(),
+            Self::Samples(samples) => samples.frequency_until(end),
+            _ => 0.0,
+        }
+    }
+
+    /// Values at ascending times, and what lies between them; as [`Samples::new`].
+    pub fn samples(times: Vec<f64>, values: &[f64], interpolation: super::Interpolation, held: bool) -> Self {
+        let values: Vec<Vector1<f64>> = values.iter().map(|&value| Vector1::new(value)).collect();
+        Self::Samples(Samples::new(times, &values, interpolation, held))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Interpolation;
     use super::*;
 
     #[test]
@@ -177,6 +219,13 @@ mod tests {
             History::Table { times: vec![0.0, 1.0, 3.0], values: vec![1.0, 2.0, -2.0] },
             History::Sine { amplitude: 3.0, frequency: 0.7, phase: 0.2 },
             History::Ramp { from: 1.0, to: -2.0, start: 0.5, duration: 2.0 },
+            History::samples(
+                vec![-1.0, 0.3, 1.1, 2.0, 5.0],
+                &[1.0, 2.0, -2.0, 0.5, 1.0],
+                Interpolation::Cubic,
+                false,
+            ),
+            History::samples(vec![-1.0, 0.3, 3.0], &[1.0, 2.0, -2.0], Interpolation::Linear, true),
         ];
         for history in histories {
             for i in 0..60 {
@@ -188,7 +237,7 @@ mod tests {
                 };
                 near(slope_of(&|t| history.at(t).0), history.at(time).1);
                 near(slope_of(&|t| history.integral(t)), history.at(time).0);
-                if !matches!(history, History::Table { .. }) {
+                if history.is_smooth() {
                     near(slope_of(&|t| history.at(t).1), history.curvature(time));
                 }
                 let (value, rate) = history.largest_until(4.0);

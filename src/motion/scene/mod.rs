@@ -12,19 +12,24 @@ mod lively;
 mod peak;
 mod prepared;
 mod read;
+mod read_attitude;
 mod read_carried;
+mod read_columns;
+mod read_numbers;
 mod read_requirements;
 mod read_values;
 mod recording;
 mod requirements;
+mod samples;
 mod simulate;
 mod stage;
 mod surroundings;
 mod trace;
+mod vector_history;
 
 pub use axes::Axes;
 pub use description::{
-    Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, Spin, Translation,
+    Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, SeriesFile, Spin,
 };
 pub(crate) use errors::LEAST_REACTION;
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
@@ -36,7 +41,9 @@ pub(crate) use prepared::{damped, ends_a_run};
 pub use read::read_scene;
 pub use recording::{Path, Recording, Resolution, Setting};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+pub use samples::{Interpolation, Sample, Samples, Sizes};
 pub use simulate::simulate;
 pub use stage::Stage;
 pub(crate) use surroundings::points_of;
 pub use trace::{Trace, trace, trace_at};
+pub use vector_history::VectorHistory;

@@ -8,7 +8,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
 use crate::motion::dynamics::{
-    BodyPoint, Configuration, EquationsOfMotion, Motion, RotationVector, Surroundings,
+    BodyPoint, Configuration, EquationsOfMotion, Motion, Orientation, RotationVector, Surroundings,
 };
 use crate::numerics::integration::{
     Explicit, Failure, Gauss, Method, Sight, System, Work, integrate_closely,
@@ -171,10 +171,11 @@ fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configurat
     for start in &initial.modes {
         (q[start.mode], qd[start.mode]) = (start.amplitude, start.rate);
     }
-    let prescribed = forces.prescribed(0.0).0;
+    let attitude = RotationVector(initial.rotation);
+    let prescribed = forces.prescribed(0.0, &attitude.axes()).0;
     Configuration {
         origin: initial.origin,
-        attitude: RotationVector(initial.rotation).into(),
+        attitude: attitude.into(),
         velocity: prescribed.linear.unwrap_or(initial.velocity),
         omega: prescribed.angular.unwrap_or(initial.angular_velocity),
         q,

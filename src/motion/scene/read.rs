@@ -1,12 +1,15 @@
 //! Reads `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
 use super::contradictions::contradictions;
+use super::read_attitude::turning;
 use super::read_carried::carried;
+use super::read_columns::{HistoryFiles, columns_history};
+use super::read_numbers::{finite, place_of, positive};
 use super::read_requirements::{self, requirements};
-use super::read_values::{
-    EVERY, axes, direction, finite, history, list, mode_number, place, place_of, positive, transposed, vector,
+use super::read_values::{EVERY, axes, history, list, mode_number, place, transposed, vector};
+use super::{
+    Axes, History, Initial, Interpolation, Load, ModeStart, Run, Scene, Scheme, Spin, VectorHistory,
 };
-use super::{Axes, History, Initial, Load, ModeStart, Run, Scene, Scheme, Spin};
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;
 use crate::base::provenance::SourceFile;
@@ -22,8 +25,9 @@ const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance
 const INITIAL: &[&str] =
     &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
 const MODE: &[&str] = &["number", "amplitude", "rate"];
-const LOAD: &[&str] = &["node", "interface", "force", "torque", "axes", "history"];
-const SPIN: &[&str] = &["axis", "axes", "rate", "hold"];
+const LOAD: &[&str] =
+    &["node", "interface", "force", "torque", "force_from", "torque_from", "axes", "history"];
+const SPIN: &[&str] = &["axis", "axes", "rate", "angular_velocity_from", "attitude_from", "hold"];
 const WATCH: &[&str] = &["node", "interface"];
 /// Instants recorded unless said.
 const OUTPUTS: i64 = 500;
@@ -40,8 +44,8 @@ const TOLERANCES: Range<f64> = 1e-14..0.1;
 /// Reads a scene.
 ///
 /// # Errors
-/// FB101, FB106 when it cannot be read; FB211 for syntax, unknown, missing or mistyped keys and values that cannot be. All of them,
-/// in the order of lines.
+/// FB101, FB106 when it or a file of its histories cannot be read; FB211 for syntax, unknown, missing or mistyped keys and values that cannot
+/// be; FB213 for what contradicts itself; FB215 to FB217 for what is wrong in files of histories. All of them, in the order of lines.
 pub fn read_scene(path: impl AsRef<Path>) -> Result<Scene> {
     let path = path.as_ref();
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -61,10 +65,11 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         Some((table, _)) => initial(walk, table),
         None => Some(Initial::default()),
     };
+    let files = HistoryFiles::new(run.as_ref());
     let gravity = top.get("gravity").map(|value| vector(walk, "gravity", value));
-    let loads = list(walk, top, "load", load);
-    let spin = walk.table(top, "spin").map(|(table, span)| spin(walk, table, span));
-    let carried = walk.table(top, "carried").map(|(table, span)| carried(walk, table, span));
+    let loads = list(walk, top, "load", |walk, table, span| load(walk, &files, table, span));
+    let spin = walk.table(top, "spin").map(|(table, span)| spin(walk, &files, table, span));
+    let carried = walk.table(top, "carried").map(|(table, span)| carried(walk, &files, table, span));
     let watched = list(walk, top, "watch", |walk, table, span| {
         walk.known_keys(table, "[[watch]]", WATCH);
         place(walk, table, span)
@@ -82,6 +87,7 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         watched: watched?,
         requirements: requirements?,
         source: Some(SourceFile::new("scene", walk.path, walk.fingerprint())),
+        series: files.into_files(),
         resolved: false,
     })
 }
@@ -237,42 +243,41 @@ fn settled(walk: &mut Walk<'_>, value: &Value) -> Option<bool> {
     settled
 }
 
-fn load(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Load> {
+fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<Load> {
     walk.known_keys(table, "[[load]]", LOAD);
     let at = place(walk, table, span.clone());
-    let force = table.get("force").map(|value| vector(walk, "force", value));
-    let torque = table.get("torque").map(|value| vector(walk, "torque", value));
-    if force.is_none() && torque.is_none() {
-        walk.wrong(span, "load has neither `force` nor `torque`".to_owned());
-    }
-    let axes = axes(walk, table, &EVERY, Axes::World);
-    let history = match table.get("history") {
-        Some(value) => history(walk, "history", value),
+    let factor = match table.get("history") {
+        Some(value) => history(walk, files, "history", value),
         None => Some(History::Constant(1.0)),
     };
-    Some(Load {
-        at: at?,
-        force: force.unwrap_or(Some(Vector3::zeros()))?,
-        torque: torque.unwrap_or(Some(Vector3::zeros()))?,
-        axes: axes?,
-        history: history?,
-    })
-}
-
-fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Spin> {
-    walk.known_keys(table, "[spin]", SPIN);
-    let axis = match table.contains_key("axis") {
-        true => direction(walk, table, "axis"),
-        false => Some(Vector3::z()),
-    };
-    let axes = axes(walk, table, &EVERY, Axes::Model);
-    let rate = match table.get("rate") {
-        Some(value) => history(walk, "rate", value),
-        None => {
-            walk.wrong(span, "key `rate` is missing in [spin]".to_owned());
+    let has = |key: &str| table.contains_key(key);
+    if !["force", "torque", "force_from", "torque_from"].into_iter().any(has) {
+        walk.wrong(span.clone(), "load has neither `force` nor `torque`".to_owned());
+    }
+    if has("history") && !has("force") && !has("torque") && (has("force_from") || has("torque_from")) {
+        let message = "`history` is given, but there is no `force` or `torque` that it is a factor of: columns have theirs";
+        walk.complain(Code::SceneContradicts, span.clone(), message.to_owned());
+    }
+    let mut part = |key: &str, key_of_columns: &str| match (table.get(key), table.get(key_of_columns)) {
+        (None, None) => Some(VectorHistory::nothing()),
+        (Some(value), None) => {
+            let direction = vector(walk, key, value)?;
+            Some(VectorHistory::Along { direction, factor: factor.clone()? })
+        }
+        (None, Some(value)) => columns_history(walk, files, key_of_columns, value, Interpolation::Linear),
+        (Some(_), Some(value)) => {
+            let message = format!("load has both `{key}` and `{key_of_columns}`");
+            walk.complain(Code::SceneContradicts, value.span(), message);
             None
         }
     };
+    let (force, torque) = (part("force", "force_from"), part("torque", "torque_from"));
+    let axes = axes(walk, table, &EVERY, Axes::World);
+    Some(Load { at: at?, force: force?, torque: torque?, axes: axes? })
+}
+
+fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<Spin> {
+    walk.known_keys(table, "[spin]", SPIN);
     let hold = match table.get("hold").map(|value| (value, value.get_ref())) {
         None => Some(false),
         Some((_, DeValue::Boolean(hold))) => Some(*hold),
@@ -281,12 +286,15 @@ fn spin(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Spin> 
             None
         }
     };
-    Some(Spin { axis: axis?, axes: axes?, rate: rate?, hold: hold? })
+    let turning = turning(walk, files, table, span, "[spin]")?;
+    Some(Spin { velocity: turning.velocity, axes: turning.axes, start: turning.start, hold: hold? })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::read_attitude::ATTITUDE;
     use super::super::read_carried::{CARRIED, CARRIED_SPIN, TRANSLATION};
+    use super::super::read_columns::{COLUMN, COLUMNS};
     use super::super::read_values::HISTORIES;
     use super::*;
 
@@ -305,9 +313,12 @@ mod tests {
             ("/properties/carried/properties/spin/properties", CARRIED_SPIN),
             ("/properties/carried/properties/translation/properties", TRANSLATION),
             ("/properties/watch/items/properties", WATCH),
-            ("/$defs/history/anyOf/1/properties", HISTORIES[0].1),
-            ("/$defs/history/anyOf/2/properties", HISTORIES[1].1),
-            ("/$defs/history/anyOf/3/properties", HISTORIES[2].1),
+            ("/$defs/history/anyOf/1/properties", HISTORIES[1].1),
+            ("/$defs/history/anyOf/2/properties", HISTORIES[2].1),
+            ("/$defs/history/anyOf/3/properties", HISTORIES[3].1),
+            ("/$defs/history/anyOf/4/properties", COLUMN),
+            ("/$defs/columns/properties", COLUMNS),
+            ("/$defs/attitude/properties", ATTITUDE),
         ];
         let required = read_requirements::TABLES;
         let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));

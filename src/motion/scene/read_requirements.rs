@@ -1,7 +1,8 @@
 //! Reads the tables of a scene that say what is demanded of the body.
 
 use super::Axes;
-use super::read_values::{axes, finite, list, mode_number, place_of, positive, vector};
+use super::read_numbers::{finite, place_of, positive};
+use super::read_values::{axes, list, mode_number, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 use crate::input::{Table, Value, Walk, integer, real};
 use nalgebra::{Matrix3, Vector3};

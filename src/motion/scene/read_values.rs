@@ -2,7 +2,9 @@
 //!
 //! Every function gives `None` only with something in `found`.
 
-use super::{Axes, History, Point};
+use super::read_columns::{COLUMN, HistoryFiles, column_history, interpolation};
+use super::read_numbers::{finite, positive};
+use super::{Axes, History, Interpolation, Point};
 use crate::input::{Table, Value, Walk, integer, real};
 use nalgebra::Vector3;
 use std::ops::Range;
@@ -12,8 +14,9 @@ use toml::de::DeValue;
 pub(super) const EVERY: [Axes; 3] = [Axes::Model, Axes::Body, Axes::World];
 
 /// Kinds of histories, and the keys of their tables.
-pub(super) const HISTORIES: [(&str, &[&str]); 3] = [
-    ("a table of points", &["times", "values"]),
+pub(super) const HISTORIES: [(&str, &[&str]); 4] = [
+    ("a column of a file", COLUMN),
+    ("a table of points", &["times", "values", "interpolation"]),
     ("a sine", &["amplitude", "frequency", "phase"]),
     ("a ramp", &["from", "to", "start", "duration"]),
 ];
@@ -91,8 +94,13 @@ pub(super) fn place(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> O
 }
 
 /// A number, or a table of one of the kinds of histories.
-pub(super) fn history(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<History> {
-    const EXPECTED: &str = "a number or a table { times, values }, { amplitude, frequency, phase } or { from, to, start, duration }";
+pub(super) fn history(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    key: &str,
+    value: &Value,
+) -> Option<History> {
+    const EXPECTED: &str = "a number or a table { times, values }, { amplitude, frequency, phase }, { from, to, start, duration } or { file, time, value }";
     let table = match value.get_ref() {
         DeValue::Table(table) => table,
         _ => {
@@ -103,7 +111,9 @@ pub(super) fn history(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<H
             return number.map(History::Constant);
         }
     };
-    let kind = HISTORIES.iter().position(|(_, keys)| keys.iter().any(|key| table.contains_key(*key)));
+    // The kind that most of the keys belong to, the first of several.
+    let fitting = |kind: usize| HISTORIES[kind].1.iter().filter(|key| table.contains_key(**key)).count();
+    let kind = (0..HISTORIES.len()).rev().max_by_key(|&kind| fitting(kind)).filter(|&kind| fitting(kind) > 0);
     let Some(kind) = kind else {
         walk.wrong(value.span(), format!("`{key}` is empty, expected {EXPECTED}"));
         return None;
@@ -114,8 +124,9 @@ pub(super) fn history(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<H
     let mut or_zero =
         |key: &str| if table.contains_key(key) { finite(walk, table, key, &span) } else { Some(0.0) };
     match kind {
-        0 => points(walk, table, span),
-        1 => {
+        0 => column_history(walk, files, table, &span),
+        1 => points(walk, table, span),
+        2 => {
             let phase = or_zero("phase");
             let (amplitude, frequency) =
                 (finite(walk, table, "amplitude", &span), positive(walk, table, "frequency", &span));
@@ -142,13 +153,16 @@ fn points(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Hist
         list
     };
     let (times, values) = (numbers("times"), numbers("values"));
-    let (times, values) = (times?, values?);
+    let interpolation = interpolation(walk, table, Interpolation::Linear);
+    let (times, values, interpolation) = (times?, values?, interpolation?);
     let problem = if times.len() != values.len() {
         format!("{} times and {} values", times.len(), values.len())
     } else if times.is_empty() {
         "no points".to_owned()
     } else if times.windows(2).any(|pair| pair[0] >= pair[1]) {
         "times are not ascending".to_owned()
+    } else if interpolation == Interpolation::Cubic && times.len() > 1 {
+        return Some(History::samples(times, &values, Interpolation::Cubic, true));
     } else {
         return Some(History::Table { times, values });
     };
@@ -198,29 +212,4 @@ pub(super) fn vector(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<Ve
             None
         }
     }
-}
-
-/// A finite number that must be there.
-pub(super) fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
-    let number = walk.number(table, key, span)?;
-    if !number.is_finite() {
-        walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a finite number"));
-        return None;
-    }
-    Some(number)
-}
-
-/// A positive number that must be there.
-pub(super) fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
-    let number = finite(walk, table, key, span)?;
-    if number <= 0.0 {
-        walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a positive number"));
-        return None;
-    }
-    Some(number)
-}
-
-/// Where the value of `key` stands; `span` is that of its table.
-pub(super) fn place_of(table: &Table, key: &str, span: &Range<usize>) -> Range<usize> {
-    table.get(key).map_or_else(|| span.clone(), |value| value.span())
 }

@@ -3,7 +3,7 @@
 //! A flex-body file has its frame where the conversion put it, along principal axes as a rule. What a scene means does not depend on that:
 //! everything is computed in this frame, and vectors of the results are along its axes, which are those of the model.
 
-use super::{Axes, Load, Point, Range, Scene};
+use super::{Axes, Load, Point, Range, Scene, VectorHistory};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::{Carrier, FlexBody};
@@ -85,6 +85,7 @@ fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
 /// The scene with its vectors along the axes of the model; `axes` are those of the body in the model, `origin` is that of its frame.
 fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene {
     let mut scene = scene.clone();
+    start_with_the_motion(&mut scene, axes);
     let attitude = RotationVector(scene.initial.rotation).axes();
     let in_model = |vector: &mut Vector3<f64>, given: &mut Axes| {
         *vector = match given {
@@ -97,15 +98,22 @@ fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene 
     let initial = &mut scene.initial;
     initial.origin += attitude * origin;
     in_model(&mut initial.angular_velocity, &mut initial.axes);
+    let turn = |velocity: &mut VectorHistory, given: &mut Axes| match given {
+        Axes::Model => (),
+        // The axes of columns stay where they are in space, however the body turns.
+        Axes::World if velocity.direction().is_none() => (),
+        Axes::Body => (*velocity, *given) = (velocity.turned(axes), Axes::Model),
+        Axes::World => (*velocity, *given) = (velocity.turned(&attitude.transpose()), Axes::Model),
+    };
     if let Some(spin) = &mut scene.spin {
-        in_model(&mut spin.axis, &mut spin.axes);
+        turn(&mut spin.velocity, &mut spin.axes);
     }
     if let Some(spin) = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut()) {
-        in_model(&mut spin.axis, &mut spin.axes);
+        turn(&mut spin.velocity, &mut spin.axes);
     }
     for Load { force, torque, axes: given, .. } in &mut scene.loads {
         if *given == Axes::Body {
-            (*force, *torque, *given) = (axes * *force, axes * *torque, Axes::Model);
+            (*force, *torque, *given) = (force.turned(axes), torque.turned(axes), Axes::Model);
         }
     }
     let demands = &mut scene.requirements;
@@ -126,6 +134,18 @@ fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene 
     scene
 }
 
+/// The attitude at time zero is that of the prescribed motion, where that has one; `axes` are those of the body in the model.
+fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
+    let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
+    let spin = scene.spin.as_mut().map(|spin| (&mut spin.start, spin.axes));
+    let Some((start, of)) = spin.or(carried.map(|spin| (&mut spin.start, spin.axes))) else { return };
+    let Some(start) = start.take() else { return };
+    scene.initial.rotation = match of {
+        Axes::Body => RotationVector::of_axes(&(start.axes() * axes.transpose())).0,
+        Axes::Model | Axes::World => start.0,
+    };
+}
+
 /// Refuses a start or a prescribed rotation beyond what [motion] allows; `axes` are those of the body in the model.
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
@@ -136,18 +156,37 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
             "[motion] has the largest rotation that the body ever has, that of the scene included",
         ));
     };
-    let given = scene.spin.as_ref().map(|spin| (spin.axis, spin.axes, &spin.rate, "[spin]"));
+    let given = scene.spin.as_ref().map(|spin| (&spin.velocity, spin.axes, "[spin]"));
     let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
-    let carried = carried.map(|spin| (spin.axis, spin.axes, &spin.rate, "[carried.spin]"));
+    let carried = carried.map(|spin| (&spin.velocity, spin.axes, "[carried.spin]"));
     match given.or(carried) {
-        Some((axis, kind, rate, table)) => {
+        Some((history, kind, table)) => {
             let end = scene.run.duration.unwrap_or(f64::INFINITY);
-            let (velocity, acceleration) = rate.largest_until(end);
-            let axis = along_range(scene, axes, &axis, kind);
-            if is_beyond(&motion.angular_velocity, axis * velocity) {
+            let (velocity, acceleration) = history.largest_until(end);
+            let beyond =
+                |range: &Option<Range>, length: f64, components: fn(&VectorHistory, f64) -> Vector3<f64>| {
+                    let any_direction = matches!(range, Some(Range::Any(_)));
+                    match (history.direction(), kind) {
+                        // Which components a rotation about axes of the world has in the body is known when it has run.
+                        (None, Axes::World) => {
+                            range.is_some_and(|range| length > range.length() * (1.0 + ROUNDING))
+                        }
+                        _ if any_direction => is_beyond(range, Vector3::x() * length),
+                        (None, _) => {
+                            is_beyond(range, components(&in_range_axes(scene, axes, history, kind), end))
+                        }
+                        (Some(direction), _) => {
+                            let along = along_range(scene, axes, direction, kind).try_normalize(0.0);
+                            is_beyond(range, along.unwrap_or_default() * length)
+                        }
+                    }
+                };
+            if beyond(&motion.angular_velocity, velocity, |history, end| history.components_until(end).0) {
                 refuse(&format!("the rate {velocity} of {table}"), "angular_velocity");
             }
-            if is_beyond(&motion.angular_acceleration, axis * acceleration) {
+            if beyond(&motion.angular_acceleration, acceleration, |history, end| {
+                history.components_until(end).1
+            }) {
                 refuse(&format!("the acceleration {acceleration} of {table}"), "angular_acceleration");
             }
         }
@@ -160,6 +199,15 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
         }
     }
     if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// Columns that are `given` along axes that turn with the body, along those of the ranges in [motion].
+fn in_range_axes(scene: &Scene, axes: &Matrix3<f64>, history: &VectorHistory, given: Axes) -> VectorHistory {
+    match (given, scene.requirements.motion.axes) {
+        (Axes::Body, Axes::Model | Axes::World) => history.turned(axes),
+        (Axes::Model, Axes::Body) => history.turned(&axes.transpose()),
+        _ => history.clone(),
+    }
 }
 
 /// A vector that is `given` along some axes, along those of the ranges in [motion].
@@ -198,9 +246,7 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
     let end = scene.run.duration.unwrap_or(f64::INFINITY);
     for load in &scene.loads {
         let place = &load.at;
-        if load.force == Vector3::zeros() && load.torque == Vector3::zeros()
-            || load.history.is_zero_until(end)
-        {
+        if load.force.is_zero_until(end) && load.torque.is_zero_until(end) {
             tell(format!("the load at {place} is zero all the time"), leave);
         } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
             let message = format!(

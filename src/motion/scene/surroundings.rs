@@ -1,12 +1,10 @@
 //! A scene as forces and prescribed motion of one body.
 
-use super::{Axes, Carried, Load, Point, Scene, Spin};
+use super::{Axes, Carried, Load, Point, Scene, Spin, VectorHistory};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
-use crate::motion::dynamics::{
-    BodyPoint, Evaluation, Orientation, Place, Prescribed, RotationVector, Surroundings,
-};
+use crate::motion::dynamics::{BodyPoint, Evaluation, Place, Prescribed, Surroundings};
 use nalgebra::{Matrix3, Vector3};
 
 /// Gravity, loads and prescribed motion of a scene.
@@ -22,8 +20,6 @@ struct CarriedMotion<'a> {
     carried: &'a Carried,
     /// From the axis of rotation to the origin of the frame, its axes.
     arm: Vector3<f64>,
-    /// Axes of the frame at time zero.
-    start: Matrix3<f64>,
 }
 
 impl<'a> CarriedMotion<'a> {
@@ -31,28 +27,16 @@ impl<'a> CarriedMotion<'a> {
         let carried = scene.carried.as_ref()?;
         let through = carried.spin.as_ref().and_then(|spin| spin.through);
         let arm = through.map_or_else(Vector3::zeros, |through| body.frame().origin - through);
-        Some(Self { carried, arm, start: RotationVector(scene.initial.rotation).axes() })
+        Some(Self { carried, arm })
     }
 
-    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes of the frame.
-    fn at(&self, time: f64) -> (Prescribed, Prescribed) {
-        let zero = Vector3::zeros();
-        let (omega, alpha, turned) = match &self.carried.spin {
-            Some(spin) => {
-                let (rate, slope) = spin.rate.at(time);
-                let turned = RotationVector(spin.axis * spin.rate.integral(time)).axes();
-                (spin.axis * rate, spin.axis * slope, turned)
-            }
-            None => (zero, zero, Matrix3::identity()),
-        };
-        let (velocity, acceleration) = match &self.carried.translation {
-            Some(translation) => {
-                let (velocity, acceleration) = translation.drive.at(time);
-                let along = (self.start * turned).tr_mul(&translation.direction);
-                (along * velocity, along * acceleration)
-            }
-            None => (zero, zero),
-        };
+    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes A of the frame.
+    fn at(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
+        let nothing = (Vector3::zeros(), Vector3::zeros());
+        let (omega, alpha) = self.carried.spin.as_ref().map_or(nothing, |spin| spin.at(time, axes));
+        let (velocity, acceleration) =
+            self.carried.translation.as_ref().map_or(nothing, |drive| drive.at(time));
+        let (velocity, acceleration) = (axes.tr_mul(&velocity), axes.tr_mul(&acceleration));
         let linear = omega.cross(&self.arm) + velocity;
         let rate = alpha.cross(&self.arm) + acceleration - omega.cross(&velocity);
         (
@@ -87,7 +71,7 @@ impl<'a> SceneForces<'a> {
         let watched = scene.watched.iter().map(&mut points).collect();
         let loads: Option<Vec<_>> = scene.loads.iter().map(|load| Some((points(&load.at)?, load))).collect();
         for (point, load) in loads.iter().flatten() {
-            if load.torque != Vector3::zeros() && !point.turns() {
+            if !load.torque.is_nothing() && !point.turns() {
                 wrong(format!("no torque can act at {}: it has no orientation", load.at));
             }
         }
@@ -133,6 +117,8 @@ fn point(body: &FlexBody, scene: &Scene, place: &Point) -> std::result::Result<B
 fn leaving_the_plane(scene: &Scene) -> Vec<String> {
     let in_plane = |v: &Vector3<f64>| v.z == 0.0;
     let about_normal = |v: &Vector3<f64>| v.x == 0.0 && v.y == 0.0;
+    let moves_in_plane = |v: &VectorHistory| !v.has_component(2);
+    let turns_about_normal = |v: &VectorHistory| !v.has_component(0) && !v.has_component(1);
     let initial = &scene.initial;
     let mut checks = vec![
         // The start of a frame that is turned out of the plane tells nothing of where the model was put.
@@ -141,20 +127,24 @@ fn leaving_the_plane(scene: &Scene) -> Vec<String> {
         (about_normal(&initial.rotation), "`rotation`".to_owned()),
         (about_normal(&initial.angular_velocity), "`angular_velocity`".to_owned()),
         (scene.gravity.as_ref().is_none_or(in_plane), "`gravity`".to_owned()),
-        (scene.spin.as_ref().is_none_or(|spin| about_normal(&spin.axis)), "`axis` of [spin]".to_owned()),
+        (
+            scene.spin.as_ref().is_none_or(|spin| turns_about_normal(&spin.velocity)),
+            "`axis` of [spin]".to_owned(),
+        ),
     ];
     let carried = scene.carried.as_ref();
     if let Some(spin) = carried.and_then(|carried| carried.spin.as_ref()) {
-        checks.push((about_normal(&spin.axis), "`axis` of [carried.spin]".to_owned()));
+        checks.push((turns_about_normal(&spin.velocity), "`axis` of [carried.spin]".to_owned()));
         let through = spin.through.as_ref().is_none_or(in_plane);
         checks.push((through, "`through` of [carried.spin]".to_owned()));
     }
     if let Some(translation) = carried.and_then(|carried| carried.translation.as_ref()) {
-        checks.push((in_plane(&translation.direction), "`direction` of [carried.translation]".to_owned()));
+        let stays = moves_in_plane(translation.history());
+        checks.push((stays, "`direction` of [carried.translation]".to_owned()));
     }
     for load in &scene.loads {
-        checks.push((in_plane(&load.force), format!("`force` at {}", load.at)));
-        checks.push((about_normal(&load.torque), format!("`torque` at {}", load.at)));
+        checks.push((moves_in_plane(&load.force), format!("`force` at {}", load.at)));
+        checks.push((turns_about_normal(&load.torque), format!("`torque` at {}", load.at)));
     }
     checks.into_iter().filter(|(fits, _)| !fits).map(|(_, what)| what).collect()
 }
@@ -173,13 +163,12 @@ impl SceneForces<'_> {
     ) -> impl Iterator<Item = (&BodyPoint, Vector3<f64>, Vector3<f64>)> {
         let axes = place.axes;
         self.loads.iter().map(move |(point, load)| {
-            let factor = load.history.at(time).0;
-            let in_body = |v: &Vector3<f64>| match load.axes {
-                Axes::World => axes.tr_mul(v) * factor,
+            let (force, torque) = load.at_time(time);
+            match load.axes {
+                Axes::World => (point, axes.tr_mul(&force), axes.tr_mul(&torque)),
                 // The frame of the body is that of the scene.
-                Axes::Model | Axes::Body => v * factor,
-            };
-            (point, in_body(&load.force), in_body(&load.torque))
+                Axes::Model | Axes::Body => (point, force, torque),
+            }
         })
     }
 }
@@ -197,16 +186,13 @@ impl Surroundings for SceneForces<'_> {
         }
     }
 
-    fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
+    fn prescribed(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         if let Some(carried) = &self.carried {
-            return carried.at(time);
+            return carried.at(time, axes);
         }
         let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
-        let (rate, slope) = spin.rate.at(time);
+        let (omega, alpha) = spin.at(time, axes);
         let linear = spin.hold.then(Vector3::zeros);
-        (
-            Prescribed { linear, angular: Some(spin.axis * rate) },
-            Prescribed { linear, angular: Some(spin.axis * slope) },
-        )
+        (Prescribed { linear, angular: Some(omega) }, Prescribed { linear, angular: Some(alpha) })
     }
 }

@@ -102,10 +102,12 @@ pub fn integrate_closely<E: From<Failure>>(
     observe(Sight::Instant, start, state)?;
     let mut wanted = Wanted { rest: &instants[1..] };
     let mut from = start;
-    for stop in breaks.iter().copied().filter(|&at| start < at && at < last).chain([last]) {
+    let inner = breaks.iter().filter(|&&at| start < at && at < last).map(|&at| (at, true));
+    let ends_in_break = breaks.binary_search_by(|at| at.total_cmp(&last)).is_ok();
+    for (stop, is_break) in inner.chain([(last, ends_in_break)]) {
         method.restart();
         // f at a break is that after it, which is not what the last rate of an explicit step is about.
-        let piece = Piece { from, before: if breaks.contains(&stop) { just_before(stop) } else { stop } };
+        let piece = Piece { from, before: if is_break { just_before(stop) } else { stop } };
         match method {
             Method::Explicit(method) => {
                 explicit_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;

@@ -60,7 +60,7 @@ impl ReferenceError {
             self.time
         );
         let warning = Diagnostic::new(Code::ReferenceLacks, message);
-        let begins_with_shock = scene.loads.iter().any(|load| load.history.at(0.0).0 != 0.0);
+        let begins_with_shock = scene.acting().any(|history| history.at(0.0).0.norm() != 0.0);
         Some(match begins_with_shock && !scene.initial.settled {
             true => warning.with_help(
                 "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",

@@ -35,8 +35,8 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     let mut own = scene.clone();
     own.requirements.motion = Default::default();
     let (spin, acceleration) = match (scene.rotation(), &scene.carried) {
-        (Some((_, rate)), _) => {
-            let rate = Variation::of(rate, allowed.duration.value);
+        (Some(velocity), _) => {
+            let rate = Variation::of_vector(velocity, allowed.duration.value);
             (rate.largest, rate.rate)
         }
         (None, Some(_)) => (0.0, 0.0),
@@ -116,8 +116,8 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             let runs = case.runs();
             let TrialRuns { body, scene, situation, .. } = runs;
             let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
-            let has_axis = driven.rotation.axis.is_some();
-            let follows_run = scene.spin.is_some() && scene.run.duration.is_some() && has_axis;
+            let is_of_run = driven.rotation.of_run;
+            let follows_run = scene.spin.is_some() && scene.run.duration.is_some() && is_of_run;
             let held = body.invariants().groups();
             let is_cheap = kept == Groups::NONE || kept == only_w1 && held.w1;
             if follows_run && !is_cheap {

@@ -3,7 +3,7 @@
 use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
 use super::norms::Norms;
 use crate::body::flex_body::{FlexBody, Groups};
-use crate::motion::dynamics::{Configuration, EquationsOfMotion, Evaluation, Terms};
+use crate::motion::dynamics::{Configuration, EquationsOfMotion, Evaluation, Orientation, Terms};
 use crate::motion::scene::{Recording, Scene};
 use crate::numerics::linalg::larger;
 use faer::Mat;
@@ -56,7 +56,10 @@ fn instants<'r>(scene: &Scene, run: &'r Recording) -> Vec<Instant<'r>> {
         Instant {
             time,
             state: &run.states[i],
-            alpha: scene.spin.as_ref().map_or_else(Vector3::zeros, |spin| spin.axis * spin.rate.at(time).1),
+            alpha: scene
+                .spin
+                .as_ref()
+                .map_or_else(Vector3::zeros, |spin| spin.at(time, &run.states[i].attitude.axes()).1),
             acceleration: acceleration(run, i),
         }
     };

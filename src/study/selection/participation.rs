@@ -18,7 +18,7 @@ pub struct Participation {
     pub body: Option<(f64, f64)>,
 }
 
-/// For the loads of `scene` at `points` in their first direction, and for steady spin about its axis. Loads that deform nothing are left
+/// For the loads of `scene` at `points` in their first direction, or where that changes along every axis that they have, and for steady spin about its axis. Loads that deform nothing are left
 /// out.
 pub fn participations(
     body: &FlexBody,
@@ -43,18 +43,20 @@ pub fn participations(
     };
     for (load, point) in scene.loads.iter().zip(points) {
         let psi = rows.of(point);
-        let forces = (0..eigenvalues.len()).map(|j| psi.column(j).dot(&load.force)).collect();
         let at_interface = |name: &str| match &load.at {
             Point::Interface(interface) => {
                 name.strip_prefix(interface.as_str()).is_some_and(|rest| rest.starts_with(' '))
             }
             Point::Node(_) => false,
         };
-        let [x, y, z] = load.force.into();
-        add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
+        for direction in load.force.directions() {
+            let forces = (0..eigenvalues.len()).map(|j| psi.column(j).dot(&direction)).collect();
+            let [x, y, z] = direction.into();
+            add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
+        }
     }
     let axis = match scene.rotation() {
-        Some((axis, _)) => Some(*axis),
+        Some(velocity) => velocity.main_direction(),
         None => scene.initial.angular_velocity.try_normalize(0.0),
     };
     if let (Some(axis), Some(w1)) = (axis, body.invariants().w1()) {

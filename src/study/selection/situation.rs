@@ -6,8 +6,8 @@ use super::variation::{Rotation, Variation};
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::Invariants;
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
-use crate::motion::scene::{AttachmentKind, Axes, Load, Range, Scene};
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use crate::motion::scene::{AttachmentKind, Axes, Load, Range, Scene, VectorHistory};
+use nalgebra::{DMatrix, Matrix3};
 use std::f64::consts::TAU;
 
 /// Deflection, relative to the largest extent, where linear elasticity ends: the bound of amplitudes unless a scene has one.
@@ -152,8 +152,8 @@ fn turning_of_run(
     points: &[BodyPoint],
 ) -> [Sourced; 2] {
     match (scene.rotation(), &scene.carried) {
-        (Some((_, rate)), carried) => {
-            let rate = Variation::of(rate, duration);
+        (Some(velocity), carried) => {
+            let rate = Variation::of_vector(velocity, duration);
             let source = if carried.is_some() { "[carried.spin] rate" } else { "[spin] rate" }.to_owned();
             [(rate.largest, source.clone()), (rate.rate, source)]
         }
@@ -182,9 +182,9 @@ fn turning_of_run(
 /// What the loads can turn the undeformed body with.
 fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
     let torque = |(load, point): (&Load, &BodyPoint)| {
-        let size = Variation::of(&load.history, duration).largest;
+        let largest = |history: &VectorHistory| Variation::of_vector(history, duration).largest;
         let lever = point.place(&Evaluation::new(&EquationsOfMotion::new(body, Terms::NONE))).norm();
-        size * (load.force.norm() * lever + load.torque.norm())
+        largest(&load.force) * lever + largest(&load.torque)
     };
     scene.loads.iter().zip(points).map(torque).sum()
 }
@@ -236,19 +236,23 @@ fn given_rotation(
     let spin_of_run = scene.spin.as_ref().filter(|_| spin.source.starts_with("[spin]"));
     match (spin_of_run, scene.requirements.attachment.kind) {
         (Some(spin), _) => {
-            let rate = Variation::of(&spin.rate, duration);
+            let rate = Variation::of_vector(&spin.velocity, duration);
+            // Seen from the body, the acceleration of a rotation about axes of the world turns with omega besides.
+            let turned = if spin.axes == Axes::World { rate.largest * rate.total } else { 0.0 };
             Ok(Rotation {
-                axis: Some(spin.axis),
+                axis: spin.velocity.direction().and_then(|direction| direction.try_normalize(0.0)),
+                of_run: true,
                 largest: rate.largest,
                 start: rate.start,
                 variation: rate.total,
                 acceleration: rate.rate,
-                jerk: rate.rate_total,
+                jerk: rate.rate_total + turned,
                 duration,
             })
         }
         (None, AttachmentKind::Stiff) if spin.value > 0.0 => Ok(Rotation {
             axis: None,
+            of_run: false,
             largest: spin.value,
             start: spin.value,
             variation: acceleration.value * duration,
@@ -268,7 +272,7 @@ fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
         "the mass matrix does not commute with rotations"
     } else if !body.geometric_stiffness().is_empty() {
         "the body has geometric stiffness"
-    } else if scene.loads.iter().any(|load| load.torque != Vector3::zeros()) {
+    } else if scene.loads.iter().any(|load| !load.torque.is_nothing()) {
         "a torque acts on axes that turn with the deformation"
     } else if !is_about_centre(body.invariants()) {
         "the frame is not that of free-surface modes about the centre of mass"
@@ -288,18 +292,20 @@ fn modal_loads(
 ) -> Vec<ModalLoad> {
     let rows = PointRows::new(body);
     let modal_load = |(load, point): (&Load, &BodyPoint)| {
-        let history = Variation::of(&load.history, rotation.duration);
-        let psi = rows.of(point);
-        let (psi, size, factor) = match load.axes {
-            Axes::Model | Axes::Body => {
-                let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(&load.force));
-                (along, 1.0, history)
+        let (duration, psi) = (rotation.duration, rows.of(point));
+        let (psi, factor) = match (load.axes, &load.force) {
+            (Axes::Model | Axes::Body, VectorHistory::Along { direction, factor }) => {
+                let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(direction));
+                (along, Variation::of(factor, duration))
             }
-            Axes::World => (psi, load.force.norm(), history.times(&Variation::direction(rotation))),
+            (Axes::Model | Axes::Body, force) => (psi, Variation::of_vector(force, duration)),
+            (Axes::World, force) => {
+                (psi, Variation::of_vector(force, duration).times(&Variation::direction(rotation)))
+            }
         };
         ModalLoad {
-            force: size * PointRows::norm(&psi),
-            energy: size * PointRows::norm(&PointRows::weighted(&psi, |j| 1.0 / root[j])),
+            force: PointRows::norm(&psi),
+            energy: PointRows::norm(&PointRows::weighted(&psi, |j| 1.0 / root[j])),
             factor,
         }
     };

@@ -11,8 +11,8 @@ use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Groups};
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::motion::scene::{
-    ErrorHistory, History, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin,
-    Trace, ends_a_run, simulate, trace, trace_at,
+    ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin, Trace,
+    ends_a_run, simulate, trace, trace_at,
 };
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
@@ -99,17 +99,16 @@ impl TrialRuns<'_> {
     fn fastest(&self) -> f64 {
         let duration = self.situation.duration.value;
         let modes = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
-        let histories = self.scene.loads.iter().map(|load| &load.history);
-        let tones = histories.chain(self.scene.driving()).map(|history| match history {
-            History::Sine { frequency, .. } => TAU * frequency,
-            _ => 0.0,
-        });
-        let mut breaks = self.scene.rotation().map_or(Vec::new(), |(_, rate)| rate.breaks());
+        let histories = self.scene.acting().chain(self.scene.driving());
+        let tones = histories.map(|history| TAU * history.frequency_until(duration));
+        // Between two rows of a smooth history there may be half an oscillation.
+        let rows = self.scene.driving().filter_map(|history| Some(0.5 * TAU / history.spacing()?));
+        let mut breaks = self.scene.rotation().map_or(Vec::new(), |velocity| velocity.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);
         let ends: Vec<f64> = ends.collect();
         let pieces = ends.windows(2).map(|ends| 0.5 * TAU / (ends[1] - ends[0]));
-        tones.chain(pieces).fold(modes, f64::max) + self.situation.spin.value
+        tones.chain(rows).chain(pieces).fold(modes, f64::max) + self.situation.spin.value
     }
 
     /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure` holds; and how its errors grow.
@@ -210,8 +209,8 @@ impl TrialRuns<'_> {
     fn lever_torques(&self, driven: &Driven) -> f64 {
         let rows = PointRows::new(self.body);
         let lever = |(load, point): (&Load, &BodyPoint)| {
-            let largest = Variation::of(&load.history, driven.rotation.duration).largest;
-            largest * load.force.norm() * self.reach_of(&rows.of(point))
+            let largest = Variation::of_vector(&load.force, driven.rotation.duration).largest;
+            largest * self.reach_of(&rows.of(point))
         };
         self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>()
     }
@@ -249,7 +248,7 @@ impl TrialRuns<'_> {
         let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
         let rate = |spin: &Spin| {
             let even = (0..=LEAST_INSTANTS).map(|i| duration * (i as f64 / LEAST_INSTANTS as f64));
-            even.map(|time| spin.rate.at(time).0.abs()).fold(0.0, f64::max)
+            even.map(|time| spin.velocity.at(time).0.norm()).fold(0.0, f64::max)
         };
         LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2)
     }

@@ -1,6 +1,6 @@
 //! How much a function of time varies: all that bounds on the response to it need to know.
 
-use crate::motion::scene::History;
+use crate::motion::scene::{History, Sizes, VectorHistory};
 use std::f64::consts::TAU;
 
 /// Bounds of a continuous function h of time over the duration of a scene.
@@ -68,6 +68,17 @@ impl Variation {
                     rate_total: 4.0 * step / length,
                 }
             }
+            History::Samples(samples) => samples.sizes_until(duration).into(),
+        }
+    }
+
+    /// Of a vector from time 0 to `duration`, in its length.
+    pub fn of_vector(history: &VectorHistory, duration: f64) -> Self {
+        match history {
+            VectorHistory::Along { direction, factor } => {
+                Self::of(factor, duration).times(&Self::constant(direction.norm()))
+            }
+            VectorHistory::Columns(columns) => columns.sizes_until(duration).into(),
         }
     }
 
@@ -99,11 +110,19 @@ impl Variation {
     }
 }
 
+impl From<Sizes> for Variation {
+    fn from(Sizes { start, largest, total, rate, rate_total }: Sizes) -> Self {
+        Self { start, largest, total, rate, rate_total }
+    }
+}
+
 /// Bounds of the angular velocity of a frame whose rotation is given, over the duration of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation {
     /// Axis, body axes, where there is only one.
     pub axis: Option<nalgebra::Vector3<f64>>,
+    /// Whether it is that of the run, and not any within these bounds.
+    pub of_run: bool,
     /// max |omega|.
     pub largest: f64,
     /// |omega| at the start.
@@ -134,6 +153,7 @@ impl Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::scene::Interpolation;
 
     /// No sampled function varies more than it is said to, and the bounds of smooth ones are not far above.
     #[test]
@@ -143,6 +163,13 @@ mod tests {
             History::Table { times: vec![-1.0, 0.5, 1.0, 9.0], values: vec![1.0, 3.0, -2.0, 5.0] },
             History::Sine { amplitude: -3.0, frequency: 0.7, phase: 0.3 },
             History::Ramp { from: 1.0, to: -2.0, start: 0.5, duration: 2.0 },
+            History::samples(
+                vec![-1.0, 0.5, 1.0, 3.0, 9.0],
+                &[1.0, 3.0, -2.0, 5.0, 0.0],
+                Interpolation::Cubic,
+                false,
+            ),
+            History::samples(vec![0.5, 1.0, 3.0], &[3.0, -2.0, 5.0], Interpolation::Linear, true),
         ];
         let duration = 4.0;
         let count = 40_000;

@@ -3,7 +3,7 @@
 use super::rows::PointRows;
 use super::trial::TrialRuns;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::motion::scene::{Axes, History, Measure};
+use crate::motion::scene::{Axes, History, Measure, VectorHistory};
 use std::f64::consts::TAU;
 
 /// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths of its resonance.
@@ -26,15 +26,16 @@ pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[u
     for (load, point) in scene.loads.iter().zip(runs.loads) {
         // Seen from the body a force that is fixed in space turns the other way round.
         let turning = if load.axes == Axes::World { spin } else { 0.0 };
-        let rates: Vec<f64> = match &load.history {
-            History::Sine { frequency, .. } => {
+        let rates: Vec<f64> = match &load.force {
+            VectorHistory::Along { factor: History::Sine { frequency, .. }, .. } => {
                 [-1.0, 0.0, 1.0].iter().map(|sign| (TAU * frequency + sign * turning).abs()).collect()
             }
             _ => vec![turning],
         };
         let modal = rows.of(point);
         for (j, lambda) in body.modes().eigenvalue.iter().enumerate() {
-            let moved = modal.column(j).norm() * load.force.norm();
+            let moved =
+                modal.column(j).norm() * load.force.main_direction().map_or(0.0, |along| along.norm());
             let near = |rate: &&f64| {
                 let width = NEAR.max(3.0 * body.modes().damping_ratio[j]);
                 (*rate / lambda.sqrt() - 1.0).abs() < width

@@ -154,14 +154,14 @@ impl Acting<'_> {
             evaluation.add_gravity(gravity);
         }
         for (node, load) in &self.loads {
-            let factor = load.history.at(time).0;
-            let in_world = |v: &Vector3<f64>| match load.axes {
-                Axes::World => v * factor,
-                Axes::Model | Axes::Body => evaluation.axes() * v * factor,
+            let in_world = |v: Vector3<f64>| match load.axes {
+                Axes::World => v,
+                Axes::Model | Axes::Body => evaluation.axes() * v,
             };
-            let (force, torque) = (in_world(&load.force), in_world(&load.torque));
+            let (force, torque) = load.at_time(time);
+            let (force, torque) = (in_world(force), in_world(torque));
             evaluation.add_force(*node, &force);
-            if load.torque != Vector3::zeros() {
+            if !load.torque.is_nothing() {
                 evaluation.add_torque(*node, &torque);
             }
         }

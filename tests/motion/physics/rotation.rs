@@ -11,7 +11,7 @@ use flexbody::motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Place, Prescribed,
     Surroundings, Terms,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// At rest at the origin.
@@ -94,7 +94,7 @@ struct SpinUp {
 impl Surroundings for SpinUp {
     fn add_forces(&self, _: f64, _: &Place, _: &Evaluation<'_>, _: &mut [f64]) {}
 
-    fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
+    fn prescribed(&self, time: f64, _: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         let phase = TAU * (time / self.duration).min(1.0);
         let about = |value: f64| Prescribed { linear: None, angular: Some(Vector3::z() * value) };
         (
