@@ -306,20 +306,23 @@ struct Reading<'r> {
     series: Series,
     shown: Vec<Diagnostic>,
     bad: usize,
+    /// The line of the first bad row that is only counted.
+    first_not_shown: Option<usize>,
 }
 
 impl<'r> Reading<'r> {
     fn new(file: &'r InputFile, layout: &'r Layout<'r>, places: Vec<usize>) -> Self {
         let columns = vec![Vec::new(); places.len() - 1];
         let series = Series { times: Vec::new(), columns, lines: Vec::new() };
-        Self { file, layout, places, series, shown: Vec::new(), bad: 0 }
+        Self { file, layout, places, series, shown: Vec::new(), bad: 0, first_not_shown: None }
     }
 
     fn take(&mut self, line: usize, text: &[u8]) {
         if let Err(diagnostic) = self.row(line, text) {
             self.bad += 1;
-            if self.shown.len() < SHOWN {
-                self.shown.push(diagnostic);
+            match self.bad {
+                bad if bad <= SHOWN => self.shown.push(diagnostic),
+                _ => self.first_not_shown = self.first_not_shown.or(Some(line)),
             }
         }
     }
@@ -327,8 +330,11 @@ impl<'r> Reading<'r> {
     fn row(&mut self, line: usize, text: &[u8]) -> Result<(), Diagnostic> {
         let fields = self.layout.separator.split(text);
         if fields.len() != self.layout.fields {
-            let message =
-                format!("row has {} fields, the first line has {}", fields.len(), self.layout.fields);
+            let count = match fields.len() {
+                1 => "1 field".to_owned(),
+                count => format!("{count} fields"),
+            };
+            let message = format!("row has {count}, the first line has {}", self.layout.fields);
             return Err(row_error(self.file, line, message));
         }
         let numbers: Vec<f64> = self
@@ -352,12 +358,13 @@ impl<'r> Reading<'r> {
 
     /// The number in a field.
     fn cell(&self, line: usize, place: usize, field: &[u8]) -> Result<f64, Diagnostic> {
-        let column = match self.layout.names.get(place) {
-            Some(name) => format!("`{}`", printable(name)),
-            None => format!("{}", place + 1),
+        let told = |what: &str| {
+            let column = match self.layout.names.get(place) {
+                Some(name) => format!("`{}`", printable(name)),
+                None => format!("{}", place + 1),
+            };
+            row_error(self.file, line, format!("`{}` in column {column} {what}", printable(field)))
         };
-        let text = printable(field);
-        let told = |what: &str| row_error(self.file, line, format!("`{text}` in column {column} {what}"));
         match number(field) {
             Some(value) if value.is_finite() => Ok(value),
             Some(_) => Err(told("is not a finite number")),
@@ -370,14 +377,15 @@ impl<'r> Reading<'r> {
 
     fn finish(mut self) -> Result<Series, Vec<Diagnostic>> {
         let more = self.bad - self.shown.len();
-        let in_file = |message: String| Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path());
-        if more > 0 {
-            self.shown.push(in_file(format!("{more} more rows are bad")));
+        if let Some(line) = self.first_not_shown {
+            let message = format!("{more} more rows are bad, from this one on");
+            self.shown.push(row_error(self.file, line, message));
         }
         let rows = self.series.times.len();
         if self.bad == 0 && rows < LEAST_ROWS {
             let count = if rows == 0 { "no rows" } else { "only one row" };
-            self.shown.push(in_file(format!("file has {count}, a history needs two at least")));
+            let message = format!("file has {count}, a history needs two at least");
+            self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));
         }
         if self.shown.is_empty() { Ok(self.series) } else { Err(self.shown) }
     }
@@ -434,7 +442,7 @@ mod tests {
             ("t,F\n0,1\n\n1,x\n", "t", "F", 4, "`x` in column `F` is not a number"),
             ("t,F\n0,1\n1,NaN\n", "t", "F", 3, "`NaN` in column `F` is not a finite number"),
             ("t,F\n0,1\n1,-inf\n", "t", "F", 3, "`-inf` in column `F` is not a finite number"),
-            ("t,F\n0,1\n1,\n", "t", "F", 3, "row has 1 fields, the first line has 2"),
+            ("t,F\n0,1\n1,\n", "t", "F", 3, "row has 1 field, the first line has 2"),
             ("t,F\n0,1\n1,2\n1,3\n", "t", "F", 4, "time 1 does not increase: line 3 has 1"),
         ] {
             let found = read(text, time, &[value]).expect_err(text);

@@ -50,6 +50,8 @@ pub(super) fn turning(
         };
         let wrong = walk.at(Code::SceneSyntax, span, message);
         walk.found.push(wrong.with_help(format!("give one of {ways}")));
+        axis_of(walk, table);
+        axes(walk, table, &EVERY, Axes::Model);
         return None;
     };
     let value = table.get(way)?;
@@ -60,11 +62,10 @@ pub(super) fn turning(
     }
     match way {
         "rate" => {
-            let axis =
-                if table.contains_key("axis") { direction(walk, table, "axis") } else { Some(Vector3::z()) };
+            let axis = axis_of(walk, table);
             let axes = axes(walk, table, &EVERY, Axes::Model);
-            let factor = history(walk, files, "rate", value)?;
-            let velocity = VectorHistory::Along { direction: axis?, factor };
+            let factor = history(walk, files, "rate", value);
+            let velocity = VectorHistory::Along { direction: axis?, factor: factor? };
             Some(Turning { velocity, axes: axes?, start: None })
         }
         "angular_velocity_from" => {
@@ -89,6 +90,11 @@ pub(super) fn turning(
             }
         }
     }
+}
+
+/// The axis of a rotation.
+fn axis_of(walk: &mut Walk<'_>, table: &Table) -> Option<Vector3<f64>> {
+    if table.contains_key("axis") { direction(walk, table, "axis") } else { Some(Vector3::z()) }
 }
 
 type Result<T> = std::result::Result<T, Box<Diagnostic>>;

@@ -86,6 +86,7 @@ fn translation(
         return None;
     };
     let value = table.get(key)?;
+    let mut has_direction = true;
     let history = if has_columns {
         if let Some(direction) = table.get("direction") {
             let message = format!(
@@ -101,7 +102,9 @@ fn translation(
         }
         let direction = direction(walk, table, "direction");
         let factor = history(walk, files, key, value)?;
-        VectorHistory::Along { direction: direction?, factor }
+        // Without a direction there is still something to say of the history.
+        has_direction = direction.is_some();
+        VectorHistory::Along { direction: direction.unwrap_or_default(), factor }
     };
     if matches!(drive(VectorHistory::nothing()), Drive::Displacement(_)) && !history.is_smooth() {
         let message = format!(
@@ -110,5 +113,5 @@ fn translation(
         walk.wrong(value.span(), message);
         return None;
     }
-    Some(drive(history))
+    has_direction.then(|| drive(history))
 }
