@@ -28,7 +28,7 @@ pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Surroundings};
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
-    ReferenceConditions,
+    NodalPoint, ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use points::BodyPoint;

@@ -2,6 +2,8 @@
 //! reduced equation is measured against.
 
 mod conditions;
+mod damping;
+mod driven;
 mod equations;
 mod error;
 mod evaluation;
@@ -10,8 +12,11 @@ mod massless;
 mod modes;
 mod motion;
 mod observed;
+mod points;
 mod reframe;
+mod settled;
 mod state;
+mod stiff;
 
 pub use conditions::ReferenceConditions;
 pub use equations::NodalEquations;
@@ -19,4 +24,5 @@ pub use error::NodalError;
 pub use evaluation::NodalEvaluation;
 pub use modes::NodalModes;
 pub use motion::NodalMotion;
+pub use points::NodalPoint;
 pub use state::NodalConfiguration;
