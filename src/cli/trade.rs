@@ -50,7 +50,11 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         (None, vec![Source::new("file", body, None)?], Vec::new())
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
-    let settings = Settings { repeat: arguments.repeat.into(), memory: memory_left(None) };
+    let settings = Settings {
+        repeat: arguments.repeat.into(),
+        memory: memory_left(None),
+        longest: longest(arguments.allow_long),
+    };
     let study = trade(&sources, &scene, nodal, &settings, &|event: Event<'_>| watcher.hear(event))
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());

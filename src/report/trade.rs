@@ -11,9 +11,11 @@ use super::text::{Page, diagnostics_lines};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::Storage;
-use crate::motion::scene::{OutputErrors, Tolerance};
+use crate::motion::scene::{OutputErrors, Scheme, Tolerance};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Kind, Measured, Recommendation, ReferenceKind, Row, Times, Trade};
+use crate::study::trade::{
+    Kind, Measured, NodalIntegration, Recommendation, ReferenceKind, Row, Times, Trade,
+};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -33,6 +35,8 @@ pub struct TradeFacts<'a> {
     scene: &'a str,
     body: &'a str,
     reference: ReferenceKind,
+    /// How the equations of all nodes were integrated, where they are the reference.
+    nodal: Option<NodalFacts>,
     /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only a file is at hand.
     reference_lacks: Vec<LackFacts>,
     tolerance: Tolerance,
@@ -45,6 +49,47 @@ pub struct TradeFacts<'a> {
     threads: usize,
     wall_seconds: f64,
     cpu_seconds: f64,
+}
+
+/// How the equations of all nodes were integrated.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct NodalFacts {
+    rows: usize,
+    /// None: of order 8 with error control.
+    order: Option<usize>,
+    tolerance: Option<f64>,
+    step: Option<f64>,
+    steps: u64,
+    error: Option<f64>,
+}
+
+impl NodalFacts {
+    fn new(nodal: &NodalIntegration) -> Self {
+        let (order, tolerance, step) = match nodal.scheme {
+            Scheme::Adaptive { tolerance } => (None, Some(tolerance), None),
+            Scheme::Conserving { order, step } => (Some(order), None, step),
+        };
+        Self { rows: nodal.rows, order, tolerance, step, steps: nodal.steps, error: nodal.error }
+    }
+
+    fn in_words(&self) -> String {
+        let how = match (self.order, self.step, self.tolerance) {
+            (Some(order), Some(step), _) => {
+                format!("implicit steps of order {order}, of {} at most", significant(step, 3))
+            }
+            (_, _, tolerance) => {
+                format!("explicit steps, tolerance {}", significant(tolerance.unwrap_or(0.0), 2))
+            }
+        };
+        let worth = match self.error {
+            Some(error) => {
+                let part = significant(100.0 * error, 2);
+                format!("; steps twice as long change it by {part} % of the tolerances")
+            }
+            None => String::new(),
+        };
+        format!("{} rows, {} {how}{worth}", self.rows, self.steps)
+    }
 }
 
 /// A candidate.
@@ -150,6 +195,7 @@ impl<'a> TradeFacts<'a> {
             scene: &trade.scene,
             body: &trade.body,
             reference: trade.reference,
+            nodal: trade.nodal.as_ref().map(NodalFacts::new),
             reference_lacks: lacks.iter().map(LackFacts::new).collect(),
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
@@ -187,6 +233,13 @@ impl<'a> TradeFacts<'a> {
         }
     }
 
+    fn reference_told(&self) -> String {
+        match &self.nodal {
+            None => self.against().to_owned(),
+            Some(nodal) => format!("{}: {}", self.against(), nodal.in_words()),
+        }
+    }
+
     /// Rows of the front, and the recommended one, ascending in cost.
     fn shown(&self) -> Vec<&RowFacts<'a>> {
         let mut numbers = self.front.clone();
@@ -205,6 +258,9 @@ impl<'a> TradeFacts<'a> {
             "Trade",
             &format!("{}: {}, {count} against {}", plain(self.scene), plain(self.body), self.against()),
         );
+        if let Some(nodal) = &self.nodal {
+            page.entry("Nodes", &nodal.in_words());
+        }
         page.entry("Whole body", &reference_in_words(&self.reference_lacks));
         page.entry("Tolerances", &self.tolerances_in_words());
         if let Some(allowed) = self.allowed_multiplications {
@@ -250,7 +306,7 @@ impl<'a> TradeFacts<'a> {
             &mut html,
             [
                 ("Body", escape(self.body)),
-                ("Reference", self.against().to_owned()),
+                ("Reference", self.reference_told()),
                 ("Whole body", escape(&reference_in_words(&self.reference_lacks))),
                 ("Tolerances", escape(&self.tolerances_in_words())),
                 (

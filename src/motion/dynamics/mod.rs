@@ -27,8 +27,8 @@ pub(crate) use geometric::geometric_stiffness;
 pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Surroundings};
 pub use nodal::{
-    NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
-    NodalPoint, ReferenceConditions,
+    NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, NodalPoint,
+    ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use points::BodyPoint;

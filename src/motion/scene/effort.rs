@@ -16,7 +16,7 @@ const STEPS_PER_OSCILLATION: f64 = 2.0;
 const STABLE: f64 = 6.0;
 
 /// Frequency of the fastest history, in oscillations per time; zero without any that oscillates.
-fn fastest_history(scene: &Scene) -> f64 {
+pub(crate) fn fastest_history(scene: &Scene) -> f64 {
     let histories = scene.loads.iter().map(|load| &load.history);
     let frequency = |history: &History| match history {
         History::Sine { amplitude, frequency, .. } if *amplitude != 0.0 => frequency.abs(),

@@ -1,65 +1,18 @@
 //! A scene as forces and prescribed motion of one body.
 
-use super::{Axes, Carried, Load, Point, Scene, Spin};
+use super::driving::Driving;
+use super::{Axes, Load, Point, Scene};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
-use crate::motion::dynamics::{
-    BodyPoint, Evaluation, Orientation, Place, Prescribed, RotationVector, Surroundings,
-};
-use nalgebra::{Matrix3, Vector3};
+use crate::motion::dynamics::{BodyPoint, Evaluation, Place, Prescribed, Surroundings};
+use nalgebra::Vector3;
 
 /// Gravity, loads and prescribed motion of a scene.
 pub(super) struct SceneForces<'a> {
     gravity: Option<Vector3<f64>>,
     loads: Vec<(BodyPoint, &'a Load)>,
-    spin: Option<&'a Spin>,
-    carried: Option<CarriedMotion<'a>>,
-}
-
-/// The prescribed motion of the frame of a body that is carried.
-struct CarriedMotion<'a> {
-    carried: &'a Carried,
-    /// From the axis of rotation to the origin of the frame, its axes.
-    arm: Vector3<f64>,
-    /// Axes of the frame at time zero.
-    start: Matrix3<f64>,
-}
-
-impl<'a> CarriedMotion<'a> {
-    fn new(body: &FlexBody, scene: &'a Scene) -> Option<Self> {
-        let carried = scene.carried.as_ref()?;
-        let through = carried.spin.as_ref().and_then(|spin| spin.through);
-        let arm = through.map_or_else(Vector3::zeros, |through| body.frame().origin - through);
-        Some(Self { carried, arm, start: RotationVector(scene.initial.rotation).axes() })
-    }
-
-    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes of the frame.
-    fn at(&self, time: f64) -> (Prescribed, Prescribed) {
-        let zero = Vector3::zeros();
-        let (omega, alpha, turned) = match &self.carried.spin {
-            Some(spin) => {
-                let (rate, slope) = spin.rate.at(time);
-                let turned = RotationVector(spin.axis * spin.rate.integral(time)).axes();
-                (spin.axis * rate, spin.axis * slope, turned)
-            }
-            None => (zero, zero, Matrix3::identity()),
-        };
-        let (velocity, acceleration) = match &self.carried.translation {
-            Some(translation) => {
-                let (velocity, acceleration) = translation.drive.at(time);
-                let along = (self.start * turned).tr_mul(&translation.direction);
-                (along * velocity, along * acceleration)
-            }
-            None => (zero, zero),
-        };
-        let linear = omega.cross(&self.arm) + velocity;
-        let rate = alpha.cross(&self.arm) + acceleration - omega.cross(&velocity);
-        (
-            Prescribed { linear: Some(linear), angular: Some(omega) },
-            Prescribed { linear: Some(rate), angular: Some(alpha) },
-        )
-    }
+    driving: Driving<'a>,
 }
 
 impl<'a> SceneForces<'a> {
@@ -93,8 +46,8 @@ impl<'a> SceneForces<'a> {
         }
         match (watched, loads) {
             (Some(watched), Some(loads)) if found.is_empty() => {
-                let (spin, carried) = (scene.spin.as_ref(), CarriedMotion::new(body, scene));
-                Ok((Self { gravity: scene.gravity, loads, spin, carried }, watched))
+                let driving = Driving::new(body.frame(), scene);
+                Ok((Self { gravity: scene.gravity, loads, driving }, watched))
             }
             _ => Err(Error::new(found)),
         }
@@ -198,15 +151,6 @@ impl Surroundings for SceneForces<'_> {
     }
 
     fn prescribed(&self, time: f64) -> (Prescribed, Prescribed) {
-        if let Some(carried) = &self.carried {
-            return carried.at(time);
-        }
-        let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
-        let (rate, slope) = spin.rate.at(time);
-        let linear = spin.hold.then(Vector3::zeros);
-        (
-            Prescribed { linear, angular: Some(spin.axis * rate) },
-            Prescribed { linear, angular: Some(spin.axis * slope) },
-        )
+        self.driving.at(time)
     }
 }

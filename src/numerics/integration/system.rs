@@ -29,7 +29,12 @@ pub trait System {
     ///
     /// # Errors
     /// Where that cannot be solved.
-    fn correct_stages(&mut self, _h: f64, _modes: &[StageMode], _lacks: &mut [Vec<f64>]) -> Result<(), Failure> {
+    fn correct_stages(
+        &mut self,
+        _h: f64,
+        _modes: &[StageMode],
+        _lacks: &mut [Vec<f64>],
+    ) -> Result<(), Failure> {
         Ok(())
     }
 

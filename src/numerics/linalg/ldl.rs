@@ -78,7 +78,6 @@ impl<T: Scalar> SparseLdl<T> {
         self.values.len()
     }
 
-
     /// Rows whose pivot was zero, ascending: as many as the matrix has null vectors. The solution for e_j, j one of them, is a null
     /// vector; together they span the null space. Right-hand sides in the range of A have the solution of A x = b that is zero in
     /// these rows.

@@ -54,7 +54,10 @@ impl<'a, T: Scalar> MatrixSum<'a, T> {
     /// # Panics
     /// When there are none, or their sizes disagree.
     pub fn new(terms: Vec<(T, &'a SymmetricMatrix, usize)>) -> Self {
-        assert!(terms.windows(2).all(|pair| pair[0].1.n() * pair[0].2 == pair[1].1.n() * pair[1].2), "sizes of a sum");
+        assert!(
+            terms.windows(2).all(|pair| pair[0].1.n() * pair[0].2 == pair[1].1.n() * pair[1].2),
+            "sizes of a sum"
+        );
         assert!(!terms.is_empty(), "a sum of something");
         Self { terms }
     }

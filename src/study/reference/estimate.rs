@@ -4,10 +4,10 @@ use super::compressed::{Compressed, principal};
 use super::residual::NodalView;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::body::basis::{free_static_responses, interface_loads};
+use crate::body::basis::free_static_responses;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
-use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, instants, trace};
+use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, instants, nodal_point, trace};
 use crate::numerics::linalg::{combine, gram, larger, multiply, subtract_combination};
 use faer::{Mat, MatRef};
 
@@ -91,7 +91,7 @@ impl Estimate {
         let Some(duration) = scene.run.duration.filter(|_| scene.carried.is_none()) else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
         let (body, scene) = (&*stage.body, &*stage.scene);
-        let at = |point: &Point| point_loads(model, point);
+        let at = |point: &Point| Ok(nodal_point(model, point)?.unit_loads(model));
         let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
         let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
         let Some(view) = NodalView::new(model, body, loads) else { return Ok(None) };
@@ -113,27 +113,6 @@ impl Estimate {
         let missing = missed.dominant(enough * energy_scale(&motion));
         Ok(Some(Self { error, missing }))
     }
-}
-
-/// Nodal forces of unit forces and torques at a point.
-fn point_loads(model: &FeModel, point: &Point) -> Result<Mat<f64>> {
-    let (d, n) = (model.dimension(), model.rows().len());
-    let found = match point {
-        Point::Interface(name) => interface_loads(model, name)?,
-        Point::Node(number) => model.nodes().ids.iter().position(|id| id == number).map(|node| {
-            let rigid = if d == 2 { 3 } else { 6 };
-            let mut loads = Mat::zeros(n, rigid);
-            (0..d).for_each(|k| loads[(d * node + k, k)] = 1.0);
-            let first = model.rows().displacements();
-            for (row, &(of, axis)) in (first..).zip(model.rows().rotations()) {
-                if of as usize == node {
-                    loads[(row, if d == 2 { 2 } else { d + usize::from(axis) })] = 1.0;
-                }
-            }
-            loads
-        }),
-    };
-    found.ok_or_else(|| Diagnostic::new(Code::SceneBody, format!("the model has no {point}")).into())
 }
 
 /// Root of the largest elastic energy of a motion, or the least that counts.

@@ -23,7 +23,11 @@ pub(super) struct Drive {
 
 impl Drive {
     /// Solves (6.16) for right-hand sides of the conditions and of the momenta or, where it is given, the motion.
-    fn solve(&self, conditions: &Vector6<f64>, frame: &Vector6<f64>) -> Result<(Vector6<f64>, Vector6<f64>), Failure> {
+    fn solve(
+        &self,
+        conditions: &Vector6<f64>,
+        frame: &Vector6<f64>,
+    ) -> Result<(Vector6<f64>, Vector6<f64>), Failure> {
         let mut right = SVector::<f64, 12>::zeros();
         right.fixed_rows_mut::<6>(0).copy_from(conditions);
         right.fixed_rows_mut::<6>(6).copy_from(frame);
@@ -75,11 +79,8 @@ impl NodalEvaluation<'_> {
         let momenta = self.go_to(state);
         let at_rest = body.conditions_at(&self.u);
         let given = mask(velocities);
-        let drive = Drive {
-            given,
-            matrix: matrix(&body.answer, &at_rest, given).lu(),
-            reaction: Vector6::zeros(),
-        };
+        let drive =
+            Drive { given, matrix: matrix(&body.answer, &at_rest, given).lu(), reaction: Vector6::zeros() };
 
         self.vbar.copy_from_slice(&self.w);
         body.solve(&mut self.vbar, &mut self.first);

@@ -180,6 +180,16 @@ impl<'m> NodalEquations<'m> {
         self.model
     }
 
+    /// The frame, where it is before deformation.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Number of entries of the factor of M below the diagonal.
+    pub fn factor_entries(&self) -> usize {
+        self.factor.entries()
+    }
+
     /// Number of rows N of the model.
     pub fn n_rows(&self) -> usize {
         self.rigid.len()

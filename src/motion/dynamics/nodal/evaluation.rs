@@ -25,8 +25,9 @@ pub struct NodalEvaluation<'e> {
     pub(super) origin: Vector3<f64>,
     /// As in the state, of unit length but for the error of the integration.
     pub(super) attitude: EulerParameters,
-    /// D.
+    /// D, and P / m.
     offset: Vector3<f64>,
+    flight: Vector3<f64>,
     /// Model axes to world axes.
     pub(super) axes: Matrix3<f64>,
     /// V, omega, p, h in model axes.
@@ -65,6 +66,7 @@ impl<'e> NodalEvaluation<'e> {
             origin: zero,
             attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
             offset: zero,
+            flight: zero,
             axes: equations.frame.axes.transpose(),
             velocity: zero,
             omega: zero,
@@ -128,8 +130,10 @@ impl<'e> NodalEvaluation<'e> {
         let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
         self.offset = vector(OFFSET);
         self.origin = vector(0) + self.offset;
+        self.flight = vector(LINEAR) / body.rigid_mass[(0, 0)];
         self.attitude = attitude(frame);
-        self.axes = self.attitude.normalised().axes() * body.frame.axes.transpose();
+        // As the reduced equations have it between the ends of steps, where e is not of unit length.
+        self.axes = self.attitude.axes() * body.frame.axes.transpose();
         self.u.copy_from_slice(u);
         self.w.copy_from_slice(w);
         (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
@@ -163,13 +167,14 @@ impl<'e> NodalEvaluation<'e> {
     pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
         assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
         self.find_rates()?;
-        let velocity = self.axes * self.velocity;
-        // Where the frame is driven it is not told from the momentum: G goes with it.
-        let flight = match self.drive {
-            None => self.axes * self.p / self.equations.rigid_mass[(0, 0)],
-            Some(_) => velocity,
+        let (flight, offset) = match self.drive {
+            None => {
+                let relative = self.velocity - self.p / self.equations.rigid_mass[(0, 0)];
+                (self.flight, self.axes * relative)
+            }
+            // Where the frame is driven it is not told from the momentum: G goes with it.
+            Some(_) => (self.axes * self.velocity, Vector3::zeros()),
         };
-        let offset = velocity - flight;
         let linear = self.axes * self.force;
         let angular = self.axes * self.torque + self.offset.cross(&linear);
         let turning = self.attitude.rate(&self.equations.frame.axes.tr_mul(&self.omega));

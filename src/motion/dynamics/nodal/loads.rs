@@ -79,7 +79,7 @@ impl NodalEvaluation<'_> {
     }
 
     /// A world vector in model axes, for a plane body in its plane.
-    pub(super) fn in_body(&self, world: &Vector3<f64>) -> Vector3<f64> {
+    fn in_body(&self, world: &Vector3<f64>) -> Vector3<f64> {
         let own = self.axes.tr_mul(world);
         let d = self.equations.model.dimension();
         Vector3::from_fn(|k, _| if k < d { own[k] } else { 0.0 })

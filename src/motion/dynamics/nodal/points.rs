@@ -4,7 +4,7 @@ use super::NodalEvaluation;
 use crate::base::error::Result;
 use crate::body::basis::interface_loads;
 use crate::model::{FeModel, Reference};
-use crate::motion::dynamics::{Orientation, RotationVector};
+use crate::motion::dynamics::{LoadAxes, Orientation, RotationVector};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
@@ -41,7 +41,7 @@ impl NodalPoint {
     }
 
     /// The reference point of the interface `name`: the rigid motion that fits that of its nodes best, as of every coupling
-    /// (theory 5.3). `None` for an interface that does not exist or has no reference point.
+    /// (theory (5.3)). `None` for an interface that does not exist or has no reference point.
     ///
     /// # Errors
     /// FB150 when the model has no interfaces at all.
@@ -109,9 +109,12 @@ fn sum(weights: &Weights, u: &[f64]) -> Vector3<f64> {
 impl NodalEvaluation<'_> {
     /// Adds a force at a point, whose moment is about where the point is displaced to.
     ///
-    /// * `force`: world axes; of a plane body what it has along z is left out.
-    pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>) {
-        let own = self.in_body(force);
+    /// * `force`: along `axes`, those of the world or of the frame; of a plane body what it has along z is left out.
+    pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
+        let mut own = self.along_model(force, axes);
+        if self.equations.model.dimension() == 2 {
+            own.z = 0.0;
+        }
         let place = point.place - self.equations.frame.origin + point.displacement(&self.u);
         self.force += own;
         self.torque += place.cross(&own);
@@ -120,15 +123,22 @@ impl NodalEvaluation<'_> {
 
     /// Adds a torque at a point, on the axes that its rotation vector theta turns: C_r'G(theta) t (theory 6.8).
     ///
-    /// * `torque`: world axes; of a plane body what it has along z.
-    pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>) {
-        let mut own = self.axes.tr_mul(torque);
+    /// * `torque`: along `axes`, those of the world or of the frame; of a plane body what it has along z.
+    pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>, axes: LoadAxes) {
+        let mut own = self.along_model(torque, axes);
         if self.equations.model.dimension() == 2 {
             (own.x, own.y) = (0.0, 0.0);
         }
         self.torque += own;
         let moment = RotationVector(point.rotation(&self.u)).map() * own;
         self.add_weighted(&point.rotation, &moment);
+    }
+
+    fn along_model(&self, load: &Vector3<f64>, axes: LoadAxes) -> Vector3<f64> {
+        match axes {
+            LoadAxes::World => self.axes.tr_mul(load),
+            LoadAxes::Body => self.equations.frame.axes * load,
+        }
     }
 
     fn add_weighted(&mut self, weights: &Weights, load: &Vector3<f64>) {

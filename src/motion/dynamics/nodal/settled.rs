@@ -14,7 +14,7 @@ const NEAR_ROUNDING: f64 = 1e-6;
 /// The shift of K, relative to the square of the first circular frequency: steps leave a tenth of the way to go, or less.
 const SHIFT: f64 = 0.1;
 
-impl<L: FnMut(f64, &mut NodalEvaluation<'_>)> NodalMotion<'_, L> {
+impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     /// `start` with the deformation that stays as it is under what acts at `time`: u'' = 0 with u' = 0, by
     /// u += (K + sigma M)^-1 M u''.
     ///
@@ -40,8 +40,9 @@ impl<L: FnMut(f64, &mut NodalEvaluation<'_>)> NodalMotion<'_, L> {
         settled.ud.fill(0.0);
         let mut before = f64::INFINITY;
         for _ in 0..MOST_STEPS {
-            let state =
-                body.state(&settled).map_err(|_| lost("the deformation does not fulfil the reference conditions"))?;
+            let state = body
+                .state(&settled)
+                .map_err(|_| lost("the deformation does not fulfil the reference conditions"))?;
             self.accelerations(time, &state, &mut acceleration)?;
             body.weigh(&acceleration, &mut step);
             factor.solve_in_place(1, &mut step, &mut scratch);

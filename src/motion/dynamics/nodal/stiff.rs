@@ -8,8 +8,9 @@ use crate::numerics::linalg::{MatrixSum, Scalar, SparseLdl, multiply_vector};
 use nalgebra::Complex;
 
 /// M + z D + z^2 K is singular to rounding, or too large for its ordering.
-const SINGULAR: Failure =
-    Failure::Rates { reason: "mass, damping and stiffness of the nodes cannot be factored for implicit steps" };
+const SINGULAR: Failure = Failure::Rates {
+    reason: "mass, damping and stiffness of the nodes cannot be factored for implicit steps",
+};
 
 /// u' = P M^-1 w, w' = -K u - D u' with P = I - R (C R)^-1 C: what is linear and fast in the nodal equations, solved in the eigenvalues mu of an
 /// implicit method with the step h. What the stages lack, (a, b) in (u, w), is corrected by
