@@ -147,7 +147,7 @@ pub struct TradeArguments {
     /// Table to write the candidates to
     #[arg(long, value_name = "TRADE.csv")]
     pub csv: Option<PathBuf>,
-    /// Do work that is estimated to take more than half an hour for its number of modes
+    /// Do work that is estimated to take more than half an hour: modes, or the motion of all nodes
     #[arg(long)]
     pub allow_long: bool,
     /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)

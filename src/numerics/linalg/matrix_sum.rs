@@ -8,6 +8,8 @@ use std::ops::{AddAssign, Div, Mul, SubAssign};
 pub trait Scalar: Copy + Mul<Output = Self> + Div<Output = Self> + AddAssign + SubAssign {
     /// Zero.
     const ZERO: Self;
+    /// One.
+    const ONE: Self;
     /// The product with a real number.
     fn times(self, real: f64) -> Self;
     /// 1 / x.
@@ -18,6 +20,7 @@ pub trait Scalar: Copy + Mul<Output = Self> + Div<Output = Self> + AddAssign + S
 
 impl Scalar for f64 {
     const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
     fn times(self, real: f64) -> Self {
         self * real
     }
@@ -31,6 +34,7 @@ impl Scalar for f64 {
 
 impl Scalar for Complex<f64> {
     const ZERO: Self = Self::new(0.0, 0.0);
+    const ONE: Self = Self::new(1.0, 0.0);
     fn times(self, real: f64) -> Self {
         self * real
     }

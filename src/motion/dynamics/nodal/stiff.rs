@@ -19,7 +19,8 @@ const SINGULAR: Failure = Failure::Rates {
 /// (M + z D + z^2 K) x = z b + M a + z D a,    z = h mu,    u: P x,    w: M (x - a) / z
 /// ```
 ///
-/// where K R = 0 and D R = 0, D being the damping of the model; that of modes is left to the iteration.
+/// where K R = 0 and D R = 0, D being the damping of the model; that of modes is left to the iteration. This is what is linear with mean axes;
+/// other conditions leave a constraint in M^-1 w that is left to the iteration too, which then asks for steps below the shortest period.
 #[derive(Debug)]
 pub(super) struct Stiff<'m> {
     equations: &'m NodalEquations<'m>,
@@ -97,9 +98,8 @@ impl<'m> Stiff<'m> {
     /// M + z D + z^2 K.
     fn sum<T: Scalar>(&self, z: T) -> MatrixSum<'m, T> {
         let model = self.equations.model;
-        let (pencil, one) = (model.pencil(), z / z);
-        let square = z * z;
-        let (mut of_mass, mut of_stiffness) = (one, square);
+        let pencil = model.pencil();
+        let (mut of_mass, mut of_stiffness) = (T::ONE, z * z);
         let mut terms = Vec::new();
         match model.damping() {
             Some(Damping::Rayleigh { alpha, beta }) => {

@@ -107,6 +107,8 @@ impl Effort {
     /// How to integrate what a scene asks for by `scheme`, with circular frequencies up to `liveliest` that count; and the seconds that it takes.
     pub fn plan(&self, scene: &Scene, scheme: Scheme, liveliest: f64) -> (Way, f64) {
         match scheme {
+            // Implicit steps solve what is stiff of a body with mean axes.
+            _ if scene.carried.is_some() => (Way::Explicit, self.explicit()),
             Scheme::Conserving { order, step } => {
                 let step = step.unwrap_or(TAU / (20.0 * liveliest)).min(self.duration);
                 (Way::Implicit { order, step, given: true }, self.implicit(order, step, 1.0))
