@@ -1,45 +1,12 @@
 //! The nodal equations where motion of the frame is given instead of following from forces.
 
 use super::NodalEvaluation;
+use super::drive::{Drive, mask};
 use super::equations::NodalEquations;
-use super::evaluation::{LOST, halves, joined};
+use super::evaluation::{halves, joined};
 use crate::motion::dynamics::Prescribed;
 use crate::numerics::integration::Failure;
-use nalgebra::{Const, LU, Matrix6, SMatrix, SVector, Vector3, Vector6};
-
-/// The multipliers and the motion of the frame together.
-type Both = SMatrix<f64, 12, 12>;
-
-/// Which motion of the frame is given, and the equations for the rest of it.
-#[derive(Debug, Clone)]
-pub(super) struct Drive {
-    /// Of (V, omega).
-    given: [bool; 6],
-    /// The matrix of [`NodalEvaluation::set_driven`].
-    matrix: LU<f64, Const<12>, Const<12>>,
-    /// Force and torque that the given motion takes, model axes.
-    reaction: Vector6<f64>,
-}
-
-impl Drive {
-    /// Solves (6.16) for right-hand sides of the conditions and of the momenta or, where it is given, the motion.
-    fn solve(
-        &self,
-        conditions: &Vector6<f64>,
-        frame: &Vector6<f64>,
-    ) -> Result<(Vector6<f64>, Vector6<f64>), Failure> {
-        let mut right = SVector::<f64, 12>::zeros();
-        right.fixed_rows_mut::<6>(0).copy_from(conditions);
-        right.fixed_rows_mut::<6>(6).copy_from(frame);
-        let both = self.matrix.solve(&right).ok_or(LOST)?;
-        Ok((both.fixed_rows::<6>(0).into_owned(), both.fixed_rows::<6>(6).into_owned()))
-    }
-}
-
-/// Components of (V, omega) that are given.
-fn mask(prescribed: &Prescribed) -> [bool; 6] {
-    std::array::from_fn(|k| if k < 3 { prescribed.linear.is_some() } else { prescribed.angular.is_some() })
-}
+use nalgebra::{Vector3, Vector6};
 
 impl NodalEquations<'_> {
     /// What is given of (V, omega), or of the rates of its components: model axes, zero elsewhere.
@@ -79,8 +46,7 @@ impl NodalEvaluation<'_> {
         let momenta = self.go_to(state);
         let at_rest = body.conditions_at(&self.u);
         let given = mask(velocities);
-        let drive =
-            Drive { given, matrix: matrix(&body.answer, &at_rest, given).lu(), reaction: Vector6::zeros() };
+        let drive = Drive::new(&body.answer, &at_rest, given);
 
         self.vbar.copy_from_slice(&self.w);
         body.solve(&mut self.vbar, &mut self.first);
@@ -154,18 +120,4 @@ impl NodalEvaluation<'_> {
             - self.equations.moment(&self.ud, &self.w);
         joined(&(self.force - self.omega.cross(&self.p)), &torque)
     }
-}
-
-/// \[E, -(B'C')'; B'C', 0\], rows of what is given replaced.
-fn matrix(answer: &Matrix6<f64>, conditions: &Matrix6<f64>, given: [bool; 6]) -> Both {
-    let mut both = Both::zeros();
-    both.fixed_view_mut::<6, 6>(0, 0).copy_from(answer);
-    both.fixed_view_mut::<6, 6>(0, 6).copy_from(&-conditions.transpose());
-    for (k, given) in given.into_iter().enumerate() {
-        match given {
-            true => both[(6 + k, 6 + k)] = 1.0,
-            false => both.fixed_view_mut::<1, 6>(6 + k, 0).copy_from(&conditions.row(k)),
-        }
-    }
-    both
 }

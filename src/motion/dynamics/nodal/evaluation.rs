@@ -1,7 +1,7 @@
 //! The nodal equations at one state.
 
 use super::damping::{Amplitudes, ModalDamping};
-use super::driven::Drive;
+use super::drive::{Drive, LOST};
 use super::equations::NodalEquations;
 use super::massless::Room;
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
@@ -10,11 +10,6 @@ use crate::motion::dynamics::{EulerParameters, Orientation};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{LU, Matrix3, U6, Vector3, Vector6};
-
-/// The deformation is beyond what the conditions can follow.
-pub(super) const LOST: Failure = Failure::Rates {
-    reason: "the deformation is so large that the reference conditions do not determine the frame",
-};
 
 /// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after [`NodalEvaluation::new`].
 ///

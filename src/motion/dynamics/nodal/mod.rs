@@ -3,6 +3,7 @@
 
 mod conditions;
 mod damping;
+mod drive;
 mod driven;
 mod equations;
 mod error;

@@ -1,15 +1,13 @@
 //! Points of a body among its nodes: where loads act and motion is read.
 
-use super::NodalEvaluation;
 use crate::base::error::Result;
 use crate::body::basis::interface_loads;
 use crate::model::{FeModel, Reference};
-use crate::motion::dynamics::{LoadAxes, Orientation, RotationVector};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
 /// Rows of the model with their weights in the three components of a vector.
-type Weights = Vec<(usize, [f64; 3])>;
+pub(super) type Weights = Vec<(usize, [f64; 3])>;
 
 /// A node, or the reference point of an interface: C_t and C_r, which take the displacement and the rotation vector of the point from the
 /// displacements u of all rows, in model axes. The forces b and torques t that do work on these are the nodal forces C_t'b + C_r't:
@@ -18,9 +16,9 @@ type Weights = Vec<(usize, [f64; 3])>;
 pub struct NodalPoint {
     /// Place in the undeformed model.
     place: Vector3<f64>,
-    translation: Weights,
+    pub(super) translation: Weights,
     /// Empty where the point has no orientation.
-    rotation: Weights,
+    pub(super) rotation: Weights,
 }
 
 impl NodalPoint {
@@ -104,46 +102,4 @@ fn weights(loads: MatRef<'_, f64>, first: usize) -> Weights {
 
 fn sum(weights: &Weights, u: &[f64]) -> Vector3<f64> {
     weights.iter().map(|(row, weights)| Vector3::from(*weights) * u[*row]).sum()
-}
-
-impl NodalEvaluation<'_> {
-    /// Adds a force at a point, whose moment is about where the point is displaced to.
-    ///
-    /// * `force`: along `axes`, those of the world or of the frame; of a plane body what it has along z is left out.
-    pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
-        let mut own = self.along_model(force, axes);
-        if self.equations.model.dimension() == 2 {
-            own.z = 0.0;
-        }
-        let place = point.place - self.equations.frame.origin + point.displacement(&self.u);
-        self.force += own;
-        self.torque += place.cross(&own);
-        self.add_weighted(&point.translation, &own);
-    }
-
-    /// Adds a torque at a point, on the axes that its rotation vector theta turns: C_r'G(theta) t (theory 6.8).
-    ///
-    /// * `torque`: along `axes`, those of the world or of the frame; of a plane body what it has along z.
-    pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>, axes: LoadAxes) {
-        let mut own = self.along_model(torque, axes);
-        if self.equations.model.dimension() == 2 {
-            (own.x, own.y) = (0.0, 0.0);
-        }
-        self.torque += own;
-        let moment = RotationVector(point.rotation(&self.u)).map() * own;
-        self.add_weighted(&point.rotation, &moment);
-    }
-
-    fn along_model(&self, load: &Vector3<f64>, axes: LoadAxes) -> Vector3<f64> {
-        match axes {
-            LoadAxes::World => self.axes.tr_mul(load),
-            LoadAxes::Body => self.equations.frame.axes * load,
-        }
-    }
-
-    fn add_weighted(&mut self, weights: &Weights, load: &Vector3<f64>) {
-        for (row, weights) in weights {
-            self.row_forces[*row] += Vector3::from(*weights).dot(load);
-        }
-    }
 }
