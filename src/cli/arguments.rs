@@ -156,7 +156,7 @@ pub struct TradeArguments {
     /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: to time them in a program of your own
     #[arg(long, value_name = "FOLDER")]
     pub bodies: Option<PathBuf>,
-    /// Do work that is estimated to take more than half an hour for its number of modes
+    /// Do work that is estimated to take more than half an hour: modes, or the motion of all nodes
     #[arg(long)]
     pub allow_long: bool,
     /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)

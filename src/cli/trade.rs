@@ -53,7 +53,12 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
     let reserved = lacks.last().filter(|own| own.is_reference()).map_or(0.0, |own| own.worst);
-    let settings = Settings { repeat: arguments.repeat.into(), memory: memory_left(None), reserved };
+    let settings = Settings {
+        repeat: arguments.repeat.into(),
+        memory: memory_left(None),
+        reserved,
+        longest: longest(arguments.allow_long),
+    };
     let study = trade(&sources, &scene, nodal, &settings, &|event: Event<'_>| watcher.hear(event))
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());

@@ -3,7 +3,7 @@
 use super::Format;
 use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
-use super::numbers::{counted, significant};
+use super::numbers::significant;
 use super::render::json;
 use super::run_data::RunData;
 use super::selection_verdict::SelectionVerdict;

@@ -12,9 +12,9 @@ use super::trade_verdict::verdict_lines;
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::Storage;
-use crate::motion::scene::{OutputErrors, Tolerance};
+use crate::motion::scene::{OutputErrors, Scheme, Tolerance};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Kind, LumpedMass, Measured, ReferenceKind, Row, Trade};
+use crate::study::trade::{Kind, LumpedMass, Measured, NodalIntegration, ReferenceKind, Row, Trade};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -31,6 +31,8 @@ pub struct TradeFacts<'a> {
     scene: &'a str,
     body: &'a str,
     reference: ReferenceKind,
+    /// How the equations of all nodes were integrated, where they are the reference.
+    nodal: Option<NodalFacts>,
     /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only a file is at hand.
     reference_lacks: Vec<LackFacts>,
     tolerance: Tolerance,
@@ -51,6 +53,47 @@ pub struct TradeFacts<'a> {
 struct VerdictLine {
     label: &'static str,
     text: String,
+}
+
+/// How the equations of all nodes were integrated.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct NodalFacts {
+    rows: usize,
+    /// None: of order 8 with error control.
+    order: Option<usize>,
+    tolerance: Option<f64>,
+    step: Option<f64>,
+    steps: u64,
+    error: Option<f64>,
+}
+
+impl NodalFacts {
+    fn new(nodal: &NodalIntegration) -> Self {
+        let (order, tolerance, step) = match nodal.scheme {
+            Scheme::Adaptive { tolerance } => (None, Some(tolerance), None),
+            Scheme::Conserving { order, step } => (Some(order), None, step),
+        };
+        Self { rows: nodal.rows, order, tolerance, step, steps: nodal.steps, error: nodal.error }
+    }
+
+    fn in_words(&self) -> String {
+        let how = match (self.order, self.step, self.tolerance) {
+            (Some(order), Some(step), _) => {
+                format!("implicit steps of order {order}, of {} at most", significant(step, 3))
+            }
+            (_, _, tolerance) => {
+                format!("explicit steps, tolerance {}", significant(tolerance.unwrap_or(0.0), 2))
+            }
+        };
+        let worth = match self.error {
+            Some(error) => {
+                let part = significant(100.0 * error, 2);
+                format!("; steps twice as long change it by {part} % of the tolerances")
+            }
+            None => String::new(),
+        };
+        format!("{} rows, {} {how}{worth}", self.rows, self.steps)
+    }
 }
 
 /// A candidate.
@@ -174,6 +217,7 @@ impl<'a> TradeFacts<'a> {
             scene: &trade.scene,
             body: &trade.body,
             reference: trade.reference,
+            nodal: trade.nodal.as_ref().map(NodalFacts::new),
             reference_lacks: lacks.iter().map(LackFacts::new).collect(),
             tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
@@ -219,6 +263,13 @@ impl<'a> TradeFacts<'a> {
         }
     }
 
+    fn reference_told(&self) -> String {
+        match &self.nodal {
+            None => self.against().to_owned(),
+            Some(nodal) => format!("{}: {}", self.against(), nodal.in_words()),
+        }
+    }
+
     /// Rows of the front, and the recommended one, ascending in cost.
     fn shown(&self) -> Vec<&RowFacts<'a>> {
         let mut numbers = self.front.clone();
@@ -239,6 +290,9 @@ impl<'a> TradeFacts<'a> {
         );
         for line in &self.verdict {
             page.entry(line.label, &line.text);
+        }
+        if let Some(nodal) = &self.nodal {
+            page.entry("Nodes", &nodal.in_words());
         }
         page.entry("Whole body", &reference_in_words(&self.reference_lacks));
         page.0.push_str("\n  multiplications  evaluation  simulation      file  error/tol  what\n");
@@ -283,7 +337,7 @@ impl<'a> TradeFacts<'a> {
             &mut html,
             [
                 ("Body", escape(self.body)),
-                ("Reference", self.against().to_owned()),
+                ("Reference", self.reference_told()),
                 ("Whole body", escape(&reference_in_words(&self.reference_lacks))),
                 ("Tolerances", escape(&self.tolerances_in_words())),
                 (

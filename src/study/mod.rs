@@ -2,7 +2,6 @@
 
 #[cfg(feature = "hdf5")]
 pub(crate) mod checkpoint;
-mod point_loads;
 pub mod reference;
 pub mod response;
 pub mod selection;

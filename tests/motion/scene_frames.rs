@@ -147,7 +147,7 @@ fn selections_and_studies_do_not_know_the_frame() {
         }
     }
     let [_, _, (name, scene), _] = golden();
-    let settings = Settings { repeat: 1, memory: None, reserved: 0.0 };
+    let settings = Settings { repeat: 1, memory: None, reserved: 0.0, longest: None };
     let studies = bodies.iter().map(|body| {
         let source = Source::new("body", body.clone(), None).expect("a body");
         trade(&[source], &scene, None, &settings, SILENT).expect("a study")

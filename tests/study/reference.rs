@@ -14,7 +14,7 @@ use flexbody::motion::scene::{
 use flexbody::numerics::eigen::{Resume, Wanted};
 use flexbody::study::reference::{Enriched, PART_OF_REFERENCE, ReferenceError, enrich};
 use flexbody::study::tailoring::Tailoring;
-use flexbody::study::trade::NodalReference;
+use flexbody::study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -82,8 +82,8 @@ fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError 
 fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
     let stage = Stage::new(body, scene).expect("a stage");
     let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ()).expect("a motion");
-    let nodal =
-        NodalReference::new(model, &stage.body, &stage.scene, &motion, None, SILENT).expect("a reference");
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)
+        .expect("a reference");
     let errors = nodal.errors(&stage.body, &motion).expect("of one model").largest();
     [errors.deflection, errors.stress].map(|error| error.expect("a deformed body"))
 }

@@ -23,7 +23,7 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs;
 
-const QUICK: Settings = Settings { repeat: 1, memory: None, reserved: 0.0 };
+const QUICK: Settings = Settings { repeat: 1, memory: None, reserved: 0.0, longest: None };
 
 /// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns` turns.
 fn tumble(spin: f64, turns: f64) -> Scene {
@@ -294,23 +294,25 @@ fn a_wholly_lumped_mass_has_modes_of_its_own() {
 }
 
 #[test]
-fn what_nodal_equations_do_not_have_is_refused() {
+fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     let model = model();
-    let Conversions { sources, .. } = without_scene(&model, 2);
+    let Conversions { sources, .. } = without_scene(&model, 4);
     let rate = first_rate(sources[0].body());
-    let mut scene = tumble(0.1 * rate, 0.1);
-    scene.requirements.damping = Some(0.01);
-    let refused = |scene: &Scene| {
-        let error = trade(&sources, scene, Some(&model), &QUICK, SILENT).expect_err("refused");
-        assert_eq!(error.diagnostics()[0].code(), Code::Usage);
-        error.diagnostics()[0].message().to_owned()
-    };
-    assert!(refused(&scene).contains("damping ratios"));
-    scene.requirements.damping = None;
-    scene.run.duration = Some(1e12 / rate);
-    // Long before the motion of the bodies is computed.
-    scene.run.scheme = Scheme::Conserving { order: 2, step: Some(1e11 / rate) };
-    assert!(refused(&scene).contains("multiplications"));
+    let mut scene = tumble(0.15 * rate, 0.3);
+    scene.requirements.damping = Some(0.02);
+    scene.run.scheme = Scheme::Conserving { order: 4, step: Some(0.1 / rate) };
+    let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
+    let nodal = found.nodal.expect("the nodes are the reference");
+    assert_eq!((nodal.rows, nodal.scheme, nodal.error), (model.rows().len(), scene.run.scheme, None));
+    let row = |at: usize| found.rows[at].outcome.as_ref().expect("a motion");
+    assert!(row(0).worst > 0.0 && row(0).errors.stress.expect("deformed") < 0.1, "{:?}", row(0).errors);
+    let full = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
+    assert!(full.nodal.is_none());
+    assert_eq!(full.rows[0].outcome.as_ref().expect("a motion").worst, 0.0);
+    // Work that takes too long is refused before any.
+    let hasty = Settings { longest: Some(1e-6), ..QUICK };
+    let error = trade(&sources, &scene, Some(&model), &hasty, SILENT).expect_err("refused");
+    assert_eq!(error.diagnostics()[0].code(), Code::WorkLong);
 }
 
 /// The same modes by the same search: what `trade` recommends and what `select` takes.

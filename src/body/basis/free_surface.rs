@@ -12,9 +12,7 @@ use crate::model::{FeModel, centre_and_length};
 use crate::numerics::eigen::{
     Accuracy, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve,
 };
-use crate::numerics::linalg::{
-    CscMatrix, Pencil, SymmetricMatrix, combine, gram, subtract_combination, symmetric_eigen,
-};
+use crate::numerics::linalg::{Pencil, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{Mat, MatRef};
 
 /// The lowest free-surface modes.

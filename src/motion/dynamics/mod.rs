@@ -28,7 +28,7 @@ pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Surroundings};
 pub(crate) use nodal::add_turned;
 pub use nodal::{
-    NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion,
+    NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, NodalPoint,
     ReferenceConditions,
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};

@@ -16,7 +16,7 @@ const STEPS_PER_OSCILLATION: f64 = 2.0;
 const STABLE: f64 = 6.0;
 
 /// Frequency of the fastest history of a scene that lasts `duration`, in oscillations per time; zero without any that oscillates.
-fn fastest_history(scene: &Scene, duration: f64) -> f64 {
+pub(crate) fn fastest_history(scene: &Scene, duration: f64) -> f64 {
     scene.acting().chain(scene.driving()).map(|history| history.frequency_until(duration)).fold(0.0, f64::max)
 }
 

@@ -3,12 +3,14 @@
 mod axes;
 mod contradictions;
 mod description;
+mod driving;
 mod effort;
 mod errors;
 mod extremes;
 mod history;
 mod instants;
 mod lively;
+mod nodal_point;
 mod peak;
 mod prepared;
 mod read;
@@ -31,11 +33,14 @@ pub use axes::Axes;
 pub use description::{
     Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, SeriesFile, Spin,
 };
+pub(crate) use driving::Driving;
+pub(crate) use effort::fastest_history;
 pub(crate) use errors::LEAST_REACTION;
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
 pub use extremes::{Drift, Extremes};
 pub use history::History;
 pub use instants::{Instant, instants};
+pub(crate) use nodal_point::{find_nodal_point, nodal_point};
 pub use peak::Peak;
 pub(crate) use prepared::{damped, ends_a_run};
 pub use read::read_scene;

@@ -1,6 +1,7 @@
 //! A scene as forces and prescribed motion of one body.
 
-use super::{Axes, Carried, Load, Point, Scene, Spin, VectorHistory};
+use super::driving::Driving;
+use super::{Axes, Load, Point, Scene, VectorHistory};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
@@ -11,39 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) struct SceneForces<'a> {
     gravity: Option<Vector3<f64>>,
     loads: Vec<(BodyPoint, &'a Load)>,
-    spin: Option<&'a Spin>,
-    carried: Option<CarriedMotion<'a>>,
-}
-
-/// The prescribed motion of the frame of a body that is carried.
-struct CarriedMotion<'a> {
-    carried: &'a Carried,
-    /// From the axis of rotation to the origin of the frame, its axes.
-    arm: Vector3<f64>,
-}
-
-impl<'a> CarriedMotion<'a> {
-    fn new(body: &FlexBody, scene: &'a Scene) -> Option<Self> {
-        let carried = scene.carried.as_ref()?;
-        let through = carried.spin.as_ref().and_then(|spin| spin.through);
-        let arm = through.map_or_else(Vector3::zeros, |through| body.frame().origin - through);
-        Some(Self { carried, arm })
-    }
-
-    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes A of the frame.
-    fn at(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
-        let nothing = (Vector3::zeros(), Vector3::zeros());
-        let (omega, alpha) = self.carried.spin.as_ref().map_or(nothing, |spin| spin.at(time, axes));
-        let (velocity, acceleration) =
-            self.carried.translation.as_ref().map_or(nothing, |drive| drive.at(time));
-        let (velocity, acceleration) = (axes.tr_mul(&velocity), axes.tr_mul(&acceleration));
-        let linear = omega.cross(&self.arm) + velocity;
-        let rate = alpha.cross(&self.arm) + acceleration - omega.cross(&velocity);
-        (
-            Prescribed { linear: Some(linear), angular: Some(omega) },
-            Prescribed { linear: Some(rate), angular: Some(alpha) },
-        )
-    }
+    driving: Driving<'a>,
 }
 
 impl<'a> SceneForces<'a> {
@@ -77,8 +46,8 @@ impl<'a> SceneForces<'a> {
         }
         match (watched, loads) {
             (Some(watched), Some(loads)) if found.is_empty() => {
-                let (spin, carried) = (scene.spin.as_ref(), CarriedMotion::new(body, scene));
-                Ok((Self { gravity: scene.gravity, loads, spin, carried }, watched))
+                let driving = Driving::new(body.frame(), scene);
+                Ok((Self { gravity: scene.gravity, loads, driving }, watched))
             }
             _ => Err(Error::new(found)),
         }
@@ -187,12 +156,6 @@ impl Surroundings for SceneForces<'_> {
     }
 
     fn prescribed(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
-        if let Some(carried) = &self.carried {
-            return carried.at(time, axes);
-        }
-        let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
-        let (omega, alpha) = spin.at(time, axes);
-        let linear = spin.hold.then(Vector3::zeros);
-        (Prescribed { linear, angular: Some(omega) }, Prescribed { linear, angular: Some(alpha) })
+        self.driving.at(time, axes)
     }
 }

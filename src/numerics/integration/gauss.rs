@@ -1,9 +1,7 @@
 //! Implicit steps that conserve: collocation at the points of Gauss.
 
+use super::stages::{STAGES, StageMode, stage_modes};
 use super::{Failure, Oscillator, System, Work};
-
-/// Stages of the method of the highest order here.
-const STAGES: usize = 3;
 
 type Square = [[f64; STAGES]; STAGES];
 
@@ -25,6 +23,11 @@ const SOLVED: f64 = 1e-20;
 #[derive(Debug, Clone)]
 pub struct Gauss {
     tableau: Box<Tableau>,
+    modes: Vec<StageMode>,
+    /// Corrections that count no longer.
+    solved: f64,
+    /// Into how many each of its steps is divided.
+    refinement: u32,
     /// Increments Z of the stages, and their rates.
     increments: [Vec<f64>; STAGES],
     rates: [Vec<f64>; STAGES],
@@ -90,8 +93,12 @@ impl Gauss {
     /// When the order is not 2, 4 or 6.
     pub fn new(dimension: usize, order: usize) -> Self {
         let zeros = || vec![0.0; dimension];
+        let tableau = Tableau::new(order);
         Self {
-            tableau: Box::new(Tableau::new(order)),
+            modes: stage_modes(&tableau.weights, tableau.stages),
+            tableau: Box::new(tableau),
+            solved: SOLVED,
+            refinement: 1,
             increments: std::array::from_fn(|_| zeros()),
             rates: std::array::from_fn(|_| zeros()),
             stage: zeros(),
@@ -101,6 +108,21 @@ impl Gauss {
             last: None,
             work: Work::default(),
         }
+    }
+
+    /// The same with stages that are solved until what is left of them is below `solved` in scales, instead of down to rounding.
+    pub fn solved_to(self, solved: f64) -> Self {
+        Self { solved, ..self }
+    }
+
+    /// The same with every step of an integration divided into so many: at the ends of the steps before they meet again.
+    pub fn refined(self, refinement: u32) -> Self {
+        Self { refinement: refinement.max(1), ..self }
+    }
+
+    /// Into how many each of its steps is divided.
+    pub(super) fn refinement(&self) -> u32 {
+        self.refinement
     }
 
     /// What was done so far.
@@ -140,6 +162,8 @@ impl Gauss {
                 self.work.rates += 1;
                 system.rates(time + self.tableau.nodes[i] * h, &self.stage, &mut self.rates[i])?;
             }
+            self.find_lacks(h);
+            system.correct_stages(h, &self.modes, &mut self.rates[..self.tableau.stages])?;
             let size = self.correct(h);
             // How much the corrections shrink; nothing is known at the first.
             let ratio = before.map(|before: f64| size / before);
@@ -148,7 +172,7 @@ impl Gauss {
                 self.work.rejected += 1;
                 return Err(failed);
             }
-            if size == 0.0 || ratio.is_some_and(|ratio| size * ratio <= SOLVED || stalled(ratio)) {
+            if size == 0.0 || ratio.is_some_and(|ratio| size * ratio <= self.solved || stalled(ratio)) {
                 self.advance(state);
                 self.last = Some(h);
                 self.work.steps += 1;
@@ -188,14 +212,18 @@ impl Gauss {
         std::array::from_fn(|i| std::array::from_fn(|j| if i < n && j < n { inverse[(i, j)] } else { 0.0 }))
     }
 
-    /// Corrects the increments by what they lack, h A f - Z, seen through the oscillators; root mean square in scales.
-    fn correct(&mut self, h: f64) -> f64 {
+    /// What the increments lack, h A f - Z, in place of the rates.
+    fn find_lacks(&mut self, h: f64) {
         for at in 0..self.stage.len() {
             let rates = self.rates.each_ref().map(|rates| rates[at]);
             for i in 0..self.tableau.stages {
                 self.rates[i][at] = h * product(&self.tableau.weights[i], &rates) - self.increments[i][at];
             }
         }
+    }
+
+    /// Corrects the increments by what they lack, seen through the oscillators; root mean square in scales.
+    fn correct(&mut self, h: f64) -> f64 {
         for (oscillator, inverse) in &self.oscillators {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
             let entry = |rates: &[Vec<f64>; STAGES], at: usize| rates.each_ref().map(|rates| rates[at]);

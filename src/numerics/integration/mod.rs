@@ -4,9 +4,11 @@ mod dormand_prince;
 mod explicit;
 mod gauss;
 mod schedule;
+mod stages;
 mod system;
 
 pub use explicit::Explicit;
 pub use gauss::Gauss;
 pub use schedule::{Method, Sight, integrate, integrate_closely};
+pub use stages::StageMode;
 pub use system::{Failure, Oscillator, System, Work};

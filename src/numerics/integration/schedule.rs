@@ -210,7 +210,7 @@ fn gauss_piece<E: From<Failure>>(
     }
     let mut aside: Option<Gauss> = None;
     let mut before = state.to_vec();
-    let steps = (span / longest * (1.0 - STEP_ROUNDING)).ceil().max(1.0);
+    let steps = (span / longest * (1.0 - STEP_ROUNDING)).ceil().max(1.0) * f64::from(method.refinement());
     let length = span / steps;
     let (mut time, mut taken) = (piece.from, 0.0);
     while taken < steps {

@@ -1,5 +1,7 @@
 //! What is integrated, and why an integration ends early.
 
+use super::StageMode;
+
 /// A system of ordinary differential equations y' = f(t, y).
 pub trait System {
     /// Number of entries of y.
@@ -19,6 +21,21 @@ pub trait System {
     /// The stiff part of the system that implicit steps solve without iterating; none unless the system knows one.
     fn oscillators(&self) -> &[Oscillator] {
         &[]
+    }
+
+    /// Sees what the stages of an implicit step of length h lack, `lacks`, through a stiff linear part J of the system that is solved as a
+    /// whole: replaces it by (I - h A kron J)^-1 `lacks`, with the matrix A of the method given by its eigenvalues. Nothing unless the system
+    /// has such a part.
+    ///
+    /// # Errors
+    /// Where that cannot be solved.
+    fn correct_stages(
+        &mut self,
+        _h: f64,
+        _modes: &[StageMode],
+        _lacks: &mut [Vec<f64>],
+    ) -> Result<(), Failure> {
+        Ok(())
     }
 
     /// Restores what holds exactly, as the length of Euler parameters; called after every step that is taken.

@@ -8,9 +8,8 @@ use crate::body::basis::free_static_responses;
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::symmetric_part;
 use crate::model::FeModel;
-use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, instants, trace};
+use crate::motion::scene::{OutputErrors, Peak, Point, Scene, Stage, Trace, instants, nodal_point, trace};
 use crate::numerics::linalg::{combine, gram, larger, not_negative, subtract_combination};
-use crate::study::point_loads::point_loads;
 use faer::{Mat, MatRef};
 
 /// Part of the tolerances that the reference of a study may lack of the model without a word.
@@ -93,10 +92,7 @@ impl Estimate {
         let Some(duration) = scene.run.duration.filter(|_| scene.carried.is_none()) else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
         let (body, scene) = (&*stage.body, &*stage.scene);
-        let at = |point: &Point| {
-            let missing = || Diagnostic::new(Code::SceneBody, format!("the model has no {point}")).into();
-            point_loads(model, point)?.ok_or_else(missing)
-        };
+        let at = |point: &Point| Ok(nodal_point(model, point)?.unit_loads(model));
         let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
         let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
         let Some(view) = NodalView::new(model, body, loads) else { return Ok(None) };

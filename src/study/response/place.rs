@@ -4,8 +4,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
-use crate::motion::scene::Point;
-use crate::study::point_loads::point_loads;
+use crate::motion::scene::{Point, find_nodal_point};
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -188,7 +187,7 @@ impl Place {
             let message = format!("the model has no {} with a reference point", self.point);
             Diagnostic::new(Code::PlaceUnknown, message)
         };
-        let all = point_loads(model, &self.point)?.ok_or_else(missing)?;
+        let all = find_nodal_point(model, &self.point)?.ok_or_else(missing)?.unit_loads(model);
         let mut columns = Mat::zeros(all.nrows(), 0);
         for direction in self.directions_of(d) {
             let column = direction.column(d).filter(|&column| column < all.ncols());

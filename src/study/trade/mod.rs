@@ -12,7 +12,7 @@ mod timing;
 pub use candidate::{Candidate, Kind, LumpedMass};
 pub use conversions::{Conversions, conversions};
 pub use front::{Recommendation, front};
-pub use nodal::NodalReference;
+pub use nodal::{Allowed, NodalIntegration, NodalReference};
 pub use row::{Failed, Measured, Row, Timed};
 pub use source::Source;
 pub use study::{ReferenceKind, Settings, Trade, trade};

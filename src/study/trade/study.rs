@@ -1,7 +1,10 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
 use super::candidate::{first_of, ladder, whole_candidates};
-use super::{Candidate, Failed, Measured, NodalReference, Recommendation, Row, Source, Timed, front, timing};
+use super::{
+    Allowed, Candidate, Failed, Measured, NodalIntegration, NodalReference, Recommendation, Row, Source,
+    Timed, front, timing,
+};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::memory::refuse_beyond;
@@ -44,6 +47,8 @@ pub struct Settings {
     pub memory: Option<u64>,
     /// Part of the tolerances that the reference lacks of its model itself: candidates get the rest.
     pub reserved: f64,
+    /// Seconds that the motion of all nodes may take by its estimate; `None`: any.
+    pub longest: Option<f64>,
 }
 
 /// A finished study.
@@ -55,6 +60,8 @@ pub struct Trade {
     pub body: String,
     /// The motion that errors are measured against.
     pub reference: ReferenceKind,
+    /// How the equations of all nodes were integrated, where they are the reference.
+    pub nodal: Option<NodalIntegration>,
     /// Tolerances of the scene.
     pub tolerance: Tolerance,
     /// Multiplications that the scene allows instead.
@@ -90,7 +97,7 @@ pub fn trade(
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
     };
     watch(Event::Phase("reference"));
-    nodal.map(|model| NodalReference::refuse(model, scene)).transpose()?;
+    nodal.map(|model| NodalReference::refuse(model, source.body(), scene, settings.longest)).transpose()?;
     let stage = Stage::new(source.body(), scene)?;
     let staged = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
     let (sources, source) = (&staged[..], &staged[0]);
@@ -100,14 +107,16 @@ pub fn trade(
     let full = |part| watch(Event::Fraction(part));
     let (motion, said) = trace(source.body(), &scene, settings.memory, full)?;
     refuse_too_much(sources, &motion, settings.memory)?;
-    let diagnostics = [stage.found, said].concat();
     let nodal = match nodal {
         Some(model) => {
             watch(Event::Phase("nodal reference"));
-            Some(NodalReference::new(model, source.body(), &scene, &motion, settings.memory, watch)?)
+            let allowed = Allowed { memory: settings.memory, longest: settings.longest };
+            Some(NodalReference::new(model, source.body(), &scene, &motion, allowed, watch)?)
         }
         None => None,
     };
+    let warning = nodal.as_ref().and_then(NodalReference::warning);
+    let diagnostics = [stage.found, said, Vec::from_iter(warning)].concat();
     let measure = Measure::new(source.body(), &motion);
     let most = (1.0 - settings.reserved).max(0.0);
     let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref(), most };
@@ -117,6 +126,7 @@ pub fn trade(
         scene: scene.name.clone(),
         body: source.body().source().name.clone(),
         reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
+        nodal: nodal.as_ref().map(NodalReference::integration),
         tolerance: scene.requirements.tolerance,
         allowed,
         front: front(&rows),
@@ -261,7 +271,8 @@ impl Job<'_> {
         let body = candidate.body(source)?;
         let mut scene = self.own_scene(source, &body, candidate);
         scene.run.scheme = self.motion.scheme;
-        let motion = trace_at(&body, &scene, &self.motion.time, None)?;
+        let instants = self.nodal.map_or(&self.motion.time[..], NodalReference::time);
+        let motion = trace_at(&body, &scene, instants, None)?;
         let history = match self.nodal {
             Some(nodal) => nodal.errors(&body, &motion),
             None => source.errors(self.measure, &body, &candidate.modes, &motion),

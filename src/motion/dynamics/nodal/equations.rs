@@ -2,8 +2,9 @@
 
 use super::NodalError;
 use super::conditions::{Motions, ReferenceConditions};
+use super::damping::ModalDamping;
 use super::massless::{Massless, NULL_PIVOT};
-use crate::body::flex_body::Frame;
+use crate::body::flex_body::{FlexBody, Frame};
 use crate::model::{Damping, FeModel, centre_and_length};
 use crate::numerics::linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -65,6 +66,10 @@ pub struct NodalEquations<'m> {
     pub(super) rigid_part: Matrix6<f64>,
     pub(super) factor: SparseLdl,
     pub(super) massless: Massless,
+    /// M^-1 C', and E = C M^-1 C', completed in the same way.
+    pub(super) answered: Motions,
+    pub(super) answer: Matrix6<f64>,
+    pub(super) modal_damping: Option<ModalDamping>,
 }
 
 /// R and M R: rigid motions of the frame at the rows of the model, zero for those that a plane body does not have.
@@ -100,12 +105,37 @@ impl<'m> NodalEquations<'m> {
         if matches!(model.damping(), Some(Damping::Ratio(_) | Damping::Bands(_))) {
             return Err(NodalError::DampingOfModes);
         }
+        Self::undamped_modes(model, frame, conditions)
+    }
+
+    /// The equations of `model` in the frame of `body`, a body of it, with the damping of its modes where the model has no damping matrix of
+    /// its own: D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M, with which Psi'D Psi is the D_ff of the body.
+    ///
+    /// # Errors
+    /// As [`NodalEquations::new`]; [`NodalError::OtherBody`] when the body has other rows, or modes that depend on each other.
+    pub fn of_body(
+        model: &'m FeModel,
+        body: &FlexBody,
+        conditions: &ReferenceConditions,
+    ) -> Result<Self, NodalError> {
+        let mut equations = Self::undamped_modes(model, body.frame(), conditions)?;
+        if !matches!(model.damping(), Some(Damping::Rayleigh { .. } | Damping::Matrix(_))) {
+            equations.modal_damping = ModalDamping::new(model, body).ok_or(NodalError::OtherBody)?;
+        }
+        Ok(equations)
+    }
+
+    fn undamped_modes(
+        model: &'m FeModel,
+        frame: &Frame,
+        conditions: &ReferenceConditions,
+    ) -> Result<Self, NodalError> {
         let moving: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
         let (rigid, mass_rigid) = rigid_motions(model, frame, moving);
         let factor = SparseLdl::new(model.pencil().mass(), NULL_PIVOT).ok_or(NodalError::MassIndefinite)?;
         let massless = Massless::new(model, &factor)?;
         let columns = conditions.columns(model, moving, &mass_rigid)?;
-        if matches!(conditions, ReferenceConditions::Held(_)) && massless.n_vectors() > 0 {
+        if *conditions != ReferenceConditions::MeanAxes && massless.n_vectors() > 0 {
             return Err(NodalError::HeldMassSingular { null_vectors: massless.n_vectors() });
         }
 
@@ -113,13 +143,17 @@ impl<'m> NodalEquations<'m> {
         let conditions_rigid = products(&rigid, &columns, moving);
         let independent = match conditions {
             ReferenceConditions::MeanAxes => true,
-            ReferenceConditions::Held(_) => {
+            ReferenceConditions::Held(_) | ReferenceConditions::AtRest(_) => {
                 let values = equilibrated(&conditions_rigid, length).singular_values();
                 values.min() > INDEPENDENT * values.max()
             }
         };
         let rigid_part = conditions_rigid.transpose().try_inverse().filter(|_| independent);
         let rigid_part = rigid_part.ok_or(NodalError::ConditionsDependent)?;
+        let answered = match conditions {
+            ReferenceConditions::MeanAxes => rigid.clone(),
+            _ => answers(model, &factor, &columns, moving),
+        };
         let positions = model.nodes().positions.iter().map(|x| Vector3::from(*x) - frame.origin).collect();
         Ok(Self {
             model,
@@ -130,6 +164,9 @@ impl<'m> NodalEquations<'m> {
             rigid_mass: products(&rigid, &mass_rigid, moving),
             rigid,
             mass_rigid,
+            answer: products(&columns, &answered, moving),
+            answered,
+            modal_damping: None,
             conditions: columns,
             conditions_rigid,
             rigid_part,
@@ -141,6 +178,16 @@ impl<'m> NodalEquations<'m> {
     /// The model.
     pub fn model(&self) -> &'m FeModel {
         self.model
+    }
+
+    /// The frame, where it is before deformation.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Number of entries of the factor of M below the diagonal.
+    pub fn factor_entries(&self) -> usize {
+        self.factor.entries()
     }
 
     /// Number of rows N of the model.
@@ -254,6 +301,18 @@ impl<'m> NodalEquations<'m> {
         let both = Vector6::from_iterator(linear.iter().chain(&angular).copied());
         Vector6::from_fn(|k, _| if self.moving.contains(&k) { both[k] } else { 0.0 })
     }
+}
+
+/// M^-1 C'.
+fn answers(model: &FeModel, factor: &SparseLdl, columns: &Motions, moving: &[usize]) -> Motions {
+    let n = columns.len();
+    let (mut answered, mut scratch) = (vec![[0.0; 6]; n], vec![0.0; n]);
+    for &motion in moving {
+        let mut column: Vec<f64> = columns.iter().map(|row| row[motion]).collect();
+        factor.solve_in_place(model.pencil().block(), &mut column, &mut scratch);
+        answered.iter_mut().zip(column).for_each(|(row, value)| row[motion] = value);
+    }
+    answered
 }
 
 /// y += factor omega x x, at the displacements of the rows of `model`.

@@ -36,6 +36,8 @@ pub enum NodalError {
     },
     /// Damping is given by ratios of modes.
     DampingOfModes,
+    /// The body is none of the model.
+    OtherBody,
     /// A frame that nodal rotations or rows without a place tie to the body.
     FrameTied,
     /// The displacements do not fulfil the reference conditions.
@@ -74,8 +76,9 @@ impl std::fmt::Display for NodalError {
                 "the mass matrix of {rows} rows has {null_vectors} null vectors, too many for dense storage; help: take full integration of the mass, or the reduced equations"
             ),
             Self::DampingOfModes => f.write_str(
-                "damping ratios belong to modes, the nodal equations have none; help: give Rayleigh damping or a damping matrix",
+                "damping ratios belong to modes, which these equations know of no body; help: give the body (`of_body`), Rayleigh damping or a damping matrix",
             ),
+            Self::OtherBody => f.write_str("the body has other rows than the model, or modes that depend on each other"),
             Self::FrameTied => f.write_str(
                 "the frame of a body with nodal rotations or rows without a place cannot be changed; help: start without deformation",
             ),

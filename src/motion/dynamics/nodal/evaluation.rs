@@ -1,5 +1,7 @@
 //! The nodal equations at one state.
 
+use super::damping::{Amplitudes, ModalDamping};
+use super::drive::{Drive, LOST};
 use super::equations::NodalEquations;
 use super::massless::Room;
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
@@ -8,11 +10,6 @@ use crate::motion::dynamics::{EulerParameters, Orientation};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{LU, Matrix3, U6, Vector3, Vector6};
-
-/// The deformation is beyond what the conditions can follow.
-const LOST: Failure = Failure::Rates {
-    reason: "the deformation is so large that the reference conditions do not determine the frame",
-};
 
 /// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after [`NodalEvaluation::new`].
 ///
@@ -23,8 +20,9 @@ pub struct NodalEvaluation<'e> {
     pub(super) origin: Vector3<f64>,
     /// As in the state, of unit length but for the error of the integration.
     pub(super) attitude: EulerParameters,
-    /// D.
+    /// D, and P / m.
     offset: Vector3<f64>,
+    flight: Vector3<f64>,
     /// Model axes to world axes.
     pub(super) axes: Matrix3<f64>,
     /// V, omega, p, h in model axes.
@@ -43,11 +41,14 @@ pub struct NodalEvaluation<'e> {
     pub(super) force: Vector3<f64>,
     pub(super) torque: Vector3<f64>,
     pub(super) row_forces: Vec<f64>,
-    w_rate: Vec<f64>,
-    multipliers: Vector6<f64>,
-    first: Vec<f64>,
+    pub(super) w_rate: Vec<f64>,
+    pub(super) multipliers: Vector6<f64>,
+    /// Where motion of the frame is given.
+    pub(super) drive: Option<Drive>,
+    pub(super) first: Vec<f64>,
     second: Vec<f64>,
-    room: Room,
+    pub(super) room: Room,
+    amplitudes: Amplitudes,
 }
 
 impl<'e> NodalEvaluation<'e> {
@@ -60,6 +61,7 @@ impl<'e> NodalEvaluation<'e> {
             origin: zero,
             attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
             offset: zero,
+            flight: zero,
             axes: equations.frame.axes.transpose(),
             velocity: zero,
             omega: zero,
@@ -76,9 +78,11 @@ impl<'e> NodalEvaluation<'e> {
             row_forces: zeros(),
             w_rate: zeros(),
             multipliers: Vector6::zeros(),
+            drive: None,
             first: zeros(),
             second: zeros(),
             room: equations.massless.room(),
+            amplitudes: equations.modal_damping.as_ref().map_or_else(Amplitudes::default, ModalDamping::room),
         }
     }
 
@@ -99,22 +103,10 @@ impl<'e> NodalEvaluation<'e> {
     /// When `state` has not [`NodalEquations::dimension`] entries.
     pub fn set(&mut self, state: &[f64]) -> Result<(), Failure> {
         let body = self.equations;
-        let (frame, u, w) = body.parts(state);
-        let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
-        self.offset = vector(OFFSET);
-        self.origin = vector(0) + self.offset;
-        self.attitude = attitude(frame);
-        self.axes = self.attitude.normalised().axes() * body.frame.axes.transpose();
-        self.u.copy_from_slice(u);
-        self.w.copy_from_slice(w);
-        (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
-        self.row_forces.fill(0.0);
-
+        let momenta = self.go_to(state);
         let matrix = body.conditions_at(&self.u);
         (self.conditions, self.conditions_transposed) = (matrix.lu(), matrix.transpose().lu());
-        let (linear, angular) = (vector(LINEAR), vector(ANGULAR) - self.offset.cross(&vector(LINEAR)));
-        (self.p, self.h) = (self.axes.tr_mul(&linear), self.axes.tr_mul(&angular));
-        let missing = joined(&self.p, &self.h) - body.onto_frame(&self.u, &self.w);
+        let missing = momenta - body.onto_frame(&self.u, &self.w);
         let mu = self.conditions.solve(&missing).ok_or(LOST)?;
         NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
 
@@ -122,15 +114,42 @@ impl<'e> NodalEvaluation<'e> {
         body.solve(&mut self.vbar, &mut self.first);
         let nu = NodalEquations::sums(&body.conditions, &self.vbar);
         let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
-        (self.velocity, self.omega) = halves(&nu);
+        self.move_frame(&nu);
+        Ok(())
+    }
+
+    /// Takes what the state says, without loads; (p, h) as its momenta say.
+    pub(super) fn go_to(&mut self, state: &[f64]) -> Vector6<f64> {
+        let body = self.equations;
+        let (frame, u, w) = body.parts(state);
+        let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
+        self.offset = vector(OFFSET);
+        self.origin = vector(0) + self.offset;
+        self.flight = vector(LINEAR) / body.rigid_mass[(0, 0)];
+        self.attitude = attitude(frame);
+        // As the reduced equations have it between the ends of steps, where e is not of unit length.
+        self.axes = self.attitude.axes() * body.frame.axes.transpose();
+        self.u.copy_from_slice(u);
+        self.w.copy_from_slice(w);
+        (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
+        self.row_forces.fill(0.0);
+        self.drive = None;
+        let (linear, angular) = (vector(LINEAR), vector(ANGULAR) - self.offset.cross(&vector(LINEAR)));
+        (self.p, self.h) = (self.axes.tr_mul(&linear), self.axes.tr_mul(&angular));
+        joined(&self.p, &self.h)
+    }
+
+    /// The frame moves with nu = (V, omega); u' is what that leaves of vbar.
+    pub(super) fn move_frame(&mut self, nu: &Vector6<f64>) {
+        let body = self.equations;
+        (self.velocity, self.omega) = halves(nu);
         self.ud.copy_from_slice(&self.vbar);
-        body.add_frame(-1.0, &nu, &self.u, &mut self.ud);
+        body.add_frame(-1.0, nu, &self.u, &mut self.ud);
         if !body.massless.is_empty() {
             body.massless.project(body.stiffness(), &mut self.ud, &mut self.room);
             self.vbar.copy_from_slice(&self.ud);
-            body.add_frame(1.0, &nu, &self.u, &mut self.vbar);
+            body.add_frame(1.0, nu, &self.u, &mut self.vbar);
         }
-        Ok(())
     }
 
     /// y' (see [`NodalEquations::dimension`]) under the loads.
@@ -143,8 +162,14 @@ impl<'e> NodalEvaluation<'e> {
     pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
         assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
         self.find_rates()?;
-        let flight = self.axes * self.p / self.equations.rigid_mass[(0, 0)];
-        let offset = self.axes * self.velocity - flight;
+        let (flight, offset) = match self.drive {
+            None => {
+                let relative = self.velocity - self.p / self.equations.rigid_mass[(0, 0)];
+                (self.flight, self.axes * relative)
+            }
+            // Where the frame is driven it is not told from the momentum: G goes with it.
+            Some(_) => (self.axes * self.velocity, Vector3::zeros()),
+        };
         let linear = self.axes * self.force;
         let angular = self.axes * self.torque + self.offset.cross(&linear);
         let turning = self.attitude.rate(&self.equations.frame.axes.tr_mul(&self.omega));
@@ -157,20 +182,27 @@ impl<'e> NodalEvaluation<'e> {
     /// w' and lambda.
     ///
     /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is known from the momenta.
+    ///
+    /// Where motion of the frame is given, w counts up to C'mu: lambda then leaves R'w' = 0.
     fn find_rates(&mut self) -> Result<(), Failure> {
         let body = self.equations;
-        self.first.copy_from_slice(&self.row_forces);
-        body.add_turned(-1.0, &self.omega, &self.w, &mut self.first);
-        self.take_internal_forces();
-        let torque = self.torque
-            - self.omega.cross(&self.h)
-            - self.velocity.cross(&self.p)
-            - body.moment(&self.ud, &self.w);
-        let wanted = joined(&(self.force - self.omega.cross(&self.p)), &torque);
+        let wanted = self.find_forces();
+        if self.drive.is_some() {
+            body.take_conditions(&mut self.w_rate);
+            return Ok(());
+        }
         let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
         self.multipliers = self.conditions.solve(&missing).ok_or(LOST)?;
         NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
         Ok(())
+    }
+
+    /// w' without C'lambda; what B'w' is of a body that nothing drives.
+    pub(super) fn find_forces(&mut self) -> Vector6<f64> {
+        self.first.copy_from_slice(&self.row_forces);
+        self.equations.add_turned(-1.0, &self.omega, &self.w, &mut self.first);
+        self.take_internal_forces();
+        self.wanted()
     }
 
     /// `w_rate` = T'(f - D u') - K u for the forces f in `first`.
@@ -188,7 +220,11 @@ impl<'e> NodalEvaluation<'e> {
                 multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
                 add_scaled(-1.0, &self.w_rate, &mut self.first);
             }
-            Some(Damping::Ratio(_) | Damping::Bands(_)) => unreachable!("refused at construction"),
+            // That of the modes is below.
+            Some(Damping::Ratio(_) | Damping::Bands(_)) => {}
+        }
+        if let Some(damping) = &body.modal_damping {
+            damping.add(-1.0, &self.ud, &mut self.first, &mut self.amplitudes);
         }
         // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the others.
         body.massless.add_static(&self.first, &mut self.second, &mut self.room);
@@ -265,12 +301,12 @@ impl<'e> NodalEvaluation<'e> {
 }
 
 /// A linear and an angular part as one vector.
-fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+pub(super) fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
     Vector6::from_iterator(linear.iter().chain(angular).copied())
 }
 
 /// The linear and the angular part.
-fn halves(both: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+pub(super) fn halves(both: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (both.fixed_rows::<3>(0).into_owned(), both.fixed_rows::<3>(3).into_owned())
 }
 

@@ -1,8 +1,9 @@
 //! Loads on the nodes.
 
-use super::NodalEvaluation;
 use super::equations::NodalEquations;
-use crate::motion::dynamics::{Orientation, RotationVector};
+use super::points::Weights;
+use super::{NodalEvaluation, NodalPoint};
+use crate::motion::dynamics::{LoadAxes, Orientation, RotationVector};
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEvaluation<'_> {
@@ -76,6 +77,46 @@ impl NodalEvaluation<'_> {
         self.force += both.fixed_rows::<3>(0);
         self.torque += both.fixed_rows::<3>(3);
         self.row_forces.iter_mut().zip(forces).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// Adds a force at a point, whose moment is about where the point is displaced to.
+    ///
+    /// * `force`: along `axes`, those of the world or of the frame; of a plane body what it has along z is left out.
+    pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
+        let mut own = self.along_model(force, axes);
+        if self.equations.model.dimension() == 2 {
+            own.z = 0.0;
+        }
+        let place = point.place() - self.equations.frame.origin + point.displacement(&self.u);
+        self.force += own;
+        self.torque += place.cross(&own);
+        self.add_weighted(&point.translation, &own);
+    }
+
+    /// Adds a torque at a point, on the axes that its rotation vector theta turns: C_r'G(theta) t (theory 6.8).
+    ///
+    /// * `torque`: along `axes`, those of the world or of the frame; of a plane body what it has along z.
+    pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>, axes: LoadAxes) {
+        let mut own = self.along_model(torque, axes);
+        if self.equations.model.dimension() == 2 {
+            (own.x, own.y) = (0.0, 0.0);
+        }
+        self.torque += own;
+        let moment = RotationVector(point.rotation(&self.u)).map() * own;
+        self.add_weighted(&point.rotation, &moment);
+    }
+
+    fn along_model(&self, load: &Vector3<f64>, axes: LoadAxes) -> Vector3<f64> {
+        match axes {
+            LoadAxes::World => self.axes.tr_mul(load),
+            LoadAxes::Body => self.equations.frame.axes * load,
+        }
+    }
+
+    fn add_weighted(&mut self, weights: &Weights, load: &Vector3<f64>) {
+        for (row, weights) in weights {
+            self.row_forces[*row] += Vector3::from(*weights).dot(load);
+        }
     }
 
     /// A world vector in model axes, for a plane body in its plane.

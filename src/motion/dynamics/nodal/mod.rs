@@ -2,6 +2,9 @@
 //! reduced equation is measured against.
 
 mod conditions;
+mod damping;
+mod drive;
+mod driven;
 mod equations;
 mod error;
 mod evaluation;
@@ -10,8 +13,11 @@ mod massless;
 mod modes;
 mod motion;
 mod observed;
+mod points;
 mod reframe;
+mod settled;
 mod state;
+mod stiff;
 
 pub use conditions::ReferenceConditions;
 pub use equations::NodalEquations;
@@ -20,4 +26,5 @@ pub use error::NodalError;
 pub use evaluation::NodalEvaluation;
 pub use modes::NodalModes;
 pub use motion::NodalMotion;
+pub use points::NodalPoint;
 pub use state::NodalConfiguration;

@@ -1,0 +1,433 @@
+//! The motion of all nodes in every kind of scene: with all modes of its model a body moves as the nodes do.
+
+use crate::support::elements::{Kind as Element, MassRule, Material};
+use crate::support::general::raw_fixture;
+use crate::support::mesh::{Mesh, grid};
+use crate::support::unreduced::soft_plate;
+use flexbody::base::diagnostic::Code;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel, Reference};
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Run, Scene, Scheme, Spin,
+    Stage, Trace, Translation, trace, trace_at,
+};
+use flexbody::numerics::eigen::Wanted;
+use flexbody::study::trade::{Allowed, NodalReference};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// More modes than there are.
+const ALL: usize = 10_000;
+
+/// Implicit steps: the nodes take the same, so that what is left between them is the rounding of both.
+const SAME_STEPS: f64 = 1e-7;
+
+/// The same of bodies that take thousands of steps, each with the tolerance 1e-8.
+const MANY_STEPS: f64 = 1e-5;
+
+/// Ratio of the fastest to the slowest mode above which steps that the reduced equations can iterate are too many for a test.
+const STIFF: f64 = 100.0;
+
+/// Explicit steps with the tolerance of the nodes.
+const EXPLICIT: f64 = 1e-6;
+
+/// A model with the interfaces `left` (averaging, its reference point beside its nodes) and `right` (rigid) at both ends along x.
+fn with_ends(mut raw: RawModel) -> RawModel {
+    let x: Vec<f64> = raw.nodes.positions.iter().map(|x| x[0]).collect();
+    let (least, most) = x.iter().fold((f64::INFINITY, -f64::INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let near = |at: f64| -> Vec<i64> {
+        let nodes = raw.nodes.ids.iter().zip(&x).filter(|(_, x)| (*x - at).abs() < 0.2 * (most - least));
+        nodes.map(|(id, _)| *id).collect()
+    };
+    let mean = |ids: &[i64]| {
+        let at = |id: &i64| raw.nodes.ids.iter().position(|own| own == id).expect("a node");
+        ids.iter().map(|id| Vector3::from(raw.nodes.positions[at(id)])).sum::<Vector3<f64>>()
+            / ids.len() as f64
+    };
+    let (left, right) = (near(least), near(most));
+    let plane = raw.nodes.positions.iter().all(|x| x[2] == 0.0);
+    let beside = mean(&left) + 0.1 * (most - least) * Vector3::new(-1.0, 0.4, if plane { 0.0 } else { 0.2 });
+    raw.interfaces = vec![
+        NodeSet {
+            coupling: Some(Coupling::Averaging),
+            reference: Reference::Point(beside.into()),
+            ..NodeSet::new("left", left)
+        },
+        NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new("right", right) },
+    ];
+    raw
+}
+
+/// A rubber beam of some bricks, askew.
+fn solid() -> RawModel {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Element::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
+        [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
+    });
+    with_ends(mesh.assemble(&rubber, MassRule::Consistent).raw_model())
+}
+
+fn model_of(raw: RawModel) -> FeModel {
+    FeModel::from_raw(raw).expect("a sound model").model
+}
+
+fn body_of(model: &FeModel, modes: usize) -> FlexBody {
+    let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT).expect("a body").body
+}
+
+/// First circular frequency, mass, and length of a body: what forces and rates are measured in.
+struct Size {
+    rate: f64,
+    fastest: f64,
+    force: f64,
+    torque: f64,
+    plane: bool,
+}
+
+impl Size {
+    fn new(body: &FlexBody) -> Self {
+        let rate = body.modes().eigenvalue[0].sqrt();
+        let mass = body.invariants().mass();
+        let radius = (body.invariants().inertia().trace() / mass).sqrt();
+        let force = 0.03 * mass * radius * rate * rate;
+        let fastest = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+        Self { rate, fastest, force, torque: force * radius, plane: body.dimension() == 2 }
+    }
+
+    /// A vector in the plane of a plane body.
+    fn along(&self, v: [f64; 3]) -> Vector3<f64> {
+        Vector3::new(v[0], v[1], if self.plane { 0.0 } else { v[2] })
+    }
+
+    /// A vector about which a plane body turns.
+    fn about(&self, v: [f64; 3]) -> Vector3<f64> {
+        if self.plane { Vector3::new(0.0, 0.0, v[2]) } else { v.into() }
+    }
+
+    fn swing(&self, times: f64) -> History {
+        History::Sine { amplitude: 1.0, frequency: times * self.rate / std::f64::consts::TAU, phase: 0.3 }
+    }
+
+    /// Nothing acts, for a period of the first mode.
+    fn scene(&self, scheme: Scheme) -> Scene {
+        Scene {
+            name: "all nodes".to_owned(),
+            run: Run {
+                duration: Some(1.0 * std::f64::consts::TAU / self.rate),
+                outputs: 10,
+                most_steps: Run::MOST_STEPS,
+                scheme,
+                terms: Terms::ALL,
+            },
+            initial: Initial {
+                origin: self.along([0.1, 0.2, -0.1]),
+                rotation: self.about([0.3, -0.2, 0.5]),
+                angular_velocity: self.about([0.05, 0.03, -0.04]) * self.rate,
+                ..Initial::default()
+            },
+            gravity: None,
+            loads: Vec::new(),
+            spin: None,
+            carried: None,
+            watched: Vec::new(),
+            requirements: Default::default(),
+            source: None,
+            resolved: false,
+        }
+    }
+
+    fn steps(&self, order: usize) -> Scheme {
+        // The reduced equations leave the modes of a body that is carried, and torques, to their iteration.
+        Scheme::Conserving { order, step: Some(0.5 / self.fastest) }
+    }
+
+    /// Forces and torques at both interfaces, along axes of the world and of the model.
+    fn at_interfaces(&self, torques: bool) -> Vec<Load> {
+        let torque = |v: [f64; 3]| if torques { self.about(v) * self.torque } else { Vector3::zeros() };
+        let load = |name: &str, force: [f64; 3], t: [f64; 3], axes: Axes, history: History| Load {
+            at: Point::Interface(name.to_owned()),
+            force: self.along(force) * self.force,
+            torque: torque(t),
+            axes,
+            history,
+        };
+        vec![
+            load("left", [0.4, 1.0, -0.6], [0.3, -0.5, 0.8], Axes::World, self.swing(0.7)),
+            load("right", [-0.7, 0.5, 0.9], [0.2, 0.6, -0.4], Axes::Model, self.swing(1.3)),
+        ]
+    }
+
+    fn spin(&self, hold: bool) -> Option<Spin> {
+        let axis = self.about([0.2, -0.3, 1.0]).normalize();
+        let rate = History::Ramp {
+            from: 0.1 * self.rate,
+            to: 0.3 * self.rate,
+            start: 0.0,
+            duration: 5.0 / self.rate,
+        };
+        Some(Spin { axis, axes: Axes::Model, rate, hold })
+    }
+
+    /// Carried about an axis beside it that moves.
+    fn carried(&self, by: Point) -> Option<Carried> {
+        let rate = History::Ramp { from: 0.0, to: 0.2 * self.rate, start: 0.0, duration: 5.0 / self.rate };
+        let axis = self.about([0.5, 0.3, 1.0]).normalize();
+        let through = Some(self.along([-0.3, 0.2, 0.1]));
+        let velocity = History::Sine { amplitude: 0.02 * self.rate, frequency: 0.1 * self.rate, phase: 0.0 };
+        Some(Carried {
+            by,
+            spin: Some(CarriedSpin { axis, axes: Axes::Model, through, rate }),
+            translation: Some(Translation {
+                direction: self.along([0.6, -1.0, 0.4]).normalize(),
+                drive: Drive::Velocity(velocity),
+            }),
+        })
+    }
+}
+
+/// The motion of a body, that of the nodes of its model, and the errors between them.
+fn errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> (Trace, OutputErrors) {
+    let stage = Stage::new(body, scene).expect("a stage");
+    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ()).expect("a motion");
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)
+        .expect("a reference");
+    if matches!(scene.run.scheme, Scheme::Conserving { .. }) {
+        // Steps end where they do.
+        assert_eq!(nodal.time(), motion.time, "the same steps");
+    }
+    let own = trace_at(&stage.body, &stage.scene, nodal.time(), None).expect("a motion");
+    let errors = nodal.errors(&stage.body, &own).expect("of one model").largest();
+    (motion, errors)
+}
+
+/// With all modes the body moves as the nodes do, with most of them left out it does not.
+fn assert_same(what: &str, raw: &RawModel, scene: impl Fn(&Size, Scheme) -> Scene) {
+    let model = model_of(raw.clone());
+    let whole = body_of(&model, ALL);
+    let size = Size::new(&whole);
+    let explicit = Scheme::Adaptive { tolerance: 1e-9 };
+    let is_stiff = size.fastest > STIFF * size.rate;
+    let mut schemes = vec![(explicit, if is_stiff { MANY_STEPS } else { EXPLICIT })];
+    // What is carried is integrated explicitly, whatever the scene says.
+    if !is_stiff && scene(&size, explicit).carried.is_none() {
+        schemes.extend([2, 4, 6].map(|order| (size.steps(order), SAME_STEPS)));
+    }
+    for (scheme, limit) in schemes {
+        let scene = scene(&size, scheme);
+        let (motion, errors) = errors(&model, &whole, &scene);
+        assert!(
+            motion.extremes.deflection.value > 1e-3,
+            "{what}, {scheme:?}: {:e}",
+            motion.extremes.deflection.value
+        );
+        let OutputErrors { attitude, deflection, stress, reaction } = errors;
+        assert_eq!(reaction.is_some(), scene.prescribes(), "{what}, {scheme:?}");
+        let all = [Some(attitude), deflection, stress, reaction];
+        assert!(deflection.is_some() && stress.is_some(), "{what}, {scheme:?}");
+        assert!(all.into_iter().flatten().all(|error| error < limit), "{what}, {scheme:?}: {errors:?}");
+    }
+    let scene = scene(&size, explicit);
+    let (_, errors) = errors_of_few(&model, &scene);
+    assert!(errors.stress.is_some_and(|error| error > 1e-3), "{what} with four modes: {errors:?}");
+}
+
+fn errors_of_few(model: &FeModel, scene: &Scene) -> (Trace, OutputErrors) {
+    errors(model, &body_of(model, 4), scene)
+}
+
+#[test]
+fn loads_at_interfaces_act_on_their_nodes() {
+    for (what, raw, torques) in [
+        ("solid", solid(), true),
+        ("plane", with_ends(soft_plate()), true),
+        ("beams", with_ends(raw_fixture("frame_beams")), true),
+        ("massless rotations", with_ends(raw_fixture("frame_lumped")), true),
+    ] {
+        assert_same(what, &raw, |size, scheme| Scene {
+            loads: size.at_interfaces(torques),
+            watched: vec![Point::Interface("left".to_owned()), Point::Interface("right".to_owned())],
+            ..size.scene(scheme)
+        });
+    }
+}
+
+#[test]
+fn spin_is_prescribed_with_the_centre_free_or_held() {
+    for (what, raw) in [
+        ("solid", solid()),
+        ("plane", with_ends(soft_plate())),
+        ("beams", with_ends(raw_fixture("frame_beams"))),
+    ] {
+        for hold in [false, true] {
+            assert_same(what, &raw, |size, scheme| Scene {
+                spin: size.spin(hold),
+                loads: size.at_interfaces(true),
+                gravity: Some(size.along([0.0, -0.01, 0.02]) * size.rate * size.rate),
+                ..size.scene(scheme)
+            });
+        }
+    }
+}
+
+#[test]
+fn ratios_damp_the_modes_on_the_nodes() {
+    let scene = |size: &Size, scheme| {
+        let mut scene =
+            Scene { loads: size.at_interfaces(true), spin: size.spin(false), ..size.scene(scheme) };
+        scene.requirements.damping = Some(0.05);
+        scene
+    };
+    assert_same("solid", &solid(), scene);
+    // The model says it.
+    let own = RawModel { damping: Some(Damping::Ratio(0.08)), ..solid() };
+    assert_same("of the model", &own, |size, scheme| Scene {
+        loads: size.at_interfaces(true),
+        ..size.scene(scheme)
+    });
+    // A damping matrix of the model counts, not the ratio of the scene.
+    let rayleigh = RawModel { damping: Some(Damping::Rayleigh { alpha: 0.1, beta: 0.02 }), ..solid() };
+    assert_same("Rayleigh", &rayleigh, scene);
+}
+
+#[test]
+fn what_carries_a_body_moves_it() {
+    let interface = || Point::Interface("left".to_owned());
+    let rigid = || Point::Interface("right".to_owned());
+    for (what, raw, by) in [
+        ("averaging", solid(), interface()),
+        ("rigid", solid(), rigid()),
+        ("plane", with_ends(soft_plate()), interface()),
+        (
+            "node of beams",
+            with_ends(raw_fixture("frame_beams")),
+            Point::Node(raw_fixture("frame_beams").nodes.ids[0]),
+        ),
+    ] {
+        assert_same(what, &raw, |size, scheme| {
+            let mut scene = Scene {
+                carried: size.carried(by.clone()),
+                gravity: Some(size.along([0.01, -0.02, 0.02]) * size.rate * size.rate),
+                ..size.scene(scheme)
+            };
+            scene.requirements.damping = Some(0.03);
+            scene
+        });
+    }
+}
+
+#[test]
+fn settled_starts_have_the_static_deformation_of_the_nodes() {
+    for (what, raw) in [("solid", solid()), ("beams", with_ends(raw_fixture("frame_beams")))] {
+        for driven in [false, true] {
+            assert_same(what, &raw, |size, scheme| {
+                let mut scene = Scene {
+                    loads: size.at_interfaces(true),
+                    spin: if driven { size.spin(true) } else { None },
+                    ..size.scene(scheme)
+                };
+                scene.initial.settled = true;
+                scene
+            });
+        }
+    }
+}
+
+/// Steps that are halved: those of the explicit method have their own error control.
+#[test]
+fn implicit_and_explicit_steps_meet_in_one_motion() {
+    let model = model_of(solid());
+    let whole = body_of(&model, ALL);
+    let size = Size::new(&whole);
+    let scene =
+        |scheme| Scene { loads: size.at_interfaces(true), spin: size.spin(false), ..size.scene(scheme) };
+    // Against a motion that is exact: the collocation of order 4 converges like h^4.
+    let exact = scene(Scheme::Adaptive { tolerance: 1e-11 });
+    let error = |step: f64| {
+        let stage = Stage::new(&whole, &scene(Scheme::Conserving { order: 4, step: Some(step / size.rate) }))
+            .map(|stage| (stage.body.into_owned(), stage.scene.into_owned()))
+            .expect("a stage");
+        let (motion, _) = trace(&stage.0, &stage.1, None, |_| ()).expect("a motion");
+        let nodal = NodalReference::new(&model, &stage.0, &stage.1, &motion, Allowed::default(), SILENT)
+            .expect("a reference");
+        let staged = Stage::new(&whole, &exact).expect("a stage");
+        let own = trace_at(&staged.body, &staged.scene, nodal.time(), None).expect("a motion");
+        nodal.errors(&whole_of(&staged), &own).expect("of one model").largest().stress.expect("deformed")
+    };
+    let errors = [0.1, 0.05, 0.025].map(error);
+    let orders = [errors[0] / errors[1], errors[1] / errors[2]];
+    assert!(orders.iter().all(|ratio| (10.0..20.0).contains(ratio)), "{errors:?}");
+}
+
+fn whole_of(stage: &Stage<'_>) -> FlexBody {
+    stage.body.clone().into_owned()
+}
+
+#[test]
+fn long_work_is_refused_with_what_it_takes() {
+    let model = model_of(solid());
+    let body = body_of(&model, 4);
+    let size = Size::new(&body);
+    let mut scene = size.scene(Scheme::Adaptive { tolerance: 1e-9 });
+    scene.run.duration = Some(1e12 / size.rate);
+    let error = NodalReference::refuse(&model, &body, &scene, Some(1800.0)).expect_err("too long");
+    let found = &error.diagnostics()[0];
+    assert_eq!(found.code(), Code::WorkLong);
+    assert!(found.message().contains("1800 s are allowed"), "{}", found.message());
+    assert!(NodalReference::refuse(&model, &body, &scene, None).is_ok());
+    scene.run.duration = Some(1.0 / size.rate);
+    assert!(NodalReference::refuse(&model, &body, &scene, Some(1800.0)).is_ok());
+}
+
+#[test]
+fn geometric_stiffness_is_refused_unless_the_body_is_carried() {
+    let model = model_of(raw_fixture("turbine_blade"));
+    let body = body_of(&model, 4);
+    let mut scene = Size::new(&body).scene(Scheme::Adaptive { tolerance: 1e-9 });
+    let error = NodalReference::refuse(&model, &body, &scene, None).expect_err("geometric stiffness");
+    let found = &error.diagnostics()[0];
+    assert_eq!(found.code(), Code::Usage);
+    assert!(found.message().contains("geometric stiffness"), "{}", found.message());
+    scene.carried = Some(Carried { by: Point::Interface("root".to_owned()), spin: None, translation: None });
+    assert!(NodalReference::refuse(&model, &body, &scene, None).is_ok());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_load_and_any_spin(
+        (force, torque) in (prop::array::uniform3(-1.0f64..1.0), prop::array::uniform3(-1.0f64..1.0)),
+        (axis, speed) in (prop::array::uniform3(-1.0f64..1.0), 0.0f64..0.4),
+        (order, hold, world) in (1usize..4, any::<bool>(), any::<bool>()),
+        (damping, step, swing) in (0.0f64..0.2, 0.02f64..0.2, 0.2f64..2.0),
+    ) {
+        prop_assume!(Vector3::from(axis).norm() > 0.1);
+        let model = model_of(solid());
+        let whole = body_of(&model, ALL);
+        let size = Size::new(&whole);
+        let load = Load {
+            at: Point::Interface("left".to_owned()),
+            force: Vector3::from(force) * size.force,
+            torque: Vector3::from(torque) * size.torque,
+            axes: if world { Axes::World } else { Axes::Model },
+            history: size.swing(swing),
+        };
+        let spin = Spin {
+            axis: Vector3::from(axis).normalize(),
+            axes: Axes::Model,
+            rate: History::Sine { amplitude: speed * size.rate, frequency: 0.1 * size.rate, phase: 1.0 },
+            hold,
+        };
+        let scheme = Scheme::Conserving { order: 2 * order, step: Some(step / size.rate) };
+        let mut scene = Scene { loads: vec![load], spin: Some(spin), ..size.scene(scheme) };
+        scene.requirements.damping = Some(damping);
+        let (_, errors) = errors(&model, &whole, &scene);
+        let worst = [Some(errors.attitude), errors.deflection, errors.stress, errors.reaction];
+        prop_assert!(worst.into_iter().flatten().all(|error| error < SAME_STEPS), "{:?}", errors);
+    }
+}
