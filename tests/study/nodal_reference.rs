@@ -13,7 +13,7 @@ use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel, Reference};
 use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Run, Scene, Scheme, Spin,
-    Stage, Trace, Translation, trace, trace_at,
+    Stage, Trace, VectorHistory, trace, trace_at,
 };
 use flexbody::numerics::eigen::Wanted;
 use flexbody::study::trade::{Allowed, NodalReference};
@@ -137,6 +137,7 @@ impl Size {
             watched: Vec::new(),
             requirements: Default::default(),
             source: None,
+            series: Vec::new(),
             resolved: false,
         }
     }
@@ -148,13 +149,16 @@ impl Size {
 
     /// Forces and torques at both interfaces, along axes of the world and of the model.
     fn at_interfaces(&self, torques: bool) -> Vec<Load> {
+        let along = |direction: Vector3<f64>, factor: &History| VectorHistory::Along {
+            direction,
+            factor: factor.clone(),
+        };
         let torque = |v: [f64; 3]| if torques { self.about(v) * self.torque } else { Vector3::zeros() };
         let load = |name: &str, force: [f64; 3], t: [f64; 3], axes: Axes, history: History| Load {
             at: Point::Interface(name.to_owned()),
-            force: self.along(force) * self.force,
-            torque: torque(t),
+            force: along(self.along(force) * self.force, &history),
+            torque: along(torque(t), &history),
             axes,
-            history,
         };
         vec![
             load("left", [0.4, 1.0, -0.6], [0.3, -0.5, 0.8], Axes::World, self.swing(0.7)),
@@ -170,7 +174,8 @@ impl Size {
             start: 0.0,
             duration: 5.0 / self.rate,
         };
-        Some(Spin { axis, axes: Axes::Model, rate, hold })
+        let velocity = VectorHistory::Along { direction: axis, factor: rate };
+        Some(Spin { velocity, axes: Axes::Model, start: None, hold })
     }
 
     /// Carried about an axis beside it that moves.
@@ -179,13 +184,12 @@ impl Size {
         let axis = self.about([0.5, 0.3, 1.0]).normalize();
         let through = Some(self.along([-0.3, 0.2, 0.1]));
         let velocity = History::Sine { amplitude: 0.02 * self.rate, frequency: 0.1 * self.rate, phase: 0.0 };
+        let direction = self.along([0.6, -1.0, 0.4]).normalize();
+        let turning = VectorHistory::Along { direction: axis, factor: rate };
         Some(Carried {
             by,
-            spin: Some(CarriedSpin { axis, axes: Axes::Model, through, rate }),
-            translation: Some(Translation {
-                direction: self.along([0.6, -1.0, 0.4]).normalize(),
-                drive: Drive::Velocity(velocity),
-            }),
+            spin: Some(CarriedSpin { velocity: turning, axes: Axes::Model, start: None, through }),
+            translation: Some(Drive::Velocity(VectorHistory::Along { direction, factor: velocity })),
         })
     }
 }
@@ -410,17 +414,20 @@ proptest! {
         let model = model_of(solid());
         let whole = body_of(&model, ALL);
         let size = Size::new(&whole);
+        let swinging = |direction: Vector3<f64>, factor: History| VectorHistory::Along { direction, factor };
         let load = Load {
             at: Point::Interface("left".to_owned()),
-            force: Vector3::from(force) * size.force,
-            torque: Vector3::from(torque) * size.torque,
+            force: swinging(Vector3::from(force) * size.force, size.swing(swing)),
+            torque: swinging(Vector3::from(torque) * size.torque, size.swing(swing)),
             axes: if world { Axes::World } else { Axes::Model },
-            history: size.swing(swing),
         };
         let spin = Spin {
-            axis: Vector3::from(axis).normalize(),
+            velocity: swinging(
+                Vector3::from(axis).normalize(),
+                History::Sine { amplitude: speed * size.rate, frequency: 0.1 * size.rate, phase: 1.0 },
+            ),
             axes: Axes::Model,
-            rate: History::Sine { amplitude: speed * size.rate, frequency: 0.1 * size.rate, phase: 1.0 },
+            start: None,
             hold,
         };
         let scheme = Scheme::Conserving { order: 2 * order, step: Some(step / size.rate) };
