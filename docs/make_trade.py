@@ -255,9 +255,28 @@ def scene_part(program, name, model, modes):
         agree = agreement(program, folder, path, times[told["rows"][0]["number"]])
     drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:])
-    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy."
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy.{needed(told)}"
     parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](images/trade_{name}.svg)"]
     return "\n\n".join(parts) + "\n\n", summary(told, times)
+
+
+def needed(told):
+    """How many modes of the reference the tolerances take, in the order of frequency and by what they do, with the terms that are recommended."""
+    recommended = told["rows"][(told["recommended"] or 1) - 1]
+    first = told["rows"][0]
+
+    def fewest(lowest):
+        def fits(row):
+            same = row["source"] == first["source"] and row["groups"] == recommended["groups"] and not row["lumped"] and row["storage"] == "f64"
+            in_order = row["mode_numbers"][-1] == row["modes"]
+            return same and row["measured"] and row["measured"]["worst"] <= 1 and (in_order == lowest or row["modes"] == first["modes"])
+
+        return min((row["modes"] for row in told["rows"] if fits(row)), default=None)
+
+    by_frequency, by_motion = fewest(True), fewest(False)
+    if by_frequency is None or by_motion is None:
+        return ""
+    return f" Of the {first['modes']} modes of the reference, residual vectors and responses to its motion among them, the tolerances take {by_motion} by what they do and {by_frequency} in the order of frequency (on a coarse ladder), with the terms that are recommended."
 
 
 def agreement(program, folder, scene, one):

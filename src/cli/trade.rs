@@ -52,7 +52,9 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         (None, vec![Source::new("file", body, None)?], Vec::new())
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
-    let reserved = lacks.last().filter(|own| own.is_reference()).map_or(0.0, |own| own.worst);
+    // All nodes lack nothing.
+    let lacking = lacks.last().filter(|own| nodal.is_none() && own.is_reference());
+    let reserved = lacking.map_or(0.0, |own| own.worst);
     let settings = Settings {
         repeat: arguments.repeat.into(),
         memory: memory_left(None),

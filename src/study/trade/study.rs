@@ -188,14 +188,23 @@ impl Job<'_> {
         Ok(rows)
     }
 
-    /// Bisects between the recommended rung of the ladder and the highest one below it that is not good enough, as a selection does.
+    /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that is not, as a selection does.
     fn refine(&self, liveliest: &[usize], rows: &mut Vec<Row>) -> Result<()> {
-        let Recommendation::Cheapest(at) = self.recommended(rows) else { return Ok(()) };
-        let best = rows[at].candidate.clone();
+        if self.scene.requirements.multiplications.is_some() {
+            return Ok(());
+        }
+        let is_exact =
+            |own: &Candidate| own.source == 0 && own.lumped.is_none() && own.storage == Storage::F64;
+        let enough = rows.iter().filter(|row| is_exact(&row.candidate)).filter_map(|row| {
+            let measured = row.outcome.as_ref().ok().filter(|measured| measured.worst <= self.most)?;
+            Some((measured.multiplications, &row.candidate))
+        });
+        let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
+        let best = best.clone();
         let count = best.modes.len();
         let lowest: Vec<usize> = (0..liveliest.len()).collect();
         let order = if best.modes == lowest[..count] { &lowest[..] } else { liveliest };
-        if best.source > 0 || first_of(order, count) != best.modes {
+        if first_of(order, count) != best.modes {
             return Ok(());
         }
         let with = |count: usize| Candidate { modes: first_of(order, count), ..best.clone() };
