@@ -6,7 +6,7 @@
     python3 docs/make_trade.py
 
 Seconds are those of the processor in Exudyn and in a C program (docs/trade_seconds.py); it takes about an hour, since all of them are measured five
-times, one after the other. `--only SCENE` tries it.
+times, one after the other. What it finds of a scene is kept in target/trade: `--only SCENE ...` measures some of them anew.
 """
 
 import argparse
@@ -407,9 +407,15 @@ def main():
     args = parser.parse_args()
     program = str(Path(args.program).resolve())  # it runs in another folder
     version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
-    scenes = [one for one in SCENES if not args.only or one[0] in args.only]
+    kept = ROOT / "target/trade"
+    kept.mkdir(parents=True, exist_ok=True)
     # One after the other: the times are measured.
-    parts = [scene_part(program, *one) for one in scenes]
+    for one in SCENES:
+        if not args.only or one[0] in args.only:
+            (kept / f"{one[0]}.json").write_text(json.dumps(scene_part(program, *one)))
+            print(one[0], flush=True)
+    scenes = [one for one in SCENES if (kept / f"{one[0]}.json").exists()]
+    parts = [json.loads((kept / f"{one[0]}.json").read_text()) for one in scenes]
     head = ["| scene | body | its error | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|"]
     top = "\n".join(head + [row for _, row in parts])
     counter = counter_part(program) + conversion_part(program)

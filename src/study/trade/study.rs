@@ -203,7 +203,8 @@ impl Job<'_> {
         let best = best.clone();
         let count = best.modes.len();
         let lowest: Vec<usize> = (0..liveliest.len()).collect();
-        let order = if best.modes == lowest[..count] { &lowest[..] } else { liveliest };
+        let by_frequency = count < lowest.len() && best.modes == lowest[..count];
+        let order = if by_frequency { &lowest[..] } else { liveliest };
         if first_of(order, count) != best.modes {
             return Ok(());
         }
