@@ -15,7 +15,7 @@ import numpy as np
 from trade_guidelines import history, kinks, skew
 
 # Steps per period of the highest frequency that the scene asks about (`[band]`), and how many there are at the least and at the most.
-PER_PERIOD, FEWEST, MOST = 30, 500, 20000
+PER_PERIOD, FEWEST, MOST = 20, 500, 20000
 # The Runge-Kutta method of order 4 is stable up to 2.83 / omega.
 STABLE = 2.5
 TURNS = 5

@@ -583,12 +583,12 @@ fn mbdyn_says_what_its_input_must_have() {
 /// Six nodes on a cross have the place and the rotation of the interface, also of nodal rotations that Exudyn has no other form for.
 #[test]
 fn interfaces_of_exudyn_are_crosses_of_six_nodes_where_places_are_asked_for() {
-    for model in ["bracket_hex20", "frame_beams"] {
+    for model in ["bracket_hex20", "car_frame"] {
         let body = fixture(model, 4, BodyFrame::Principal);
         let other = body.nodes().ids[3];
         let points = Points::InterfacesAnd(vec![other]);
         let (bytes, losses) = written(&body, "exudyn", &options("", points));
-        assert!(losses.is_empty(), "{losses:?}");
+        assert!(!losses.iter().any(|loss| loss.contains("rotations of the nodes")), "{losses:?}");
         let (nodal, turned) = (body.modes().shape.as_ref(), body.modes().rotation.as_ref());
         opened(&bytes, |file| {
             let count = 6 * body.interfaces().len() + 1;
