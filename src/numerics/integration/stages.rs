@@ -99,14 +99,14 @@ mod tests {
         for (a, stages) in matrices {
             let modes = stage_modes(&a, stages);
             assert_eq!(modes.len(), stages.div_ceil(2));
-            for i in 0..stages {
-                for j in 0..stages {
+            for (i, row) in a.iter().enumerate().take(stages) {
+                for (j, entry) in row.iter().enumerate().take(stages) {
                     let part = |mode: &StageMode| {
                         let own = mode.right[i] * mode.value * mode.left[j];
                         if mode.paired { 2.0 * own.re } else { own.re }
                     };
                     let sum: f64 = modes.iter().map(part).sum();
-                    assert!((sum - a[i][j]).abs() < 1e-14, "{stages} stages: ({i}, {j})");
+                    assert!((sum - entry).abs() < 1e-14, "{stages} stages: ({i}, {j})");
                 }
             }
             for mode in modes {
