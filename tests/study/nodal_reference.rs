@@ -272,7 +272,8 @@ fn spin_is_prescribed_with_the_centre_free_or_held() {
         ("plane", with_ends(soft_plate())),
         ("beams", with_ends(raw_fixture("frame_beams"))),
     ] {
-        for hold in [false, true] {
+        // Beams take long: held alone.
+        for hold in [false, true].into_iter().filter(|hold| *hold || what != "beams") {
             assert_same(what, &raw, |size, scheme| Scene {
                 spin: size.spin(hold),
                 loads: size.at_interfaces(true),
@@ -349,7 +350,7 @@ fn a_node_carries_beams() {
 #[test]
 fn settled_starts_have_the_static_deformation_of_the_nodes() {
     for (what, raw) in [("solid", solid()), ("beams", with_ends(raw_fixture("frame_beams")))] {
-        for driven in [false, true] {
+        for driven in [false, true].into_iter().filter(|driven| *driven || what != "beams") {
             assert_same(what, &raw, |size, scheme| {
                 let mut scene = Scene {
                     loads: size.at_interfaces(true),
