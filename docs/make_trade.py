@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 
@@ -406,26 +407,43 @@ def main():
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser.add_argument("--program", default=str(target / "release" / "flexbody"), help="flexbody (default: the release build)")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "trade.md")
-    parser.add_argument("--only", nargs="*", help="measure these scenes only")
+    parser.add_argument("--only", nargs="*", help="measure these parts only, by the names of their scenes")
     args = parser.parse_args()
     program = str(Path(args.program).resolve())  # it runs in another folder
     version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
     kept = ROOT / "target/trade"
     kept.mkdir(parents=True, exist_ok=True)
-    # One after the other: the times are measured.
-    for one in SCENES:
-        if not args.only or one[0] in args.only:
-            (kept / f"{one[0]}.json").write_text(json.dumps(scene_part(program, *one)))
-            print(one[0], flush=True)
-    scenes = [one for one in SCENES if (kept / f"{one[0]}.json").exists()]
-    parts = [json.loads((kept / f"{one[0]}.json").read_text()) for one in scenes]
+    for name, make in jobs(program).items():
+        # One after the other: the times are measured.
+        if not args.only or name in args.only:
+            (kept / f"{name}.json").write_text(json.dumps(make()))
+            print(name, flush=True)
+    found = {path.stem: json.loads(path.read_text()) for path in kept.glob("*.json")}
+    args.output.write_text(assembled(version, found), encoding="utf-8")
+    print(args.output)
+
+
+def jobs(program):
+    """What is measured, each part by its name."""
+    scenes = {one[0]: partial(scene_part, program, *one) for one in SCENES}
+    return {**scenes, "guidelines": partial(all_guidelines, program), "block": partial(counter_part, program), "conversions": partial(conversion_part, program)}
+
+
+def all_guidelines(program):
+    with ProcessPoolExecutor() as pool:
+        return list(pool.map(guidelines, [(program, name, model) for name, model, *_ in SCENES]))
+
+
+def assembled(version, found):
+    """The page, of the parts that are there."""
+    parts = [found[name] for name, *_ in SCENES if name in found]
     head = ["| scene | body | its error | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|"]
     top = "\n".join(head + [row for _, row in parts])
-    counter = counter_part(program) + conversion_part(program)
-    with ProcessPoolExecutor() as pool:
-        found = list(pool.map(guidelines, [(program, name, model) for name, model, *_ in scenes]))
-    args.output.write_text(HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top) + "".join(part for part, _ in parts) + guide_part(found) + counter.rstrip() + "\n", encoding="utf-8")
-    print(args.output)
+    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top)
+    text += "".join(part for part, _ in parts)
+    if "guidelines" in found:
+        text += guide_part(found["guidelines"])
+    return (text + found.get("block", "") + found.get("conversions", "")).rstrip() + "\n"
 
 
 if __name__ == "__main__":
