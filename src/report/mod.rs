@@ -7,6 +7,7 @@ mod common_modes;
 mod comparison;
 mod completeness;
 mod craig_bampton;
+mod errors_in_words;
 mod facts;
 mod frequency_chart;
 mod geometric_stiffness;

@@ -1,8 +1,8 @@
 //! A selection in five lines: what was asked, what to take, why, the error, and what it saves.
 
+use super::errors_in_words::{errors_in_words, ranges};
 use super::lacks::LackFacts;
 use super::numbers::{counted, significant};
-use super::selection::{errors_in_words, ranges};
 use crate::body::flex_body::Group;
 use crate::study::reference::ReferenceError;
 use crate::study::selection::{Ground, Selection};

@@ -98,7 +98,7 @@ impl NodalFacts {
 
 /// A candidate.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct RowFacts<'a> {
+struct RowFacts<'a> {
     number: usize,
     source: &'a str,
     kind: Kind,
@@ -180,7 +180,7 @@ impl<'a> RowFacts<'a> {
     }
 
     /// `6 modes, W1`: what it has, in words.
-    pub fn in_words(&self) -> String {
+    fn in_words(&self) -> String {
         let mut words = format!("{}, {}", counted(self.modes, "mode"), self.groups_in_words());
         if !self.lowest() {
             words.push_str(", not the lowest");
@@ -230,14 +230,10 @@ impl<'a> TradeFacts<'a> {
             wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
             cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
         };
-        let lines = verdict_lines(&facts, trade).into_iter();
+        let names: Vec<String> = facts.rows.iter().map(RowFacts::in_words).collect();
+        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words()).into_iter();
         facts.verdict = lines.map(|(label, text)| VerdictLine { label, text }).collect();
         facts
-    }
-
-    /// The candidates, in the order of the study.
-    pub(super) fn rows(&self) -> &[RowFacts<'a>] {
-        &self.rows
     }
 
     /// The facts in a format, ending with a line break.
@@ -249,7 +245,7 @@ impl<'a> TradeFacts<'a> {
         }
     }
 
-    pub(super) fn tolerances_in_words(&self) -> String {
+    fn tolerances_in_words(&self) -> String {
         let Tolerance { attitude, deflection, stress, reaction, .. } = self.tolerance;
         let all = [("deflection", deflection), ("stress", stress), ("reaction", reaction)];
         let relative = all.map(|(name, value)| format!("{name} {} %", significant(100.0 * value, 3)));

@@ -1,13 +1,16 @@
 //! A trade study in five lines: what was asked, what to take, why, the error, and what it saves.
 
+use super::errors_in_words::errors_in_words;
 use super::numbers::{duration, significant};
-use super::selection::errors_in_words;
-use super::trade::{RowFacts, TradeFacts};
 use crate::study::trade::{Measured, Recommendation, Row, Trade};
 
-/// The five lines, with their labels.
-pub(super) fn verdict_lines(facts: &TradeFacts<'_>, trade: &Trade) -> Vec<(&'static str, String)> {
-    let asked = format!("{}: {}", trade.scene, asked(facts, trade));
+/// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in words.
+pub(super) fn verdict_lines(
+    trade: &Trade,
+    names: &[String],
+    tolerances: &str,
+) -> Vec<(&'static str, String)> {
+    let asked = format!("{}: {}", trade.scene, asked(trade, tolerances));
     let Some(at) = trade.recommended.row() else {
         return vec![("Asked", asked), ("Result", nothing(trade))];
     };
@@ -16,17 +19,17 @@ pub(super) fn verdict_lines(facts: &TradeFacts<'_>, trade: &Trade) -> Vec<(&'sta
     let whole = trade.rows.first().and_then(|row| row.outcome.as_ref().ok());
     vec![
         ("Asked", asked),
-        ("Take", taken(&facts.rows()[at], row)),
-        ("Why", why(facts, trade, measured)),
+        ("Take", taken(&names[at], row)),
+        ("Why", why(trade, names, measured)),
         ("Error", error(measured)),
         ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
     ]
 }
 
-fn asked(facts: &TradeFacts<'_>, trade: &Trade) -> String {
+fn asked(trade: &Trade, tolerances: &str) -> String {
     match trade.allowed {
         Some(allowed) => format!("the most accurate of at most {allowed} multiplications per evaluation"),
-        None => format!("errors of at most {}", facts.tolerances_in_words()),
+        None => format!("errors of at most {tolerances}"),
     }
 }
 
@@ -46,12 +49,12 @@ fn nothing(trade: &Trade) -> String {
     }
 }
 
-fn taken(facts: &RowFacts<'_>, row: &Row) -> String {
-    format!("{} (to {} Hz), of: {}", facts.in_words(), significant(row.last_frequency_hz, 3), row.source)
+fn taken(name: &str, row: &Row) -> String {
+    format!("{} (to {} Hz), of: {}", name, significant(row.last_frequency_hz, 3), row.source)
 }
 
 /// The next cheaper one on the front shows what one would pay for less.
-fn why(facts: &TradeFacts<'_>, trade: &Trade, measured: &Measured) -> String {
+fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     let count = trade.rows.len();
     let first = match trade.recommended {
         Recommendation::MostAccurate(_) => {
@@ -68,7 +71,7 @@ fn why(facts: &TradeFacts<'_>, trade: &Trade, measured: &Measured) -> String {
     let times = significant(error / allowed, 2);
     format!(
         "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed",
-        facts.rows()[at].in_words()
+        names[at]
     )
 }
 
