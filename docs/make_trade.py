@@ -100,7 +100,11 @@ def run(program, *arguments, folder, passes=(0,)):
 def number(value, digits=2):
     if value is None:
         return ""
-    return "0" if value == 0 else f"{value:.{digits}g}" if 1e-3 <= abs(value) < 1e4 else f"{value:.{digits - 1}e}"
+    if value == 0:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e4:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
 
 
 def convert(program, folder, model, modes):
@@ -243,7 +247,7 @@ def drawn(told, times, name):
         seconds = times[timed_as].median("exudyn") if timed_as in times else None
         errors = [value for key, value in row["measured"]["errors"].items() if key in tolerance and value is not None]
         if seconds and errors and max(errors) > 0:
-            points.append((seconds, 100 * max(errors), described(row), bool(row["lumped"]), row["number"] == told["recommended"], row["number"] in told["front"]))
+            points.append((seconds, 100 * max(errors), described(row), bool(row["lumped"]), row["number"] == told["recommended"]))
     (ROOT / "docs/images" / f"trade_{name}.svg").write_text(figure(told["scene"], points, 100 * min(tolerance.values())))
 
 

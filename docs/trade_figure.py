@@ -4,7 +4,7 @@ import math
 from html import escape
 
 WIDTH, HEIGHT = 840, 380
-LEFT, RIGHT, TOP, BOTTOM = 84, 210, 30, 52
+LEFT, RIGHT, TOP, BOTTOM = 100, 210, 30, 52
 STYLE = (
     "text { font: 12px system-ui, sans-serif; fill: #1a1d21; } .tick { fill: #5a6370; } .grid { stroke: #d5dae1; } .allowed { stroke: #4f7a28; stroke-dasharray: 6 4; } "
     ".front { fill: none; stroke: #1f5fa8; stroke-width: 1.2; } .exact { fill: #1f5fa8; } .lumped { fill: none; stroke: #b4560d; stroke-width: 1.6; } .ring { fill: none; stroke: #1a1d21; stroke-width: 1.6; }"
@@ -17,8 +17,17 @@ def decades(values, least):
     return (first, max(last, first + least))
 
 
+def fastest(points):
+    """The exact points that no faster one is as accurate as, by their seconds."""
+    front = []
+    for point in sorted(points):
+        if not point[3] and (not front or point[1] < front[-1][1]):
+            front.append(point)
+    return front
+
+
 def figure(title, points, allowed):
-    """`points`: [(seconds, error in per cent, name, lumped, recommended, on the front)]; `allowed`: the tolerance in per cent."""
+    """`points`: [(seconds, error in per cent, name, lumped, recommended)]; `allowed`: the tolerance in per cent."""
     seconds, errors = [point[0] for point in points], [point[1] for point in points] + [allowed]
     (x0, x1), (y0, y1) = decades(seconds, 1), decades(errors, 2)
 
@@ -42,10 +51,10 @@ def figure(title, points, allowed):
         out.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/><text class="tick" x="{LEFT - 8}" y="{at + 4:.1f}" text-anchor="end">{10.0**power:g} %</text>')
     at = y(allowed)
     out.append(f'<line class="allowed" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/><text x="{WIDTH - RIGHT + 8}" y="{at + 4:.1f}">allowed: {allowed:g} %</text>')
-    front = sorted(point for point in points if point[5])
+    front = fastest(points)
     if len(front) > 1:
         out.append('<polyline class="front" points="' + " ".join(f"{x(point[0]):.1f},{y(point[1]):.1f}" for point in front) + '"/>')
-    for second, error, name, lumped, recommended, _ in points:
+    for second, error, name, lumped, recommended in points:
         shape = f'<rect class="lumped" x="{x(second) - 4:.1f}" y="{y(error) - 4:.1f}" width="8" height="8">' if lumped else f'<circle class="exact" cx="{x(second):.1f}" cy="{y(error):.1f}" r="4">'
         out.append(f"{shape}<title>{escape(name)}: {second:.3g} s, {error:.3g} %</title></{'rect' if lumped else 'circle'}>")
         if recommended:

@@ -234,7 +234,7 @@ impl<'a> SelectionFacts<'a> {
             let budget = match term.budget {
                 budget if budget < 1.0 => {
                     format!(
-                        " ({} % of the tolerance: the rest is for the modes)",
+                        " ({} % of the tolerance: the rest is for modes left out and the error of the body)",
                         significant(100.0 * budget, 2)
                     )
                 }

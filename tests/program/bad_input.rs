@@ -81,7 +81,7 @@ struct Run {
 fn result_option(command: &str) -> Option<(&'static str, &'static str)> {
     match command {
         "convert" | "simulate" | "export" => Some(("--output", "body.flex.h5")),
-        "select" | "response" => Some(("--report", "report.json")),
+        "select" | "response" | "trade" => Some(("--report", "report.json")),
         "audit" => None,
         other => panic!("no case ran `{other}` before: name the option for its result here"),
     }

@@ -12,7 +12,7 @@ use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::{FlexBody, Groups, MassStructure, Storage};
 use flexbody::body::invariants::BodyFrame;
 use flexbody::model::FeModel;
-use flexbody::motion::scene::{Axes, Initial, ModeStart, Scene, Scheme, simulate};
+use flexbody::motion::scene::{Axes, Initial, ModeStart, Scene, Scheme, Tolerance, simulate};
 use flexbody::numerics::eigen::Wanted;
 use flexbody::study::selection::select;
 use flexbody::study::trade::{
@@ -261,10 +261,14 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     assert!(whole < with && with < without && without < one, "{whole} {with} {without} {one}");
     // The same against the largest body: apart by no more than that is from the truth.
     let reduced = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
-    for (a, b) in found.rows.iter().zip(&reduced.rows) {
-        assert_eq!(a.candidate, b.candidate);
+    let mut both = 0;
+    for a in &found.rows {
+        // Ladders differ: which sets of groups are hopeless is judged by either reference.
+        let Some(b) = reduced.rows.iter().find(|b| a.candidate == b.candidate) else { continue };
         assert!((stress(a) - stress(b)).abs() <= 1.1 * whole, "{a:?} {b:?}");
+        both += 1;
     }
+    assert!(both > 20, "{both} candidates of both studies");
 }
 
 #[test]
@@ -289,7 +293,8 @@ fn a_wholly_lumped_mass_has_modes_of_its_own() {
     let scene = tumble(0.05 * first_rate(sources[0].body()), 0.1);
     let found = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
     let whole = found.rows.iter().filter(|row| matches!(row.candidate.lumped, Some(LumpedMass::Whole(_))));
-    assert_eq!(whole.count(), 2);
+    let worst: Vec<f64> = whole.map(|row| row.outcome.as_ref().expect("a motion").worst).collect();
+    assert!(worst.len() == 2 && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
     assert!(found.front.iter().all(|&row| found.rows[row].candidate.lumped.is_none()));
 }
 
@@ -319,7 +324,9 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
 #[test]
 fn a_study_and_a_selection_take_the_same_modes() {
     let body = soft_block(9);
-    let scene = tumble(0.01 * first_rate(&body), 0.3);
+    let mut scene = tumble(0.05 * first_rate(&body), 0.3);
+    scene.initial.settled = true;
+    scene.requirements.tolerance = Tolerance { deflection: 0.2, stress: 0.2, ..Tolerance::default() };
     let found = study(body.clone(), &scene);
     let row = recommended(&found);
     let taken = select(&body, &scene, None, SILENT).expect("a selection");
