@@ -32,6 +32,7 @@ mod term_facts;
 mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
+#[cfg(feature = "hdf5")]
 mod trade_verdict;
 
 pub use audit::{audit_json, audit_text};
