@@ -467,6 +467,9 @@ def assembled(version, found):
     head = ["| scene | body | its error | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|"]
     top = "\n".join(head + [row for _, row in parts])
     text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top)
+    missing = [name for name, *_ in SCENES if name not in found]
+    if missing:
+        text += f"Not measured yet in this form: {', '.join(missing)} (`python3 docs/make_trade.py --only ...`).\n\n"
     text += "".join(part for part, _ in parts)
     if "guidelines" in found:
         text += guide_part(found["guidelines"])

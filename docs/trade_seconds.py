@@ -16,6 +16,8 @@ from trade_guidelines import history, kinks, skew
 
 # Steps per period of the highest frequency that the scene asks about (`[band]`), and how many there are at the least and at the most.
 PER_PERIOD, FEWEST, MOST = 20, 500, 20000
+# A scene that names no such frequency is followed up to this many times the first one of the body.
+WITHOUT_BAND = 5
 # The Runge-Kutta method of order 4 is stable up to 2.83 / omega.
 STABLE = 2.5
 TURNS = 5
@@ -54,7 +56,8 @@ class Task:
             self.spin = axis / np.linalg.norm(axis), history(spin["rate"]), bool(spin.get("hold"))
             self.omega = self.spin[0] * self.spin[1](0.0)[0]
         self.loads = self.grouped()
-        frequency = scene.get("band", {}).get("frequency", 0.0)
+        first = np.sqrt(self.eigenvalue.min()) / (2 * np.pi)
+        frequency = scene.get("band", {}).get("frequency", WITHOUT_BAND * first)
         wanted = PER_PERIOD * frequency * self.duration
         self.steps = int(np.clip(np.ceil(wanted), FEWEST, MOST))
 
