@@ -6,13 +6,14 @@ the scene asks about allows, the same for every body; the C program with the cla
 highest mode of the body allow.
 """
 
+import re
 import subprocess
 import time
 
 import h5py
 import numpy as np
 
-from trade_guidelines import history, kinks, skew
+from trade_guidelines import history, skew
 
 # Steps per period of the highest frequency that the scene asks about (`[band]`), and how many there are at the least and at the most.
 PER_PERIOD, FEWEST, MOST = 20, 500, 20000
@@ -368,8 +369,6 @@ class InC:
         self.steps = max(task.steps, int(np.ceil(task.duration * highest / STABLE)))
 
     def source(self):
-        import re
-
         header = (self.folder / "body.h").read_text()
         prefix = re.search(r"\b(flexbody_\w+)_evaluation\b", header).group(1)
         header = header.replace(prefix, "flexbody_body").replace(prefix.upper(), "FLEXBODY_BODY")

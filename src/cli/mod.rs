@@ -8,6 +8,7 @@ mod convert;
 mod export;
 mod import;
 mod inspect;
+mod models;
 mod outcome;
 mod output;
 mod places;

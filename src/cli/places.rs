@@ -57,9 +57,9 @@ pub(super) fn format_of(path: &Path) -> Result<Format> {
 }
 
 /// No output may replace an input or another output.
-pub(super) fn refuse_replacing<'p>(
-    inputs: impl Iterator<Item = &'p PathBuf>,
-    outputs: impl Iterator<Item = &'p PathBuf>,
+pub(super) fn refuse_replacing<'i, 'o>(
+    inputs: impl Iterator<Item = &'i PathBuf>,
+    outputs: impl Iterator<Item = &'o PathBuf>,
 ) -> Result<()> {
     let mut taken: Vec<FileIdentity> = inputs.map(|path| FileIdentity::of(path)).collect();
     for output in outputs {

@@ -2,6 +2,7 @@
 
 use super::arguments::{BasisName, ResponseArguments};
 use super::convert::load_sources;
+use super::models::{is_manifest, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -14,7 +15,7 @@ use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, Mod
 use crate::body::convert::{ConvertSettings, convert};
 use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
-use crate::input::{LoadSource, read_manifest, read_model};
+use crate::input::LoadSource;
 use crate::model::FeModel;
 use crate::motion::scene::{Point, Scene, read_scene};
 use crate::numerics::eigen::Wanted;
@@ -27,7 +28,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let inputs = || std::iter::once(&arguments.model).chain(&arguments.body).chain(&arguments.scene);
     refuse_replacing(inputs(), outputs(arguments))?;
-    let is_manifest = arguments.model.extension().is_some_and(|extension| extension == "toml");
+    let is_manifest = is_manifest(&arguments.model);
     refuse_contradictions(arguments, is_manifest)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
@@ -98,9 +99,7 @@ fn model_and_body(
     asked: Option<Vec<LoadSource>>,
     watch: Watch<'_>,
 ) -> Result<(FeModel, FlexBody, Vec<Diagnostic>)> {
-    let files = read_manifest(&arguments.model)?;
-    refuse_replacing(files.paths().into_iter(), outputs(arguments))?;
-    let checked = FeModel::from_raw(read_model(&files)?)?;
+    let (files, checked) = read_checked(&arguments.model, outputs(arguments))?;
     let (model, mut diagnostics) = (checked.model, checked.diagnostics);
     if let Some(path) = &arguments.body {
         let (body, notes) = flex_body_file::read_with_notes(path)?;

@@ -1,6 +1,7 @@
 //! `flexbody select`.
 
 use super::arguments::SelectArguments;
+use super::models::{is_manifest, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -13,8 +14,7 @@ use crate::body::basis::{BasisChoice, FreeSurface, ModeSettings};
 use crate::body::convert::ConvertSettings;
 use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
-use crate::input::{read_manifest, read_model};
-use crate::model::{CheckedModel, FeModel};
+use crate::model::CheckedModel;
 use crate::motion::scene::{Scene, read_scene};
 use crate::numerics::eigen::{Resume, Wanted};
 use crate::report::{Format, RunData, SelectionFacts};
@@ -32,8 +32,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let scene = read_scene(&arguments.scene)?;
     refuse_replacing(scene.series.iter().map(|file| &file.path), arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let is_manifest = arguments.body.extension().is_some_and(|extension| extension == "toml");
-    let (body, lacks, mut diagnostics) = if is_manifest {
+    let (body, lacks, mut diagnostics) = if is_manifest(&arguments.body) {
         converted(arguments, &scene, &watch)?
     } else {
         refuse_modes(arguments)?;
@@ -64,9 +63,8 @@ fn converted(
     scene: &Scene,
     watch: Watch<'_>,
 ) -> Result<(FlexBody, Vec<ReferenceError>, Vec<Diagnostic>)> {
-    let files = read_manifest(&arguments.body)?;
-    refuse_replacing(files.paths().into_iter(), arguments.report.iter())?;
-    let CheckedModel { model, mut diagnostics, .. } = FeModel::from_raw(read_model(&files)?)?;
+    let (files, checked) = read_checked(&arguments.body, arguments.report.iter())?;
+    let CheckedModel { model, mut diagnostics, .. } = checked;
     let loads = loads_for(Some(scene), &files.residual_vectors);
     let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
     let settings = ConvertSettings {

@@ -1,6 +1,7 @@
 //! `flexbody trade`.
 
 use super::arguments::{ReferenceName, TradeArguments};
+use super::models::{is_manifest, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -11,8 +12,6 @@ use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::body::basis::ModeSettings;
 use crate::formats::flex_body_file;
-use crate::input::{read_manifest, read_model};
-use crate::model::FeModel;
 use crate::motion::scene::read_scene;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
@@ -23,7 +22,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let outputs = || arguments.csv.iter().chain(&arguments.report);
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), outputs())?;
-    let is_manifest = arguments.body.extension().is_some_and(|extension| extension == "toml");
+    let is_manifest = is_manifest(&arguments.body);
     refuse_contradictions(arguments, is_manifest)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
@@ -35,9 +34,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();
     let (model, sources, lacks) = if is_manifest {
-        let files = read_manifest(&arguments.body)?;
-        refuse_replacing(files.paths().into_iter(), outputs())?;
-        let checked = FeModel::from_raw(read_model(&files)?)?;
+        let (_, checked) = read_checked(&arguments.body, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
         let longest = longest(arguments.allow_long);

@@ -3,6 +3,13 @@
 use super::numbers::significant;
 use crate::motion::scene::OutputErrors;
 
+/// `attitude 0.001 rad, deflection 1 %, stress 1 %, reaction 1 %`.
+pub(super) fn tolerances_in_words(attitude: f64, deflection: f64, stress: f64, reaction: f64) -> String {
+    let parts = [("deflection", deflection), ("stress", stress), ("reaction", reaction)];
+    let relative = parts.map(|(name, part)| format!("{name} {} %", significant(100.0 * part, 3)));
+    format!("attitude {} rad, {}", significant(attitude, 3), relative.join(", "))
+}
+
 /// `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
 pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
     let relative = |name: &str, error: Option<f64>| {

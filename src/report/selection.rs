@@ -1,7 +1,7 @@
 //! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
 
 use super::Format;
-use super::errors_in_words::{errors_in_words, ranges};
+use super::errors_in_words::{errors_in_words, ranges, tolerances_in_words};
 use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::significant;
@@ -251,14 +251,7 @@ impl<'a> SelectionFacts<'a> {
 
     fn tolerance_in_words(&self) -> String {
         let ToleranceFacts { attitude, deflection, stress, reaction } = self.tolerance;
-        let part = |part: f64| significant(100.0 * part, 3);
-        format!(
-            "attitude {} rad, deflection {} %, stress {} %, reaction {} %",
-            significant(attitude, 3),
-            part(deflection),
-            part(stress),
-            part(reaction)
-        )
+        tolerances_in_words(attitude, deflection, stress, reaction)
     }
 
     fn modes_in_words(&self) -> String {

@@ -1,6 +1,7 @@
 //! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
 
 use super::Format;
+use super::errors_in_words::tolerances_in_words;
 use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{bytes, counted, duration, plain, significant};
@@ -247,9 +248,7 @@ impl<'a> TradeFacts<'a> {
 
     fn tolerances_in_words(&self) -> String {
         let Tolerance { attitude, deflection, stress, reaction, .. } = self.tolerance;
-        let all = [("deflection", deflection), ("stress", stress), ("reaction", reaction)];
-        let relative = all.map(|(name, value)| format!("{name} {} %", significant(100.0 * value, 3)));
-        format!("attitude {} rad, {}", significant(attitude, 3), relative.join(", "))
+        tolerances_in_words(attitude, deflection, stress, reaction)
     }
 
     fn against(&self) -> &'static str {

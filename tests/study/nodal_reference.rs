@@ -3,6 +3,7 @@
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::general::raw_fixture;
 use crate::support::mesh::{Mesh, grid};
+use crate::support::scenes::nothing_happens;
 use crate::support::unreduced::soft_plate;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
@@ -10,9 +11,8 @@ use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel, Reference};
-use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Run, Scene, Scheme, Spin,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Scene, Scheme, Spin,
     Stage, Trace, VectorHistory, trace, trace_at,
 };
 use flexbody::numerics::eigen::Wanted;
@@ -114,31 +114,15 @@ impl Size {
 
     /// Nothing acts, for a period of the first mode.
     fn scene(&self, scheme: Scheme) -> Scene {
-        Scene {
-            name: "all nodes".to_owned(),
-            run: Run {
-                duration: Some(1.0 * std::f64::consts::TAU / self.rate),
-                outputs: 10,
-                most_steps: Run::MOST_STEPS,
-                scheme,
-                terms: Terms::ALL,
-            },
-            initial: Initial {
-                origin: self.along([0.1, 0.2, -0.1]),
-                rotation: self.about([0.3, -0.2, 0.5]),
-                angular_velocity: self.about([0.05, 0.03, -0.04]) * self.rate,
-                ..Initial::default()
-            },
-            gravity: None,
-            loads: Vec::new(),
-            spin: None,
-            carried: None,
-            watched: Vec::new(),
-            requirements: Default::default(),
-            source: None,
-            series: Vec::new(),
-            resolved: false,
-        }
+        let mut scene = nothing_happens("all nodes", std::f64::consts::TAU / self.rate, 1e-9);
+        (scene.run.outputs, scene.run.scheme) = (10, scheme);
+        scene.initial = Initial {
+            origin: self.along([0.1, 0.2, -0.1]),
+            rotation: self.about([0.3, -0.2, 0.5]),
+            angular_velocity: self.about([0.05, 0.03, -0.04]) * self.rate,
+            ..Initial::default()
+        };
+        scene
     }
 
     fn steps(&self, order: usize) -> Scheme {

@@ -1,12 +1,11 @@
 //! What `select` decides holds when it is measured: the selected body against the whole one, in the scene and at the limits of it.
 
-use crate::support::scenes::{bodies, doing, seeded, some_modes};
+use crate::support::scenes::{bodies, doing, nothing_happens, seeded, some_modes};
 use flexbody::base::progress::SILENT;
 use flexbody::body::flex_body::{FlexBody, Groups};
 use flexbody::motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody::motion::scene::{
-    AttachmentKind, Initial, Measure, MotionRange, Range, Requirements, Run, Scene, Scheme, Tolerance,
-    simulate, trace, trace_at,
+    AttachmentKind, Measure, MotionRange, Range, Requirements, Scene, Tolerance, simulate, trace, trace_at,
 };
 use flexbody::study::selection::{Selection, select};
 use nalgebra::Vector3;
@@ -109,26 +108,9 @@ proptest! {
 
 /// A scene that is not simulated.
 fn idle(requirements: Requirements) -> Scene {
-    Scene {
-        name: "idle".to_owned(),
-        run: Run {
-            duration: None,
-            outputs: 500,
-            most_steps: Run::MOST_STEPS,
-            scheme: Scheme::Adaptive { tolerance: 1e-9 },
-            terms: Terms::ALL,
-        },
-        initial: Initial::default(),
-        gravity: None,
-        loads: Vec::new(),
-        spin: None,
-        carried: None,
-        watched: Vec::new(),
-        requirements,
-        source: None,
-        series: Vec::new(),
-        resolved: false,
-    }
+    let mut scene = Scene { requirements, ..nothing_happens("idle", 0.0, 1e-9) };
+    (scene.run.duration, scene.run.outputs) = (None, 500);
+    scene
 }
 
 #[test]

@@ -64,33 +64,7 @@ pub fn free_surface_resumed(
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<ModalBasis> {
-    compute(model, model.pencil(), settings, resume, watch)
-}
-
-/// The same with nodal masses (n), the same in every direction, in place of the model's.
-///
-/// # Errors
-/// As [`free_surface`].
-///
-/// # Panics
-/// When there is not one mass per node.
-pub fn free_surface_of(
-    model: &FeModel,
-    masses: &[f64],
-    settings: &ModeSettings,
-    watch: Watch<'_>,
-) -> Result<ModalBasis> {
-    let lumped = model.with_nodal_masses(masses);
-    compute(&lumped, lumped.pencil(), settings, Resume::default(), watch)
-}
-
-fn compute(
-    model: &FeModel,
-    pencil: Pencil<'_>,
-    settings: &ModeSettings,
-    resume: Resume<'_>,
-    watch: Watch<'_>,
-) -> Result<ModalBasis> {
+    let pencil = model.pencil();
     let rigid = rigid_modes(model, &pencil)?;
     let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
     let problem = EigenProblem {

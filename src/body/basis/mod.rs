@@ -22,7 +22,7 @@ pub use choice::BasisChoice;
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;
-pub use free_surface::{FreeSurface, free_surface, free_surface_of, free_surface_resumed};
+pub use free_surface::{FreeSurface, free_surface, free_surface_resumed};
 pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};

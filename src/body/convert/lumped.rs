@@ -5,7 +5,7 @@ use super::{BodyModes, Lumping, ModalModel};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::Watch;
-use crate::body::basis::{ModeSettings, free_surface_of};
+use crate::body::basis::{ModeSettings, free_surface};
 use crate::body::flex_body::{Groups, LumpedBody};
 use crate::body::invariants::{
     Invariants, LumpedMasses, align, condense_lumped, condense_lumped_linear, error_norms,
@@ -130,7 +130,8 @@ fn own_modes(
     };
     let wanted = Wanted::Lowest(modal.n_modes());
     let settings = ModeSettings { wanted, accuracy, ..modal.settings.modes };
-    let found = free_surface_of(modal.model, masses.masses(), &settings, watch)
+    let lumped = modal.model.with_nodal_masses(masses.masses());
+    let found = free_surface(&lumped, &settings, watch)
         .map_err(|error| error.diagnostics()[0].message().to_owned())?
         .solution;
     if found.eigenvalues.len() < modal.n_modes() {

@@ -5,6 +5,7 @@
 use super::matrix_sum::{MatrixSum, Scalar};
 use super::ordering::{nested_dissection, node_graph};
 use super::{Pencil, SymmetricMatrix};
+
 /// No parent in the elimination tree.
 const NONE: u32 = u32::MAX;
 
