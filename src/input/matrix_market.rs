@@ -55,8 +55,7 @@ const SHOWN: usize = 5;
 
 fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnostic>> {
     let path = source.file.path();
-    let mut blocks =
-        Blocks::new(source.compression, source.file.bytes()).map_err(|e| vec![broken(path, &e)])?;
+    let mut blocks = Blocks::new(source.compression, source.file.bytes());
     let mut next = || blocks.next().map_err(|e| vec![broken(path, &e)]);
     let Some(first) = next()? else {
         return Err(vec![Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes")]);

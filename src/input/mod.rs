@@ -23,6 +23,7 @@ mod shapes;
 mod table;
 mod tables;
 mod walk;
+mod zstd_frames;
 
 pub(crate) use assemble::check_size;
 pub use bytes::InputFile;

@@ -18,7 +18,7 @@ type Found<T> = Result<T, Vec<Diagnostic>>;
 /// Reads an array of real numbers.
 pub(in crate::input) fn read_array(file: &InputFile, compression: Compression) -> Found<Array> {
     let damaged = |e: std::io::Error| vec![broken(file.path(), &e)];
-    let mut blocks = Blocks::new(compression, file.bytes()).map_err(damaged)?;
+    let mut blocks = Blocks::new(compression, file.bytes());
     let mut reading = Reading::default();
     while let Some(block) = blocks.next().map_err(damaged)? {
         for line in block.split(|&b| b == b'\n') {
