@@ -163,8 +163,10 @@ impl Gauss {
                 system.rates(time + self.tableau.nodes[i] * h, &self.stage, &mut self.rates[i])?;
             }
             self.find_lacks(h);
-            system.correct_stages(h, &self.modes, &mut self.rates[..self.tableau.stages])?;
-            let size = self.correct(h);
+            let lacks = &mut self.rates[..self.tableau.stages];
+            let own_size = system.correct_stages(h, &self.modes, &self.scales, lacks)?;
+            let in_scales = self.correct(h);
+            let size = own_size.unwrap_or(in_scales);
             // How much the corrections shrink; nothing is known at the first.
             let ratio = before.map(|before: f64| size / before);
             let stalled = |ratio: f64| ratio > 0.5 && size < NEAR_ROUNDING;

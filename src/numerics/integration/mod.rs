@@ -10,5 +10,5 @@ mod system;
 pub use explicit::Explicit;
 pub use gauss::Gauss;
 pub use schedule::{Method, Sight, integrate, integrate_closely};
-pub use stages::StageMode;
+pub use stages::{STAGES, StageMode};
 pub use system::{Failure, Oscillator, System, Work};

@@ -27,15 +27,19 @@ pub trait System {
     /// whole: replaces it by (I - h A kron J)^-1 `lacks`, with the matrix A of the method given by its eigenvalues. Nothing unless the system
     /// has such a part.
     ///
+    /// Returns the root mean square of the corrections over the stages in a norm of the system's own, relative to the motion, where its scales,
+    /// entry by entry, would count as much what is stiff as what is soft and is known less closely; else `None`.
+    ///
     /// # Errors
     /// Where that cannot be solved.
     fn correct_stages(
         &mut self,
         _h: f64,
         _modes: &[StageMode],
+        _scales: &[f64],
         _lacks: &mut [Vec<f64>],
-    ) -> Result<(), Failure> {
-        Ok(())
+    ) -> Result<Option<f64>, Failure> {
+        Ok(None)
     }
 
     /// Restores what holds exactly, as the length of Euler parameters; called after every step that is taken.

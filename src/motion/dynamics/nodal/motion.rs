@@ -159,8 +159,19 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
         w.iter_mut().zip(&self.mass).for_each(|(scale, m)| *scale = (share * m).sqrt());
     }
 
-    fn correct_stages(&mut self, h: f64, modes: &[StageMode], lacks: &mut [Vec<f64>]) -> Result<(), Failure> {
-        self.stiff.correct(h, modes, lacks)
+    /// The energy of the corrections of u and w, relative to E of the step; those of the frame in their scales.
+    fn correct_stages(
+        &mut self,
+        h: f64,
+        modes: &[StageMode],
+        scales: &[f64],
+        lacks: &mut [Vec<f64>],
+    ) -> Result<Option<f64>, Failure> {
+        let energy = self.stiff.correct(h, modes, lacks)?;
+        let of_step = 0.5 * scales.len() as f64 * self.stiffness[0] * scales[DISPLACEMENTS].powi(2);
+        let frame = lacks.iter().flat_map(|lack| lack[..DISPLACEMENTS].iter().zip(scales));
+        let frame: f64 = frame.map(|(lack, scale)| (lack / scale).powi(2)).sum();
+        Ok(Some((energy / of_step + frame / (lacks.len() * scales.len()) as f64).sqrt()))
     }
 
     /// Euler parameters of unit length; C u = 0; of a body that is driven R'w = 0.

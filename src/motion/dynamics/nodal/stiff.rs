@@ -3,7 +3,7 @@
 use super::equations::NodalEquations;
 use super::state::DISPLACEMENTS;
 use crate::model::Damping;
-use crate::numerics::integration::{Failure, StageMode};
+use crate::numerics::integration::{Failure, STAGES, StageMode};
 use crate::numerics::linalg::{MatrixSum, Scalar, SparseLdl, multiply_vector};
 use nalgebra::Complex;
 
@@ -57,22 +57,26 @@ impl<'m> Stiff<'m> {
         }
     }
 
-    /// Corrections in place of what the stages lack.
-    pub fn correct(&mut self, h: f64, modes: &[StageMode], lacks: &mut [Vec<f64>]) -> Result<(), Failure> {
+    /// Corrections in place of what the stages lack; their energy, u'K u / 2 + w'M^-1 w / 2, on an average over the stages, at the most.
+    pub fn correct(&mut self, h: f64, modes: &[StageMode], lacks: &mut [Vec<f64>]) -> Result<f64, Failure> {
         let n = self.equations.n_rows();
         if self.step != h || self.factors.len() != modes.len() {
             self.prepare(h, modes, lacks.len())?;
         }
         self.corrected.iter_mut().for_each(|stage| stage.fill(0.0));
+        // Square roots of the energies of the stages: those of the parts, of which a pair counts twice, add up at the most.
+        let mut roots = [0.0; STAGES];
         for (at, mode) in modes.iter().enumerate() {
             self.gather(mode, lacks);
-            self.solve(at, mode.value * h);
+            let root = self.solve(at, mode.value * h).sqrt();
             self.spread(mode);
+            let twice = if mode.paired { 2.0 } else { 1.0 };
+            roots.iter_mut().zip(&mode.right).for_each(|(sum, right)| *sum += twice * right.norm() * root);
         }
         for (lack, corrected) in lacks.iter_mut().zip(&self.corrected) {
             lack[DISPLACEMENTS..][..2 * n].copy_from_slice(corrected);
         }
-        Ok(())
+        Ok(roots.iter().map(|root| root * root).sum::<f64>() / lacks.len() as f64)
     }
 
     fn prepare(&mut self, h: f64, modes: &[StageMode], stages: usize) -> Result<(), Failure> {
@@ -129,8 +133,8 @@ impl<'m> Stiff<'m> {
         }
     }
 
-    /// (a, b) <- (P x, M (x - a) / z), x from the factor.
-    fn solve(&mut self, at: usize, z: Complex<f64>) {
+    /// (a, b) <- (P x, M (x - a) / z), x from the factor; x*K x / 2 + (x - a)*M (x - a) / (2 |z|^2).
+    fn solve(&mut self, at: usize, z: Complex<f64>) -> f64 {
         let Self { equations, factors, parts: [a_re, a_im, b_re, b_im], product, real, complex, .. } = self;
         match &factors[at] {
             Factor::Real(factor) => {
@@ -140,8 +144,10 @@ impl<'m> Stiff<'m> {
                 factor.solve_in_place(1, x, scratch);
                 a_re.iter_mut().zip(&*x).for_each(|(a, x)| *a = (x - *a) / z.re);
                 equations.weigh(a_re, b_re);
+                let kinetic = half_product(a_re, b_re);
                 a_re.copy_from_slice(x);
                 equations.take_rigid(a_re);
+                kinetic + equations.elastic_energy(a_re)
             }
             Factor::Complex(factor) => {
                 let [x, scratch] = complex;
@@ -164,11 +170,13 @@ impl<'m> Stiff<'m> {
                 }
                 equations.weigh(a_re, b_re);
                 equations.weigh(a_im, b_im);
+                let kinetic = half_product(a_re, b_re) + half_product(a_im, b_im);
                 for ((x, re), im) in x.iter().zip(&mut *a_re).zip(&mut *a_im) {
                     (*re, *im) = (x.re, x.im);
                 }
                 equations.take_rigid(a_re);
                 equations.take_rigid(a_im);
+                kinetic + equations.elastic_energy(a_re) + equations.elastic_energy(a_im)
             }
         }
     }
@@ -218,6 +226,11 @@ fn weigh_damped(equations: &NodalEquations<'_>, z: f64, x: &[f64], y: &mut [f64]
     if damp(equations, x, damped, room) {
         add(z, damped, y);
     }
+}
+
+/// x'y / 2.
+fn half_product(x: &[f64], y: &[f64]) -> f64 {
+    0.5 * x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
 }
 
 /// y += factor x.

@@ -19,9 +19,6 @@ const PART_OF_STEPS: f64 = 0.01;
 /// Part that is a reference for others no longer without a word.
 const WORTH_A_WORD: f64 = 0.1;
 
-/// Modes whose root of the elastic energy stays below this part of the largest, and of the tolerance of the stress, need no steps of their own.
-const LIVELY: f64 = 0.1;
-
 /// What a reference may take.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Allowed {
@@ -200,11 +197,12 @@ impl Halving<'_, '_> {
     }
 }
 
-/// The largest circular frequency of the modes that take part in a motion to an extent that counts.
+/// The largest circular frequency of the modes whose root of the elastic energy, relative to the largest, is above the tolerance of the stress:
+/// others need no steps of their own to begin with.
 fn liveliest(body: &FlexBody, scene: &Scene, motion: &Trace) -> f64 {
     let roots = body.modes().eigenvalue.iter().zip(&motion.extremes.amplitudes);
     let roots: Vec<f64> = roots.map(|(lambda, amplitude)| lambda.sqrt() * amplitude.abs()).collect();
-    let least = LIVELY * scene.requirements.tolerance.stress * roots.iter().copied().fold(0.0, f64::max);
+    let least = scene.requirements.tolerance.stress * roots.iter().copied().fold(0.0, f64::max);
     let lively = roots.iter().rposition(|root| *root >= least).unwrap_or(0);
     body.modes().eigenvalue[lively].sqrt()
 }
