@@ -4,11 +4,11 @@ use crate::support::equations::ReducedBody;
 use crate::support::flexible::oracle;
 use crate::support::partial::combinations;
 use crate::support::random::Random;
-use crate::support::scenes::{Doing, Shape, bodies, direction, doing, seeded, some_modes};
+use crate::support::scenes::{Doing, Shape, bodies, direction, doing, seeded, shape, some_modes};
 use flexbody::body::flex_body::{FlexBody, Groups};
-use flexbody::motion::dynamics::{BodyPoint, Terms};
+use flexbody::motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use flexbody::motion::scene::{
-    Axes, Interpolation, Measure, OutputErrors, Point, Recording, Samples, Scene, Stage, Trace,
+    Axes, Interpolation, Load, Measure, OutputErrors, Point, Recording, Samples, Scene, Stage, Trace,
     VectorHistory, simulate, trace_at,
 };
 use flexbody::study::selection::{Norms, Situation, TrialRuns};
@@ -40,10 +40,16 @@ struct Tested<'t> {
 
 impl<'t> Tested<'t> {
     fn new(body: &'t FlexBody, scene: &'t Scene) -> Self {
-        let point = |point: &Point| {
-            let Point::Node(id) = point else { panic!("a node") };
-            let at = body.nodes().ids.iter().position(|other| other == id).expect("a node of the body");
-            BodyPoint::node(body, at)
+        let point = |point: &Point| match point {
+            Point::Node(id) => {
+                let at = body.nodes().ids.iter().position(|other| other == id).expect("a node of the body");
+                BodyPoint::node(body, at)
+            }
+            Point::Interface(name) => {
+                let interface = body.interfaces().iter().find(|interface| interface.name == *name);
+                BodyPoint::interface(body, interface.expect("one of the body"), scene.run.terms)
+                    .expect("a point")
+            }
         };
         let loads: Vec<BodyPoint> = scene.loads.iter().map(|load| point(&load.at)).collect();
         let watched = scene.watched.iter().map(point).collect();
@@ -306,6 +312,52 @@ proptest! {
         let broken = search(&body, &scene);
         prop_assert!(broken.is_empty(), "{:#?}", broken);
     }
+}
+
+proptest! {
+    #![proptest_config(seeded(16, 4))]
+
+    /// The same where torques turn with the deformation, which is large: interfaces of the rod turn by up to half a radian.
+    #[test]
+    fn no_motion_under_torques_breaks_a_bound(
+        bits in any::<u8>(),
+        doing in doing(10.0),
+        torques in proptest::collection::vec((any::<bool>(), direction(), 0.01..1.0f64, shape(), any::<bool>()), 1..3),
+    ) {
+        let body = damped(some_modes(&bodies()[2], bits), &doing);
+        let mut scene = doing.scene(&body, false);
+        let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
+        for (big, along, part, over, fixed) in torques {
+            let name = if big { "big_end" } else { "small_end" };
+            scene.loads.push(Load {
+                at: Point::Interface(name.to_owned()),
+                force: VectorHistory::nothing(),
+                torque: VectorHistory::Along {
+                    direction: Vector3::from(along).normalize() * (part * turning_torque(&body, name)),
+                    factor: over.history(1.0, scene.run.duration.expect("a duration"), &rates),
+                },
+                axes: if fixed { Axes::World } else { Axes::Body },
+            });
+        }
+        prop_assume!(follows(&body, &scene));
+        let broken = search(&body, &scene);
+        prop_assert!(broken.is_empty(), "{:#?}", broken);
+    }
+}
+
+/// The torque that turns an interface by half a radian, statically.
+fn turning_torque(body: &FlexBody, interface: &str) -> f64 {
+    let interface = body.interfaces().iter().find(|one| one.name == interface).expect("one of the body");
+    let point = BodyPoint::interface(body, interface, Terms::NONE).expect("a point");
+    let equations = EquationsOfMotion::new(body, Terms::NONE);
+    let mut compliance = 0.0f64;
+    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+        let mut forces = vec![0.0; equations.n_velocities()];
+        point.add_torque(&Evaluation::new(&equations), &axis, &mut forces);
+        let modal = forces[equations.n_rigid()..].iter().zip(&body.modes().eigenvalue);
+        compliance = compliance.max(modal.map(|(force, lambda)| force * force / lambda).sum());
+    }
+    0.5 / compliance
 }
 
 /// Whether the body can be simulated with every set of groups.

@@ -74,7 +74,8 @@ pub enum Shape {
 }
 
 impl Shape {
-    fn history(&self, size: f64, duration: f64, rates: &[f64]) -> History {
+    /// The function of time, times `size`, over a duration, of a body with these circular frequencies.
+    pub fn history(&self, size: f64, duration: f64, rates: &[f64]) -> History {
         match self {
             Self::Constant(value) => History::Constant(size * value),
             Self::Lines(points) => {

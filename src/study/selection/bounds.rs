@@ -61,8 +61,19 @@ pub struct Driven {
     pub start: Start,
     /// Whether the deformation starts in equilibrium with the loads.
     pub settled: bool,
+    /// How torques act on the deformed body.
+    pub turned: TurnedTorques,
     /// |D|.
     pub damping: f64,
+}
+
+/// By how much torques change their modal forces, for a change of |Lambda^(1/2) q| by one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TurnedTorques {
+    /// |F|, at the largest torque.
+    pub force: f64,
+    /// |F'| where the torque changes fastest; world axes turn besides.
+    pub rate: f64,
 }
 
 /// Modes at time zero.
@@ -111,6 +122,8 @@ struct Operator {
     softening: f64,
     coupling: f64,
     first: f64,
+    /// Force of turned torques for |Lambda^(1/2) q| = 1.
+    turned: f64,
     rotation: Rotation,
     /// Whether responses start in equilibrium with the load.
     settled: bool,
@@ -127,9 +140,10 @@ impl Operator {
             return None;
         }
         let growth = coupling / (margin.sqrt() * norms.first) + rotation.largest * softening / margin;
-        let growth = (rotation.variation * growth).exp();
-        let settled = driven.settled;
-        Some(Self { margin, growth, softening, coupling, first: norms.first, rotation: *rotation, settled })
+        let turned = driven.turned.force;
+        let growth = (rotation.variation * growth + product(turned, rotation.duration) / margin.sqrt()).exp();
+        let (first, settled) = (norms.first, driven.settled);
+        Some(Self { margin, growth, softening, coupling, first, turned, rotation: *rotation, settled })
     }
 
     /// sqrt(2 H) of the response to a load, from rest without deformation; or from its static response, about which it then moves by what is
@@ -139,8 +153,9 @@ impl Operator {
         let impulse = product(self.growth, load.impulse);
         // The static response (Lambda - E)^-1 F moves with the load and with E.
         let moved = load.moved + 2.0 * r.largest * r.variation * self.softening * load.largest / m;
-        let turned = r.variation * self.coupling * load.largest / (m * self.first);
-        let varied = product(self.growth, (load.begun + moved) / m.sqrt() + turned) + load.largest / m.sqrt();
+        let swept = r.variation * self.coupling * load.largest / (m * self.first)
+            + product(self.turned * r.duration, load.largest) / m;
+        let varied = product(self.growth, (load.begun + moved) / m.sqrt() + swept) + load.largest / m.sqrt();
         if self.settled { varied } else { impulse.min(varied) }
     }
 }
@@ -171,8 +186,10 @@ impl Driven {
         } else {
             // The rates are moved by the rates of the loads, and start with the loads.
             let begun: f64 = loads.iter().map(|load| load.force * load.factor.start).sum();
+            let torques = self.turned.rate + self.turned.force * self.rotation.largest;
+            let torques = product(torques * self.rotation.duration, energy / root);
             let rates = sum(
-                self.start.rate_energy + begun,
+                self.start.rate_energy + begun + torques,
                 &mut loads.iter().map(|load| {
                     let Variation { rate, rate_total, .. } = load.factor;
                     let factor = Variation {
@@ -241,7 +258,8 @@ impl Driven {
             rate: energy,
             acceleration_without_stiffness: of_loads
                 + (2.0 * r.largest + self.damping) * energy
-                + (r.largest.powi(2) + r.acceleration) * coordinate,
+                + (r.largest.powi(2) + r.acceleration) * coordinate
+                + product(self.turned.force, energy / root),
         })
     }
 

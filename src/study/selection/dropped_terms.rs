@@ -1,9 +1,10 @@
 //! What the terms that a model drops would add along its own motion.
 
 use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
+use super::first_order::{FirstOrder, ModalState, Oscillators};
 use super::norms::Norms;
-use crate::body::flex_body::{FlexBody, Groups};
-use crate::motion::dynamics::{Configuration, EquationsOfMotion, Evaluation, Orientation, Terms};
+use crate::body::flex_body::{FlexBody, Group, Groups};
+use crate::motion::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
 use crate::motion::scene::{Recording, Scene};
 use crate::numerics::linalg::larger;
 use faer::Mat;
@@ -16,14 +17,18 @@ pub(super) struct DroppedTerms {
     pub load: LoadSizes,
     /// What the balance of torques lacks.
     pub defect: TorqueDefect,
+    /// The error in the first order, where the terms themselves are known.
+    pub first_order: Option<FirstOrder>,
 }
 
 /// The motion at one instant.
 struct Instant<'r> {
     time: f64,
-    state: &'r Configuration,
-    /// Angular acceleration.
+    /// Angular velocity and acceleration.
+    omega: Vector3<f64>,
     alpha: Vector3<f64>,
+    q: &'r [f64],
+    qd: &'r [f64],
     /// q'', from the motion at the instants beside.
     acceleration: Vec<f64>,
 }
@@ -36,17 +41,50 @@ impl DroppedTerms {
         let instants = instants(scene, run);
         let most = |size: &dyn Fn(&Instant<'_>) -> f64| instants.iter().map(size).fold(0.0, larger);
         let amplitude = Amplitude {
-            energy: most(&|i| weighted(&i.state.q, &root)),
-            coordinate: most(&|i| norm(&i.state.q)),
-            rate: most(&|i| norm(&i.state.qd)),
+            energy: most(&|i| weighted(i.q, &root)),
+            coordinate: most(&|i| norm(i.q)),
+            rate: most(&|i| norm(i.qd)),
             acceleration: most(&|i| norm(&i.acceleration)),
-            energy_rate: most(&|i| weighted(&i.state.qd, &root)),
+            energy_rate: most(&|i| weighted(i.qd, &root)),
         };
-        let (load, defect) = match norms.tier {
-            0 => by_norms(&instants, kept.complement(), norms, &root),
-            _ => by_terms(body, &instants, kept, &root),
-        };
-        Self { amplitude, load, defect }
+        if norms.tier == 0 {
+            let (load, defect) = by_norms(&instants, kept.complement(), norms, &root);
+            return Self { amplitude, load, defect, first_order: None };
+        }
+        let (load, defect, forces) = by_terms(body, &instants, kept, &root);
+        let first_order = first_order(body, scene, &instants, &forces, norms);
+        Self { amplitude, load, defect, first_order }
+    }
+}
+
+/// The response of every mode alone to the `forces` that the dropped terms are at the instants; and what the terms that couple the modes make of
+/// that, which is left to bounds.
+fn first_order(
+    body: &FlexBody,
+    scene: &Scene,
+    instants: &[Instant<'_>],
+    forces: &[Vec<f64>],
+    norms: &Norms,
+) -> Option<FirstOrder> {
+    let times: Vec<f64> = instants.iter().map(|instant| instant.time).collect();
+    let oscillators = Oscillators::new(body, &times)?;
+    let (errors, mut first) = oscillators.respond(forces, scene.initial.settled);
+    let along: Vec<Instant<'_>> =
+        instants.iter().zip(&errors).map(|(instant, error)| instant.of_error(error)).collect();
+    let coupling = Groups::NONE.with(Group::W2).with(Group::W3);
+    let (rest, _) = by_norms(&along, coupling, norms, oscillators.root());
+    first.rest.impulse += rest.impulse;
+    first.rest.begun += rest.begun;
+    first.rest.moved += rest.moved;
+    first.rest.largest += rest.largest;
+    Some(first)
+}
+
+impl<'r> Instant<'r> {
+    /// An error of the modes in place of their motion.
+    fn of_error<'e>(&self, error: &'e ModalState) -> Instant<'e> {
+        let Self { time, omega, alpha, .. } = *self;
+        Instant { time, omega, alpha, q: &error.q, qd: &error.qd, acceleration: Vec::new() }
     }
 }
 
@@ -55,7 +93,9 @@ fn instants<'r>(scene: &Scene, run: &'r Recording) -> Vec<Instant<'r>> {
         let time = run.time[i];
         Instant {
             time,
-            state: &run.states[i],
+            omega: run.states[i].omega,
+            q: &run.states[i].q,
+            qd: &run.states[i].qd,
             alpha: scene
                 .spin
                 .as_ref()
@@ -154,17 +194,17 @@ fn by_norms(
         }
         before = Some((now, force));
     }
-    let largest = instants.iter().map(|i| norm(&i.state.q)).fold(0.0, larger);
+    let largest = instants.iter().map(|i| norm(i.q)).fold(0.0, larger);
     found.stiff = norms.turning * norms.last * largest;
     found.finish()
 }
 
 impl TermNorms<'_> {
     fn scalars<'i>(&self, instant: &'i Instant<'i>) -> Scalars<'i> {
-        let (q, qd) = (&instant.state.q, &instant.state.qd);
+        let (q, qd) = (instant.q, instant.qd);
         Scalars {
             instant,
-            w: instant.state.omega.norm(),
+            w: instant.omega.norm(),
             alpha: instant.alpha.norm(),
             q: norm(q),
             v: norm(qd),
@@ -194,11 +234,11 @@ impl TermNorms<'_> {
     /// How far Lambda^(-1/2) times the load moves between two instants: products change by the change of one factor times the other.
     fn moved(&self, earlier: &Scalars<'_>, now: &Scalars<'_>) -> f64 {
         let (norms, root) = (self.norms, self.root);
-        let (state, old) = (now.instant.state, earlier.instant.state);
+        let (state, old) = (now.instant, earlier.instant);
         let dw = (state.omega - old.omega).norm();
         let da = (now.instant.alpha - earlier.instant.alpha).norm();
         let difference = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>();
-        let (dq, dv) = (difference(&state.q, &old.q), difference(&state.qd, &old.qd));
+        let (dq, dv) = (difference(state.q, old.q), difference(state.qd, old.qd));
         let w = larger(now.w, earlier.w);
         let square = w * w;
         let turned = (now.w + earlier.w) * dw;
@@ -213,13 +253,13 @@ impl TermNorms<'_> {
     }
 }
 
-/// The dropped terms themselves: what the balance of forces of the whole body has beyond that of the kept groups.
+/// The dropped terms themselves: what the balance of forces of the whole body has beyond that of the kept groups; its modal forces at every instant.
 fn by_terms(
     body: &FlexBody,
     instants: &[Instant<'_>],
     kept: Groups,
     root: &[f64],
-) -> (LoadSizes, TorqueDefect) {
+) -> (LoadSizes, TorqueDefect, Vec<Vec<f64>>) {
     let groups = body.invariants().groups();
     let equations = [groups, kept].map(|groups| EquationsOfMotion::new(body, Terms::ALL.held(groups)));
     let mut balances = Balances::new(&equations);
@@ -232,7 +272,7 @@ fn by_terms(
         rows.norm_l2()
     };
     let mut found = Collected::default();
-    let mut before: Option<(f64, Vec<f64>)> = None;
+    let mut forces: Vec<Vec<f64>> = Vec::with_capacity(instants.len());
     for (at, instant) in instants.iter().enumerate() {
         let (torque, force) = balances.difference(instant);
         found.torque = larger(found.torque, norm(&torque));
@@ -240,20 +280,22 @@ fn by_terms(
         found.load.largest = larger(found.load.largest, norm(&in_energy));
         // W3'q changes slowly beside how often it is looked at.
         if at % COARSE == 0 {
-            found.stiff = larger(found.stiff, stiff_at(&instant.state.q));
+            found.stiff = larger(found.stiff, stiff_at(instant.q));
         }
-        match &before {
+        match forces.last() {
             None => found.load.begun = norm(&in_energy),
-            Some((then, earlier)) => {
-                found.load.impulse += larger(norm(&force), norm(earlier)) * (instant.time - then);
+            Some(earlier) => {
+                found.load.impulse +=
+                    larger(norm(&force), norm(earlier)) * (instant.time - instants[at - 1].time);
                 let steps: Vec<f64> =
                     force.iter().zip(earlier).zip(root).map(|((a, b), root)| (a - b) / root).collect();
                 found.load.moved += norm(&steps);
             }
         }
-        before = Some((instant.time, force));
+        forces.push(force);
     }
-    found.finish()
+    let (load, defect) = found.finish();
+    (load, defect, forces)
 }
 
 /// The balances of forces of the whole body and of the kept groups, in the same motion.
@@ -285,14 +327,14 @@ impl<'e> Balances<'e> {
         // Free-surface modes about the centre of mass do not feel how the frame moves along.
         let first = self.rigid - self.axes.len();
         for (at, &axis) in self.axes.iter().enumerate() {
-            self.velocity[first + at] = instant.state.omega[axis];
+            self.velocity[first + at] = instant.omega[axis];
             self.acceleration[first + at] = instant.alpha[axis];
         }
-        self.velocity[self.rigid..].copy_from_slice(&instant.state.qd);
+        self.velocity[self.rigid..].copy_from_slice(instant.qd);
         self.acceleration[self.rigid..].copy_from_slice(&instant.acceleration);
         let mut forces = [self.velocity.clone(), self.velocity.clone()];
         for (evaluation, forces) in self.evaluations.iter_mut().zip(&mut forces) {
-            evaluation.set(&instant.state.q, &self.velocity);
+            evaluation.set(instant.q, &self.velocity);
             evaluation.balance(&self.acceleration, forces);
         }
         let [whole, own] = forces;

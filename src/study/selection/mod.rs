@@ -5,6 +5,7 @@ mod bounds;
 mod cases;
 mod decisions;
 mod dropped_terms;
+mod first_order;
 mod norms;
 mod participation;
 mod rows;

@@ -17,10 +17,20 @@ impl<'b> PointRows<'b> {
 
     /// Psi of a point (3 x nf), body axes.
     pub fn of(&self, point: &BodyPoint) -> DMatrix<f64> {
+        self.works(|rest, axis, forces| point.add_force(rest, axis, forces))
+    }
+
+    /// Rotations of a point that has an orientation by the modes (3 x nf), body axes.
+    pub fn of_rotation(&self, point: &BodyPoint) -> DMatrix<f64> {
+        self.works(|rest, axis, forces| point.add_torque(rest, axis, forces))
+    }
+
+    /// What a load of one along each axis does to every mode.
+    fn works(&self, add: impl Fn(&Evaluation<'_>, &Vector3<f64>, &mut [f64])) -> DMatrix<f64> {
         let rest = Evaluation::new(&self.equations);
         let rows = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
             let mut forces = vec![0.0; self.equations.n_velocities()];
-            point.add_force(&rest, &axis, &mut forces);
+            add(&rest, &axis, &mut forces);
             forces.split_off(self.equations.n_rigid())
         });
         DMatrix::from_fn(3, self.body.n_modes(), |k, j| rows[k][j])

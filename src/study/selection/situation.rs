@@ -1,6 +1,6 @@
 //! What a scene means for a body: how fast it turns, how far its modes go, what loads them, and where each of these numbers comes from.
 
-use super::bounds::{Driven, ModalLoad, Start};
+use super::bounds::{Driven, ModalLoad, Start, TurnedTorques};
 use super::rows::PointRows;
 use super::variation::{Rotation, Variation};
 use crate::body::flex_body::FlexBody;
@@ -219,6 +219,7 @@ fn driven(
     let damping = damping_norm(body, &root);
     Ok(Driven {
         loads: modal_loads(body, scene, points, &rotation, &root),
+        turned: turned_torques(body, scene, points, duration, &root),
         settled: scene.initial.settled,
         start: start_of_modes(scene, damping, &root),
         rotation,
@@ -272,8 +273,6 @@ fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
         "the mass matrix does not commute with rotations"
     } else if !body.geometric_stiffness().is_empty() {
         "the body has geometric stiffness"
-    } else if scene.loads.iter().any(|load| !load.torque.is_nothing()) {
-        "a torque acts on axes that turn with the deformation"
     } else if !is_about_centre(body.invariants()) {
         "the frame is not that of free-surface modes about the centre of mass"
     } else {
@@ -291,25 +290,56 @@ fn modal_loads(
     root: &[f64],
 ) -> Vec<ModalLoad> {
     let rows = PointRows::new(body);
-    let modal_load = |(load, point): (&Load, &BodyPoint)| {
-        let (duration, psi) = (rotation.duration, rows.of(point));
-        let (psi, factor) = match (load.axes, &load.force) {
+    let modal_load = |psi: DMatrix<f64>, axes: Axes, history: &VectorHistory| {
+        let duration = rotation.duration;
+        let (psi, factor) = match (axes, history) {
             (Axes::Model | Axes::Body, VectorHistory::Along { direction, factor }) => {
                 let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(direction));
                 (along, Variation::of(factor, duration))
             }
-            (Axes::Model | Axes::Body, force) => (psi, Variation::of_vector(force, duration)),
-            (Axes::World, force) => {
-                (psi, Variation::of_vector(force, duration).times(&Variation::direction(rotation)))
+            (Axes::Model | Axes::Body, history) => (psi, Variation::of_vector(history, duration)),
+            (Axes::World, history) => {
+                (psi, Variation::of_vector(history, duration).times(&Variation::direction(rotation)))
             }
         };
-        ModalLoad {
-            force: PointRows::norm(&psi),
-            energy: PointRows::norm(&PointRows::weighted(&psi, |j| 1.0 / root[j])),
-            factor,
-        }
+        ModalLoad { force: PointRows::norm(&psi), energy: energy_norm(&psi, root), factor }
     };
-    scene.loads.iter().zip(points).map(modal_load).collect()
+    let mut loads = Vec::new();
+    for (load, point) in scene.loads.iter().zip(points) {
+        if !load.force.is_nothing() {
+            loads.push(modal_load(rows.of(point), load.axes, &load.force));
+        }
+        if !load.torque.is_nothing() {
+            loads.push(modal_load(rows.of_rotation(point), load.axes, &load.torque));
+        }
+    }
+    loads
+}
+
+/// |Lambda^(-1/2) Psi'| of a few rows Psi; `root` is sqrt(Lambda).
+fn energy_norm(rows: &DMatrix<f64>, root: &[f64]) -> f64 {
+    PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / root[j]))
+}
+
+/// How the deformation changes the modal forces of torques: a torque t works on the rotation vector theta = Theta q of its point as G(theta)'t, where
+/// G = integral_0^1 exp(s theta~) ds, which changes by no more than half of what theta changes by.
+fn turned_torques(
+    body: &FlexBody,
+    scene: &Scene,
+    points: &[BodyPoint],
+    duration: f64,
+    root: &[f64],
+) -> TurnedTorques {
+    let rows = PointRows::new(body);
+    let mut turned = TurnedTorques::default();
+    for (load, point) in scene.loads.iter().zip(points).filter(|(load, _)| !load.torque.is_nothing()) {
+        let theta = rows.of_rotation(point);
+        let per_torque = 0.5 * PointRows::norm(&theta) * energy_norm(&theta, root);
+        let torque = Variation::of_vector(&load.torque, duration);
+        turned.force += per_torque * torque.largest;
+        turned.rate += per_torque * torque.rate;
+    }
+    turned
 }
 
 /// |D|, or a bound of it.

@@ -17,9 +17,11 @@ use crate::motion::scene::{
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
-/// Instants per shortest period that bounds look at a motion, and how many they look at in all.
+/// Instants per shortest period at which bounds look at a motion.
 const INSTANTS_PER_PERIOD: f64 = 20.0;
-const MOST_INSTANTS: usize = 20_000;
+
+/// Numbers of a motion, instants times modes, that are looked at along a run.
+const MOST_NUMBERS: f64 = 1.5e7;
 
 /// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a spin is looked for.
 const LEAST_INSTANTS: usize = 500;
@@ -87,7 +89,8 @@ impl TrialRuns<'_> {
     pub fn fine_motion(&self, kept: Groups) -> Result<Option<Recording>> {
         let mut scene = self.scene.clone();
         let wanted = (self.situation.duration.value * self.fastest() / TAU * INSTANTS_PER_PERIOD).ceil();
-        if wanted.is_nan() || wanted > MOST_INSTANTS as f64 {
+        let modes = self.body.n_modes() as f64;
+        if wanted.is_nan() || wanted * modes > MOST_NUMBERS {
             return Ok(None);
         }
         scene.run.outputs = (wanted as usize).max(LEAST_INSTANTS);
@@ -188,9 +191,11 @@ impl TrialRuns<'_> {
         let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
         let softened = || "the spin may take the stiffness of some motion".to_owned();
+        let mut first_order = None;
         let (own, residual, defect) = match run {
             Some(run) => {
                 let terms = DroppedTerms::new(self.body, self.scene, run, kept, norms);
+                first_order = terms.first_order;
                 (terms.amplitude, vec![terms.load], terms.defect)
             }
             None => {
@@ -199,7 +204,14 @@ impl TrialRuns<'_> {
                 (own, residual, driven.torque_defect(dropped, norms, &own))
             }
         };
-        let error = driven.error(norms, &residual).ok_or_else(softened)?;
+        let mut error = driven.error(norms, &residual).ok_or_else(softened)?;
+        if let Some(mut first) = first_order {
+            first.leave_torques(&driven.turned, driven.rotation.duration);
+            let closer = first.with(&driven.error(norms, &[first.rest]).ok_or_else(softened)?);
+            if closer.energy < error.energy {
+                error = closer;
+            }
+        }
         let levers = self.lever_torques(driven) * error.energy;
         let torque = driven.torque_error(norms, &own, &error, &defect) + levers;
         Ok(self.relative_errors(driven, run, &error, torque))
