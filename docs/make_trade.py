@@ -70,6 +70,11 @@ not ours. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `python
 
 Terms alone save nothing in Exudyn, whose object has no form without them (`export` writes zeros); there it is the modes that count. The C program leaves out what a body does not hold.
 
+Modes that the tolerances of each scene take, by the way in which they are chosen, the lowest first where nothing else is said. Free modes and residual vectors are tried in the numbers 2N, N, N/2 and N/4 of free modes; shapes of the motion are
+those of `convert --scene --basis scene`, which know this motion only ([select](select.md#how-it-is-decided)):
+
+{bases}
+
 """
 GUIDE = """## Guidelines I to IV
 
@@ -272,7 +277,7 @@ def summary(told, times):
 
 
 def scene_part(program, name, model, modes):
-    """The part of a scene, and its row of the table on top."""
+    """The part of a scene, and its rows of the two tables on top."""
     path = ROOT / "fixtures/scenes" / f"{name}.toml"
     manifest = ROOT / "fixtures/models" / model / "model.toml"
     with tempfile.TemporaryDirectory() as scratch:
@@ -286,28 +291,32 @@ def scene_part(program, name, model, modes):
         agree = agreement(program, folder, path, times[told["rows"][0]["number"]])
     drawn(told, times, name)
     verdict = "\n".join(f"* {line['label'].lower()}: {line['text']}" for line in told["verdict"][1:])
-    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy.{needed(told)}"
+    said = f"`trade {model}/model.toml --modes {modes}`: {len(told['rows'])} candidates in {took:.0f} s. The modes of the reference move in Exudyn as in `simulate` to {number(100 * agree)} % of the root of the elastic energy."
     parts = [f"## {told['scene']}", said, verdict, measured(told, times), f"![error over seconds](images/trade_{name}.svg)"]
-    return "\n\n".join(parts) + "\n\n", summary(told, times)
+    return "\n\n".join(parts) + "\n\n", summary(told, times), bases(told)
 
 
-def needed(told):
-    """How many modes of the reference the tolerances take, in the order of frequency and by what they do, with the terms that are recommended."""
-    recommended = told["rows"][(told["recommended"] or 1) - 1]
-    first = told["rows"][0]
+def bases(told):
+    """The row of the table of bases: how many modes the tolerances take, by the way in which they are chosen."""
+    rows, first = told["rows"], told["rows"][0]
 
-    def fewest(lowest):
-        def fits(row):
-            same = row["source"] == first["source"] and row["groups"] == recommended["groups"] and not row["lumped"] and row["storage"] == "f64"
-            in_order = row["mode_numbers"][-1] == row["modes"]
-            return same and row["measured"] and row["measured"]["worst"] <= 1 and (in_order == lowest or row["modes"] == first["modes"])
+    def fewest(fits):
+        found = [row["modes"] for row in rows if not row["lumped"] and row["measured"] and row["measured"]["worst"] <= 1 and fits(row)]
+        return str(min(found)) if found else f"more than {max((row['modes'] for row in rows if fits(row)), default=0)}"
 
-        return min((row["modes"] for row in told["rows"] if fits(row)), default=None)
+    def of_reference(row):
+        return row["source"] == first["source"]
 
-    by_frequency, by_motion = fewest(True), fewest(False)
-    if by_frequency is None or by_motion is None:
-        return ""
-    return f" Of the {first['modes']} modes of the reference, residual vectors and responses to its motion among them, the tolerances take {by_motion} by what they do and {by_frequency} in the order of frequency (on a coarse ladder), with the terms that are recommended."
+    def in_order(row):
+        return row["mode_numbers"][-1] == row["modes"]
+
+    cells = [
+        fewest(lambda row: row["source"].endswith("free modes") or row["source"].endswith("free mode")),
+        fewest(lambda row: row["source"].endswith("residual vectors") and in_order(row)),
+        fewest(of_reference),
+        fewest(lambda row: row["source"].endswith("of the motion")),
+    ]
+    return f"| {told['scene']} | " + " | ".join(cells) + " |"
 
 
 def agreement(program, folder, scene, one):
@@ -465,12 +474,14 @@ def assembled(version, found):
     """The page, of the parts that are there."""
     parts = [found[name] for name, *_ in SCENES if name in found]
     head = ["| scene | body | its error | the reference lacks (estimated) | seconds in Exudyn | milliseconds in C |", "|---|---|---|---|---|---|"]
-    top = "\n".join(head + [row for _, row in parts])
-    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top)
+    top = "\n".join(head + [part[1] for part in parts])
+    head = ["| scene | free modes | and residual vectors | those of the reference that do most | shapes of the motion |", "|---|---|---|---|---|"]
+    ways = "\n".join(head + [part[2] for part in parts])
+    text = HEAD.format(version=version, exudyn=metadata.version("exudyn"), processor=processor(), turns=TURNS, per_period=PER_PERIOD, table=top, bases=ways)
     missing = [name for name, *_ in SCENES if name not in found]
     if missing:
         text += f"Not measured yet in this form: {', '.join(missing)} (`python3 docs/make_trade.py --only ...`).\n\n"
-    text += "".join(part for part, _ in parts)
+    text += "".join(part[0] for part in parts)
     if "guidelines" in found:
         text += guide_part(found["guidelines"])
     return (text + found.get("block", "") + found.get("conversions", "")).rstrip() + "\n"

@@ -1,7 +1,7 @@
 //! From a model to a body.
 
 use super::{FlexBody, Model, Scene, Selection};
-use crate::base::diagnostic::Diagnostic;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::SILENT;
 use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
@@ -22,6 +22,8 @@ pub enum Basis {
     CraigBampton,
     /// Free modes, and the static responses to loads at the interfaces (Craig and Chang).
     CraigChang,
+    /// The fewest shapes that the motion of a scene is made of ([`Model::convert_for`]); another motion may need others.
+    Scene,
 }
 
 /// How sure the modes are.
@@ -100,7 +102,7 @@ impl ConvertOptions {
 
     fn settings(&self, model: &Model, scene: Option<&Scene>) -> Result<ConvertSettings> {
         let loads = match (self.basis, self.accuracy) {
-            (Basis::Free, Accuracy::Fast | Accuracy::Standard) => {
+            (Basis::Free | Basis::Scene, Accuracy::Fast | Accuracy::Standard) => {
                 loads_for(scene.map(|scene| &scene.0), &model.residual_vectors)
             }
             _ => model.residual_vectors.clone(),
@@ -108,7 +110,9 @@ impl ConvertOptions {
         let residual_vectors = || read_loads(&loads, &model.checked);
         let mut settings = ConvertSettings {
             basis: match self.basis {
-                Basis::Free => BasisChoice::Free(FreeSurface { residual_vectors: residual_vectors()? }),
+                Basis::Free | Basis::Scene => {
+                    BasisChoice::Free(FreeSurface { residual_vectors: residual_vectors()? })
+                }
                 Basis::CraigBampton => BasisChoice::CraigBampton(CraigBampton),
                 Basis::CraigChang => {
                     BasisChoice::CraigChang(CraigChang { residual_vectors: residual_vectors()? })
@@ -156,6 +160,10 @@ impl Model {
     /// FB501 to FB506 where the modes cannot be trusted (not converged, not complete, a mechanism), FB512 where there are none, FB514 where
     /// the damping feeds energy to them, FB601 where the memory does not suffice; FB714 where an identity does not hold.
     pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
+        if options.basis == Basis::Scene {
+            let message = "a basis made for a scene needs one: `convert_for`";
+            return Err(Diagnostic::new(Code::Usage, message).into());
+        }
         let settings = options.settings(self, None)?;
         let conversion = convert(&self.checked, &settings, SILENT)?;
         accept(&conversion.body)?;
@@ -168,8 +176,10 @@ impl Model {
     /// As [`Model::convert`]; FB212 where the scene does not fit the body.
     pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
         let settings = options.settings(self, Some(scene))?;
-        let by_band = options.modes.is_none() && options.highest.is_none() && options.basis == Basis::Free;
-        let tailoring = Tailoring { settings, by_band };
+        let by_band = options.modes.is_none()
+            && options.highest.is_none()
+            && matches!(options.basis, Basis::Free | Basis::Scene);
+        let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
         let (conversion, selection) =
             convert_for_scene(&self.checked, &tailoring, &scene.0, Resume::default(), SILENT)?;
         accept(&conversion.body)?;

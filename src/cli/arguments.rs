@@ -467,6 +467,8 @@ pub enum BasisName {
     CraigChang,
     /// Shapes that were computed elsewhere: eigenvectors, static shapes, any mixture of them
     Imported,
+    /// The fewest shapes that the motion of --scene is made of; another motion may need others
+    Scene,
 }
 
 /// Names of the accuracy levels.

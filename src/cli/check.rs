@@ -29,10 +29,10 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
 fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
     let Some(number) = body.source().number else { return Ok(FeModel::from_raw(raw)?.model) };
     let bodies = FeModel::bodies_from_raw(raw)?;
-    let of = bodies.len();
+    let count = bodies.len();
     let found = bodies.into_iter().map(|checked| checked.model).find(|model| model.number() == Some(number));
     found.ok_or_else(|| {
-        let message = format!("the file holds {number}, the model has {of}");
+        let message = format!("the file holds {number}, the model has {count}");
         Diagnostic::new(Code::BodyIncomparable, message).into()
     })
 }

@@ -194,8 +194,9 @@ impl Job<'_> {
     /// Free modes by the band of the scene, unless their number or highest frequency is given.
     fn of_band(&self, settings: ConvertSettings) -> Tailoring {
         let ConvertArguments { modes, max_frequency, basis, .. } = self.arguments;
-        let by_band = modes.is_none() && max_frequency.is_none() && *basis == BasisName::Free;
-        Tailoring { settings, by_band }
+        let by_band =
+            modes.is_none() && max_frequency.is_none() && matches!(basis, BasisName::Free | BasisName::Scene);
+        Tailoring { settings, by_band, of_motion: *basis == BasisName::Scene }
     }
 
     fn settings(&self, model: &FeModel, basis: BasisChoice) -> ConvertSettings {
@@ -237,7 +238,8 @@ fn residual_vectors(
     files: &ModelFiles,
     scene: Option<&Scene>,
 ) -> Vec<LoadSource> {
-    let free = arguments.basis == BasisName::Free && arguments.accuracy != AccuracyName::Certified;
+    let free = matches!(arguments.basis, BasisName::Free | BasisName::Scene)
+        && arguments.accuracy != AccuracyName::Certified;
     let scene = scene.filter(|_| free && !arguments.lumped_modes);
     loads_for(scene, &files.residual_vectors)
 }
@@ -271,9 +273,13 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
     let residual = !loads.is_empty();
-    let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang);
+    let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang | BasisName::Scene);
     let coupled = matches!(basis, BasisName::CraigBampton | BasisName::CraigChang);
     let message = match arguments {
+        ConvertArguments { scene: None, .. } if basis == BasisName::Scene => "--basis scene needs --scene",
+        ConvertArguments { accuracy: AccuracyName::Certified, .. } if basis == BasisName::Scene => {
+            "the modes of this basis are no eigenvectors and cannot be certified"
+        }
         ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
             "--shapes needs --basis imported"
         }

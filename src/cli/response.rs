@@ -82,6 +82,9 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_manifest: bool) -> Re
         _ if converts && !(is_manifest && arguments.body.is_none()) => {
             "--modes, --basis and --residual-vectors are for a model without a body: a file has the modes that it has"
         }
+        ResponseArguments { basis: Some(BasisName::Scene), .. } => {
+            "a basis made for a scene is for convert: convert the model, and give the body beside it"
+        }
         ResponseArguments { basis: Some(BasisName::Imported), .. } => {
             "imported shapes are for convert: convert the model, and give the body beside it"
         }

@@ -78,7 +78,7 @@ fn converted(
         lumped: Vec::new(),
         ..ConvertSettings::default()
     };
-    let tailoring = Tailoring { settings, by_band: arguments.modes.is_none() };
+    let tailoring = Tailoring { settings, by_band: arguments.modes.is_none(), of_motion: false };
     let Enriched { made, rounds } = tailoring
         .convert(&model, scene, Resume::default(), watch)
         .map_err(|error| error.in_file(&arguments.scene))?;

@@ -79,12 +79,12 @@ fn asked(selection: &Selection) -> String {
 
 fn take(selection: &Selection) -> String {
     let numbers: Vec<usize> = selection.modes.iter().map(|j| j + 1).collect();
-    let of = |j: Option<&usize>| significant(j.map_or(0.0, |&j| selection.frequencies_hz[j]), 3);
+    let frequency = |j: Option<&usize>| significant(j.map_or(0.0, |&j| selection.frequencies_hz[j]), 3);
     let which = match numbers.len() == selection.n_modes {
         true => "all".to_owned(),
         false => format!("of {}: {}", selection.n_modes, ranges(&numbers)),
     };
-    let (first, last) = (of(selection.modes.first()), of(selection.modes.last()));
+    let (first, last) = (frequency(selection.modes.first()), frequency(selection.modes.last()));
     let held: Vec<&str> = held_groups(selection).map(Group::name).collect();
     let groups = match held.is_empty() {
         true => "the inertia of the undeformed body alone".to_owned(),

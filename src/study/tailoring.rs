@@ -1,17 +1,18 @@
 //! A body made for one scene: a conversion that computes no more than the scene may need, and keeps no more than it needs.
 
-use crate::base::diagnostic::Code;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::Watch;
-use crate::body::basis::{Loads, UserLoads};
+use crate::body::basis::{BasisChoice, Loads, UserLoads};
 use crate::body::convert::{Condensation, Conversion, ConvertSettings, ModalModel};
 use crate::body::flex_body::FlexBody;
 use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
-use crate::motion::scene::Scene;
+use crate::motion::scene::{Measure, OutputErrors, Scene, trace, trace_at};
 use crate::numerics::eigen::{Accuracy, Resume, Wanted};
-use crate::study::reference::{Enriched, enrich};
+use crate::study::reference::{Enriched, MotionShapes, ReferenceError, enrich};
 use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_from};
+use crate::study::trade::Source;
 use faer::Mat;
 
 /// Settings of a conversion for a scene.
@@ -21,6 +22,8 @@ pub struct Tailoring {
     pub settings: ConvertSettings,
     /// Whether a band of the scene replaces the wanted modes: all up to twice the band, if there are any.
     pub by_band: bool,
+    /// Whether the shapes that the motion is made of replace the modes that it was computed with, where fewer of them do.
+    pub of_motion: bool,
 }
 
 impl Tailoring {
@@ -62,6 +65,53 @@ impl Tailoring {
         enrich(model, scene, settings.modes.memory, grows, watch, make, |made| &made.body)
     }
 
+    /// The body of the fewest [`MotionShapes`] that leave half of the tolerances to others, in place of the `whole` one whose motion they are made
+    /// of; that one where no number of them does.
+    ///
+    /// # Errors
+    /// Those of [`trace`] and of the conversion.
+    fn of_motion(
+        &self,
+        model: &FeModel,
+        scene: &Scene,
+        whole: Enriched<Conversion>,
+        watch: Watch<'_>,
+        condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
+    ) -> Result<Enriched<Conversion>> {
+        let Enriched { made: mut reference, rounds } = whole;
+        let (motion, _) = trace(&reference.body, scene, self.settings.modes.memory, |_| ())?;
+        let measure = Measure::new(&reference.body, &motion);
+        let lacks = rounds.last().map_or(0.0, |own| own.worst);
+        let shapes = MotionShapes::new(model, &reference.body, scene, &motion)?;
+        let counts =
+            shapes.as_ref().map_or(Vec::new(), |shapes| shapes.counts(&scene.requirements.tolerance));
+        for (shapes, count) in
+            shapes.iter().flat_map(|shapes| counts.iter().map(move |count| (shapes, *count)))
+        {
+            let settings = self.settings_of_shapes(shapes.basis(count));
+            let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
+            let condensed = condense(&modal)?;
+            let mut made = modal.finish(condensed, watch)?;
+            made.body = shapes.damped(model, made.body)?;
+            let Some(errors) = errors_beside(&made.body, &measure, model, scene)? else { break };
+            let worst = lacks + errors.worst(&scene.requirements.tolerance);
+            let own = ReferenceError { modes: made.body.n_modes(), errors, worst, time: 0.0 };
+            if own.is_reference() {
+                return Ok(Enriched { made, rounds: vec![own] });
+            }
+        }
+        let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
+        reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
+        Ok(Enriched { made: reference, rounds })
+    }
+
+    /// The settings with all modes of given shapes.
+    fn settings_of_shapes(&self, basis: BasisChoice) -> ConvertSettings {
+        let mut settings = ConvertSettings { basis, ..self.settings.clone() };
+        settings.modes.wanted = Wanted::Lowest(usize::MAX);
+        settings
+    }
+
     /// The same with the static responses to `loads` in the basis.
     fn with_motion(&self, loads: &Mat<f64>) -> Self {
         let mut own = self.clone();
@@ -95,6 +145,25 @@ impl Tailoring {
             found => found,
         }
     }
+}
+
+/// The largest errors of the motion of `body` in `scene` beside that of another body of `model`, which `measure` holds; `None` where the two cannot
+/// be compared.
+fn errors_beside(
+    body: &FlexBody,
+    measure: &Measure<'_>,
+    model: &FeModel,
+    scene: &Scene,
+) -> Result<Option<OutputErrors>> {
+    let Some(source) = Source::new("shapes of the motion", body.clone(), None)?.beside(measure.body(), model)
+    else {
+        return Ok(None);
+    };
+    let modes: Vec<usize> = (0..body.n_modes()).collect();
+    let mut scene = source.scene(scene, body, &modes, &measure.trace().start);
+    scene.run.scheme = measure.trace().scheme;
+    let motion = trace_at(body, &scene, &measure.trace().time, None)?;
+    Ok(source.errors(measure, body, &modes, &motion).map(|errors| errors.largest()))
 }
 
 /// Loads whose static responses join the modes where nobody names others: those `stated` with the model; without, those of the scene, of
@@ -135,12 +204,20 @@ pub fn convert_for_scene(
     watch: Watch<'_>,
 ) -> Result<(Conversion, Selection)> {
     let memory = tailoring.settings.modes.memory;
-    let enriched = tailoring.enriched(model, scene, resume, watch, |modal| {
+    if tailoring.of_motion && !scene.initial.modes.is_empty() {
+        let message = "--basis scene: the scene starts modes by their number, which a body made of its motion does not have";
+        return Err(Diagnostic::new(Code::Usage, message).into());
+    }
+    let condense = |modal: &ModalModel<'_>| {
         // Rigid motion alone is multiplied by M before the scene has said which groups it may need.
         let linear = modal.condense_linear();
         let terms = rule_out(&modal.body(&linear)?, scene, memory)?;
         Ok(modal.condense_kept(linear, terms))
-    })?;
+    };
+    let mut enriched = tailoring.enriched(model, scene, resume, watch, condense)?;
+    if tailoring.of_motion {
+        enriched = tailoring.of_motion(model, scene, enriched, watch, condense)?;
+    }
     let Enriched { made: mut conversion, rounds } = enriched;
     let selection = select_from(&conversion.body, &rounds, scene, memory, watch)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;

@@ -3,17 +3,20 @@
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::mesh::{Mesh, grid};
 use crate::support::scenes::nothing_happens;
+use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
+use flexbody::body::verification::accept;
 use flexbody::model::FeModel;
 use flexbody::motion::scene::{
-    Axes, History, Initial, Load, Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate, trace,
+    Axes, History, Initial, Load, ModeStart, Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate,
+    trace,
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
 use flexbody::study::reference::{Enriched, PART_OF_REFERENCE, ReferenceError, enrich};
-use flexbody::study::tailoring::Tailoring;
+use flexbody::study::tailoring::{Tailoring, convert_for_scene};
 use flexbody::study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -128,7 +131,7 @@ fn responses_join_until_what_is_lacking_does_not_count() {
         pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
     scene.requirements.tolerance.stress = 0.2;
     scene.requirements.tolerance.deflection = 0.2;
-    let tailoring = Tailoring { settings: settings(4), by_band: false };
+    let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: false };
     let Enriched { made, rounds } =
         tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
     let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
@@ -153,7 +156,7 @@ fn a_shock_is_no_reason_for_modes_without_end() {
     scene.initial.settled = false;
     scene.requirements.tolerance.stress = 1e-3;
     scene.requirements.tolerance.deflection = 1e-3;
-    let tailoring = Tailoring { settings: settings(6), by_band: false };
+    let tailoring = Tailoring { settings: settings(6), by_band: false, of_motion: false };
     let shocked = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
     let lack = shocked.error().expect("an estimate");
     assert!(lack.worst > 1.0 && lack.modes == shocked.made.body.n_modes(), "{:?}", shocked.rounds);
@@ -161,6 +164,38 @@ fn a_shock_is_no_reason_for_modes_without_end() {
     scene.initial.settled = true;
     let calm = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
     assert!(calm.error().expect("an estimate").worst < PART_OF_REFERENCE, "{:?}", calm.rounds);
+}
+
+#[test]
+fn shapes_of_the_motion_hold_the_tolerances_with_fewer_of_them() {
+    let model = model();
+    let mut scene =
+        pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
+    scene.requirements.tolerance.stress = 0.05;
+    scene.requirements.tolerance.deflection = 0.05;
+    let made = |of_motion: bool| {
+        let tailoring = Tailoring { settings: settings(12), by_band: false, of_motion };
+        convert_for_scene(&model, &tailoring, &scene, Resume::default(), SILENT).expect("a body")
+    };
+    let ((free, _), (own, selection)) = (made(false), made(true));
+    assert!(2 * own.body.n_modes() <= free.body.n_modes(), "{} {}", own.body.n_modes(), free.body.n_modes());
+    assert!(selection.holds(), "{selection:?}");
+    let errors = true_errors(&model, &own.body, &scene);
+    assert!(errors.iter().all(|error| *error < 0.05), "{errors:?}");
+    // What every body has to fulfil.
+    accept(&own.body).expect("the identities");
+    assert_eq!(own.body.source().settings["basis"], "scene");
+}
+
+#[test]
+fn a_basis_made_of_a_motion_needs_a_motion_without_numbered_modes() {
+    let model = model();
+    let mut scene = pulled(&model, 7, Vector3::x() * 1e-4, 0.7, Vector3::zeros());
+    scene.initial.settled = false;
+    scene.initial.modes = vec![ModeStart { mode: 0, amplitude: 0.01, rate: 0.0 }];
+    let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: true };
+    let refused = convert_for_scene(&model, &tailoring, &scene, Resume::default(), SILENT);
+    assert!(refused.expect_err("a refusal").has(Code::Usage));
 }
 
 #[test]

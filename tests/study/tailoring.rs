@@ -57,9 +57,14 @@ fn a_mild_scene_never_forms_w() {
     let scene = read_scene(folder.path().join("scene.toml")).expect("a scene");
     let modes = ModeSettings { wanted: Wanted::Lowest(MODES), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, ..ConvertSettings::default() };
-    let (conversion, selection) =
-        convert_for_scene(&model, &Tailoring { settings, by_band: false }, &scene, Resume::default(), SILENT)
-            .expect("converts");
+    let (conversion, selection) = convert_for_scene(
+        &model,
+        &Tailoring { settings, by_band: false, of_motion: false },
+        &scene,
+        Resume::default(),
+        SILENT,
+    )
+    .expect("converts");
     assert_eq!(conversion.condensed_columns, 4, "the columns of rigid motion");
     assert_eq!((selection.groups, conversion.body.groups()), (Groups::NONE, Groups::NONE));
     let terms = conversion.body.terms();

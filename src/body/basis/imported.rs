@@ -1,4 +1,4 @@
-//! Shapes that were computed elsewhere: checked, brought into the order of the model, freed from rigid motion,
+//! Shapes that were computed elsewhere, in a file or from a motion: checked, brought into the order of the model, freed from rigid motion,
 //! M-orthonormalised. Nothing is factored unless eigenvectors are to be proved complete.
 
 use super::columns::columns;
@@ -20,7 +20,20 @@ pub struct ImportedShapes {
     shapes: Mat<f64>,
     digits: u8,
     source: Option<SourceFile>,
+    origin: Origin,
 }
+
+/// Where shapes come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Origin {
+    /// The user, who names a file.
+    User,
+    /// The motion of a body in a scene.
+    Motion,
+}
+
+/// Digits of numbers that were computed here.
+const COMPUTED_DIGITS: u8 = 15;
 
 impl ImportedShapes {
     /// Shapes for `model`, given by its matrix rows.
@@ -30,7 +43,20 @@ impl ImportedShapes {
     /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let (digits, source) = (raw.digits, raw.source.clone());
-        Ok(Self { shapes: columns(model, raw, "shape")?, digits, source })
+        Ok(Self { shapes: columns(model, raw, "shape")?, digits, source, origin: Origin::User })
+    }
+
+    /// Shapes that a motion was found to be made of (N x k, by the rows of the model).
+    pub fn of_motion(shapes: Mat<f64>) -> Self {
+        Self { shapes, digits: COMPUTED_DIGITS, source: None, origin: Origin::Motion }
+    }
+
+    /// What one of them is called, and several.
+    fn names(&self) -> (&'static str, &'static str) {
+        match self.origin {
+            Origin::User => ("imported shape", "imported shapes"),
+            Origin::Motion => ("shape of the motion", "shapes of the motion"),
+        }
     }
 
     /// The file that they were read from.
@@ -46,7 +72,10 @@ impl ImportedShapes {
 
 impl Basis for ImportedShapes {
     fn name(&self) -> &'static str {
-        "imported"
+        match self.origin {
+            Origin::User => "imported",
+            Origin::Motion => "scene",
+        }
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
@@ -54,16 +83,17 @@ impl Basis for ImportedShapes {
         let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref(), resume);
         let criterion = self.dependent();
+        let (one, several) = self.names();
         let failed = |failure| explain(model, failure);
         let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
-        let notes = independent.notes("imported shapes", criterion, |j| format!("shape {}", j + 1));
+        let notes = independent.notes(several, criterion, |j| format!("shape {}", j + 1));
         if independent.kept.is_empty() {
-            let message = format!("none of {} imported shapes deforms the body", self.shapes.ncols());
+            let message = format!("none of {} {several} deforms the body", self.shapes.ncols());
             return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
         }
         let solution = modes_of_span(&problem, independent.vectors, settings, watch).map_err(failed)?;
-        let mut basis = ModalBasis::new(model, &problem, settings, solution, "imported shape")?;
+        let mut basis = ModalBasis::new(model, &problem, settings, solution, one)?;
         basis.diagnostics.extend(notes);
         let given = basis.solution.eigenvalues.len();
         if let Wanted::Lowest(wanted) = settings.wanted

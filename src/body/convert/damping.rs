@@ -37,29 +37,29 @@ pub(crate) fn modal_damping(
 ) -> Result<Option<ModalDamping>> {
     let Some(damping) = model.damping() else { return Ok(None) };
     let critical: Vec<f64> = eigenvalues.iter().map(|lambda| 2.0 * lambda.sqrt()).collect();
-    let of_ratios = |ratio: Vec<f64>| {
+    let from_ratios = |ratio: Vec<f64>| {
         let diagonal = |i: usize, j: usize| if i == j { ratio[j] * critical[j] } else { 0.0 };
         (Mat::from_fn(critical.len(), critical.len(), diagonal), ratio)
     };
-    let of_matrix = |matrix: Mat<f64>| {
+    let from_matrix = |matrix: Mat<f64>| {
         // What is below zero here is rounding: anything else was refused.
         let ratio = critical.iter().enumerate().map(|(j, c)| matrix[(j, j)].max(0.0) / c).collect();
         (matrix, ratio)
     };
     let (matrix, ratio): (Mat<f64>, Vec<f64>) = match damping {
-        Damping::Ratio(ratio) => of_ratios(vec![*ratio; critical.len()]),
+        Damping::Ratio(ratio) => from_ratios(vec![*ratio; critical.len()]),
         Damping::Bands(bands) => {
             let hertz = eigenvalues.iter().map(|&lambda| model.units().frequency_of(lambda));
-            of_ratios(hertz.map(|f| ratio_at(bands, f)).collect())
+            from_ratios(hertz.map(|f| ratio_at(bands, f)).collect())
         }
         Damping::Rayleigh { alpha, beta } => {
             let (m, k) = (invariants.modal_mass(), invariants.modal_stiffness());
-            of_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
+            from_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
         }
         Damping::Matrix(d) => {
             let matrix = reduced(d, vectors);
             check_semidefinite(model, d, vectors, &matrix)?;
-            of_matrix(matrix)
+            from_matrix(matrix)
         }
     };
     if let Some(j) = ratio.iter().position(|ratio| !ratio.is_finite()) {

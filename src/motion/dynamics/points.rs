@@ -120,14 +120,17 @@ impl BodyPoint {
         let (modes, nf) = (body.modes(), body.n_modes());
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
         let rows = interface.rows(body.nodes(), modes.shape.as_ref(), rotation, body.dimension())?;
-        let of = |rows: &Mat<f64>, kind: LoadKind| {
-            let motion = PointMotion::new(nf, |k, j| rows[(k, j)]);
-            if terms.geometric_stiffness { motion.with_geometric_stiffness(body, &kind) } else { motion }
+        let motion = |rows: &Mat<f64>, kind: LoadKind| {
+            let linear = PointMotion::new(nf, |k, j| rows[(k, j)]);
+            if terms.geometric_stiffness { linear.with_geometric_stiffness(body, &kind) } else { linear }
         };
         Some(Self {
             position: Vector3::from(interface.reference?),
-            translation: of(&rows.translation, LoadKind::Force(interface.name.clone())),
-            rotation: rows.rotation.as_ref().map(|rows| of(rows, LoadKind::Moment(interface.name.clone()))),
+            translation: motion(&rows.translation, LoadKind::Force(interface.name.clone())),
+            rotation: rows
+                .rotation
+                .as_ref()
+                .map(|rows| motion(rows, LoadKind::Moment(interface.name.clone()))),
         })
     }
 

@@ -485,14 +485,14 @@ mod tests {
     #[test]
     fn the_frequency_is_that_of_the_fastest_part() {
         let times: Vec<f64> = (0..400).map(|i| f64::from(i) / 399.0).collect();
-        let of = |value: &dyn Fn(f64) -> f64| {
+        let fastest = |value: &dyn Fn(f64) -> f64| {
             let values: Vec<_> = times.iter().map(|&t| Vector1::new(value(t))).collect();
             Samples::new(times.clone(), &values, Interpolation::Cubic, false).frequency_until(1.0)
         };
-        assert!((of(&|t| 3.0 + 100.0 * t + (TAU * 7.0 * t).sin()) / 7.0 - 1.0).abs() < 0.01);
-        let pulse = of(&|t| (-((t - 0.5) / 0.02).powi(2) / 2.0).exp());
+        assert!((fastest(&|t| 3.0 + 100.0 * t + (TAU * 7.0 * t).sin()) / 7.0 - 1.0).abs() < 0.01);
+        let pulse = fastest(&|t| (-((t - 0.5) / 0.02).powi(2) / 2.0).exp());
         assert!((pulse * TAU * 0.02 / 1.65 - 1.0).abs() < 0.02, "{pulse}");
-        assert_eq!((of(&|_| 4.0), of(&|t| 2.0 * t)), (0.0, 0.0));
+        assert_eq!((fastest(&|_| 4.0), fastest(&|t| 2.0 * t)), (0.0, 0.0));
     }
 
     #[test]

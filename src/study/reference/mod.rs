@@ -1,10 +1,12 @@
 //! The body that a study measures against: what it lacks of the model that it was made of, estimated along its motion, and a body that is
-//! enriched until that no longer counts. No files.
+//! enriched until that no longer counts; shapes made of its motion. No files.
 
 mod compressed;
 mod enrich;
 mod estimate;
+mod motion_shapes;
 mod residual;
 
 pub use enrich::{Enriched, enrich};
 pub use estimate::{PART_OF_REFERENCE, ReferenceError};
+pub use motion_shapes::MotionShapes;

@@ -148,12 +148,12 @@ impl Place {
             Point::Node(number) => {
                 let found = body.nodes().ids.iter().position(|id| id == number);
                 let node = found.ok_or_else(|| self.unknown(body))?;
-                let of = |shape: &Mat<f64>| Mat::from_fn(3, nf, |k, j| shape[(3 * node + k, j)]);
+                let rows_of_node = |shape: &Mat<f64>| Mat::from_fn(3, nf, |k, j| shape[(3 * node + k, j)]);
                 // Nodes without rotations have zeros in their place.
                 let turns = |rows: &Mat<f64>| (0..nf).any(|j| (0..3).any(|k| rows[(k, j)] != 0.0));
-                let rotation = modes.rotation.as_ref().map(of).filter(turns);
+                let rotation = modes.rotation.as_ref().map(rows_of_node).filter(turns);
                 let position = Vector3::from(body.nodes().positions[node]);
-                Ok(PointMotion { position, translation: of(&modes.shape), rotation })
+                Ok(PointMotion { position, translation: rows_of_node(&modes.shape), rotation })
             }
             Point::Interface(name) => {
                 let found = body.interfaces().iter().find(|interface| interface.name == *name);

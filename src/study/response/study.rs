@@ -290,12 +290,20 @@ fn nodal_modes<'m>(
         let why = format!("modal masses or stiffnesses of its modes differ by up to {apart:.1e}");
         return Err(foreign(&why).into());
     }
-    let of = |places: &[Place]| -> Result<Mat<f64>> {
+    let unit_loads = |places: &[Place]| -> Result<Mat<f64>> {
         let loads = places.iter().map(|place| place.loads(model)).collect::<Result<Vec<_>>>()?;
         Ok(side_by_side(&loads.iter().map(|load| load.as_ref()).collect::<Vec<_>>()))
     };
     let rigid = rigid_modes(model, &pencil)?;
-    Ok(NodalModes { model, rigid, vectors, inertial, elastic, loads: of(from)?, measured: of(to)? })
+    Ok(NodalModes {
+        model,
+        rigid,
+        vectors,
+        inertial,
+        elastic,
+        loads: unit_loads(from)?,
+        measured: unit_loads(to)?,
+    })
 }
 
 /// The responses of everything to everything, at every frequency.
@@ -317,10 +325,10 @@ impl Curves {
         units: &UnitSystem,
     ) -> Self {
         let omega = |f: &Frequency| units.eigenvalue_of(f.hertz).sqrt();
-        let of = |sum: &ModalSum| frequencies.par_iter().map(|f| sum.at(omega(f))).collect::<Vec<_>>();
-        let own = of(reduced);
+        let responses = |sum: &ModalSum| frequencies.par_iter().map(|f| sum.at(omega(f))).collect::<Vec<_>>();
+        let own = responses(reduced);
         let enriched = match known {
-            Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), of),
+            Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), responses),
             None => Vec::new(),
         };
         let full = frequencies.iter().map(|_| None).collect();
@@ -393,12 +401,12 @@ impl Curves {
         let mut functions = Vec::new();
         for &(column, from) in &block.columns {
             for &(row, to) in &block.rows {
-                let of_solution = |s: &Option<DirectSolution>| s.as_ref().map(|s| s.response[(row, column)]);
+                let entry = |s: &Option<DirectSolution>| s.as_ref().map(|s| s.response[(row, column)]);
                 functions.push(Function {
                     from,
                     to,
                     reduced: self.reduced.iter().map(|h| h[(row, column)]).collect(),
-                    full: self.full.iter().map(of_solution).collect(),
+                    full: self.full.iter().map(entry).collect(),
                 });
             }
         }
@@ -409,8 +417,8 @@ impl Curves {
         if self.enriched.is_empty() {
             return None;
         }
-        let of = |all: &[DMatrix<Complex<f64>>]| all.iter().map(|h| block.of(h)).collect::<Vec<_>>();
-        let (reduced, enriched) = (of(&self.reduced), of(&self.enriched));
+        let blocks = |all: &[DMatrix<Complex<f64>>]| all.iter().map(|h| block.of(h)).collect::<Vec<_>>();
+        let (reduced, enriched) = (blocks(&self.reduced), blocks(&self.enriched));
         let full: Vec<_> = self.full.iter().map(|s| s.as_ref().map(|s| block.of(&s.response))).collect();
         let compared: Vec<Compared<'_>> = (0..reduced.len())
             .map(|i| Compared {
@@ -443,10 +451,11 @@ fn blocks<'p>(from: &'p [Place], to: &'p [Place], dimension: usize) -> Vec<(&'p 
     for (source, columns) in numbered(from, dimension) {
         for (target, rows) in numbered(to, dimension) {
             for turns in [(false, false), (false, true), (true, false), (true, true)] {
-                let of_kind = |all: &[(usize, Direction)], turns: bool| {
+                let kind_alone = |all: &[(usize, Direction)], turns: bool| {
                     all.iter().copied().filter(|(_, d)| d.turns() == turns).collect::<Vec<_>>()
                 };
-                let block = Block { columns: of_kind(&columns, turns.0), rows: of_kind(&rows, turns.1) };
+                let block =
+                    Block { columns: kind_alone(&columns, turns.0), rows: kind_alone(&rows, turns.1) };
                 if !block.columns.is_empty() && !block.rows.is_empty() {
                     blocks.push((source, target, block));
                 }

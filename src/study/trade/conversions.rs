@@ -7,9 +7,9 @@ use crate::base::progress::Watch;
 use crate::body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use crate::body::convert::{ConvertSettings, Lumping, convert};
 use crate::model::FeModel;
-use crate::motion::scene::Scene;
+use crate::motion::scene::{Scene, trace};
 use crate::numerics::eigen::{Accuracy, Wanted};
-use crate::study::reference::{Enriched, ReferenceError, enrich};
+use crate::study::reference::{Enriched, MotionShapes, ReferenceError, enrich};
 use faer::Mat;
 use std::fmt::Write;
 use std::time::Instant;
@@ -27,8 +27,8 @@ pub struct Conversions {
 /// Every conversion of a study in `scene`.
 ///
 /// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what [`enrich`] finds lacking. Beside it stand
-/// `modes`, their half and their quarter with residual vectors and without, `modes` at the other levels of accuracy, and what the settings
-/// of the reference make of the model with its whole mass lumped. Each is timed.
+/// `modes`, their half and their quarter with residual vectors and without, `modes` at the other levels of accuracy, bodies of the shapes that
+/// the motion of the reference is made of, and what the settings of the reference make of the model with its whole mass lumped. Each is timed.
 ///
 /// # Errors
 /// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
@@ -64,6 +64,9 @@ pub fn conversions(
         };
         let beside = source.beside(sources[0].body(), model);
         sources.push(beside.expect(OF_THE_MODEL));
+    }
+    for source in making.make_of_motion(&sources[0], scene)? {
+        sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
     }
     for lumping in lumpings(model) {
         match making.make_lumped(&finest, &responses, &lumping)? {
@@ -148,6 +151,20 @@ impl<'m> Making<'m> {
         Self { model, loads, memory, longest, watch }
     }
 
+    /// Settings of a conversion with so many modes, without lumped comparators.
+    fn settings(&self, modes: usize) -> ConvertSettings {
+        ConvertSettings {
+            modes: ModeSettings {
+                wanted: Wanted::Lowest(modes),
+                memory: self.memory,
+                longest: self.longest,
+                ..ModeSettings::default()
+            },
+            lumped: Vec::new(),
+            ..ConvertSettings::default()
+        }
+    }
+
     /// Converts the model, with the static responses to `motion` as well, and takes the time of it.
     fn make(
         &self,
@@ -157,22 +174,38 @@ impl<'m> Making<'m> {
     ) -> Result<(Source, Vec<Diagnostic>)> {
         let residual_vectors = if wish.residual { self.loads.clone() } else { Vec::new() };
         let basis = BasisChoice::Free(FreeSurface { residual_vectors });
+        let own = self.settings(wish.count);
         let settings = ConvertSettings {
-            modes: ModeSettings {
-                wanted: Wanted::Lowest(wish.count),
-                accuracy: wish.accuracy,
-                memory: self.memory,
-                longest: self.longest,
-                ..ModeSettings::default()
-            },
+            modes: ModeSettings { accuracy: wish.accuracy, ..own.modes },
             basis: basis.with_motion(motion).expect("free modes take responses"),
             lumped,
-            ..ConvertSettings::default()
+            ..own
         };
         let start = Instant::now();
         let conversion = convert(self.model, &settings, self.watch)?;
         let seconds = start.elapsed().as_secs_f64();
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
+    }
+
+    /// Bodies of the [`MotionShapes`] of `reference` in `scene`; each takes the time of the reference and its motion besides.
+    fn make_of_motion(&self, reference: &Source, scene: &Scene) -> Result<Vec<Source>> {
+        if scene.run.duration.is_none() {
+            return Ok(Vec::new());
+        }
+        let start = Instant::now();
+        let (motion, _) = trace(reference.body(), scene, self.memory, |_| ())?;
+        let Some(shapes) = MotionShapes::new(self.model, reference.body(), scene, &motion)? else {
+            return Ok(Vec::new());
+        };
+        let before = start.elapsed().as_secs_f64() + reference.preprocessing().unwrap_or(0.0);
+        let make = |count: usize| {
+            let start = Instant::now();
+            let settings = ConvertSettings { basis: shapes.basis(count), ..self.settings(usize::MAX) };
+            let body = shapes.damped(self.model, convert(self.model, &settings, self.watch)?.body)?;
+            let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
+            Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
+        };
+        shapes.counts(&scene.requirements.tolerance).into_iter().map(make).collect()
     }
 
     /// The same of the model with its whole mass lumped; the reason where this has no modes.

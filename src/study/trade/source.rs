@@ -103,7 +103,7 @@ impl Source {
     ///
     /// Modes of the start are those of the reference; other modes take the part of its deformation that is nearest to it in elastic
     /// energy, q = L^-1 G q_r.
-    pub(super) fn scene(
+    pub(in crate::study) fn scene(
         &self,
         scene: &Scene,
         body: &FlexBody,
@@ -128,7 +128,7 @@ impl Source {
     }
 
     /// Errors of the motion of a candidate with the `modes` of this body; `None` where its modes cannot be compared.
-    pub(super) fn errors(
+    pub(in crate::study) fn errors(
         &self,
         measure: &Measure<'_>,
         body: &FlexBody,

@@ -173,11 +173,11 @@ impl Job<'_> {
         let whole = whole_candidates(self.sources, carried);
         let mut rows = self.errors(whole, "errors of whole bodies", watch)?;
         let worst_of = |groups: Groups| {
-            let of_groups = |row: &&Row| {
+            let has_groups = |row: &&Row| {
                 let own = &row.candidate;
                 own.source == 0 && own.groups == groups && own.lumped.is_none() && own.storage == Storage::F64
             };
-            let measured = rows.iter().find(of_groups).and_then(|row| row.outcome.as_ref().ok());
+            let measured = rows.iter().find(has_groups).and_then(|row| row.outcome.as_ref().ok());
             measured.map_or(f64::INFINITY, |measured| measured.worst)
         };
         let liveliest = liveliest_modes(self.sources[0].body(), self.scene, self.motion)?;

@@ -1,0 +1,145 @@
+//! Shapes made of a motion: what a body does in a scene, by as few shapes as that takes.
+
+use super::compressed::principal;
+use crate::base::error::Result;
+use crate::body::basis::{BasisChoice, ImportedShapes};
+use crate::body::flex_body::FlexBody;
+use crate::body::invariants::symmetric_part;
+use crate::model::FeModel;
+use crate::motion::scene::{Scene, Stage, Tolerance, Trace, damped};
+use crate::numerics::linalg::{combine, gram, larger};
+use faer::Mat;
+use nalgebra::{DMatrix, DVector};
+
+/// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth trying: what a reduced body makes of its
+/// own motion may be better or worse than the best that its shapes allow.
+const PARTS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
+
+/// Shapes at the most.
+const MOST: usize = 120;
+
+/// The part of the sum of energies that no shape is made for.
+const LEFT_OUT: f64 = 1e-16;
+
+/// Principal directions of a motion in elastic energy (proper orthogonal decomposition): with K_ff = L L' and y = L' q of the instants of the
+/// motion, the eigenvectors u of the mean of y y' give the shapes Psi L'^-1 u. Of all sets of as many shapes the first r leave out the least of the
+/// elastic energy, on average over the motion.
+#[derive(Debug, Clone)]
+pub struct MotionShapes {
+    /// N x k, rows and axes of the model.
+    shapes: Mat<f64>,
+    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of the motion, for r = 0 to k.
+    left: Vec<f64>,
+    /// The damping that the scene gives the modes of the motion; `None` where the model says it, or there is none.
+    damping: Option<GivenDamping>,
+}
+
+/// Damping of the modes Psi of a body.
+#[derive(Debug, Clone)]
+struct GivenDamping {
+    /// D of the modes (nf x nf).
+    matrix: Mat<f64>,
+    /// K Psi K_ff^-1 (N x nf): takes displacements in the span of Psi to modal coordinates.
+    dual: Mat<f64>,
+}
+
+impl MotionShapes {
+    /// Of the `motion` of `body`, made of `model`, in `scene`. `None` where the body has other rows than the model, or nothing deforms.
+    ///
+    /// # Errors
+    /// Those of [`Stage::new`].
+    pub fn new(model: &FeModel, body: &FlexBody, scene: &Scene, motion: &Trace) -> Result<Option<Self>> {
+        let stage = Stage::new(body, scene)?;
+        let undamped = stage.body.modes().damping_ratio.iter().all(|ratio| *ratio == 0.0);
+        let body = &*damped(&stage.body, &stage.scene)?;
+        let vectors = body.vectors_of(model);
+        let factor = body.invariants().symmetric_stiffness().cholesky();
+        let (Some(vectors), Some(factor)) = (vectors, factor) else { return Ok(None) };
+        let lower = factor.l();
+        let weighted: Vec<DVector<f64>> =
+            motion.q.iter().map(|q| lower.tr_mul(&DVector::from_column_slice(q))).collect();
+        let Some((directions, _)) = principal(mean_of_products(&weighted, &motion.time), LEFT_OUT, MOST)
+        else {
+            return Ok(None);
+        };
+        let directions = DMatrix::from_fn(directions.nrows(), directions.ncols(), |i, j| directions[(i, j)]);
+        let left = left_out(&weighted, &directions);
+        let Some(combinations) = lower.tr_solve_lower_triangular(&directions) else { return Ok(None) };
+        let combinations =
+            Mat::from_fn(combinations.nrows(), combinations.ncols(), |i, j| combinations[(i, j)]);
+        let given = undamped && body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0);
+        let damping = given.then(|| {
+            let inverse = factor.inverse();
+            let inverse = Mat::from_fn(inverse.nrows(), inverse.ncols(), |i, j| inverse[(i, j)]);
+            let weighted = model.pencil().apply_stiffness(vectors.as_ref());
+            GivenDamping { matrix: body.damping(), dual: combine(weighted.as_ref(), inverse.as_ref()) }
+        });
+        Ok(Some(Self { shapes: combine(vectors.as_ref(), combinations.as_ref()), left, damping }))
+    }
+
+    /// `made` of some of the shapes, with the damping that the scene gives the modes whose motion they are, D = C'D_r C with C = K_r^-1 Psi_r'K Psi:
+    /// the same ratio for its own modes, each of which is made of several of those, would be another damping.
+    ///
+    /// # Errors
+    /// Those of [`FlexBody::new`].
+    pub fn damped(&self, model: &FeModel, made: FlexBody) -> Result<FlexBody> {
+        let (Some(GivenDamping { matrix, dual }), Some(vectors)) = (&self.damping, made.vectors_of(model))
+        else {
+            return Ok(made);
+        };
+        let seen = gram(dual.as_ref(), vectors.as_ref());
+        let product = gram(seen.as_ref(), (matrix * &seen).as_ref());
+        let damping = symmetric_part(&product);
+        let mut parts = made.into_parts();
+        let own = parts.modes.eigenvalue.iter().enumerate();
+        parts.modes.damping_ratio = own.map(|(j, lambda)| 0.5 * damping[(j, j)] / lambda.sqrt()).collect();
+        parts.modes.modal_damping = Some(damping);
+        FlexBody::new(parts)
+    }
+
+    /// Numbers of shapes worth trying where errors may be so large, ascending.
+    pub fn counts(&self, tolerance: &Tolerance) -> Vec<usize> {
+        let allowed = tolerance.stress.min(tolerance.deflection);
+        let most = self.shapes.ncols();
+        let count =
+            |part: f64| self.left.iter().position(|left| *left <= part * allowed).unwrap_or(most).max(1);
+        let mut counts: Vec<usize> = PARTS.map(count).to_vec();
+        counts.dedup();
+        counts
+    }
+
+    /// The basis of the first `count` shapes.
+    pub fn basis(&self, count: usize) -> BasisChoice {
+        BasisChoice::Imported(ImportedShapes::of_motion(self.shapes.as_ref().subcols(0, count).to_owned()))
+    }
+}
+
+/// The mean of y y' over the time of a motion.
+fn mean_of_products(weighted: &[DVector<f64>], time: &[f64]) -> Mat<f64> {
+    let n = weighted[0].len();
+    let last = time.len() - 1;
+    let mut sum = DMatrix::zeros(n, n);
+    for (i, y) in weighted.iter().enumerate() {
+        let share = 0.5 * (time[(i + 1).min(last)] - time[i.saturating_sub(1)]);
+        sum.ger(share, y, y, 1.0);
+    }
+    Mat::from_fn(n, n, |i, j| sum[(i, j)])
+}
+
+/// What the first r of the `directions` leave out of the motion at the most, relative to the largest of it, for every r.
+fn left_out(weighted: &[DVector<f64>], directions: &DMatrix<f64>) -> Vec<f64> {
+    let mut largest = 0.0;
+    let mut left = vec![0.0f64; directions.ncols() + 1];
+    for y in weighted {
+        largest = larger(largest, y.norm_squared());
+        let parts = directions.tr_mul(y);
+        let mut rest = (y - directions * &parts).norm_squared();
+        for r in (0..left.len()).rev() {
+            left[r] = larger(left[r], rest);
+            if r > 0 {
+                rest += parts[r - 1] * parts[r - 1];
+            }
+        }
+    }
+    left.into_iter().map(|left| (left / largest).sqrt()).collect()
+}
