@@ -60,13 +60,12 @@ def shapes(xi):
     return np.array(values), np.array(gradients)
 
 
-def plate(young=210e9, poisson=0.3, density=7850.0):
-    """Positions, K (dense) and scalar mass."""
-    elements = [[tuple(2 * c + 1 + s for c, s in zip(cell, node)) for node in NODES] for cell in itertools.product(*map(range, CELLS))]
+def hexahedra(cells, place, young=210e9, poisson=0.3, density=7850.0):
+    """Positions, K (dense) and scalar mass of a body of steel; `place` takes points of the lattice (n x 3, in elements) to where they are."""
+    elements = [[tuple(2 * c + 1 + s for c, s in zip(cell, node)) for node in NODES] for cell in itertools.product(*map(range, cells))]
     number = {place: i for i, place in enumerate(sorted({place for element in elements for place in element}))}
     lattice = np.array(sorted(number)) / 2
-    angle, radius = 0.8 * (lattice[:, 0] / CELLS[0] - 0.5), 1.25 + 0.01 * (lattice[:, 2] - 0.5)
-    x = np.column_stack([radius * np.sin(angle), 0.75 * lattice[:, 1] / CELLS[1], radius * np.cos(angle)])
+    x = place(lattice)
     lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     elastic = np.diag([shear] * 6)
     elastic[:3, :3] = lame + 2 * shear * np.eye(3)
@@ -88,6 +87,12 @@ def plate(young=210e9, poisson=0.3, density=7850.0):
             k[np.ix_(rows, rows)] += strain.T @ elastic @ strain * weight
             m[np.ix_(own, own)] += np.outer(values, values) * density * weight
     return x, (k + k.T) / 2, (m + m.T) / 2
+
+
+def curved(lattice):
+    """The plate of the page: an arc along x."""
+    angle, radius = 0.8 * (lattice[:, 0] / CELLS[0] - 0.5), 1.25 + 0.01 * (lattice[:, 2] - 0.5)
+    return np.column_stack([radius * np.sin(angle), 0.75 * lattice[:, 1] / CELLS[1], radius * np.cos(angle)])
 
 
 def centrifugal(x, m):
@@ -120,7 +125,7 @@ def main():
     args = parser.parse_args()
     args.program = str(Path(args.program).resolve())  # it runs in another folder
     version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
-    x, k, m = plate()
+    x, k, m = hexahedra(CELLS, curved)
     x = x - m.sum(axis=0) @ x / m.sum()
     mass = np.kron(m, np.eye(3))
     values, vectors = scipy.linalg.eigh(k, mass)

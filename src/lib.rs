@@ -5,7 +5,7 @@
 //! lumped-mass approximation, into the constant invariants I0, W1, W2, W3. Sources of every equation and the
 //! errata of the literature: `docs/theory.md`.
 //!
-//! # Five tasks
+//! # Six tasks
 //!
 //! **Convert the model of a manifest, look at the body, write it and read it back.**
 //!
@@ -71,6 +71,9 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! **Join bodies.** The equations of motion and the points of a body are enough for Lagrange multipliers: `examples/joints/mod.rs` holds flexible
+//! bodies together in some two hundred lines, `examples/pendulum.rs` and `examples/slider_crank.rs` use it.
 //!
 //! **Hand the body to another program.** Errors carry codes (`docs/codes.md`), with what to do.
 //!
@@ -154,10 +157,12 @@ pub use api::{
     Motion, Scene, Selection, SparseMatrix,
 };
 /// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity forces, accelerations, momenta,
-/// energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`] makes them.
+/// energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`] makes them, [`FlexBody::node_point`] and
+/// [`FlexBody::interface_point`] the points where joints hold a body; `examples/pendulum.rs` joins one to the ground.
 pub mod dynamics {
     pub use crate::motion::dynamics::{
-        EquationsOfMotion, Evaluation, NotPositiveDefinite, Prescribed, Terms,
+        AngularVelocity, BodyPoint, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes, LoadJacobian,
+        NotPositiveDefinite, Orientation, PlaneAngle, Prescribed, RotationVector, Terms,
     };
 }
 

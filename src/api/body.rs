@@ -2,7 +2,7 @@
 
 use super::matrix::shown;
 use super::{Matrix, Motion, Scene, Selection};
-use crate::base::diagnostic::Diagnostic;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::base::progress::SILENT;
@@ -10,8 +10,8 @@ use crate::body::flex_body;
 use crate::body::verification::own_identities;
 use crate::formats::export::ExportOptions;
 use crate::formats::{export, find_format};
-use crate::motion::dynamics::{EquationsOfMotion, Terms};
-use crate::motion::scene::simulate;
+use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
+use crate::motion::scene::{Point, body_point, simulate};
 use crate::study::selection::select;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -191,6 +191,48 @@ impl FlexBody {
     /// The equations of motion of the body, with all terms that it holds.
     pub fn equations_of_motion(&self) -> EquationsOfMotion {
         EquationsOfMotion::new(&self.0, Terms::ALL)
+    }
+
+    /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v ([`BodyPoint::velocity`]), a force of a joint
+    /// is J'lambda ([`BodyPoint::add_force`]; [ZG19] (57) to (60)). `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies so.
+    ///
+    /// ```
+    /// use flexbody::dynamics::Evaluation;
+    /// use flexbody::{ConvertOptions, Model};
+    /// # fn main() -> flexbody::Result<()> {
+    /// let body = Model::read("fixtures/models/cube_hex8/model.toml")?.convert(&ConvertOptions::default().modes(6))?.body;
+    /// let node = body.node_point(body.node_ids()[0])?;
+    /// let equations = body.equations_of_motion();
+    /// let mut evaluation = Evaluation::new(&equations);
+    /// evaluation.set(&[1e-4; 6], &[0.1; 12]);
+    /// // A force does the power F v on the velocities nu, whatever the deformation.
+    /// let force = nalgebra::Vector3::new(1.0, 2.0, 3.0);
+    /// let mut generalised = vec![0.0; 12];
+    /// node.add_force(&evaluation, &force, &mut generalised);
+    /// let power: f64 = generalised.iter().map(|part| part * 0.1).sum();
+    /// assert!((power - force.dot(&node.velocity(&evaluation))).abs() < 1e-12);
+    /// assert!(body.node_point(-1).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// FB212 for a node that the body does not have.
+    pub fn node_point(&self, number: i64) -> Result<BodyPoint> {
+        self.point(&Point::Node(number))
+    }
+
+    /// The reference point of an interface, which moves as its nodes do on average (theory 5.3).
+    ///
+    /// # Errors
+    /// FB212 for an interface that the body does not have, or one without a reference point.
+    pub fn interface_point(&self, name: &str) -> Result<BodyPoint> {
+        self.point(&Point::Interface(name.to_owned()))
+    }
+
+    fn point(&self, place: &Point) -> Result<BodyPoint> {
+        let wrong = |message| Diagnostic::new(Code::SceneBody, message).into();
+        body_point(&self.0, Terms::ALL, place).map_err(wrong)
     }
 
     /// Simulates the body in a scene.

@@ -12,8 +12,9 @@ use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::base::units::UnitSystem;
 use crate::motion::dynamics::Balance;
-use crate::motion::scene::{Drift, Recording, Scheme};
+use crate::motion::scene::{Drift, Path, Recording, Scheme};
 use crate::numerics::integration::Work;
+use crate::numerics::linalg::larger;
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -47,6 +48,10 @@ pub struct SimulationFacts<'a> {
     /// Description of the origin of the frame.
     frame_origin: String,
     largest_deflection: f64,
+    /// Force and torque that prescribed motion takes at most; none without such.
+    reaction: Option<ReactionFacts>,
+    /// The torque that the reference conditions carry at most at the instants written; none where the frame is not a mean one.
+    largest_conditions_torque: Option<f64>,
     points: Vec<PointFacts<'a>>,
     diagnostics: &'a [Diagnostic],
     wall_seconds: f64,
@@ -71,6 +76,12 @@ struct CarriedFacts<'a> {
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
+struct ReactionFacts {
+    largest_force: f64,
+    largest_torque: f64,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
 struct EnergyFacts {
     kinetic: f64,
     elastic: f64,
@@ -81,7 +92,33 @@ struct EnergyFacts {
 struct PointFacts<'a> {
     name: &'a str,
     largest_deflection: f64,
+    /// World axes; so are the velocity and the acceleration.
     last_place: [f64; 3],
+    last_velocity: [f64; 3],
+    last_acceleration: [f64; 3],
+    /// At the instants written.
+    largest_speed: f64,
+    largest_acceleration: f64,
+}
+
+impl<'a> PointFacts<'a> {
+    fn new(path: &'a Path, largest_deflection: f64) -> Self {
+        let last = |vectors: &[Vector3<f64>]| vectors.last().copied().unwrap_or_default().into();
+        Self {
+            name: &path.name,
+            largest_deflection,
+            last_place: last(&path.place),
+            last_velocity: last(&path.velocity),
+            last_acceleration: last(&path.acceleration),
+            largest_speed: longest(&path.velocity),
+            largest_acceleration: longest(&path.acceleration),
+        }
+    }
+}
+
+/// The length of the longest vector.
+fn longest(vectors: &[Vector3<f64>]) -> f64 {
+    vectors.iter().fold(0.0, |most, vector| larger(most, vector.norm()))
 }
 
 impl<'a> SimulationFacts<'a> {
@@ -102,10 +139,10 @@ impl<'a> SimulationFacts<'a> {
             largest_force: extremes.reaction.0,
             largest_torque: extremes.reaction.1,
         });
-        let points = recording.paths.iter().zip(&extremes.watched).map(|(path, peak)| PointFacts {
-            name: &path.name,
-            largest_deflection: peak.value,
-            last_place: path.place.last().copied().unwrap_or_default().into(),
+        let points = recording.paths.iter().zip(&extremes.watched);
+        let reaction = recording.reactions.as_ref().map(|_| ReactionFacts {
+            largest_force: extremes.reaction.0,
+            largest_torque: extremes.reaction.1,
         });
         Self {
             generator: generator(),
@@ -134,7 +171,9 @@ impl<'a> SimulationFacts<'a> {
             gravity: setting.gravity.map(Into::into),
             carried,
             frame_origin: setting.origin_in_words(),
-            points: points.collect(),
+            reaction,
+            largest_conditions_torque: recording.conditions.as_deref().map(longest),
+            points: points.map(|(path, peak)| PointFacts::new(path, peak.value)).collect(),
             diagnostics: &run.diagnostics,
             wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
             cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
@@ -205,24 +244,31 @@ impl<'a> SimulationFacts<'a> {
         format!("{most}; at most {x}, {y}, {z} about the axes of the model")
     }
 
-    fn carried_in_words(&self) -> Vec<(&'static str, String)> {
+    /// What carries the body, and what that and the reference conditions have to bear.
+    fn support_in_words(&self) -> Vec<(&'static str, String)> {
+        let torque = |value: f64| format!("{} {}", significant(value, 5), self.unit(1, 2, -2));
+        let mut words = Vec::from_iter(self.carried_in_words().map(|carried| ("Carried", carried)));
+        if let Some(ReactionFacts { largest_force, largest_torque }) = self.reaction {
+            let force = format!("{} {}", significant(largest_force, 5), self.unit(1, 1, -2));
+            let torque = torque(largest_torque);
+            words.push(("Reaction", format!("force at most {force}, torque at most {torque}")));
+        }
+        if let Some(largest) = self.largest_conditions_torque {
+            words.push((
+                "Mean axes",
+                format!("are held by no force and a torque of at most {}", torque(largest)),
+            ));
+        }
+        words
+    }
+
+    fn carried_in_words(&self) -> Option<String> {
         const FIRST: usize = 6;
-        let Some(carried) = &self.carried else { return Vec::new() };
+        let carried = self.carried.as_ref()?;
         let first: Vec<String> =
             carried.frequency_hz.iter().take(FIRST).map(|hertz| significant(*hertz, 5)).collect();
         let more = if carried.frequency_hz.len() > FIRST { " ..." } else { "" };
-        let (force, torque) = (significant(carried.largest_force, 5), significant(carried.largest_torque, 5));
-        vec![
-            ("Carried", format!("by {}; natural frequencies so {}{more} Hz", carried.by, first.join(" "))),
-            (
-                "Reaction",
-                format!(
-                    "force at most {force} {}, torque at most {torque} {}",
-                    self.unit(1, 1, -2),
-                    self.unit(1, 2, -2)
-                ),
-            ),
-        ]
+        Some(format!("by {}; natural frequencies so {}{more} Hz", carried.by, first.join(" ")))
     }
 
     fn text(&self) -> String {
@@ -251,7 +297,7 @@ impl<'a> SimulationFacts<'a> {
             page.entry("Gravity", &gravity);
         }
         page.entry("Spin", &format!("at most {}", self.spin_in_words()));
-        for (what, words) in self.carried_in_words() {
+        for (what, words) in self.support_in_words() {
             page.entry(what, &words);
         }
         let part = significant(100.0 * self.largest_deflection, 3);
@@ -315,7 +361,7 @@ impl<'a> SimulationFacts<'a> {
             ),
         ];
         items.extend(self.gravity_in_words().map(|gravity| ("Gravity", escape(&gravity))));
-        items.extend(self.carried_in_words().into_iter().map(|(what, words)| (what, escape(&words))));
+        items.extend(self.support_in_words().into_iter().map(|(what, words)| (what, escape(&words))));
         for point in &self.points {
             let [x, y, z] = point.last_place.map(|v| significant(v, 6));
             items.push((
@@ -365,6 +411,8 @@ impl<'a> SimulationFacts<'a> {
         for path in paths {
             let title = format!("Deflection of {}, axes of the model", path.name);
             chart(&title, components(&path.deflection), self.units.length().clone());
+            let title = format!("Acceleration of {}, world axes", path.name);
+            chart(&title, components(&path.acceleration), self.unit(0, 1, -2));
         }
         if let Some(reactions) = reactions {
             let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
@@ -397,7 +445,7 @@ impl<'a> SimulationFacts<'a> {
 
 /// A recording as a table of comma-separated values, a row for every instant; numbers round-trip.
 pub fn simulation_csv(recording: &Recording) -> String {
-    let Recording { time, states, balances, paths, reactions, .. } = recording;
+    let Recording { time, states, balances, paths, reactions, conditions, .. } = recording;
     let nf = states.first().map_or(0, |state| state.q.len());
     let mut head = vec!["time".to_owned()];
     let xyz = |name: &str| ["x", "y", "z"].map(|k| format!("{name}_{k}"));
@@ -412,9 +460,13 @@ pub fn simulation_csv(recording: &Recording) -> String {
     if reactions.is_some() {
         head.extend(["reaction_force", "reaction_torque"].iter().flat_map(|name| xyz(name)));
     }
+    if conditions.is_some() {
+        head.extend(xyz("conditions_torque"));
+    }
     for path in paths {
-        head.extend(xyz(&format!("{} place", path.name)));
-        head.extend(xyz(&format!("{} deflection", path.name)));
+        for what in ["place", "deflection", "velocity", "acceleration"] {
+            head.extend(xyz(&format!("{} {what}", path.name)));
+        }
     }
     let mut out = head.iter().map(|cell| csv_cell(cell)).collect::<Vec<_>>().join(",");
     for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
@@ -432,9 +484,13 @@ pub fn simulation_csv(recording: &Recording) -> String {
             row.extend(&reactions[i].0);
             row.extend(&reactions[i].1);
         }
+        if let Some(torques) = conditions {
+            row.extend(&torques[i]);
+        }
         for path in paths {
-            row.extend(&path.place[i]);
-            row.extend(&path.deflection[i]);
+            for vectors in [&path.place, &path.deflection, &path.velocity, &path.acceleration] {
+                row.extend(&vectors[i]);
+            }
         }
         out.push('\n');
         out.push_str(&row.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(","));

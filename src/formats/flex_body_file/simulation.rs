@@ -81,6 +81,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     writer.energy()?;
     writer.momentum()?;
     writer.reaction()?;
+    writer.conditions()?;
     writer.points()?;
     writer.file.flush()?;
     writer.file.close()
@@ -216,6 +217,13 @@ impl Writer<'_> {
         reaction.vectors("torque", unit(2, 2, -2), description, reactions.iter().map(|r| &r.1))
     }
 
+    /// What the reference conditions carry, where the frame is a mean one.
+    fn conditions(&self) -> hdf5::Result<()> {
+        let Some(torques) = &self.recording.conditions else { return Ok(()) };
+        let description = "torque about the origin of the frame that the reference conditions (mean axes) carry, axes of the model, turning with the body; their force is zero";
+        self.group("conditions")?.vectors("torque", unit(2, 2, -2), description, torques.iter())
+    }
+
     /// Paths of watched points, where there are such.
     fn points(&self) -> hdf5::Result<()> {
         if self.recording.paths.is_empty() {
@@ -228,6 +236,13 @@ impl Writer<'_> {
             point.vectors("place", unit(0, 1, 0), "place, world axes", path.place.iter())?;
             let description = "deflection from the undeformed body, axes of the model, turning with the body";
             point.vectors("deflection", unit(0, 1, 0), description, path.deflection.iter())?;
+            point.vectors("velocity", unit(0, 1, -1), "velocity, world axes", path.velocity.iter())?;
+            point.vectors(
+                "acceleration",
+                unit(0, 1, -2),
+                "acceleration, world axes",
+                path.acceleration.iter(),
+            )?;
         }
         Ok(())
     }

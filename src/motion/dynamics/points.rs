@@ -97,7 +97,7 @@ pub struct BodyPoint {
 }
 
 impl BodyPoint {
-    /// Node `node` of `body`, by its index. It has an orientation where the node has rotations.
+    /// Node `node` of `body`, by its index; users of the library ask the body (`FlexBody::node_point`). It has an orientation where the node has rotations.
     ///
     /// # Panics
     /// When the index is not below the number of nodes.
@@ -176,6 +176,22 @@ impl BodyPoint {
     pub fn velocity_drift(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
         let rate = self.translation.rate(&evaluation.q, &evaluation.qd);
         evaluation.omega.cross(&(self.velocity(evaluation) + rate)) + self.translation.bend(&evaluation.qd)
+    }
+
+    /// Acceleration J nu' + drift of the point for the accelerations nu' in the order of [`EquationsOfMotion`](super::EquationsOfMotion), relative to
+    /// the world and along body axes ([RD] (10.9), [ZG19] the second derivative of the position):
+    ///
+    /// ```text
+    /// a = V' + omega' x r + dr/dq qdd + omega x (V + omega x r + 2 dr/dq qd) + (d2r/dq dq) qd qd
+    /// ```
+    ///
+    /// # Panics
+    /// When `acceleration` has not the length of the equations.
+    pub fn acceleration(&self, evaluation: &Evaluation<'_>, acceleration: &[f64]) -> Vector3<f64> {
+        let (linear, angular, modal) = evaluation.equations().split(acceleration);
+        let turned = angular.cross(&self.place(evaluation));
+        let bent = self.translation.rate(&evaluation.q, modal);
+        linear + turned + bent + self.velocity_drift(evaluation)
     }
 
     /// The same of the angular velocity: d(omega_p)/dt without accelerations. `None` where the point has no orientation.

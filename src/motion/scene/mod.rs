@@ -1,6 +1,7 @@
 //! What a body is to do: the scene file, and its simulation.
 
 mod axes;
+mod conditions;
 mod contradictions;
 mod description;
 mod driving;
@@ -49,6 +50,6 @@ pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, R
 pub use samples::{Interpolation, Sample, Samples, Sizes};
 pub use simulate::simulate;
 pub use stage::Stage;
-pub(crate) use surroundings::points_of;
+pub(crate) use surroundings::{body_point, points_of};
 pub use trace::{Trace, trace, trace_at};
 pub use vector_history::VectorHistory;

@@ -25,6 +25,9 @@ pub struct Recording {
     pub setting: Setting,
     /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes; none without.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
+    /// Torque about the origin of the frame, axes of the model, that the reference conditions carry; their force is zero. None where the frame
+    /// is not a mean one: `reactions` are then all that there are.
+    pub conditions: Option<Vec<Vector3<f64>>>,
     /// Paths of the watched points.
     pub paths: Vec<Path>,
     /// Steps and evaluations of the integration.
@@ -104,6 +107,10 @@ pub struct Path {
     pub place: Vec<Vector3<f64>>,
     /// Deflection from the undeformed body, axes of the model.
     pub deflection: Vec<Vector3<f64>>,
+    /// Velocity at every instant, world axes: that of the place.
+    pub velocity: Vec<Vector3<f64>>,
+    /// Acceleration at every instant, world axes: that of the place. Where a load or motion jumps, that after it.
+    pub acceleration: Vec<Vector3<f64>>,
 }
 
 impl Recording {
@@ -116,6 +123,7 @@ impl Recording {
 impl Path {
     /// A path without a place yet.
     pub(super) fn new(name: String) -> Self {
-        Self { name, place: Vec::new(), deflection: Vec::new() }
+        let none = Vec::new;
+        Self { name, place: none(), deflection: none(), velocity: none(), acceleration: none() }
     }
 }

@@ -1,5 +1,6 @@
 //! The simulation of a scene.
 
+use super::conditions::MeanAxes;
 use super::extremes::Survey;
 use super::prepared::{PARTS, Prepared, damped};
 use super::{Extremes, Path, Recording, Scene, Setting, Stage};
@@ -19,7 +20,10 @@ const LINEAR_RANGE: f64 = 0.1;
 const BYTES: f64 = 8.0 + 25.0;
 
 /// Numbers of an instant besides modes and watched points.
-const NUMBERS: usize = 44;
+const NUMBERS: usize = 47;
+
+/// Numbers of an instant of a watched point: place, deflection, velocity and acceleration.
+const WATCHED: usize = 12;
 
 /// The motion of `body` in `scene` at the instants that it writes, with warnings and notes about it.
 ///
@@ -63,6 +67,7 @@ pub fn simulate(
 struct Recorder<'r> {
     recording: Recording,
     watched: &'r [BodyPoint],
+    conditions: Option<MeanAxes>,
     /// Places of the watched points in the undeformed body.
     rest: Vec<Vector3<f64>>,
 }
@@ -70,6 +75,7 @@ struct Recorder<'r> {
 impl<'r> Recorder<'r> {
     fn new(body: &FlexBody, scene: &Scene, run: &'r Prepared<'_>, instants: usize) -> Self {
         let undeformed = Evaluation::new(&run.equations);
+        let conditions = if scene.carried.is_some() { None } else { MeanAxes::new(body) };
         Self {
             recording: Recording {
                 scene: scene.name.clone(),
@@ -79,12 +85,14 @@ impl<'r> Recorder<'r> {
                 states: Vec::with_capacity(instants),
                 balances: Vec::with_capacity(instants),
                 reactions: scene.prescribes().then(Vec::new),
+                conditions: conditions.is_some().then(Vec::new),
                 setting: Setting::new(body, scene),
                 paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
                 work: Work::default(),
                 extremes: Extremes::default(),
             },
             watched: &run.watched,
+            conditions,
             rest: run.watched.iter().map(|point| point.place(&undeformed)).collect(),
         }
     }
@@ -95,6 +103,7 @@ impl<'r> Recorder<'r> {
         state: &[f64],
         motion: &mut Motion<'_>,
     ) -> std::result::Result<(), Failure> {
+        let accelerations = motion.accelerations(time, state)?.to_vec();
         let now = motion.evaluate(time, state)?;
         self.recording.time.push(time);
         self.recording.states.push(now.configuration());
@@ -102,10 +111,17 @@ impl<'r> Recorder<'r> {
         if let Some(reactions) = &mut self.recording.reactions {
             reactions.push(now.reaction());
         }
+        if let (Some(torques), Some(conditions)) = (&mut self.recording.conditions, &self.conditions) {
+            let evaluation = now.evaluation();
+            torques.push(conditions.torque(evaluation.modal_coordinates(), evaluation.modal_velocity()));
+        }
         for ((path, point), rest) in self.recording.paths.iter_mut().zip(self.watched).zip(&self.rest) {
-            let at = point.place(now.evaluation());
-            path.place.push(now.place().origin + now.place().axes * at);
+            let (place, evaluation) = (now.place(), now.evaluation());
+            let at = point.place(evaluation);
+            path.place.push(place.origin + place.axes * at);
             path.deflection.push(at - rest);
+            path.velocity.push(place.axes * point.velocity(evaluation));
+            path.acceleration.push(place.axes * point.acceleration(evaluation, &accelerations));
         }
         Ok(())
     }
@@ -114,7 +130,7 @@ impl<'r> Recorder<'r> {
 /// # Errors
 /// FB601 when the recording does not fit the memory.
 fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
-    let numbers = NUMBERS + 2 * body.n_modes() + 6 * scene.watched.len();
+    let numbers = NUMBERS + 2 * body.n_modes() + WATCHED * scene.watched.len();
     let instants = scene.run.outputs + 1;
     let needed = instants as f64 * numbers as f64 * BYTES;
     refuse_beyond(memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")

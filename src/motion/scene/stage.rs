@@ -18,7 +18,7 @@ const AT_ORIGIN: f64 = 1e-10;
 const ROUNDING: f64 = 1e-6;
 
 /// Coupling of acceleration and modes below this part of its bound is rounding.
-const UNCOUPLED: f64 = 1e-8;
+pub(super) const UNCOUPLED: f64 = 1e-8;
 
 /// A body in the frame of a scene, that scene, and warnings and notes about the two.
 #[derive(Debug, Clone)]
@@ -266,7 +266,7 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
 }
 
 /// Whether accelerations of the frame excite no mode.
-fn is_uncoupled(body: &FlexBody) -> bool {
+pub(super) fn is_uncoupled(body: &FlexBody) -> bool {
     let (invariants, modal) = (body.invariants(), body.invariants().modal_mass());
     (0..body.n_modes()).all(|j| {
         let bound = (invariants.mass() * modal[(j, j)]).sqrt();

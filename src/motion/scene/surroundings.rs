@@ -5,7 +5,7 @@ use super::{Axes, Load, Point, Scene, VectorHistory};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
-use crate::motion::dynamics::{BodyPoint, Evaluation, Place, Prescribed, Surroundings};
+use crate::motion::dynamics::{BodyPoint, Evaluation, Place, Prescribed, Surroundings, Terms};
 use nalgebra::{Matrix3, Vector3};
 
 /// Gravity, loads and prescribed motion of a scene.
@@ -36,7 +36,8 @@ impl<'a> SceneForces<'a> {
                 ));
             });
         }
-        let mut points = |place: &Point| point(body, scene, place).map_err(&mut wrong).ok();
+        let terms = scene.run.terms;
+        let mut points = |place: &Point| body_point(body, terms, place).map_err(&mut wrong).ok();
         let watched = scene.watched.iter().map(&mut points).collect();
         let loads: Option<Vec<_>> = scene.loads.iter().map(|load| Some((points(&load.at)?, load))).collect();
         for (point, load) in loads.iter().flatten() {
@@ -63,7 +64,12 @@ pub(crate) fn points_of(body: &FlexBody, scene: &Scene) -> Result<(Vec<BodyPoint
     Ok((forces.loads.into_iter().map(|(point, _)| point).collect(), watched))
 }
 
-fn point(body: &FlexBody, scene: &Scene, place: &Point) -> std::result::Result<BodyPoint, String> {
+/// A node or the reference point of an interface of `body`, with geometric stiffness where `terms` have it; or why there is no such point.
+pub(crate) fn body_point(
+    body: &FlexBody,
+    terms: Terms,
+    place: &Point,
+) -> std::result::Result<BodyPoint, String> {
     match place {
         Point::Node(number) => {
             let at = body.nodes().ids.iter().position(|id| id == number);
@@ -76,7 +82,7 @@ fn point(body: &FlexBody, scene: &Scene, place: &Point) -> std::result::Result<B
                 let known = if all.is_empty() { "it has none".to_owned() } else { all.join(", ") };
                 format!("the body has no interface `{name}`: {known}")
             })?;
-            BodyPoint::interface(body, interface, scene.run.terms)
+            BodyPoint::interface(body, interface, terms)
                 .ok_or_else(|| format!("interface `{name}` has no reference point: name a node of it"))
         }
     }

@@ -1,10 +1,9 @@
 //! Two flexible bodies held together by joints: beside Exudyn, and in the limit of stiff bodies the rigid double pendulum.
 
 use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::equations::State;
 use crate::support::flexible::{body_of, fixture};
 use crate::support::integrate;
-use crate::support::jointed::{End, Joint, Jointed, Scales};
+use crate::support::jointed::{Assembly, End, Joint, Jointed, Scales, Start};
 use crate::support::mesh::Mesh;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
@@ -62,9 +61,8 @@ fn interface(body: &FlexBody, name: &str) -> BodyPoint {
     BodyPoint::interface(body, found, Terms::ALL).expect("a reference point")
 }
 
-fn at_rest(origin: Vector3<f64>, axes: Matrix3<f64>, nf: usize) -> State {
-    let zero = DVector::zeros(nf);
-    State { origin, axes, velocity: Vector3::zeros(), omega: Vector3::zeros(), q: zero.clone(), qd: zero }
+fn at_rest(origin: Vector3<f64>, axes: Matrix3<f64>) -> Start {
+    Start { origin, axes, velocity: Vector3::zeros(), omega: Vector3::zeros() }
 }
 
 impl Mechanism {
@@ -90,45 +88,49 @@ impl Mechanism {
             ends: [self.seat(&held.ends[0], &bodies), self.seat(&held.ends[1], &bodies)],
             axes: held.axes,
         };
-        let mut system = Jointed {
+        let assembly = Assembly {
             bodies: &equations,
             masses: bodies.iter().map(|body| body.invariants().mass()).collect(),
             joints: self.joints.iter().map(joint).collect(),
             gravity,
+        };
+        let mut system = Jointed {
+            assembly,
             scales: Scales { length: 100.0, rate: std::f64::consts::TAU / self.duration },
         };
         let shown: Vec<End> = self.shown.iter().map(|seat| self.seat(seat, &bodies)).collect();
-        let states: Vec<State> = self
+        let starts: Vec<Start> = self
             .bodies
             .iter()
             .map(|one| {
                 let axes = Matrix3::from_fn(|i, j| one.axes[i][j]);
-                at_rest(Vector3::from(one.origin), axes, one.modes)
+                at_rest(Vector3::from(one.origin), axes)
             })
             .collect();
-        let mut y = system.state(&states);
-        let (gap, _) = system.violation(&y);
+        let mut y = system.assembly.state(&starts);
+        let (gap, _) = system.assembly.violation(&y).expect("a body with mass");
         assert!(gap < 1e-9, "{what}: joints are open by {gap:e}");
-        let energy = system.energy(&y);
+        let energy = system.assembly.energy(&y);
+        let rate = system.scales.rate;
         let count = self.places.len();
         let instants: Vec<f64> = (1..=count).map(|i| self.duration * i as f64 / count as f64).collect();
         let (mut worst, mut drift, mut open, mut fall) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-        system.run(&mut y, &instants, 1e-9, |system, at, y| {
-            let origins = (0..bodies.len()).map(|body| system.origin(y, body));
+        system.run(&mut y, &instants, 1e-9, |assembly, at, y| {
+            let origins = (0..bodies.len()).map(|body| assembly.origin(y, body));
             let points = shown.iter().map(|end| match end {
                 End::Ground(place) => *place,
-                End::Body(body, point) => system.place(y, *body, point),
+                End::Body(body, point) => assembly.place(y, *body, point),
             });
             for (found, expected) in origins.chain(points).zip(&self.places[at]) {
                 worst = worst.max((found - Vector3::from(*expected)).amax());
             }
             let lift: f64 = (0..bodies.len())
-                .map(|body| -system.masses[body] * gravity.dot(&Vector3::from(self.places[at][body])))
+                .map(|body| -assembly.masses[body] * gravity.dot(&Vector3::from(self.places[at][body])))
                 .sum();
-            drift = drift.max((system.energy(y) - energy).abs());
+            drift = drift.max((assembly.energy(y) - energy).abs());
             fall = fall.max((lift - energy).abs());
-            let (gap, rate) = system.violation(y);
-            open = open.max(gap).max(rate / system.scales.rate);
+            let (gap, speed) = assembly.violation(y).expect("a body with mass");
+            open = open.max(gap).max(speed / rate);
         });
         println!(
             "{what}: {worst:e} from Exudyn, whose error is about {:e}; energy {:e}",
@@ -179,7 +181,7 @@ fn tips(youngs: f64) -> Vec<Vector3<f64>> {
     let equations = [0, 1].map(|_| EquationsOfMotion::new(&body, Terms::ALL));
     let (left, right) = (interface(&body, "left"), interface(&body, "right"));
     let all = [true; 3];
-    let mut system = Jointed {
+    let assembly = Assembly {
         bodies: &equations,
         masses: vec![body.invariants().mass(); 2],
         joints: vec![
@@ -187,21 +189,21 @@ fn tips(youngs: f64) -> Vec<Vector3<f64>> {
             Joint { ends: [End::Body(1, left.clone()), End::Body(0, right.clone())], axes: all },
         ],
         gravity: Vector3::new(0.0, -GRAVITY, 0.0),
-        scales: Scales { length: LENGTH, rate: (GRAVITY / LENGTH).sqrt() },
     };
+    let scales = Scales { length: LENGTH, rate: (GRAVITY / LENGTH).sqrt() };
+    let mut system = Jointed { assembly, scales };
     // Angles from where a pendulum hangs.
     let axes = ANGLES.map(|angle| {
         *Rotation3::from_axis_angle(&Vector3::z_axis(), angle - 0.5 * std::f64::consts::PI).matrix()
     });
     let half = Vector3::new(0.5 * LENGTH, 0.0, 0.0);
     let origins = [axes[0] * half, axes[0] * half * 2.0 + axes[1] * half];
-    let states = [0, 1].map(|i| at_rest(origins[i], axes[i], 4));
-    let mut y = system.state(&states);
-    let energy = system.energy(&y);
+    let mut y = system.assembly.state(&[0, 1].map(|i| at_rest(origins[i], axes[i])));
+    let energy = system.assembly.energy(&y);
     let mut tips = Vec::new();
-    system.run(&mut y, &[DURATION], 1e-10, |system, _, y| {
-        tips = vec![system.place(y, 0, &right), system.place(y, 1, &right)];
-        let drift = (system.energy(y) - energy).abs() / (system.masses[0] * GRAVITY * LENGTH);
+    system.run(&mut y, &[DURATION], 1e-10, |assembly, _, y| {
+        tips = vec![assembly.place(y, 0, &right), assembly.place(y, 1, &right)];
+        let drift = (assembly.energy(y) - energy).abs() / (assembly.masses[0] * GRAVITY * LENGTH);
         assert!(drift < 1e-9, "energy {drift:e}");
     });
     tips
