@@ -9,6 +9,7 @@ Bodies are converted by the program, the sizes of the terms are those of `flexbo
 """
 
 import argparse
+import itertools
 import json
 import os
 import subprocess
@@ -26,9 +27,10 @@ ROOT = Path(__file__).resolve().parents[1]
 MODES = 20
 # Largest displacement in the first mode over the extent of the body.
 DEFLECTION = 0.01
-# Below this part of what stands beside it a term is left out.
-NEGLIGIBLE = 0.01
-SPEEDS = (0.001, 0.01, 0.1)
+# For the guidelines: deflections, speeds over the first circular frequency, and the part of what stands beside it below which a term is left out.
+DEFLECTIONS = (0.001, DEFLECTION)
+SPEEDS = (0.002, 0.02, 0.1)
+NEGLIGIBLE = 0.05
 BODIES = [
     ("rod", "connecting_rod", "connecting rod, quadratic tetrahedra"),
     ("car body", "car_frame", "space frame of a car body, beams"),
@@ -106,13 +108,14 @@ class Body:
         rows = np.einsum("kij,i->kj", np.abs(blocks), self.amplitude)
         return (rows**2 / np.diag(self.I0)[:, None]).sum(axis=0)
 
-    def coriolis_torque(self):
-        """(W1 Qd + Q'W2 Qd + Qd'W2 Q) w beside I0 w Omega_1, whatever the signs: the rate at which the inertia changes, largest over the axes."""
-        rates = self.amplitude * self.rate / self.rate[0]
+    def coriolis_torque(self, scale):
+        """(W1 Qd + Q'W2 Qd + Qd'W2 Q) w beside I0 w Omega_1, whatever the signs: the rate at which the inertia changes, largest over the axes; with `scale` times the amplitudes."""
+        amplitude = scale * self.amplitude
+        rates = amplitude * self.rate / self.rate[0]
 
         def about(k):
             quadratic = self.diagonal(self.W2, k)
-            return (np.abs(self.diagonal(self.W1, k)) @ rates + self.amplitude @ np.abs(quadratic + quadratic.T) @ rates) / self.I0[k, k]
+            return (np.abs(self.diagonal(self.W1, k)) @ rates + amplitude @ np.abs(quadratic + quadratic.T) @ rates) / self.I0[k, k]
 
         return max(about(k) for k in range(3))
 
@@ -148,15 +151,15 @@ class Program:
     def convert(self, model, path, modes, *options):
         self.run("convert", model, "--modes", modes, "--lumped", "none", "--quiet", "-o", path, *options)
 
-    def significance(self, body, speed, folder):
-        """Sizes of the terms at `speed` times the first circular frequency and deflections of the first mode."""
+    def significance(self, body, deflection, speed, folder):
+        """Sizes of the terms at `speed` times the first circular frequency and such a deflection over the extent."""
         length, time = body.units
         scene = folder / "range.toml"
-        scene.write_text(f"[motion]\nangular_velocity = {float(speed * body.rate[0] * time)!r}\n[limits]\ndeflection = {float(DEFLECTION * body.extent / length)!r}\n")
+        scene.write_text(f"[motion]\nangular_velocity = {float(speed * body.rate[0] * time)!r}\n[limits]\ndeflection = {float(deflection * body.extent / length)!r}\n")
         told = json.loads(self.run("select", body.path, "--scene", scene, "--json", codes=(0, 1)))["results"]["significance"]
         sizes = {NAMES[one["term"]]: (one["tier_1"], one["guideline"]) for one in told if one["term"] in NAMES}
         assert len(sizes) == len(NAMES), told
-        return {**sizes, TORQUE: (body.coriolis_torque(), "IV")}
+        return {**sizes, TORQUE: (body.coriolis_torque(deflection / DEFLECTION), "IV")}
 
 
 def number(value):
@@ -208,29 +211,31 @@ def per_mode(bodies):
 
 
 def qualifying(sizes, driven):
-    """The first guideline that leaves out nothing above NEGLIGIBLE, the largest term that it leaves out, and that of the guideline before it."""
+    """The first guideline that leaves out nothing above NEGLIGIBLE, and the largest term that decides: of the guideline before it, or of what I leaves out."""
     counted = {term: value for term, value in sizes.items() if not (driven and term in OF_ROTATION)}
     before = None
     for name, labels in GUIDELINES:
         out = {term: size for term, (size, label) in counted.items() if label not in labels}
         term = max(out, key=out.get)
+        decides = f"{term} {number(out[term])}"
         if out[term] < NEGLIGIBLE:
-            return name, f"{term} {number(out[term])}", before
-        before = f"{term} {number(out[term])}"
-    return "IV", None, before
+            return name, before or decides
+        before = decides
+    return "IV", before
 
 
 def guidelines(bodies, sizes):
+    """A row for every body, deflection and kind of rotation; how many bodies qualify for what."""
     rows, count = [], {}
     for body in bodies:
-        for speed in SPEEDS:
-            row = [body.name if speed == SPEEDS[0] else "", number(speed)]
+        for deflection in DEFLECTIONS:
             for driven in (True, False):
-                name, out, before = qualifying(sizes[body.name, speed], driven)
-                count.setdefault((driven, speed), []).append(name)
-                row += [f"**{name}**", out or "nothing", before or ""]
-            rows.append(row)
-    return table(["body", "speed / first frequency", "rotation given", "largest term left out", "the guideline before would leave out", "free", "largest term left out", "the guideline before would leave out"], rows), count
+                found = [qualifying(sizes[body.name, deflection, speed], driven) for speed in SPEEDS]
+                for speed, (name, _) in zip(SPEEDS, found):
+                    count.setdefault((driven, deflection, speed), []).append(name)
+                first = driven and deflection == DEFLECTIONS[0]
+                rows.append([body.name if first else "", f"{100 * deflection:g} %" if driven else "", "given" if driven else "free"] + [f"**{name}**: {decides}" for name, decides in found])
+    return table(["body", "deflection", "rotation"] + [f"speed {speed:g} Omega_1" for speed in SPEEDS], rows), count
 
 
 def main():
@@ -248,9 +253,9 @@ def main():
             path = folder / f"body{at}.flex.h5"
             program.convert(beam if model is None else ROOT / "fixtures/models" / model / "model.toml", path, MODES)
             bodies.append(Body(name, what if model is None else f"`{model}`: {what}", path))
-            for speed in SPEEDS:
-                sizes[name, speed] = program.significance(bodies[-1], speed, folder)
-            sizes[name] = sizes[name, SPEEDS[-1]]
+            for deflection, speed in itertools.product(DEFLECTIONS, SPEEDS):
+                sizes[name, deflection, speed] = program.significance(bodies[-1], deflection, speed, folder)
+            sizes[name] = sizes[name, DEFLECTION, SPEEDS[-1]]
         mechanism = seeds_mechanism.Study(program, beam, folder)
     version = program.run("--version").split()[-1]
     chosen, count = guidelines(bodies, sizes)

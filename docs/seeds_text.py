@@ -82,13 +82,13 @@ mass in two directions: in the beam the first and the second, which bend it in i
 
 Guidelines as sets of terms, with the labels of [trade.md](trade.md#guidelines-i-to-iv): I keeps I0 only, II also the constant centrifugal load W1'/2, III also W1 Q and W2 Q in the load (and the inertia coupling W3(alpha)'q), "III, free" also Q'W2 Q and
 Q'W3, IV everything: the Coriolis forces and torques of W2 and W3 too. A body qualifies for the first one that leaves out nothing above @NEGLIGIBLE@ of what stands beside it. Where joints give the rotation, as those of a driven crank do, the inertia of the rotation itself
-(W1 Q, Q'W2 Q, Q'W3 beside I0, and the Coriolis torque) does not enter the motion; of a free body it does. Deflections as above; the ratio of speed and frequency is omega / Omega_1 (inverted in the paper's text).
+(W1 Q, Q'W2 Q, Q'W3 beside I0, and the Coriolis torque) does not enter the motion; of a free body it does. Beside each guideline stands the term that decides: the largest one that the guideline before it would leave out, or of I the largest that it leaves out. Deflections relative to the largest extent; the ratio of speed and frequency is omega / Omega_1 (inverted in the paper's text).
 
 @GUIDELINES@
-What one learns: bodies whose rotation is given qualify for I at a thousandth of their first frequency (@SLOW@ of 6); at a hundredth the Coriolis force of the modes is above @NEGLIGIBLE@ for @MEDIUM@ of 6, which then need IV at once, whatever their
-centrifugal loads are. A free body that is bent by @DEFLECTION@ needs III for its inertia whatever its speed is (@BENT@ of 6), and the Coriolis torque of the same W1 with it: what the inertia changes, the angular momentum has to give back. So II and III are sets of terms that
-these sizes hardly ever ask for; a group W1, W2 or W3 of the kinetic energy is either needed or not. Sizes are cautious. What a term does to a given motion is measured by `select`, which mostly finds that less is
-needed: compare the [errors of the guidelines](trade.md#guidelines-i-to-iv) in scenes of these bodies.
+What one learns: a slow body is rigid where its rotation is given: at @SLOWEST@ of the first frequency @SLOW@ of 6 qualify for I with the small deflection. II, the constant centrifugal load, is what comes first with the speed when little else bends the body (@SECOND@ of 6 at @MIDDLE@ of the
+frequency): it grows with the square of the speed beside elastic forces that do not grow. At @FASTEST@ of the frequency the Coriolis force of the modes is larger, and @FAST@ of 6 need IV. A free body has to be looked at with its deflection: bent by @DEFLECTION@ @BENT@ of 6 do not qualify for I, however slow they are. The
+slender beam needs everything then, since its moment about its own axis is that of its bending. What asks for W1 Q mostly asks for the Coriolis torque of the same W1 too: what the inertia changes, the angular
+momentum has to give back, so that a group of the kinetic energy is rather needed or not as a whole. These are sizes, and cautious. What a term does to a given motion is measured by `select`: compare the [errors of the guidelines](trade.md#guidelines-i-to-iv) in scenes of these bodies.
 
 ## Ninety modes in a multibody run
 
@@ -115,10 +115,13 @@ def sentences(bodies, sizes, count):
     late = max(max(body.linear()[8:].max(), body.quadratic()[8:].max(), body.coupled()[8:].max()) for body in bodies)
     local = min(bodies, key=lambda body: body.averaged()[0].min())
     mean = local.averaged()[0]
+    small, large = sorted({key[1] for key in count})
+    slow, middle, fast = sorted({key[2] for key in count})
     return {
         "W2LEAST": f"{min(w2):.2g}", "W1LEAST": f"{min(w1):.2g}", "W1MOST": f"{max(w1):.2g}", "LATE": percent(late),
         "LOCAL": f"mode {mean.argmin() + 1} of the {local.name}: {percent(mean.min())}",
-        "SLOW": count[True, 0.001].count("I"), "MEDIUM": count[True, 0.01].count("IV"), "BENT": sum(name != "I" for name in count[False, 0.001]),
+        "SLOW": count[True, small, slow].count("I"), "SECOND": count[True, small, middle].count("II"), "FAST": count[True, large, fast].count("IV"),
+        "BENT": sum(name != "I" for name in count[False, large, slow]), "SLOWEST": slow, "MIDDLE": middle, "FASTEST": fast,
         "BEAM": percent(sizes["slender beam"]["Q'W2 Q"][0]),
     }
 
