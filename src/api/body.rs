@@ -194,7 +194,7 @@ impl FlexBody {
     }
 
     /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v ([`BodyPoint::velocity`]), a force of a joint
-    /// is J'lambda ([`BodyPoint::add_force`]; [ZG19] (57) to (60)). `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies so.
+    /// is J'lambda ([`BodyPoint::add_force`]; \[ZG19\] (57) to (60)). `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies so.
     ///
     /// ```
     /// use flexbody::dynamics::Evaluation;

@@ -1,9 +1,9 @@
 //! The examples that join bodies with Lagrange multipliers show what they say.
 
-#[allow(dead_code)] // its `main`
+#[allow(dead_code, clippy::duplicate_mod)] // its `main`; each example has modules of its own
 #[path = "../../examples/pendulum.rs"]
 mod pendulum;
-#[allow(dead_code)] // its `main`
+#[allow(dead_code, clippy::duplicate_mod)] // its `main`; each example has modules of its own
 #[path = "../../examples/slider_crank.rs"]
 mod slider_crank;
 

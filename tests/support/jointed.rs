@@ -5,6 +5,7 @@
 mod joints;
 
 use flexbody::numerics::integration::{Explicit, Failure, System};
+#[allow(unused_imports)] // not every test binary joins bodies
 pub use joints::{Assembly, End, Joint, Start};
 
 /// Sizes that errors are measured against.

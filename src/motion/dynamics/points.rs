@@ -101,6 +101,7 @@ impl BodyPoint {
     ///
     /// # Panics
     /// When the index is not below the number of nodes.
+    #[doc(hidden)] // Its argument is no part of the interface of the library.
     pub fn node(body: &FlexBody, node: usize) -> Self {
         let (modes, nf) = (body.modes(), body.n_modes());
         let motion = |shape: &Mat<f64>| PointMotion::new(nf, |k, j| shape[(3 * node + k, j)]);
@@ -116,6 +117,7 @@ impl BodyPoint {
     /// The reference point of `interface` of `body`: the motion of its nodes on average (theory 5.3). It has an orientation where the nodes
     /// determine one. Geometric stiffness for forces and moments at the interface is there where `terms` have it. `None` for an
     /// interface without a reference point.
+    #[doc(hidden)] // As above.
     pub fn interface(body: &FlexBody, interface: &Interface, terms: Terms) -> Option<Self> {
         let (modes, nf) = (body.modes(), body.n_modes());
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
@@ -179,7 +181,7 @@ impl BodyPoint {
     }
 
     /// Acceleration J nu' + drift of the point for the accelerations nu' in the order of [`EquationsOfMotion`](super::EquationsOfMotion), relative to
-    /// the world and along body axes ([RD] (10.9), [ZG19] the second derivative of the position):
+    /// the world and along body axes (\[RD\] (10.9)):
     ///
     /// ```text
     /// a = V' + omega' x r + dr/dq qdd + omega x (V + omega x r + 2 dr/dq qd) + (d2r/dq dq) qd qd
