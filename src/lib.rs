@@ -45,7 +45,7 @@
 //!
 //! **Keep what a scene needs**, and see why.
 //!
-//! ```
+//! ```no_run
 //! use flexbody::{ConvertOptions, Model, Scene};
 //! # fn main() -> flexbody::Result<()> {
 //! let model = Model::read("fixtures/models/bracket_hex20/model.toml")?;

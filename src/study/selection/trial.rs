@@ -21,7 +21,10 @@ use std::f64::consts::TAU;
 const INSTANTS_PER_PERIOD: f64 = 20.0;
 
 /// Numbers of a motion, instants times modes, that are looked at along a run.
-const MOST_NUMBERS: f64 = 1.5e7;
+const MOST_NUMBERS: f64 = 4e6;
+
+/// Part of the tolerance of the stress from which a mode takes part in a motion.
+const TAKES_PART: f64 = 0.01;
 
 /// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a spin is looked for.
 const LEAST_INSTANTS: usize = 500;
@@ -81,27 +84,44 @@ impl TrialRuns<'_> {
         trace(self.body, &scene, self.memory, |_| ())
     }
 
-    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the loads and the spin. `None` where
-    /// these would be too many.
+    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the loads and the spin; or, where these would
+    /// be too many, the fastest mode that takes part. `None` where that are too many still.
     ///
     /// # Errors
     /// As [`simulate`].
     pub fn fine_motion(&self, kept: Groups) -> Result<Option<Recording>> {
         let mut scene = self.scene.clone();
-        let wanted = (self.situation.duration.value * self.fastest() / TAU * INSTANTS_PER_PERIOD).ceil();
-        let modes = self.body.n_modes() as f64;
-        if wanted.is_nan() || wanted * modes > MOST_NUMBERS {
+        let duration = self.situation.duration.value;
+        let wanted = |rate: f64| (duration * rate / TAU * INSTANTS_PER_PERIOD).ceil();
+        let most = MOST_NUMBERS / self.body.n_modes() as f64;
+        let followed = wanted(self.fastest(f64::INFINITY)).min(most);
+        // What no mode has a part in has to be followed in any case.
+        if followed.is_nan() || wanted(self.fastest(0.0)) > most {
             return Ok(None);
         }
-        scene.run.outputs = (wanted as usize).max(LEAST_INSTANTS);
+        scene.run.outputs = (followed as usize).max(LEAST_INSTANTS);
         scene.run.terms = Terms::ALL.held(kept);
-        Ok(Some(simulate(self.body, &scene, self.memory, |_| ())?.0))
+        let (motion, _) = simulate(self.body, &scene, self.memory, |_| ())?;
+        let is_followed = wanted(self.liveliest(&motion)) <= followed.max(LEAST_INSTANTS as f64);
+        Ok(is_followed.then_some(motion))
     }
 
-    /// Largest circular frequency of anything in the motion of the body. What a spin does between two of its breaks is one half of a period.
-    fn fastest(&self) -> f64 {
+    /// The largest circular frequency of the modes that take part in a motion: whose root of the elastic energy, relative to the largest, is
+    /// above a part of the tolerance.
+    fn liveliest(&self, motion: &Recording) -> f64 {
+        let roots: Vec<f64> = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
+        let energies = || roots.iter().zip(&motion.extremes.amplitudes).map(|(root, q)| root * q.abs());
+        let least = TAKES_PART * self.scene.requirements.tolerance.stress * energies().fold(0.0, f64::max);
+        let lively = roots.iter().zip(energies()).filter(|(_, energy)| *energy > least);
+        lively.map(|(root, _)| *root).fold(0.0, f64::max)
+    }
+
+    /// Largest circular frequency of anything in the motion of the body, of its modes up to `highest`. What a spin does between two of its breaks is
+    /// one half of a period.
+    fn fastest(&self, highest: f64) -> f64 {
         let duration = self.situation.duration.value;
-        let modes = self.body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
+        let roots = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt());
+        let modes = roots.filter(|root| *root <= highest).fold(0.0, f64::max);
         let histories = self.scene.acting().chain(self.scene.driving());
         let tones = histories.map(|history| TAU * history.frequency_until(duration));
         // Between two rows of a smooth history there may be half an oscillation.
