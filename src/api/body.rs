@@ -12,7 +12,7 @@ use crate::formats::export::ExportOptions;
 use crate::formats::{export, find_format};
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::motion::scene::{Point, body_point, simulate};
-use crate::study::selection::select;
+use crate::study::selection::{select, select_for_cases};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
@@ -191,6 +191,18 @@ impl FlexBody {
     /// The equations of motion of the body, with all terms that it holds.
     pub fn equations_of_motion(&self) -> EquationsOfMotion {
         EquationsOfMotion::new(&self.0, Terms::ALL)
+    }
+
+    /// The same for several load cases: the terms and modes with which every one of them is within its tolerances.
+    ///
+    /// # Errors
+    /// As [`FlexBody::select`].
+    ///
+    /// # Panics
+    /// When there is no case.
+    pub fn select_for_cases(&self, cases: &[Scene]) -> Result<Selection> {
+        let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
+        select_for_cases(&self.0, &[], &scenes, None, SILENT).map(Selection)
     }
 
     /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v ([`BodyPoint::velocity`]), a force of a joint

@@ -8,8 +8,9 @@ use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
 use crate::body::convert::{ConvertSettings, Lumping, convert};
 use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;
+use crate::motion::scene;
 use crate::numerics::eigen::{self, Resume, Wanted};
-use crate::study::tailoring::{Tailoring, convert_for_scene, loads_for, read_loads};
+use crate::study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
 
 /// Which shapes the body has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,10 +101,10 @@ impl ConvertOptions {
         self
     }
 
-    fn settings(&self, model: &Model, scene: Option<&Scene>) -> Result<ConvertSettings> {
+    fn settings(&self, model: &Model, scenes: &[scene::Scene]) -> Result<ConvertSettings> {
         let loads = match (self.basis, self.accuracy) {
             (Basis::Free | Basis::Scene, Accuracy::Fast | Accuracy::Standard) => {
-                loads_for(scene.map(|scene| &scene.0), &model.residual_vectors)
+                loads_for(scenes, &model.residual_vectors)
             }
             _ => model.residual_vectors.clone(),
         };
@@ -164,7 +165,7 @@ impl Model {
             let message = "a basis made for a scene needs one: `convert_for`";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
-        let settings = options.settings(self, None)?;
+        let settings = options.settings(self, &[])?;
         let conversion = convert(&self.checked, &settings, SILENT)?;
         accept(&conversion.body)?;
         Ok(Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics })
@@ -175,13 +176,29 @@ impl Model {
     /// # Errors
     /// As [`Model::convert`]; FB212 where the scene does not fit the body.
     pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
-        let settings = options.settings(self, Some(scene))?;
+        self.convert_for_cases(std::slice::from_ref(scene), options)
+    }
+
+    /// The same for several load cases, which one body has to serve.
+    ///
+    /// # Errors
+    /// As [`Model::convert_for`].
+    ///
+    /// # Panics
+    /// When there is no case.
+    pub fn convert_for_cases(
+        &self,
+        cases: &[Scene],
+        options: &ConvertOptions,
+    ) -> Result<(Conversion, Selection)> {
+        let scenes: Vec<scene::Scene> = cases.iter().map(|case| case.0.clone()).collect();
+        let settings = options.settings(self, &scenes)?;
         let by_band = options.modes.is_none()
             && options.highest.is_none()
             && matches!(options.basis, Basis::Free | Basis::Scene);
         let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
         let (conversion, selection) =
-            convert_for_scene(&self.checked, &tailoring, &scene.0, Resume::default(), SILENT)?;
+            convert_for_cases(&self.checked, &tailoring, &scenes, Resume::default(), SILENT)?;
         accept(&conversion.body)?;
         let converted = Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics };
         Ok((converted, Selection(selection)))

@@ -2,7 +2,7 @@
 
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
-use crate::motion::scene::{self, Recording, read_scene};
+use crate::motion::scene::{self, Recording, read_case, read_cases};
 use crate::study::selection;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -16,12 +16,28 @@ impl Scene {
     ///
     /// # Errors
     /// FB101, FB106 when it or a file of its histories cannot be read; FB211, FB213 for what is wrong in it and FB215 to FB217 in these files, all of
-    /// it.
+    /// it; FB219 when it has load cases.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        read_scene(path).map(Self)
+        read_case(path, None).map(Self)
     }
 
-    /// Name.
+    /// Reads one load case of a scene file.
+    ///
+    /// # Errors
+    /// As [`Scene::read`]; FB219 when there is no such case.
+    pub fn read_case(path: impl AsRef<Path>, name: &str) -> Result<Self> {
+        read_case(path, Some(name)).map(Self)
+    }
+
+    /// Reads all load cases of a scene file, in its order; of a file without cases that is one scene.
+    ///
+    /// # Errors
+    /// As [`Scene::read`], without FB219.
+    pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<Self>> {
+        Ok(read_cases(path)?.into_iter().map(Self).collect())
+    }
+
+    /// Name; of a load case that of the scene, a colon and its own.
     pub fn name(&self) -> &str {
         &self.0.name
     }

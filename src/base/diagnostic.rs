@@ -96,6 +96,7 @@ codes! {
     SeriesRow = "FB216", Error, BadInput, "file of a history cannot be read as columns over time", "write one row per instant, with ascending times and decimal points";
     SeriesRange = "FB217", Error, BadInput, "file of a history does not cover the run", "shorten the run, or say with `outside` = \"hold\" that the first and the last value hold outside of the file";
     PlaceUnknown = "FB218", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
+    SceneCase = "FB219", Error, BadInput, "load case is not in the scene, or none is named where one is needed", "name a case of the scene with --case NAME";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";

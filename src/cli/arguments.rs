@@ -141,6 +141,9 @@ pub struct TradeArguments {
     /// What the body does, and the tolerances (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
+    /// Load case of the scene to take, by its name (a scene with cases needs one)
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub case: Option<String>,
     /// What errors are measured against: full, the body with all modes and groups, of a manifest twice the modes and residual vectors; nodal, the unreduced equations (manifests only)
     #[arg(long, value_enum, default_value_t = ReferenceName::Full)]
     pub reference: ReferenceName,
@@ -191,6 +194,9 @@ pub struct ResponseArguments {
     /// Scene whose loads, watched points, band and damping are taken where nothing else is said
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
+    /// Load case of the scene to take, by its name (a scene with cases needs one)
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub case: Option<String>,
     /// Damping ratio of the modes of a body that has no damping of its own
     #[arg(long, value_name = "RATIO", value_parser = damping_ratio)]
     pub damping: Option<f64>,
@@ -247,6 +253,9 @@ pub struct SelectArguments {
     /// What the body does and how accurate it has to be (see docs/select.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
+    /// Load case of the scene to take, by its name [default: all, which one body has to serve]
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub case: Option<String>,
     /// Of a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub modes: Option<u32>,
@@ -273,6 +282,9 @@ pub struct SimulateArguments {
     /// What the body does (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
+    /// Load case of the scene to take, by its name [default: all, one after the other; files are named by them]
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub case: Option<String>,
     /// HDF5 file to write the motion to
     #[arg(short, long, value_name = "MOTION.h5")]
     pub output: Option<PathBuf>,
@@ -297,7 +309,7 @@ pub struct ConvertArguments {
     #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "checkpoint", "split"])]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split"])]
     pub from: Option<String>,
     /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
@@ -365,6 +377,9 @@ pub struct ConvertArguments {
     /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose residual vectors and modes where nothing else does
     #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
     pub scene: Option<PathBuf>,
+    /// Load case of the scene to take, by its name [default: all, which one body has to serve]
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub case: Option<String>,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

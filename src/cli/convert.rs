@@ -5,6 +5,7 @@ use super::import;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
+use super::select::asked_cases;
 use super::watcher::Watcher;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -20,11 +21,11 @@ use crate::input::{
     LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
 };
 use crate::model::{CheckedModel, FeModel};
-use crate::motion::scene::{Scene, read_scene};
+use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
 use crate::study::checkpoint::resume;
-use crate::study::tailoring::{Tailoring, convert_for_scene, loads_for, read_loads};
+use crate::study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -41,12 +42,13 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     // What the command line says replaces what the manifest says.
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let files = model_files(arguments)?;
-    let scene = arguments.scene.as_ref().map(read_scene).transpose()?;
-    let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, scene.as_ref()));
+    let asked_of = |path| asked_cases(path, arguments.case.as_deref());
+    let scenes = arguments.scene.as_deref().map(asked_of).transpose()?.unwrap_or_default();
+    let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, &scenes));
     refuse_contradictions(arguments, &loads)?;
     // How many bodies there are is known after reading; that outputs can be written, before.
     let places = Places::of(arguments, arguments.split.then_some(1));
-    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, scene.as_ref())?;
+    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, &scenes)?;
     let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
 
@@ -54,9 +56,15 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let lumped = schemes.iter().map(Scheme::read).collect::<Result<Vec<_>>>()?;
     let raw = read_model(&files)?;
     watcher.hear(Event::Phase("checks"));
-    let scene = scene.as_ref();
-    let job =
-        Job { arguments, files: &files, lumped: &lumped, loads: &loads, formats: &formats, scene, threads };
+    let job = Job {
+        arguments,
+        files: &files,
+        lumped: &lumped,
+        loads: &loads,
+        formats: &formats,
+        scenes: &scenes,
+        threads,
+    };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
@@ -65,7 +73,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
-    refuse_overwriting(arguments, &all, &files, &schemes, &loads, scene)?;
+    refuse_overwriting(arguments, &all, &files, &schemes, &loads, &scenes)?;
     let mut slots = vec![reserved];
     for places in &all[1..] {
         slots.push(places.reserve()?);
@@ -100,7 +108,8 @@ struct Job<'a> {
     lumped: &'a [Lumping],
     loads: &'a [LoadSource],
     formats: &'a [Format],
-    scene: Option<&'a Scene>,
+    /// The load cases of the scene; none without one.
+    scenes: &'a [Scene],
     threads: usize,
 }
 
@@ -147,13 +156,11 @@ impl Job<'_> {
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
         let watch = |event: Event<'_>| watcher.hear(event);
-        let (mut conversion, selection) = match (self.scene, &arguments.scene) {
-            (Some(scene), Some(path)) => {
-                convert_for_scene(model, &self.of_band(settings), scene, resume, &watch)
-                    .map_err(|error| error.in_file(path))
-                    .map(|(conversion, selection)| (conversion, Some(selection)))
-            }
-            _ => convert_resuming(model, &settings, resume, &watch).map(|conversion| (conversion, None)),
+        let (mut conversion, selection) = match &arguments.scene {
+            Some(path) => convert_for_cases(model, &self.of_band(settings), self.scenes, resume, &watch)
+                .map_err(|error| error.in_file(path))
+                .map(|(conversion, selection)| (conversion, Some(selection))),
+            None => convert_resuming(model, &settings, resume, &watch).map(|conversion| (conversion, None)),
         }?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
@@ -233,15 +240,10 @@ impl Job<'_> {
 
 /// Loads of residual vectors where the command line names none: those of the manifest; without, those of the scene, of which free modes
 /// alone know nothing.
-fn residual_vectors(
-    arguments: &ConvertArguments,
-    files: &ModelFiles,
-    scene: Option<&Scene>,
-) -> Vec<LoadSource> {
+fn residual_vectors(arguments: &ConvertArguments, files: &ModelFiles, scenes: &[Scene]) -> Vec<LoadSource> {
     let free = matches!(arguments.basis, BasisName::Free | BasisName::Scene)
         && arguments.accuracy != AccuracyName::Certified;
-    let scene = scene.filter(|_| free && !arguments.lumped_modes);
-    loads_for(scene, &files.residual_vectors)
+    loads_for(if free && !arguments.lumped_modes { scenes } else { &[] }, &files.residual_vectors)
 }
 
 /// Loads of residual vectors as named on the command line.
@@ -402,7 +404,7 @@ fn refuse_overwriting(
     files: &ModelFiles,
     schemes: &[Scheme],
     loads: &[LoadSource],
-    scene: Option<&Scene>,
+    scenes: &[Scene],
 ) -> Result<()> {
     let masses = schemes.iter().filter_map(|scheme| match scheme {
         Scheme::User(path) => Some(path),
@@ -414,7 +416,7 @@ fn refuse_overwriting(
         _ => None,
     });
     let inputs = files.paths().into_iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
-    let series = scene.into_iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     refuse_replacing(inputs.chain(series), outputs.iter().flat_map(Places::all))
 }
 

@@ -26,7 +26,7 @@ pub(super) struct Reserved {
 impl Places {
     /// What the command line names, with a number in every name for one of several bodies.
     pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
-        let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| numbered(path, number));
+        let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| marked(path, number));
         Self {
             body: place(&arguments.output),
             reports: arguments.report.iter().map(place).collect(),
@@ -110,14 +110,14 @@ fn file_number(_: &Path) -> Option<(u64, u64)> {
     None
 }
 
-/// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`.
-fn numbered(path: &Path, number: usize) -> PathBuf {
+/// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`: with a number or a name before the extension.
+pub(super) fn marked(path: &Path, mark: impl std::fmt::Display) -> PathBuf {
     let (Some(stem), extension) = (path.file_stem(), path.extension()) else { return path.to_path_buf() };
     let inner = Path::new(stem);
     let double = inner.extension().filter(|inner| *inner == "flex");
     let stem = double.and(inner.file_stem()).unwrap_or(stem);
     let mut name = stem.to_os_string();
-    name.push(format!("-{number}"));
+    name.push(format!("-{mark}"));
     for extension in double.into_iter().chain(extension) {
         name.push(".");
         name.push(extension);
@@ -140,7 +140,7 @@ mod tests {
             (".flex.h5", ".flex-12.h5"),
             ("..", ".."),
         ] {
-            assert_eq!(numbered(Path::new(path), 12), Path::new(with_number), "{path}");
+            assert_eq!(marked(Path::new(path), 12), Path::new(with_number), "{path}");
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
 use crate::input::LoadSource;
 use crate::model::FeModel;
-use crate::motion::scene::{Point, Scene, read_scene};
+use crate::motion::scene::{Point, Scene, read_case};
 use crate::numerics::eigen::Wanted;
 use crate::report::{Format, ResponseFacts, RunData, response_csv};
 use crate::study::response::{Band, Place, Settings, respond};
@@ -36,7 +36,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let watch = |event: Event<'_>| watcher.hear(event);
-    let scene = arguments.scene.as_ref().map(read_scene).transpose()?;
+    let scene =
+        arguments.scene.as_ref().map(|path| read_case(path, arguments.case.as_deref())).transpose()?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let (model, body, diagnostics) = if is_manifest {
         let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;

@@ -15,12 +15,13 @@ use crate::body::convert::ConvertSettings;
 use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
 use crate::model::CheckedModel;
-use crate::motion::scene::{Scene, read_scene};
+use crate::motion::scene::{Scene, read_case, read_cases};
 use crate::numerics::eigen::{Resume, Wanted};
 use crate::report::{Format, RunData, SelectionFacts};
-use crate::study::reference::{Enriched, ReferenceError};
-use crate::study::selection::select_from;
+use crate::study::reference::{EnrichedForCases, ReferenceError};
+use crate::study::selection::select_for_cases;
 use crate::study::tailoring::{Tailoring, loads_for, read_loads};
+use std::path::Path;
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -29,17 +30,18 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scene = read_scene(&arguments.scene)?;
-    refuse_replacing(scene.series.iter().map(|file| &file.path), arguments.report.iter())?;
+    let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
+    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    refuse_replacing(series, arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let (body, lacks, mut diagnostics) = if is_manifest(&arguments.body) {
-        converted(arguments, &scene, &watch)?
+        converted(arguments, &scenes, &watch)?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
         (body, Vec::new(), notes)
     };
-    let selection = select_from(&body, &lacks, &scene, memory_left(None), &watch)
+    let selection = select_for_cases(&body, &lacks, &scenes, memory_left(None), &watch)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
@@ -57,15 +59,23 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     })
 }
 
-/// The body of a model with everything that the scene may need, and what it lacks of the model there.
+/// The load cases of a scene that a command is for: the one that is named, or all; of a scene without cases that scene.
+pub(super) fn asked_cases(scene: &Path, case: Option<&str>) -> Result<Vec<Scene>> {
+    match case {
+        Some(name) => Ok(vec![read_case(scene, Some(name))?]),
+        None => read_cases(scene),
+    }
+}
+
+/// The body of a model with everything that the scenes may need, and what it lacks of the model there.
 fn converted(
     arguments: &SelectArguments,
-    scene: &Scene,
+    scenes: &[Scene],
     watch: Watch<'_>,
-) -> Result<(FlexBody, Vec<ReferenceError>, Vec<Diagnostic>)> {
+) -> Result<(FlexBody, Vec<Vec<ReferenceError>>, Vec<Diagnostic>)> {
     let (files, checked) = read_checked(&arguments.body, arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = checked;
-    let loads = loads_for(Some(scene), &files.residual_vectors);
+    let loads = loads_for(scenes, &files.residual_vectors);
     let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
     let settings = ConvertSettings {
         modes: ModeSettings {
@@ -79,8 +89,8 @@ fn converted(
         ..ConvertSettings::default()
     };
     let tailoring = Tailoring { settings, by_band: arguments.modes.is_none(), of_motion: false };
-    let Enriched { made, rounds } = tailoring
-        .convert(&model, scene, Resume::default(), watch)
+    let EnrichedForCases { made, rounds } = tailoring
+        .convert_for_cases(&model, scenes, Resume::default(), watch)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(made.diagnostics);
     Ok((made.body, rounds, diagnostics))

@@ -1,50 +1,162 @@
 //! `flexbody simulate`.
 
-use super::arguments::SimulateArguments;
+use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::places::{format_of, marked, refuse_replacing};
 use super::resources::{memory_left, use_threads};
+use super::select::asked_cases;
 use super::watcher::Watcher;
+use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
+use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
-use crate::motion::scene::{read_scene, simulate};
+use crate::motion::scene::{Scene, simulate};
 use crate::report::{Format, RunData, SimulationFacts, simulation_csv};
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let outputs = || arguments.output.iter().chain(&arguments.csv).chain(&arguments.report);
-    refuse_replacing([&arguments.body, &arguments.scene].into_iter(), outputs())?;
-    let motion = arguments.output.as_ref().map(flex_body_file::prepare_output).transpose()?;
-    let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
-    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let places = Places::of(arguments, None);
+    refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all())?;
+    // Which load cases there are is known after reading; that outputs can be written, before.
+    let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scene = read_scene(&arguments.scene)?;
-    refuse_replacing(scene.series.iter().map(|file| &file.path), outputs())?;
-    let (body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
-    watcher.hear(Event::Phase("simulation"));
-    let (recording, found) =
-        simulate(&body, &scene, memory_left(None), |part| watcher.hear(Event::Fraction(part)))
-            .map_err(|error| error.in_file(&arguments.scene))?;
-    diagnostics.extend(found);
-    let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
-    refuse_warnings(arguments.printing, &run.diagnostics)?;
-    let facts = SimulationFacts::new(&recording, body.units(), &run);
-
-    if let Some(slot) = &motion {
-        flex_body_file::fill_simulation(&recording, body.units(), slot)?;
-    }
-    if let Some(slot) = &table {
-        slot.fill(simulation_csv(&recording).as_bytes())?;
-    }
-    for (slot, format) in reports.iter().zip(formats) {
-        slot.fill(facts.render(format).as_bytes())?;
-    }
+    let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
+    let of_case = |scene: &Scene| Places::of(arguments, scene.case_name());
+    let all: Vec<Places> =
+        if scenes.len() == 1 { vec![places] } else { scenes.iter().map(of_case).collect() };
+    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    let inputs = [&arguments.body, &arguments.scene].into_iter().chain(series);
+    refuse_replacing(inputs, all.iter().flat_map(Places::all))?;
+    let slots = match &all[..] {
+        [_] => vec![reserved],
+        all => all.iter().map(Places::reserve).collect::<Result<Vec<_>>>()?,
+    };
+    let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
+    let job =
+        Job { path: &arguments.scene, printing: arguments.printing, body: &body, formats: &formats, threads };
+    let several = scenes.len() > 1;
+    let done =
+        scenes.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
+    let done = done.collect::<Result<Vec<_>>>()?;
     // Nothing appears before everything is done.
-    OutputSlot::commit_all(motion.into_iter().chain(table).chain(reports))?;
-    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
-    Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
+    OutputSlot::commit_all(slots.into_iter().flat_map(Slots::into_all))?;
+    Ok(together(done))
+}
+
+/// The outcome of all load cases; of one scene it is its own.
+fn together(mut done: Vec<Outcome>) -> Outcome {
+    if done.len() == 1 {
+        return done.remove(0);
+    }
+    let texts: Vec<&str> = done.iter().map(|one| one.text.as_str()).collect();
+    let reports: Vec<&str> = done.iter().map(|one| one.json.trim_end()).collect();
+    let mut diagnostics: Vec<Diagnostic> = Vec::new();
+    for said in done.iter().flat_map(|one| &one.diagnostics) {
+        if !diagnostics.contains(said) {
+            diagnostics.push(said.clone());
+        }
+    }
+    let json = format!("{{\n\"cases\": [\n{}\n]\n}}", reports.join(",\n"));
+    Outcome { text: texts.join("\n"), json, diagnostics, passed: true }
+}
+
+/// What all load cases of a run have in common.
+struct Job<'a> {
+    path: &'a Path,
+    printing: Printing,
+    body: &'a FlexBody,
+    formats: &'a [Format],
+    threads: usize,
+}
+
+impl Job<'_> {
+    /// Simulates a scene, and writes the motion and its reports; `notes` are those about the body.
+    fn simulate(
+        &self,
+        scene: &Scene,
+        several: bool,
+        notes: &[Diagnostic],
+        slots: &Slots,
+        watcher: &Watcher,
+    ) -> Result<Outcome> {
+        watcher.hear(Event::Phase("simulation"));
+        let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
+        let hear = |part| watcher.hear(Event::Fraction(part));
+        let (recording, found) = simulate(self.body, scene, memory_left(None), hear).map_err(|error| {
+            let error = error.in_file(self.path);
+            match &name {
+                Some(name) => error.about(name),
+                None => error,
+            }
+        })?;
+        let found = found.into_iter().map(|said| match &name {
+            Some(name) => said.about(name),
+            None => said,
+        });
+        let diagnostics = notes.iter().cloned().chain(found).collect();
+        let run =
+            RunData { phases: watcher.finish(), diagnostics, threads: self.threads, ..RunData::default() };
+        refuse_warnings(self.printing, &run.diagnostics)?;
+        let facts = SimulationFacts::new(&recording, self.body.units(), &run);
+        if let Some(slot) = &slots.motion {
+            flex_body_file::fill_simulation(&recording, self.body.units(), slot)?;
+        }
+        if let Some(slot) = &slots.table {
+            slot.fill(simulation_csv(&recording).as_bytes())?;
+        }
+        for (slot, format) in slots.reports.iter().zip(self.formats) {
+            slot.fill(facts.render(*format).as_bytes())?;
+        }
+        let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+        Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
+    }
+}
+
+/// Output files of one simulation.
+struct Places {
+    motion: Option<PathBuf>,
+    table: Option<PathBuf>,
+    reports: Vec<PathBuf>,
+}
+
+/// The same, reserved.
+struct Slots {
+    motion: Option<OutputSlot>,
+    table: Option<OutputSlot>,
+    reports: Vec<OutputSlot>,
+}
+
+impl Places {
+    /// What the command line names, with the name of the load case in every name for one of several.
+    fn of(arguments: &SimulateArguments, case: Option<&str>) -> Self {
+        let place = |path: &PathBuf| case.map_or_else(|| path.clone(), |case| marked(path, case));
+        Self {
+            motion: arguments.output.as_ref().map(place),
+            table: arguments.csv.as_ref().map(place),
+            reports: arguments.report.iter().map(place).collect(),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &PathBuf> {
+        self.motion.iter().chain(&self.table).chain(&self.reports)
+    }
+
+    fn reserve(&self) -> Result<Slots> {
+        Ok(Slots {
+            motion: self.motion.as_ref().map(flex_body_file::prepare_output).transpose()?,
+            table: self.table.as_ref().map(OutputSlot::prepare).transpose()?,
+            reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
+        })
+    }
+}
+
+impl Slots {
+    fn into_all(self) -> impl Iterator<Item = OutputSlot> {
+        self.motion.into_iter().chain(self.table).chain(self.reports)
+    }
 }

@@ -12,7 +12,7 @@ use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::body::basis::ModeSettings;
 use crate::formats::flex_body_file;
-use crate::motion::scene::read_scene;
+use crate::motion::scene::read_case;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
 use crate::study::trade::{Row, Settings, Source, Trade, conversions, trade};
@@ -29,7 +29,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scene = read_scene(&arguments.scene)?;
+    let scene = read_case(&arguments.scene, arguments.case.as_deref())?;
     refuse_replacing(scene.series.iter().map(|file| &file.path), outputs())?;
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();

@@ -26,6 +26,7 @@ mod response;
 mod run_data;
 mod scatter_chart;
 mod selection;
+mod selection_cases;
 mod selection_verdict;
 mod simulation;
 mod term_facts;

@@ -7,13 +7,14 @@ use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::significant;
 use super::render::json;
 use super::run_data::RunData;
+use super::selection_cases::{CaseFacts, cases_table};
 use super::selection_verdict::SelectionVerdict;
 use super::text::{Page, diagnostics_lines};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::{Group, TermDecision};
 use crate::motion::scene::OutputErrors;
-use crate::study::selection::{Ground, Participation, Selection, Trial};
+use crate::study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -39,6 +40,9 @@ pub struct SelectionFacts<'a> {
     reference: Vec<LackFacts>,
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,
+    /// What belongs to each load case, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cases: Vec<CaseFacts<'a>>,
     diagnostics: &'a [Diagnostic],
 }
 
@@ -113,7 +117,7 @@ struct SignificanceFacts {
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct TrialFacts<'a> {
+pub(super) struct TrialFacts<'a> {
     kept: Vec<&'static str>,
     modes: usize,
     multiplications: usize,
@@ -123,6 +127,12 @@ struct TrialFacts<'a> {
     budget: f64,
     passed: bool,
     remark: &'a str,
+    /// Of several load cases the one that the errors are of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    case: Option<&'a str>,
+    /// Largest error over its tolerance in each load case.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    by_case: Vec<Option<f64>>,
 }
 
 impl<'a> ResponseFacts<'a> {
@@ -137,14 +147,18 @@ impl<'a> ResponseFacts<'a> {
 }
 
 impl<'a> TrialFacts<'a> {
-    fn new(trial: &'a Trial) -> Self {
+    /// Facts of `trial`, which was made in `cases`; none of a scene alone.
+    pub(super) fn new(trial: &'a Trial, cases: &'a [CaseSelection]) -> Self {
+        let finite = |worst: f64| worst.is_finite().then_some(worst);
         Self {
+            case: trial.case.and_then(|at| cases.get(at)).map(|case| case.name.as_str()),
+            by_case: trial.by_case.iter().map(|worst| finite(*worst)).collect(),
             kept: Group::ALL.into_iter().filter(|group| trial.kept.has(*group)).map(Group::name).collect(),
             modes: trial.modes,
             multiplications: trial.multiplications,
             tier: trial.tier,
             errors: trial.errors,
-            worst: trial.worst.is_finite().then_some(trial.worst),
+            worst: finite(trial.worst),
             budget: trial.budget,
             passed: trial.passed(),
             remark: &trial.remark,
@@ -207,11 +221,12 @@ impl<'a> SelectionFacts<'a> {
                 static_responses: selection.participations.iter().map(ResponseFacts::new).collect(),
                 shares: shares.collect(),
             },
-            chosen: selection.chosen.as_ref().map(TrialFacts::new),
+            chosen: selection.chosen.as_ref().map(|trial| TrialFacts::new(trial, &selection.cases)),
             multiplications_before: selection.multiplications,
             reference: selection.lacks.iter().map(LackFacts::new).collect(),
             significance: significance.collect(),
-            trials: selection.trials.iter().map(TrialFacts::new).collect(),
+            trials: selection.trials.iter().map(|trial| TrialFacts::new(trial, &selection.cases)).collect(),
+            cases: selection.cases.iter().map(CaseFacts::new).collect(),
             diagnostics: &run.diagnostics,
         }
     }
@@ -277,6 +292,9 @@ impl<'a> SelectionFacts<'a> {
             page.entry("Errors", &format!("{}, measured against everything", errors_in_words(errors)));
             page.entry("Reference", &reference_in_words(&self.reference));
         }
+        for (i, case) in self.cases.iter().enumerate() {
+            page.entry(if i == 0 { "Load cases" } else { "" }, &case.in_words());
+        }
         for (i, input) in self.inputs.iter().enumerate() {
             let label = if i == 0 { "Inputs" } else { "" };
             page.entry(label, &format!("{} {}: {}", input.name, significant(input.value, 4), input.source));
@@ -303,6 +321,10 @@ impl<'a> SelectionFacts<'a> {
             items.push(("Reference", escape(&reference_in_words(&self.reference))));
         }
         terms(&mut html, items);
+        if !self.cases.is_empty() {
+            section(&mut html, "Load cases");
+            cases_table(&mut html, &self.cases);
+        }
         section(&mut html, "Inputs");
         let inputs = self
             .inputs
@@ -363,6 +385,10 @@ impl<'a> SelectionFacts<'a> {
                     (true, _) => "within".to_owned(),
                     (false, "") => "beyond".to_owned(),
                     (false, remark) => escape(remark),
+                };
+                let verdict = match trial.case {
+                    Some(case) => format!("{verdict} (case {})", escape(case)),
+                    None => verdict,
                 };
                 vec![
                     trial.groups(),

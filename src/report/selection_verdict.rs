@@ -62,19 +62,39 @@ fn size(output: &str, error: f64) -> String {
 fn asked(selection: &Selection) -> String {
     if let Some(most) = selection.most_multiplications {
         return format!(
-            "{}: the most accurate of at most {most} multiplications per evaluation",
-            selection.scene
+            "{}{}: the most accurate of at most {most} multiplications per evaluation",
+            selection.scene,
+            cases_in_words(selection)
         );
     }
     let [attitude, deflection, stress, reaction] = selection.tolerance;
     format!(
-        "{}: errors of at most {} in attitude, {} in deflection, {} in stress, {} in reactions",
+        "{}{}: errors of at most {} in attitude, {} in deflection, {} in stress, {} in reactions",
         selection.scene,
+        cases_in_words(selection),
         size("attitude", attitude),
         per_cent(deflection),
         per_cent(stress),
         per_cent(reaction)
     )
+}
+
+/// The load cases, and whether the tolerances that are told are the least of theirs.
+fn cases_in_words(selection: &Selection) -> String {
+    let Some(first) = selection.cases.first() else { return String::new() };
+    let names: Vec<&str> = selection.cases.iter().map(|case| case.name.as_str()).collect();
+    let least = if selection.cases.iter().all(|case| case.tolerance == first.tolerance) {
+        ""
+    } else {
+        ", the least of theirs"
+    };
+    format!(" in each of {} load cases ({}){least}", names.len(), names.join(", "))
+}
+
+/// ` in case ...` of what belongs to one of several load cases.
+fn in_case(case: Option<usize>, selection: &Selection) -> String {
+    let case = case.and_then(|at| selection.cases.get(at));
+    case.map_or_else(String::new, |case| format!(" in case {}", case.name))
 }
 
 fn take(selection: &Selection) -> String {
@@ -107,7 +127,10 @@ fn why(selection: &Selection) -> String {
         }
     }
     reasons.sort_by_key(|reason| !reason.0);
-    let parts = reasons.iter().map(|(kept, ground, groups)| reason(*kept, *ground, groups));
+    let parts = reasons.iter().map(|(kept, ground, groups)| {
+        let case = in_case(ground.and_then(|ground| ground.case), selection);
+        reason(*kept, *ground, groups) + &case
+    });
     parts.collect::<Vec<_>>().join("; ")
 }
 
@@ -146,7 +169,11 @@ fn error(selection: &Selection) -> String {
         None => String::new(),
     };
     match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
-        Some(errors) => format!("{}, measured over the run{lacks}", errors_in_words(errors)),
+        Some(errors) => {
+            let case = in_case(selection.chosen.as_ref().and_then(|chosen| chosen.case), selection);
+            let worst = if case.is_empty() { "" } else { ", where it is worst" };
+            format!("{}, measured over the run{case}{worst}{lacks}", errors_in_words(errors))
+        }
         None => format!("nothing was simulated{lacks}"),
     }
 }

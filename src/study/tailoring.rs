@@ -10,8 +10,8 @@ use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
 use crate::motion::scene::{Measure, OutputErrors, Scene, trace, trace_at};
 use crate::numerics::eigen::{Accuracy, Resume, Wanted};
-use crate::study::reference::{Enriched, MotionShapes, ReferenceError, enrich};
-use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_from};
+use crate::study::reference::{Enriched, EnrichedForCases, MotionShapes, ReferenceError, enrich_for_cases};
+use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
 use crate::study::trade::Source;
 use faer::Mat;
 
@@ -38,21 +38,37 @@ impl Tailoring {
         resume: Resume<'_>,
         watch: Watch<'_>,
     ) -> Result<Enriched<Conversion>> {
-        self.enriched(model, scene, resume, watch, |modal| Ok(modal.condense()))
+        let EnrichedForCases { made, rounds } =
+            self.convert_for_cases(model, std::slice::from_ref(scene), resume, watch)?;
+        Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
+    }
+
+    /// The same with everything that any of the load cases `scenes` may need.
+    ///
+    /// # Errors
+    /// As [`Tailoring::convert`].
+    pub fn convert_for_cases(
+        &self,
+        model: &FeModel,
+        scenes: &[Scene],
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<EnrichedForCases<Conversion>> {
+        self.enriched(model, scenes, resume, watch, |modal| Ok(modal.condense()))
     }
 
     /// Conversions by `condense`, each with more static responses than the one before, until the body lacks nothing that counts.
     fn enriched(
         &self,
         model: &FeModel,
-        scene: &Scene,
+        scenes: &[Scene],
         resume: Resume<'_>,
         watch: Watch<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
-    ) -> Result<Enriched<Conversion>> {
+    ) -> Result<EnrichedForCases<Conversion>> {
         let make = |loads: &Mat<f64>| {
             let own = self.with_motion(loads);
-            let band_settings = own.settings_of_band(scene);
+            let band_settings = own.settings_of_band(scenes);
             // A search that was interrupted is that of the free modes, which come first.
             let resume = if loads.ncols() == 0 { resume } else { Resume::default() };
             let modal = own.find_modes(band_settings.as_ref(), model, resume, watch)?;
@@ -62,7 +78,7 @@ impl Tailoring {
         let Self { settings, .. } = self;
         let grows = settings.modes.accuracy != Accuracy::Certified
             && settings.basis.with_motion(&Mat::new()).is_some();
-        enrich(model, scene, settings.modes.memory, grows, watch, make, |made| &made.body)
+        enrich_for_cases(model, scenes, settings.modes.memory, grows, watch, make, |made| &made.body)
     }
 
     /// The body of the fewest [`MotionShapes`] that leave half of the tolerances to others, in place of the `whole` one whose motion they are made
@@ -74,14 +90,14 @@ impl Tailoring {
         &self,
         model: &FeModel,
         scene: &Scene,
-        whole: Enriched<Conversion>,
+        whole: EnrichedForCases<Conversion>,
         watch: Watch<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
-    ) -> Result<Enriched<Conversion>> {
-        let Enriched { made: mut reference, rounds } = whole;
+    ) -> Result<EnrichedForCases<Conversion>> {
+        let EnrichedForCases { made: mut reference, rounds } = whole;
         let (motion, _) = trace(&reference.body, scene, self.settings.modes.memory, |_| ())?;
         let measure = Measure::new(&reference.body, &motion);
-        let lacks = rounds.last().map_or(0.0, |own| own.worst);
+        let lacks = rounds.first().and_then(|rounds| rounds.last()).map_or(0.0, |own| own.worst);
         let shapes = MotionShapes::new(model, &reference.body, scene, &motion)?;
         let counts =
             shapes.as_ref().map_or(Vec::new(), |shapes| shapes.counts(&scene.requirements.tolerance));
@@ -97,12 +113,12 @@ impl Tailoring {
             let worst = lacks + errors.worst(&scene.requirements.tolerance);
             let own = ReferenceError { modes: made.body.n_modes(), errors, worst, time: 0.0 };
             if own.is_reference() {
-                return Ok(Enriched { made, rounds: vec![own] });
+                return Ok(EnrichedForCases { made, rounds: vec![vec![own]] });
             }
         }
         let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
-        Ok(Enriched { made: reference, rounds })
+        Ok(EnrichedForCases { made: reference, rounds })
     }
 
     /// The settings with all modes of given shapes.
@@ -119,9 +135,9 @@ impl Tailoring {
         own
     }
 
-    /// The settings with the modes that the band of `scene` wants.
-    fn settings_of_band(&self, scene: &Scene) -> Option<ConvertSettings> {
-        let highest = largest_eigenvalue(scene).filter(|_| self.by_band)?;
+    /// The settings with the modes that the highest band of `scenes` wants.
+    fn settings_of_band(&self, scenes: &[Scene]) -> Option<ConvertSettings> {
+        let highest = largest_eigenvalue(scenes).filter(|_| self.by_band)?;
         let mut settings = self.settings.clone();
         settings.modes.wanted = Wanted::Below(highest);
         Some(settings)
@@ -166,11 +182,13 @@ fn errors_beside(
     Ok(source.errors(measure, body, &modes, &motion).map(|errors| errors.largest()))
 }
 
-/// Loads whose static responses join the modes where nobody names others: those `stated` with the model; without, those of the scene, of
+/// Loads whose static responses join the modes where nobody names others: those `stated` with the model; without, those of the `scenes`, of
 /// which free modes alone know nothing.
-pub fn loads_for(scene: Option<&Scene>, stated: &[LoadSource]) -> Vec<LoadSource> {
-    let Some(scene) = scene.filter(|_| stated.is_empty()) else { return stated.to_vec() };
-    let WantedResponses { centrifugal, interfaces } = WantedResponses::of(scene);
+pub fn loads_for(scenes: &[Scene], stated: &[LoadSource]) -> Vec<LoadSource> {
+    if !stated.is_empty() {
+        return stated.to_vec();
+    }
+    let WantedResponses { centrifugal, interfaces } = WantedResponses::of_any(scenes);
     let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
     loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
 }
@@ -195,7 +213,7 @@ pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
 /// decided about the converted body. The scene becomes one of its sources.
 ///
 /// # Errors
-/// As [`convert`](crate::body::convert::convert), [`enrich`] and [`select_from`].
+/// As [`convert`](crate::body::convert::convert), [`enrich_for_cases`] and [`select_for_cases`].
 pub fn convert_for_scene(
     model: &FeModel,
     tailoring: &Tailoring,
@@ -203,27 +221,56 @@ pub fn convert_for_scene(
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<(Conversion, Selection)> {
+    convert_for_cases(model, tailoring, std::slice::from_ref(scene), resume, watch)
+}
+
+/// The same for the load cases `scenes`, which one body has to serve.
+///
+/// # Errors
+/// As [`convert_for_scene`].
+pub fn convert_for_cases(
+    model: &FeModel,
+    tailoring: &Tailoring,
+    scenes: &[Scene],
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<(Conversion, Selection)> {
     let memory = tailoring.settings.modes.memory;
-    if tailoring.of_motion && !scene.initial.modes.is_empty() {
+    refuse_unfit(tailoring, scenes)?;
+    let condense = |modal: &ModalModel<'_>| {
+        // Rigid motion alone is multiplied by M before the scenes have said which groups they may need.
+        let linear = modal.condense_linear();
+        let terms = rule_out(&modal.body(&linear)?, scenes, memory)?;
+        Ok(modal.condense_kept(linear, terms))
+    };
+    let mut enriched = tailoring.enriched(model, scenes, resume, watch, condense)?;
+    if tailoring.of_motion {
+        enriched = tailoring.of_motion(model, &scenes[0], enriched, watch, condense)?;
+    }
+    let EnrichedForCases { made: mut conversion, rounds } = enriched;
+    let selection = select_for_cases(&conversion.body, &rounds, scenes, memory, watch)?;
+    let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
+    let mut parts = reduced.into_parts();
+    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
+    for source in scenes.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {
+        // Load cases share their scene file, and may share histories.
+        if scenes.len() == 1 || !parts.source.files.contains(source) {
+            parts.source.files.push(source.clone());
+        }
+    }
+    conversion.body = FlexBody::new(parts)?;
+    Ok((conversion, selection))
+}
+
+/// Refuses what a basis that is made of a motion cannot serve.
+fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
+    if tailoring.of_motion && scenes.len() > 1 {
+        let message = "--basis scene: shapes are made of one motion, and the scene has several load cases";
+        return Err(Diagnostic::new(Code::SceneCase, message).into());
+    }
+    if tailoring.of_motion && scenes.iter().any(|scene| !scene.initial.modes.is_empty()) {
         let message = "--basis scene: the scene starts modes by their number, which a body made of its motion does not have";
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
-    let condense = |modal: &ModalModel<'_>| {
-        // Rigid motion alone is multiplied by M before the scene has said which groups it may need.
-        let linear = modal.condense_linear();
-        let terms = rule_out(&modal.body(&linear)?, scene, memory)?;
-        Ok(modal.condense_kept(linear, terms))
-    };
-    let mut enriched = tailoring.enriched(model, scene, resume, watch, condense)?;
-    if tailoring.of_motion {
-        enriched = tailoring.of_motion(model, scene, enriched, watch, condense)?;
-    }
-    let Enriched { made: mut conversion, rounds } = enriched;
-    let selection = select_from(&conversion.body, &rounds, scene, memory, watch)?;
-    let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
-    let mut parts = reduced.into_parts();
-    parts.source.files.extend(scene.source.clone());
-    parts.source.files.extend(scene.series.iter().map(|file| file.source.clone()));
-    conversion.body = FlexBody::new(parts)?;
-    Ok((conversion, selection))
+    Ok(())
 }

@@ -50,6 +50,7 @@ fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Sc
         source: None,
         series: Vec::new(),
         resolved: false,
+        case: None,
     }
 }
 

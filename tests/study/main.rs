@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod load_cases;
 mod nodal_reference;
 mod output_errors;
 mod reference;

@@ -35,6 +35,7 @@ pub fn nothing_happens(name: &str, duration: f64, tolerance: f64) -> Scene {
         source: None,
         series: Vec::new(),
         resolved: false,
+        case: None,
     }
 }
 
@@ -239,6 +240,7 @@ impl Doing {
             source: None,
             series: Vec::new(),
             resolved: false,
+            case: None,
         }
     }
 }

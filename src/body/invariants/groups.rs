@@ -76,6 +76,11 @@ impl Groups {
         Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }
     }
 
+    /// Those that are in one of them.
+    pub fn or(self, other: Self) -> Self {
+        Self { w1: self.w1 || other.w1, w2: self.w2 || other.w2, w3: self.w3 || other.w3 }
+    }
+
     /// Those that are not there.
     pub fn dropped(self) -> impl Iterator<Item = Group> {
         Group::ALL.into_iter().filter(move |group| !self.has(*group))

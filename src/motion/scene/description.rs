@@ -33,9 +33,25 @@ pub struct Scene {
     pub series: Vec<SeriesFile>,
     /// Whether its vectors are along the axes of a body in its [`Stage`](super::Stage), and its start is that of this body's frame.
     pub resolved: bool,
+    /// Which load case it is of a scene that has several.
+    pub case: Option<LoadCase>,
+}
+
+/// A load case of a scene file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LoadCase {
+    /// Name of what all cases belong to.
+    pub scene: String,
+    /// Name of the case.
+    pub name: String,
 }
 
 impl Scene {
+    /// Name of the load case that it is.
+    pub fn case_name(&self) -> Option<&str> {
+        Some(&self.case.as_ref()?.name)
+    }
+
     /// The same for a body that has only `modes` (from 0, ascending) of the one that it was written for.
     pub fn of_modes(&self, modes: &[usize]) -> Self {
         let mut scene = self.clone();

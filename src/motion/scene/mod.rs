@@ -17,6 +17,7 @@ mod prepared;
 mod read;
 mod read_attitude;
 mod read_carried;
+mod read_cases;
 mod read_columns;
 mod read_numbers;
 mod read_requirements;
@@ -32,7 +33,8 @@ mod vector_history;
 
 pub use axes::Axes;
 pub use description::{
-    Carried, CarriedSpin, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, SeriesFile, Spin,
+    Carried, CarriedSpin, Drive, Initial, Load, LoadCase, ModeStart, Point, Run, Scene, Scheme, SeriesFile,
+    Spin,
 };
 pub(crate) use driving::Driving;
 pub(crate) use effort::fastest_history;
@@ -44,7 +46,7 @@ pub use instants::{Instant, instants};
 pub(crate) use nodal_point::{find_nodal_point, nodal_point};
 pub use peak::Peak;
 pub(crate) use prepared::{damped, ends_a_run};
-pub use read::read_scene;
+pub use read_cases::{read_case, read_cases, read_scene};
 pub use recording::{Path, Recording, Resolution, Setting};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 pub use samples::{Interpolation, Sample, Samples, Sizes};

@@ -1,4 +1,4 @@
-//! Reads `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
+//! Reads a scene of `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
 use super::contradictions::contradictions;
 use super::read_attitude::turning;
@@ -11,16 +11,15 @@ use super::{
     Axes, History, Initial, Interpolation, Load, ModeStart, Run, Scene, Scheme, Spin, VectorHistory,
 };
 use crate::base::diagnostic::Code;
-use crate::base::error::Result;
 use crate::base::provenance::SourceFile;
-use crate::input::{Table, Value, Walk, integer, read_toml};
+use crate::input::{Table, Value, Walk, integer};
 use crate::motion::dynamics::Terms;
 use nalgebra::Vector3;
 use std::ops::Range;
-use std::path::Path;
 use toml::de::DeValue;
 
-const TOP: &[&str] = &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch"];
+pub(super) const TOP: &[&str] =
+    &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case"];
 const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
 const INITIAL: &[&str] =
     &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
@@ -41,19 +40,8 @@ const TOLERANCE: f64 = 1e-9;
 /// Tolerances that rounding leaves a meaning.
 const TOLERANCES: Range<f64> = 1e-14..0.1;
 
-/// Reads a scene.
-///
-/// # Errors
-/// FB101, FB106 when it or a file of its histories cannot be read; FB211 for syntax, unknown, missing or mistyped keys and values that cannot
-/// be; FB213 for what contradicts itself; FB215 to FB217 for what is wrong in files of histories. All of them, in the order of lines.
-pub fn read_scene(path: impl AsRef<Path>) -> Result<Scene> {
-    let path = path.as_ref();
-    let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    read_toml(path, "scene", Code::SceneSyntax, |walk, top| scene(walk, top, name))
-}
-
-/// `None` only with something in `found`, as everything here.
-fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
+/// A scene without cases, named `stem` where it has no name. `None` only with something in `found`, as everything here.
+pub(super) fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
     let required = read_requirements::TABLES.map(|(name, _)| name);
     walk.known_keys(top, "the scene", &[TOP, &required].concat());
     let name = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
@@ -89,6 +77,7 @@ fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
         source: Some(SourceFile::new("scene", walk.path, walk.fingerprint())),
         series: files.into_files(),
         resolved: false,
+        case: None,
     })
 }
 
@@ -323,8 +312,11 @@ mod tests {
         let required = read_requirements::TABLES;
         let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));
         let top = [TOP, &read_requirements::TABLES.map(|(name, _)| name)].concat();
+        let of_case = super::super::read_cases::known_keys();
         let lists = lists.into_iter().map(|(pointer, keys)| (pointer.to_owned(), keys));
-        for (pointer, known) in lists.chain(required).chain([("/properties".to_owned(), &top[..])]) {
+        let whole = [("/properties", &top[..]), ("/properties/case/items/properties", &of_case)]
+            .map(|(at, keys)| (at.to_owned(), keys));
+        for (pointer, known) in lists.chain(required).chain(whole) {
             let pointer = &pointer;
             let object = schema.pointer(pointer).and_then(|v| v.as_object()).expect(pointer);
             let (mut listed, mut known): (Vec<&str>, Vec<&str>) =

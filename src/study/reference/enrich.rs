@@ -31,6 +31,15 @@ impl<B> Enriched<B> {
     }
 }
 
+/// A body that is enriched for several load cases, with what it lacks of its model in each.
+#[derive(Debug, Clone)]
+pub struct EnrichedForCases<B> {
+    /// What the body was last made as.
+    pub made: B,
+    /// For each case what every body on the way lacked, the last one that of `made`; empty where nothing can be said.
+    pub rounds: Vec<Vec<ReferenceError>>,
+}
+
 /// Makes a body of `model` with `make`, which gets nodal forces (N x k) whose static responses the body shall have beside its modes, none at
 /// first. As long as the body lacks more than [`PART_OF_REFERENCE`] of the tolerances of `scene` in its own motion, the forces that its motion
 /// leaves unbalanced at the nodes join these, while that pays. `grows`: whether `make` can follow.
@@ -43,33 +52,89 @@ pub fn enrich<B>(
     memory: Option<u64>,
     grows: bool,
     watch: Watch<'_>,
-    mut make: impl FnMut(&Mat<f64>) -> Result<B>,
+    make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
 ) -> Result<Enriched<B>> {
+    let scenes = std::slice::from_ref(scene);
+    let EnrichedForCases { made, rounds } =
+        enrich_for_cases(model, scenes, memory, grows, watch, make, body)?;
+    Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
+}
+
+/// The same for the load cases `scenes`: what joins the body is what it lacks in any of them, while that pays in one of them. A case in which
+/// it no longer pays asks for nothing more.
+///
+/// # Errors
+/// As [`enrich`].
+pub fn enrich_for_cases<B>(
+    model: &FeModel,
+    scenes: &[Scene],
+    memory: Option<u64>,
+    grows: bool,
+    watch: Watch<'_>,
+    mut make: impl FnMut(&Mat<f64>) -> Result<B>,
+    body: impl Fn(&B) -> &FlexBody,
+) -> Result<EnrichedForCases<B>> {
     let mut loads = Mat::zeros(model.rows().len(), 0);
     let mut made = make(&loads)?;
-    let mut rounds: Vec<ReferenceError> = Vec::new();
+    let mut cases = vec![Asking::default(); scenes.len()];
     let mut poorer = None;
     for round in 0..=MOST_ROUNDS {
         watch(Event::Phase("what the body lacks of the model"));
-        let Some(estimate) = Estimate::new(model, body(&made), scene, PART_OF_REFERENCE, memory)? else {
+        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, PART_OF_REFERENCE, memory);
+        let estimates = scenes.iter().map(estimate).collect::<Result<Vec<_>>>()?;
+        if estimates.iter().all(Option::is_none) {
             break;
-        };
-        let Estimate { error, missing } = estimate;
-        if let (Some(before), Some(earlier)) = (rounds.last(), poorer.take())
-            && error.worst > WORTH * before.worst
-        {
+        }
+        let paid = cases.iter().zip(&estimates).any(|(case, own)| case.was_paid(own.as_ref()));
+        if let (Some(earlier), false) = (poorer.take(), paid) {
             // A shock excites modes without end: no number of responses follows it.
             made = earlier;
             break;
         }
-        let enough = error.worst <= PART_OF_REFERENCE;
-        rounds.push(error);
-        if enough || !grows || round == MOST_ROUNDS || missing.ncols() == 0 {
+        let mut wanted = vec![loads];
+        for (case, estimate) in cases.iter_mut().zip(estimates) {
+            wanted.extend(estimate.and_then(|estimate| case.hear(estimate)));
+        }
+        let is_done = wanted.len() == 1;
+        loads = side_by_side(&wanted.iter().map(Mat::as_ref).collect::<Vec<_>>());
+        if is_done || !grows || round == MOST_ROUNDS {
             break;
         }
-        loads = side_by_side(&[loads.as_ref(), missing.as_ref()]);
         poorer = Some(std::mem::replace(&mut made, make(&loads)?));
     }
-    Ok(Enriched { made, rounds })
+    Ok(EnrichedForCases { made, rounds: cases.into_iter().map(|case| case.rounds).collect() })
+}
+
+/// What a load case has asked for so far.
+#[derive(Debug, Clone, Default)]
+struct Asking {
+    rounds: Vec<ReferenceError>,
+    /// Whether responses to its motion joined the last body.
+    asked: bool,
+    /// Whether responses to its motion did not pay.
+    gave_up: bool,
+}
+
+impl Asking {
+    /// Whether the last body, which has what this case asked for, lacks less than the one before it by as much as pays.
+    fn was_paid(&self, now: Option<&Estimate>) -> bool {
+        match (self.rounds.last(), now) {
+            (Some(before), Some(now)) if self.asked => !Self::in_vain(before, &now.error),
+            _ => false,
+        }
+    }
+
+    fn in_vain(before: &ReferenceError, now: &ReferenceError) -> bool {
+        now.worst > WORTH * before.worst
+    }
+
+    /// Notes what the body lacks, and answers the forces whose responses this case asks for.
+    fn hear(&mut self, estimate: Estimate) -> Option<Mat<f64>> {
+        let Estimate { error, missing } = estimate;
+        self.gave_up |= self.asked && self.rounds.last().is_some_and(|before| Self::in_vain(before, &error));
+        self.asked = error.worst > PART_OF_REFERENCE && missing.ncols() > 0 && !self.gave_up;
+        self.rounds.push(error);
+        self.asked.then_some(missing)
+    }
 }

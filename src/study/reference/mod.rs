@@ -7,6 +7,6 @@ mod estimate;
 mod motion_shapes;
 mod residual;
 
-pub use enrich::{Enriched, enrich};
+pub use enrich::{Enriched, EnrichedForCases, enrich, enrich_for_cases};
 pub use estimate::{PART_OF_REFERENCE, ReferenceError};
 pub use motion_shapes::MotionShapes;

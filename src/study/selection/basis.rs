@@ -13,6 +13,14 @@ pub struct WantedResponses {
 }
 
 impl WantedResponses {
+    /// The responses that any of `scenes` wants.
+    pub fn of_any(scenes: &[Scene]) -> Self {
+        scenes.iter().map(Self::of).fold(Self::default(), |all, own| Self {
+            centrifugal: all.centrifugal || own.centrifugal,
+            interfaces: all.interfaces || own.interfaces,
+        })
+    }
+
     /// The responses that `scene` wants.
     pub fn of(scene: &Scene) -> Self {
         let motion = scene.requirements.motion.angular_velocity.is_some_and(|range| range.length() > 0.0);
@@ -29,7 +37,8 @@ impl WantedResponses {
 /// Free modes are wanted up to so many times the highest frequency of interest; what is above answers statically.
 pub const BEYOND_BAND: f64 = 2.0;
 
-/// lambda up to which free modes are wanted in a scene with a band.
-pub fn largest_eigenvalue(scene: &Scene) -> Option<f64> {
-    scene.requirements.band.map(|band| (TAU * BEYOND_BAND * band).powi(2))
+/// lambda up to which free modes are wanted: by the highest band of `scenes`, where one of them has a band.
+pub fn largest_eigenvalue(scenes: &[Scene]) -> Option<f64> {
+    let bands = scenes.iter().filter_map(|scene| scene.requirements.band);
+    bands.reduce(f64::max).map(|band| (TAU * BEYOND_BAND * band).powi(2))
 }

@@ -16,11 +16,10 @@ pub(super) const PART_OF_BOUNDS: f64 = 0.5;
 /// How far the run may stay behind the rotation that the scene allows for its measurements to count.
 pub(super) const SLACK_OF_RANGE: f64 = 1.01;
 
-/// Sets of groups that a body in `scene` may be left with, cheapest first. A body that is carried keeps all: dropped groups are those of
+/// Sets of groups that a body may be left with, cheapest first. A body that is carried keeps all: dropped groups are those of
 /// its own modes, and what the interface takes from these needs them.
-pub(super) fn sets_in(scene: &Scene) -> impl Iterator<Item = Groups> {
-    let all = scene.carried.is_none();
-    sets().filter(move |set| all || *set == Groups::ALL)
+pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = Groups> {
+    sets().filter(move |set| !carried || *set == Groups::ALL)
 }
 
 /// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size of K_ff, W3 two times three.
@@ -144,4 +143,22 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
 /// The trial with the largest errors, one at least.
 pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
     trials.max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in")
+}
+
+/// The trial of a model in all load cases: that of the case in which its errors take the largest part of what is left of the tolerances there.
+/// Of a scene alone it is its own.
+pub(super) fn together(trials: Vec<Trial>) -> Trial {
+    let part = |trial: &Trial| (!trial.passed(), trial.worst / trial.budget);
+    let larger = |a: &Trial, b: &Trial| {
+        let (a, b) = (part(a), part(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    };
+    let by_case: Vec<f64> = trials.iter().map(|trial| trial.worst).collect();
+    let several = trials.len() > 1;
+    let largest = trials.into_iter().enumerate().max_by(|a, b| larger(&a.1, &b.1).then(b.0.cmp(&a.0)));
+    let (at, mut trial) = largest.expect("a load case to try it in");
+    if several {
+        (trial.case, trial.by_case) = (Some(at), by_case);
+    }
+    trial
 }

@@ -2,8 +2,11 @@
 
 mod basis;
 mod bounds;
+mod by_case;
 mod cases;
+mod deciding;
 mod decisions;
+mod demand;
 mod dropped_terms;
 mod first_order;
 mod norms;
@@ -19,11 +22,12 @@ mod warnings;
 
 pub use basis::{BEYOND_BAND, WantedResponses, largest_eigenvalue};
 pub use bounds::{Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Start, TorqueDefect};
+pub use by_case::CaseSelection;
 pub use decisions::Ground;
 pub use norms::Norms;
 pub use participation::{Participation, participations};
 pub use search::liveliest_modes;
-pub use select::{Selection, rule_out, select, select_from};
+pub use select::{Selection, rule_out, select, select_for_cases, select_from};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};

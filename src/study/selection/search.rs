@@ -1,6 +1,6 @@
 //! The search for a cheaper model, by measured motion.
 
-use super::cases::{Case, PART_OF_BOUNDS, sets_in, worst};
+use super::cases::{Case, sets_in, together, worst};
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Groups};
@@ -27,14 +27,17 @@ impl Choice {
     }
 }
 
-/// Modes by what they do beside the tolerances, most first.
-fn by_share(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<usize> {
-    let weight = |j: &usize| {
-        let share = &shares[*j];
-        (share.deflection / tolerance.deflection).max(share.stress / tolerance.stress)
-    };
-    let mut ranked: Vec<usize> = (0..shares.len()).collect();
-    ranked.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.cmp(b)));
+/// What modes do beside the tolerances.
+fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
+    let weight =
+        |share: &ModeShare| (share.deflection / tolerance.deflection).max(share.stress / tolerance.stress);
+    shares.iter().map(weight).collect()
+}
+
+/// Modes by their weights, most first.
+fn by_weight(weights: &[f64]) -> Vec<usize> {
+    let mut ranked: Vec<usize> = (0..weights.len()).collect();
+    ranked.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
     ranked
 }
 
@@ -44,57 +47,65 @@ fn by_share(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<usize> {
 /// FB212 where the scene does not fit the body.
 pub fn liveliest_modes(body: &FlexBody, scene: &Scene, motion: &Trace) -> Result<Vec<usize>> {
     let case = Case::new(body, scene, None)?;
-    Ok(by_share(&case.runs().shares(motion), &scene.requirements.tolerance))
+    Ok(by_weight(&weights(&case.runs().shares(motion), &scene.requirements.tolerance)))
 }
 
-/// The scenes with their reference motions.
+/// A scene that models are tried in, with the motion that they are measured against.
+pub(super) struct Tried<'s> {
+    pub runs: TrialRuns<'s>,
+    pub measure: Measure<'s>,
+}
+
+/// The scenes of one load case.
+pub(super) struct TriedCase<'s> {
+    pub tried: Vec<Tried<'s>>,
+    /// What is left of the tolerances.
+    pub budget: f64,
+}
+
+/// The search for a model that holds in all load cases.
 pub(super) struct Search<'s> {
-    pub cases: &'s [(TrialRuns<'s>, Measure<'s>)],
-    /// Whether terms were dropped by bounds already.
-    pub by_bounds: bool,
-    /// Part of the tolerances that the whole body lacks of the model.
-    pub reserved: f64,
+    /// One at least.
+    pub cases: &'s [TriedCase<'s>],
+    /// Groups that have to stay: a run that turns slower than its scene allows shows of no term that it may be dropped.
+    pub fixed: Groups,
+    /// Whether something carries the body in a case: all groups stay then.
+    pub carried: bool,
 }
 
 impl Search<'_> {
-    /// What the body itself and bounds leave of the tolerances.
-    pub fn budget(&self) -> f64 {
-        let left = (1.0 - self.reserved).max(0.0);
-        if !self.by_bounds {
-            return left;
-        }
-        // What is measured is relative to a motion that may be larger than that of the whole body by as much as bounds allow.
-        let Tolerance { deflection, stress, reaction, .. } = self.cases[0].0.scene.requirements.tolerance;
-        (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
-    }
-
     fn body(&self) -> &FlexBody {
-        self.cases[0].0.body
+        self.cases[0].tried[0].runs.body
     }
 
-    fn measured(&self, modes: &[usize], groups: Groups, budget: f64) -> Result<Trial> {
-        let measured = |(runs, measure): &(TrialRuns<'_>, Measure<'_>)| -> Result<Trial> {
-            Ok(runs.measured(measure, modes, groups, budget)?.0)
+    /// A model tried in all load cases; it may spend `part` of what is left of the tolerances of each.
+    fn measured(&self, modes: &[usize], groups: Groups, part: f64) -> Result<Trial> {
+        let in_case = |case: &TriedCase<'_>| -> Result<Trial> {
+            let measured = |Tried { runs, measure }: &Tried<'_>| -> Result<Trial> {
+                Ok(runs.measured(measure, modes, groups, part * case.budget)?.0)
+            };
+            Ok(worst(case.tried.iter().map(measured).collect::<Result<Vec<_>>>()?.into_iter()))
         };
-        Ok(worst(self.cases.iter().map(measured).collect::<Result<Vec<_>>>()?.into_iter()))
+        Ok(together(self.cases.iter().map(in_case).collect::<Result<Vec<_>>>()?))
     }
 
     /// The cheapest groups with all modes; they leave a part of the tolerances for these.
     pub fn terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
-        self.cheapest(PART_OF_TERMS * self.budget(), choice, trials)
+        self.cheapest(PART_OF_TERMS, choice, trials)
     }
 
     /// Cheaper groups with the modes that are kept, where these take less of the tolerances than was left to them.
     pub fn fewer_terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
-        self.cheapest(self.budget(), choice, trials)
+        self.cheapest(1.0, choice, trials)
     }
 
     /// The first set of groups whose motion is within a part of the tolerances.
-    fn cheapest(&self, budget: f64, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
-        let smaller = sets_in(self.cases[0].0.scene)
-            .filter(|set| *set != choice.groups && set.and(choice.groups) == *set);
+    fn cheapest(&self, part: f64, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+        let smaller = sets_in(self.carried)
+            .filter(|set| *set != choice.groups && set.and(choice.groups) == *set)
+            .filter(|set| set.and(self.fixed) == self.fixed);
         for groups in smaller.collect::<Vec<_>>() {
-            let trial = self.measured(&choice.modes, groups, budget)?;
+            let trial = self.measured(&choice.modes, groups, part)?;
             let passed = trial.passed();
             trials.push(trial);
             if passed {
@@ -107,16 +118,25 @@ impl Search<'_> {
 
     /// Modes by what they do, most first.
     fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
-        let mut by_case = self.cases.iter().map(|(runs, measure)| runs.shares(measure.trace()));
-        choice.shares = by_case.next().unwrap_or_default();
-        for other in by_case {
-            for (share, other) in choice.shares.iter_mut().zip(other) {
-                share.amplitude = share.amplitude.max(other.amplitude);
-                share.deflection = share.deflection.max(other.deflection);
-                share.stress = share.stress.max(other.stress);
+        let mut weight = vec![0.0f64; self.body().n_modes()];
+        choice.shares.clear();
+        for case in self.cases {
+            for Tried { runs, measure } in &case.tried {
+                let shares = runs.shares(measure.trace());
+                let own = weights(&shares, &runs.scene.requirements.tolerance);
+                weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
+                if choice.shares.is_empty() {
+                    choice.shares = shares;
+                    continue;
+                }
+                for (share, other) in choice.shares.iter_mut().zip(shares) {
+                    share.amplitude = share.amplitude.max(other.amplitude);
+                    share.deflection = share.deflection.max(other.deflection);
+                    share.stress = share.stress.max(other.stress);
+                }
             }
         }
-        by_share(&choice.shares, &self.cases[0].0.scene.requirements.tolerance)
+        by_weight(&weight)
     }
 
     /// The fewest modes, in the order of what they do, whose motion is within the tolerances.
@@ -131,7 +151,7 @@ impl Search<'_> {
         let (mut too_few, mut enough) = (0, ranked.len());
         while too_few + 1 < enough {
             let count = too_few.midpoint(enough);
-            let trial = self.measured(&first(count), choice.groups, self.budget())?;
+            let trial = self.measured(&first(count), choice.groups, 1.0)?;
             if trial.passed() {
                 enough = count;
             } else {
@@ -148,7 +168,7 @@ impl Search<'_> {
     pub fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<bool> {
         let ranked = self.ranked(choice);
         let mut best: Option<(f64, Groups, Vec<usize>)> = None;
-        for groups in sets_in(self.cases[0].0.scene) {
+        for groups in sets_in(self.carried) {
             if groups.and(choice.groups) != groups {
                 continue;
             }
@@ -168,7 +188,7 @@ impl Search<'_> {
             }
             let mut modes = ranked[..fits].to_vec();
             modes.sort_unstable();
-            let trial = self.measured(&modes, groups, self.budget())?;
+            let trial = self.measured(&modes, groups, 1.0)?;
             if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst) {
                 best = Some((trial.worst, groups, modes));
             }

@@ -1,19 +1,18 @@
 //! Decides which terms and modes a body needs in a scene.
 
-use super::basis::BEYOND_BAND;
-use super::cases::{Case, SLACK_OF_RANGE, bounded, scenes, worst};
-use super::decisions::{Ground, decision, decisions, guideline};
+use super::by_case::{CaseSelection, by_case, worst_lacks};
+use super::deciding::Deciding;
+use super::decisions::{Deliberation, Ground, decision, guideline};
+use super::demand::{Demand, OnStage};
 use super::participation::{Participation, participations};
-use super::search::{Choice, Search};
-use super::significance::{Significance, significances};
-use super::situation::{Input, Situation};
+use super::significance::{Significance, largest_significances, significances};
+use super::situation::Input;
 use super::trial::{ModeShare, Trial, multiplications};
-use super::warnings::{phase_drifts, resonances};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::{FlexBody, Groups, TermDecision};
-use crate::motion::scene::{Measure, Scene, Stage, Trace, damped, points_of};
+use crate::motion::scene::{Scene, Tolerance};
 use crate::study::reference::ReferenceError;
 
 /// What was decided, and on what grounds.
@@ -25,7 +24,7 @@ pub struct Selection {
     pub body: String,
     /// Numbers that the decision follows from.
     pub inputs: Vec<Input>,
-    /// Largest errors that are allowed; in the order attitude, deflection, stress, reaction.
+    /// Largest errors that are allowed, of several load cases the least in any; in the order attitude, deflection, stress, reaction.
     pub tolerance: [f64; 4],
     /// Sizes of all terms.
     pub significances: Vec<Significance>,
@@ -58,8 +57,10 @@ pub struct Selection {
     /// The cost that the scene allows, where that decides.
     pub most_multiplications: Option<usize>,
     /// What the body, and those before it that were enriched, lack of the model, the last one the body itself; empty where only a file is at
-    /// hand, or nothing can be estimated.
+    /// hand, or nothing can be estimated. Of several load cases: in that where the body lacks most.
     pub lacks: Vec<ReferenceError>,
+    /// What belongs to each load case; empty of a scene without.
+    pub cases: Vec<CaseSelection>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -76,23 +77,27 @@ impl Selection {
     }
 }
 
-/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in this scene need not hold. `body` needs
-/// to hold none.
+/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in these load cases, one or more, need not hold.
+/// `body` needs to hold none.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
-pub fn rule_out(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<Vec<TermDecision>> {
-    if scene.carried.is_some() {
+/// FB212 where a scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
+pub fn rule_out(body: &FlexBody, scenes: &[Scene], memory: Option<u64>) -> Result<Vec<TermDecision>> {
+    if scenes.iter().any(|scene| scene.carried.is_some()) {
         return Ok(Vec::new());
     }
-    let stage = Stage::new(body, scene)?;
-    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
-    let scenes = scenes(body, scene)?;
-    let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
-    let trials = bounded(&cases, false)?;
-    let Some(passed) = trials.iter().find(|trial| trial.passed()) else { return Ok(Vec::new()) };
-    let rotation = &cases[0].situation.spin;
-    Ok(passed.kept.dropped().map(|group| decision(group, false, passed, scene, rotation)).collect())
+    let stages = scenes.iter().map(|scene| on_stage(body, scene, scenes)).collect::<Result<Vec<_>>>()?;
+    let demands = demands(&stages, scenes, memory, false)?;
+    let passed = |(at, demand): (usize, &Demand<'_>)| {
+        let trial = demand.bounds.iter().find(|trial| trial.passed())?;
+        Some(Trial { case: Some(at), ..trial.clone() })
+    };
+    let passed: Option<Vec<Trial>> = demands.iter().enumerate().map(passed).collect();
+    let Some(trials) = passed else { return Ok(Vec::new()) };
+    let kept = trials.iter().fold(Groups::NONE, |kept, trial| kept.or(trial.kept));
+    let largest = trials.iter().max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("one scene at least");
+    let rotation = &demands[largest.case.unwrap_or(0)].cases[0].situation.spin;
+    Ok(kept.dropped().map(|group| decision(group, false, largest, &demands, rotation)).collect())
 }
 
 /// The terms and modes of `body` that `scene` needs.
@@ -119,184 +124,134 @@ pub fn select_from(
     memory: Option<u64>,
     watch: Watch<'_>,
 ) -> Result<Selection> {
-    let stage = Stage::new(body, scene)?;
-    let (body, scene) = (&*damped(&stage.body, &stage.scene)?, &*stage.scene);
-    let (loads, _) = points_of(body, scene)?;
-    let situation = Situation::new(body, scene, &loads);
-    let scenes = scenes(body, scene)?;
-    let cases = scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
-    let significances = significances(&situation, body);
+    select_for_cases(body, &[lacks.to_vec()], std::slice::from_ref(scene), memory, watch)
+}
 
+/// The same for the load cases `scenes`: the terms and modes with which every one of them is within its own tolerances. A group that bounds
+/// rule out in some cases is measured in the others; modes are ranked by the most that they do beside the tolerances of any case.
+///
+/// * `lacks`: for each case as in [`select_from`]; nothing is known of cases that it does not reach.
+///
+/// # Errors
+/// As [`select`].
+///
+/// # Panics
+/// When there is no case.
+pub fn select_for_cases(
+    body: &FlexBody,
+    lacks: &[Vec<ReferenceError>],
+    scenes: &[Scene],
+    memory: Option<u64>,
+    watch: Watch<'_>,
+) -> Result<Selection> {
+    assert!(!scenes.is_empty(), "a scene to select for");
+    let stages = scenes.iter().map(|scene| on_stage(body, scene, scenes)).collect::<Result<Vec<_>>>()?;
     watch(Event::Phase("bounds"));
-    let mut deciding = Deciding::new(body, scene, &cases, stage.found.clone())?;
-    deciding.lacks(lacks);
-    let mode_reason = match scene.run.duration {
-        None => deciding.choose_by_band(),
-        Some(_) => deciding.choose_by_motion(&situation.spin, watch)?,
+    let mut demands = demands(&stages, scenes, memory, true)?;
+    for (demand, lacks) in demands.iter_mut().zip(lacks) {
+        demand.lacks = lacks;
+    }
+    let mut deciding = Deciding::new(&demands);
+    let mode_reason = match deciding.has_run() {
+        false => deciding.choose_by_band(),
+        true => deciding.choose_by_motion(watch)?,
     };
-    let Deciding { choice, trials, diagnostics, short_of, .. } = deciding;
-    let tolerance = scene.requirements.tolerance;
-    let decided = decisions(body, scene, &situation.spin, &choice, &trials, short_of);
-    let (terms, grounds) = decided.into_iter().unzip();
+    let Deciding { choice, trials, diagnostics, short_of, chosen_by_case, .. } = deciding;
+    for (demand, short_of) in demands.iter_mut().zip(short_of) {
+        demand.short_of = short_of;
+    }
+    let decided = Deliberation { demands: &demands, choice: &choice, trials: &trials }.decisions();
+    let (terms, grounds): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
+    let first = &demands[0];
     Ok(Selection {
-        scene: scene.name.clone(),
-        body: body.source().name.clone(),
-        inputs: situation.inputs().into_iter().cloned().collect(),
-        tolerance: [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction],
-        significances,
-        multiplications: multiplications(body, body.invariants().groups()),
-        terms,
-        grounds,
+        scene: scenes[0]
+            .case
+            .as_ref()
+            .filter(|_| scenes.len() > 1)
+            .map_or(&first.scene.name, |case| &case.scene)
+            .clone(),
+        body: first.body.source().name.clone(),
+        inputs: inputs(&demands),
+        tolerance: least_tolerances(&demands),
+        significances: largest_significances(
+            demands.iter().map(|one| significances(&one.situation, one.body)),
+        ),
+        multiplications: multiplications(first.body, first.body.invariants().groups()),
         guideline: guideline(choice.groups),
         groups: choice.groups,
-        n_modes: body.n_modes(),
-        frequencies_hz: body.frequencies_hz(),
-        participations: participations(body, scene, &loads, &choice.modes),
+        n_modes: first.body.n_modes(),
+        frequencies_hz: first.body.frequencies_hz(),
+        participations: static_responses(&demands, &choice.modes),
+        cases: by_case(&demands, &choice, &trials, &grounds, chosen_by_case),
+        terms,
+        grounds,
         modes: choice.modes,
         shares: choice.shares,
         mode_reason,
         chosen: choice.chosen,
-        most_multiplications: scene.requirements.multiplications,
+        most_multiplications: first.scene.requirements.multiplications,
         trials,
-        lacks: lacks.to_vec(),
+        lacks: worst_lacks(&demands),
         diagnostics: once(diagnostics),
     })
 }
 
-/// A selection on its way: what was tried and what is chosen so far.
-struct Deciding<'s> {
-    body: &'s FlexBody,
-    scene: &'s Scene,
-    cases: &'s [Case<'s>],
-    /// The groups that bounds leave, where these rule out some.
-    by_bounds: Option<Groups>,
-    choice: Choice,
-    trials: Vec<Trial>,
-    /// Part of the tolerances that the body itself lacks of the model.
-    reserved: f64,
-    /// The largest rotation of the runs and that which the scene allows, where the runs stay behind it.
-    short_of: Option<(f64, f64)>,
-    diagnostics: Vec<Diagnostic>,
+/// Body and scene on their stage; where there are several load cases, an error says which it belongs to.
+fn on_stage<'s>(body: &'s FlexBody, scene: &'s Scene, scenes: &[Scene]) -> Result<OnStage<'s>> {
+    OnStage::new(body, scene).map_err(|error| match scene.case_name().filter(|_| scenes.len() > 1) {
+        Some(name) => error.about(format!("case `{name}`")),
+        None => error,
+    })
 }
 
-impl<'s> Deciding<'s> {
-    /// All modes, and what bounds leave of the groups.
-    fn new(
-        body: &'s FlexBody,
-        scene: &'s Scene,
-        cases: &'s [Case<'s>],
-        diagnostics: Vec<Diagnostic>,
-    ) -> Result<Self> {
-        let trials = bounded(cases, true)?;
-        let by_bounds = trials.iter().find(|trial| trial.passed()).map(|trial| trial.kept);
-        let held = body.invariants().groups();
-        let choice = Choice {
-            groups: by_bounds.map_or(held, |kept| kept.and(held)),
-            modes: (0..body.n_modes()).collect(),
-            shares: Vec::new(),
-            chosen: None,
-        };
-        Ok(Self { body, scene, cases, by_bounds, choice, trials, reserved: 0.0, short_of: None, diagnostics })
-    }
-
-    /// Reserves what the body lacks of the model.
-    fn lacks(&mut self, rounds: &[ReferenceError]) {
-        let Some(own) = rounds.last() else { return };
-        self.reserved = if own.is_reference() { own.worst } else { 0.0 };
-        self.diagnostics.extend(own.warning(self.scene));
-    }
-
-    /// Chooses the modes of the band of the scene, all without one; gives the reason.
-    fn choose_by_band(&mut self) -> String {
-        let band = self.scene.requirements.band;
-        let modes = self.body.modes();
-        let within = |&j: &usize| {
-            let frequency = modes.eigenvalue[j].sqrt() / std::f64::consts::TAU;
-            // Residual vectors are what makes up for the modes beyond the band.
-            let free = modes.provenance.get(j).is_none_or(|from| from == "free mode");
-            band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
-        };
-        let within: Vec<usize> = self.choice.modes.iter().copied().filter(within).collect();
-        if !within.is_empty() {
-            self.choice.modes = within;
+fn demands<'d>(
+    stages: &'d [OnStage<'_>],
+    scenes: &'d [Scene],
+    memory: Option<u64>,
+    tier_1: bool,
+) -> Result<Vec<Demand<'d>>> {
+    let mut demands =
+        stages.iter().map(|stage| Demand::new(stage, memory, tier_1)).collect::<Result<Vec<_>>>()?;
+    if scenes.len() > 1 {
+        for (demand, scene) in demands.iter_mut().zip(scenes) {
+            demand.name = Some(scene.case_name().unwrap_or(&scene.name));
         }
-        match band {
-            Some(band) => {
-                format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
+    }
+    Ok(demands)
+}
+
+/// Numbers that the decision follows from, with their load cases where there are several.
+fn inputs(demands: &[Demand<'_>]) -> Vec<Input> {
+    let of = |demand: &Demand<'_>| {
+        let own = |input: &Input| match demand.name {
+            Some(name) => Input { source: format!("case `{name}`: {}", input.source), ..input.clone() },
+            None => input.clone(),
+        };
+        demand.situation.inputs().map(own)
+    };
+    demands.iter().flat_map(of).collect()
+}
+
+/// Largest errors that are allowed in all load cases.
+fn least_tolerances(demands: &[Demand<'_>]) -> [f64; 4] {
+    let of = |tolerance: &Tolerance| {
+        [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction]
+    };
+    let all = demands.iter().map(|demand| of(demand.tolerance()));
+    all.reduce(|a, b| std::array::from_fn(|i| a[i].min(b[i]))).expect("a scene")
+}
+
+/// What the selected modes lack of static responses; loads that several load cases have stand there once.
+fn static_responses(demands: &[Demand<'_>], modes: &[usize]) -> Vec<Participation> {
+    let mut all: Vec<Participation> = Vec::new();
+    for demand in demands {
+        for one in participations(demand.body, demand.scene, &demand.loads, modes) {
+            if !all.contains(&one) {
+                all.push(one);
             }
-            None => "the scene has neither a duration nor a band: all".to_owned(),
         }
     }
-
-    /// Chooses terms and modes by motion that is integrated; gives the reason for the modes.
-    fn choose_by_motion(&mut self, spin: &Input, watch: Watch<'_>) -> Result<String> {
-        watch(Event::Phase("reference motion"));
-        let references = self.reference_motions()?;
-        let (body, cases) = (self.body, self.cases);
-        let measures = references.iter().map(|reference| Measure::new(body, reference));
-        let measured: Vec<_> = cases.iter().map(Case::runs).zip(measures).collect();
-        let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
-        if spin.value > SLACK_OF_RANGE * largest && self.scene.requirements.motion.angular_velocity.is_some()
-        {
-            self.short_of = Some((largest, spin.value));
-        }
-        watch(Event::Phase("trials"));
-        let search =
-            Search { cases: &measured, by_bounds: self.by_bounds.is_some(), reserved: self.reserved };
-        let reason = self.search(&search)?;
-        self.measure_choice(&search)?;
-        Ok(reason)
-    }
-
-    /// The motion of the whole body, as far as bounds leave it whole, in every case.
-    fn reference_motions(&mut self) -> Result<Vec<Trace>> {
-        let mut references = Vec::new();
-        for case in self.cases {
-            let (reference, said) = case.runs().motion(self.choice.groups)?;
-            self.diagnostics.extend(said);
-            references.push(reference);
-        }
-        Ok(references)
-    }
-
-    /// Drops terms and modes; gives the reason for the modes.
-    fn search(&mut self, search: &Search<'_>) -> Result<String> {
-        let (choice, trials) = (&mut self.choice, &mut self.trials);
-        if let Some(most) = self.scene.requirements.multiplications {
-            return Ok(match search.within_cost(most, choice, trials)? {
-                true => format!("the most accurate of at most {most} multiplications"),
-                false => format!("no model takes {most} multiplications or fewer: everything is kept"),
-            });
-        }
-        // A run that turns slower than the scene allows shows of no term that it may be dropped.
-        let shows_terms = self.short_of.is_none();
-        if shows_terms {
-            search.terms(choice, trials)?;
-        }
-        search.modes(choice, trials)?;
-        if shows_terms {
-            search.fewer_terms(choice, trials)?;
-        }
-        Ok("the fewest whose motion is within the tolerances".to_owned())
-    }
-
-    /// Measures the chosen model in every case, and says what may go wrong with it.
-    fn measure_choice(&mut self, search: &Search<'_>) -> Result<()> {
-        let mut chosen = Vec::new();
-        let mut growth = None;
-        for (runs, measure) in search.cases {
-            let (modes, groups) = (&self.choice.modes, self.choice.groups);
-            let (trial, history) = runs.measured(measure, modes, groups, search.budget())?;
-            let tolerance = &self.scene.requirements.tolerance;
-            let own = history.and_then(|history| history.growth(measure.trace(), tolerance));
-            growth = [growth, own].into_iter().flatten().reduce(f64::max);
-            self.diagnostics.extend(resonances(runs, measure, modes));
-            chosen.push(trial);
-        }
-        self.diagnostics.extend(growth.map(phase_drifts));
-        self.choice.chosen = Some(worst(chosen.into_iter()));
-        Ok(())
-    }
+    all
 }
 
 /// Each diagnostic once.

@@ -101,6 +101,18 @@ fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] 
     ]
 }
 
+/// The largest of every term in any of several load cases, one at least.
+pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance>>) -> Vec<Significance> {
+    let larger = |mut all: Vec<Significance>, other: Vec<Significance>| {
+        for (one, other) in all.iter_mut().zip(other) {
+            one.bound = one.bound.max(other.bound);
+            one.of_body = one.of_body.zip(other.of_body).map(|(a, b)| a.max(b));
+        }
+        all
+    };
+    cases.reduce(larger).unwrap_or_default()
+}
+
 /// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation or the body axis where they
 /// are largest.
 ///

@@ -48,6 +48,10 @@ pub struct Trial {
     pub worst: f64,
     /// Why there are no errors; empty where there are.
     pub remark: String,
+    /// Of several load cases the one (from 0) that the errors are of: where they take the largest part of what is left of the tolerances.
+    pub case: Option<usize>,
+    /// Largest error over its tolerance in each load case, where it was tried in several.
+    pub by_case: Vec<f64>,
 }
 
 impl Trial {
@@ -175,6 +179,8 @@ impl TrialRuns<'_> {
             budget,
             worst: errors.map_or(f64::INFINITY, |errors| errors.worst(&self.scene.requirements.tolerance)),
             remark: history.as_ref().err().cloned().unwrap_or_default(),
+            case: None,
+            by_case: Vec::new(),
         };
         Ok((trial, history.ok()))
     }
@@ -191,6 +197,8 @@ impl TrialRuns<'_> {
             budget,
             worst: f64::INFINITY,
             remark: String::new(),
+            case: None,
+            by_case: Vec::new(),
         };
         match self.bounds(norms, run, kept) {
             Ok(errors) => {
