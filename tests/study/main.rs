@@ -6,6 +6,7 @@ mod support;
 mod load_cases;
 mod nodal_reference;
 mod output_errors;
+mod random_verdicts;
 mod reference;
 mod response;
 mod select_command;

@@ -9,8 +9,9 @@ use crate::motion::scene::Scene;
 use crate::numerics::linalg::side_by_side;
 use faer::Mat;
 
-/// What a body still lacks, relative to the one before it, for its modes to be worth their cost.
-const WORTH: f64 = 0.7;
+/// What a body still lacks, relative to the one before it, for its modes to be worth their cost: the first responses may leave most of what has
+/// inertia to those of the next round.
+const WORTH: f64 = 0.9;
 
 /// How often a body is enriched at the most.
 const MOST_ROUNDS: usize = 4;

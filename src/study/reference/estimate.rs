@@ -1,5 +1,6 @@
 //! What a body lacks of the model that it was made of, estimated along its motion in a scene.
 
+use super::answered::answered;
 use super::compressed::{Compressed, principal};
 use super::residual::NodalView;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -32,8 +33,8 @@ const MOST_RESPONSES: usize = 12;
 pub struct ReferenceError {
     /// Number of modes of the body.
     pub modes: usize,
-    /// Its errors against the motion of all nodes, estimated: the static responses to what the equations of all nodes leave unbalanced along its
-    /// motion. Nothing is estimated of attitude and reaction.
+    /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the equations of all nodes leave unbalanced
+    /// along its motion. Nothing is estimated of attitude and reaction.
     pub errors: OutputErrors,
     /// The larger of both over its tolerance.
     pub worst: f64,
@@ -101,7 +102,7 @@ impl Estimate {
         let mut same_steps = scene.clone();
         same_steps.run.scheme = motion.scheme;
         let residual = view.residual(&instants(body, &same_steps, &times)?);
-        let missed = Missed::new(&view, body, residual)?;
+        let missed = Missed::new(&view, body, residual)?.moving(&view, &times, scene.initial.settled);
         let energies = missed.root_energies();
         let largest = (0..energies.len()).fold(0, |at, i| if energies[i] > energies[at] { i } else { at });
         let errors = missed.errors(&view, body, &energies, &motion, &watched, &times);
@@ -124,9 +125,9 @@ fn energy_scale(motion: &Trace) -> f64 {
     Peak::of(&motion.time, roots).value.max(motion.resolution.root_energy)
 }
 
-/// The static responses E c(t) that a body lacks.
+/// The motion E c(t) that a body lacks, of static responses E.
 struct Missed {
-    /// Compressed residual.
+    /// Compressed residual; its amplitudes are those of the responses.
     forces: Compressed,
     /// E = K^+ B (N x k), beside the modes.
     responses: Mat<f64>,
@@ -155,6 +156,16 @@ impl Missed {
         let energy = gram(responses.as_ref(), model.pencil().apply_stiffness(responses.as_ref()).as_ref());
         let energy = symmetric_part(&energy);
         Ok(Self { forces, responses, energy })
+    }
+
+    /// The same with the inertia of what is missed: it need not follow the forces as if they were static.
+    fn moving(mut self, view: &NodalView<'_>, times: &[f64], settled: bool) -> Self {
+        let inertia =
+            gram(self.responses.as_ref(), view.model.pencil().apply_mass(self.responses.as_ref()).as_ref());
+        let inertia = symmetric_part(&inertia);
+        let moving = answered(&self.energy, &inertia, &self.forces.amplitudes, times, settled);
+        self.forces.amplitudes = moving.unwrap_or(self.forces.amplitudes);
+        self
     }
 
     /// The root of the elastic energy of what is missed, at every instant.

@@ -1,0 +1,393 @@
+//! A random search for bodies and scenes that break the estimate of what a body lacks of its model, or the verdict of a selection: both are held
+//! to the motion of all nodes.
+//!
+//! The suite runs a few seeds. `FLEXBODY_VERDICTS=200 cargo test --test study random_verdicts -- --nocapture` runs so many and prints the
+//! distribution; with `FLEXBODY_BLESS=1` it becomes `docs/verdicts.md`.
+
+use crate::support::elements::{Kind as Element, MassRule, Material};
+use crate::support::general::raw_fixture;
+use crate::support::mesh::{Mesh, grid};
+use crate::support::plane::rectangle;
+use crate::support::random::Random;
+use crate::support::scenes::nothing_happens;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::model::{FeModel, RawModel};
+use flexbody::motion::dynamics::Terms;
+use flexbody::motion::scene::{
+    Axes, History, Initial, Load, OutputErrors, Point, Scene, Spin, Stage, Tolerance, Trace, VectorHistory,
+    trace, trace_at,
+};
+use flexbody::numerics::eigen::{Resume, Wanted};
+use flexbody::study::selection::select_from;
+use flexbody::study::tailoring::Tailoring;
+use flexbody::study::trade::{Allowed, NodalReference};
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Seeds that the suite runs.
+const FEW: u64 = 6;
+
+/// Largest deflection that a load makes by itself, relative to the extent of the body: equations of all nodes and estimates are of small
+/// deformation.
+const DEFLECTION: f64 = 2e-3;
+
+/// Errors below this part of a tolerance are those of integration and rounding.
+const COUNTS: f64 = 1e-3;
+
+/// What the distribution leaves open, in words.
+const REMAINS: &str = "\nAll estimates of the last 60 seeds below a third of the truth are of the plane frame, whose nodes have rotations, mostly after it was enriched; the cause has not been found. Carried bodies are not in the\n\
+    table, since nothing is estimated for them; nor are attitude and reactions. Before the inertia of what is lacking was counted, estimates of the stress were below half of the truth in 26 % of calm scenes (40 seeds, least 0.13), and one verdict missed its tolerance.\n";
+
+/// How loads begin. A shock excites modes without end, which no number of responses follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Start {
+    Calm,
+    Shock,
+}
+
+/// A body and a scene that nobody chose.
+struct Case {
+    seed: u64,
+    what: String,
+    model: FeModel,
+    scene: Scene,
+    start: Start,
+    modes: usize,
+}
+
+/// What came of it.
+struct Outcome {
+    seed: u64,
+    what: String,
+    start: Start,
+    /// Estimated over true error of the body before and after it was enriched: deflection and stress, where the true error counts.
+    effectivity: Vec<(&'static str, f64)>,
+    /// Whether the selection says that its tolerances hold, and its true error over the tolerance.
+    verdict: (bool, f64),
+    /// The output that this error is of.
+    output: &'static str,
+}
+
+fn part(random: &mut Random) -> f64 {
+    0.5 * (random.signed() + 1.0)
+}
+
+fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * part(random)
+}
+
+fn pick(random: &mut Random, count: u64) -> u64 {
+    random.next_u64() % count
+}
+
+/// A block of bricks, askew, whose stiffness and density change along it.
+fn graded_block(random: &mut Random) -> RawModel {
+    let cells = [3 + pick(random, 3) as i32, 1 + pick(random, 2) as i32, 1];
+    let size = [between(random, 0.3, 0.7), between(random, 0.2, 0.5), between(random, 0.1, 0.4)];
+    let [skew, taper] = [between(random, 0.0, 0.2), between(random, -0.1, 0.1)];
+    let mesh = Mesh::from_cells(Element::Hex8, &grid(cells), |[x, y, z]| {
+        [size[0] * x + skew * y, size[1] * y * (1.0 - taper * x), size[2] * z * (1.0 + taper * y)]
+    });
+    let border = size[0] * between(random, 0.3, 0.7) * f64::from(cells[0]);
+    let stiff = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let soft = Material {
+        youngs: 4.0 * 10f64.powf(-1.5 * part(random)),
+        density: between(random, 0.3, 3.0),
+        ..stiff
+    };
+    let left = mesh.part(|node| node[0] < border).assemble(&stiff, MassRule::Consistent);
+    let right = mesh.part(|node| node[0] >= border).assemble(&soft, MassRule::Consistent);
+    left.plus(&right).raw_model()
+}
+
+/// A body: solid, plane, or with rotations of its nodes.
+fn model(random: &mut Random) -> (String, FeModel) {
+    let (name, raw) = match pick(random, 5) {
+        0 => {
+            let (columns, rows) = (3 + pick(random, 3) as usize, 1 + pick(random, 2) as usize);
+            let raw = rectangle(columns, rows, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]);
+            (format!("plane rectangle {columns} x {rows}"), raw)
+        }
+        1 => ("plane frame with rotations".to_owned(), raw_fixture("plane_frame")),
+        _ => ("graded block".to_owned(), graded_block(random)),
+    };
+    (name, FeModel::from_raw(raw).expect("a sound model").model)
+}
+
+fn settings(modes: usize) -> ConvertSettings {
+    ConvertSettings {
+        modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
+        lumped: Vec::new(),
+        ..ConvertSettings::default()
+    }
+}
+
+/// A history of a load, from zero where nothing is to begin with a shock.
+fn history(random: &mut Random, start: Start, duration: f64, rate: f64) -> History {
+    let frequency = between(random, 0.1, 2.0) * rate / TAU;
+    match (start, pick(random, 3)) {
+        (Start::Shock, 0) => History::Constant(1.0),
+        (Start::Shock, _) => History::Sine { amplitude: 1.0, frequency, phase: between(random, 0.5, 2.5) },
+        (Start::Calm, 0) => {
+            History::Ramp { from: 0.0, to: 1.0, start: 0.0, duration: between(random, 0.3, 1.0) * duration }
+        }
+        (Start::Calm, _) => History::Sine { amplitude: 1.0, frequency, phase: 0.0 },
+    }
+}
+
+fn case(seed: u64) -> Case {
+    // Seeds that follow one another shall not give streams that do.
+    let mut random = Random(seed.wrapping_mul(0x5851_f42d_4c95_7f2d));
+    let random = &mut random;
+    let (name, model) = model(random);
+    let probe = convert(&model, &settings(6), SILENT).expect("a body").body;
+    let rate = probe.modes().eigenvalue[0].sqrt();
+    let duration = between(random, 0.5, 2.0) * TAU / rate;
+    let start = if pick(random, 4) == 0 { Start::Shock } else { Start::Calm };
+    let plane = model.dimension() == 2;
+    let direction = |random: &mut Random| {
+        let [x, y, z] = random.vector::<3>();
+        Vector3::new(x, y, if plane { 0.0 } else { z })
+    };
+    let load = |random: &mut Random| Load {
+        at: Point::Node(model.nodes().ids[pick(random, model.nodes().ids.len() as u64) as usize]),
+        force: VectorHistory::Along {
+            direction: direction(random),
+            factor: history(random, start, duration, rate),
+        },
+        torque: VectorHistory::nothing(),
+        axes: if pick(random, 2) == 0 { Axes::Body } else { Axes::World },
+    };
+    let count = 1 + pick(random, 2);
+    let loads: Vec<Load> = (0..count).map(|_| load(random)).collect();
+    let turn = if plane { Vector3::z() } else { Vector3::from(random.vector::<3>()).normalize() };
+    let speed = between(random, 0.0, 0.05) * rate;
+    let spun = pick(random, 3) == 0;
+    let tolerance = 10f64.powf(between(random, -2.3, -0.8));
+    let mut scene = Scene {
+        initial: Initial {
+            angular_velocity: if spun { Vector3::zeros() } else { turn * speed },
+            settled: start == Start::Calm,
+            ..Initial::default()
+        },
+        loads,
+        ..nothing_happens("random", duration, 1e-9)
+    };
+    scene.spin = spun.then_some(Spin {
+        velocity: VectorHistory::Along {
+            direction: turn,
+            factor: History::Ramp { from: speed, to: 1.5 * speed, start: 0.0, duration },
+        },
+        axes: Axes::Model,
+        start: None,
+        hold: true,
+    });
+    scene.requirements.damping = (pick(random, 2) == 0).then_some(0.02);
+    scene.requirements.tolerance = Tolerance {
+        attitude: tolerance,
+        deflection: tolerance,
+        stress: tolerance,
+        reaction: tolerance,
+        least_deflection: None,
+    };
+    scale_loads(&mut scene, &probe);
+    let modes = 3 + pick(random, 6) as usize;
+    let what = format!(
+        "{name}, {} rows, {modes} modes, {count} loads, {}, {}, tolerance {tolerance:.1e}",
+        model.rows().len(),
+        if spun { "spun" } else { "free" },
+        if start == Start::Shock { "shock" } else { "calm" }
+    );
+    Case { seed, what, model, scene, start, modes }
+}
+
+/// Makes the loads so large that they deflect the body by [`DEFLECTION`].
+fn scale_loads(scene: &mut Scene, probe: &FlexBody) {
+    let mut alone = scene.clone();
+    (alone.spin, alone.initial) = (None, Initial { settled: scene.initial.settled, ..Initial::default() });
+    // Deflections of a load this small are linear in it.
+    let small = 1e-9 * probe.modes().eigenvalue[0] * probe.invariants().mass() * probe.extent();
+    alone.loads.iter_mut().for_each(|load| load.force = load.force.scaled(small));
+    let (motion, _) = trace(probe, &alone, None, |_| ()).expect("a motion");
+    let factor = small * DEFLECTION / motion.extremes.deflection.value.max(f64::MIN_POSITIVE);
+    scene.loads.iter_mut().for_each(|load| load.force = load.force.scaled(factor));
+}
+
+/// Errors of `body` in `scene` against the motion of all nodes.
+fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> Result<OutputErrors> {
+    let stage = Stage::new(body, scene)?;
+    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ())?;
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)?;
+    errors_beside(&nodal, &stage.body, &stage.scene, &motion)
+}
+
+fn errors_beside(
+    nodal: &NodalReference<'_>,
+    body: &FlexBody,
+    scene: &Scene,
+    motion: &Trace,
+) -> Result<OutputErrors> {
+    let mut scene = scene.clone();
+    scene.run.scheme = motion.scheme;
+    let own = trace_at(body, &scene, nodal.time(), None)?;
+    Ok(nodal.errors(body, &own).expect("a body of the model").largest())
+}
+
+/// Effectivities of an estimate where the true errors count.
+fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64) -> Vec<(&'static str, f64)> {
+    let both =
+        [("deflection", estimated.deflection, found.deflection), ("stress", estimated.stress, found.stress)];
+    both.into_iter()
+        .filter_map(|(name, estimated, found)| Some((name, estimated?, found?)))
+        .filter(|(_, _, found)| *found > COUNTS * tolerance)
+        .map(|(name, estimated, found)| (name, estimated / found))
+        .collect()
+}
+
+fn outcome(case: &Case) -> Result<Outcome> {
+    let Case { seed, what, model, scene, start, modes } = case;
+    let tolerance = scene.requirements.tolerance;
+    let tailoring = Tailoring { settings: settings(*modes), by_band: false };
+    let enriched = tailoring.convert(model, scene, Resume::default(), SILENT)?;
+    let made = &enriched.made.body;
+    let plain = convert(model, &settings(*modes), SILENT)?.body;
+    let mut effectivity = Vec::new();
+    if let Some(first) = enriched.rounds.first() {
+        effectivity.extend(effectivities(
+            &first.errors,
+            &true_errors(model, &plain, scene)?,
+            tolerance.stress,
+        ));
+    }
+    let selection = select_from(made, &enriched.rounds, scene, None, SILENT)?;
+    let stage = Stage::new(made, scene)?;
+    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ())?;
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)?;
+    if enriched.rounds.len() > 1 {
+        let found = errors_beside(&nodal, &stage.body, &stage.scene, &motion)?;
+        let last = enriched.error().expect("a round");
+        effectivity.extend(effectivities(&last.errors, &found, tolerance.stress));
+    }
+    let all = stage.body.invariants().groups();
+    let small = stage.body.reduced(&selection.modes, all, Vec::new())?;
+    let mut own = stage.scene.of_modes(&selection.modes);
+    own.run.terms = Terms::ALL.held(selection.groups);
+    let errors = errors_beside(&nodal, &small, &own, &motion)?;
+    let verdict = (selection.holds(), errors.worst(&tolerance));
+    let output = errors.decisive(&tolerance).0;
+    Ok(Outcome { seed: *seed, what: what.clone(), start: *start, effectivity, verdict, output })
+}
+
+/// Quantiles of numbers: the least, 5 %, the median, 95 % and the largest.
+fn quantiles(mut values: Vec<f64>) -> Option<[f64; 5]> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some([0.0, 0.05, 0.5, 0.95, 1.0].map(|part| values[(part * last as f64).round() as usize]))
+}
+
+/// The distribution as a page.
+fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
+    let mut page = String::from(
+        "<!-- Written by FLEXBODY_BLESS=1 FLEXBODY_VERDICTS=COUNT cargo test --test study random_verdicts -->\n\n\
+         # Estimates and verdicts beside the truth\n\n\
+         Random bodies (blocks of bricks askew, with a soft part of up to 30 times less stiffness; plane rectangles; a plane frame with nodal rotations) in random\n\
+         scenes (one or two forces at random nodes, along axes of the body or of the world, ramps and sines; free with a spin, or with a prescribed spin that changes; with\n\
+         modal damping and without; tolerances of 0.5 to 16 %), from static starts (*calm*) and from loads that begin with a *shock*. Each is converted with 3 to 8 free modes, enriched and selected as\n\
+         `select MODEL` does it, and held to the motion of all nodes (`trade --reference nodal`). None of the scenes was chosen: they follow from a seed\n\
+         (`tests/study/random_verdicts.rs`).\n\n",
+    );
+    let _ = writeln!(
+        page,
+        "{} scenes were run; {} could not be: {}.\n",
+        outcomes.len(),
+        not_run.len(),
+        if not_run.is_empty() { "none".to_owned() } else { not_run.join("; ") }
+    );
+    page.push_str("## Effectivity: the estimated error of a body over the true one\n\nOf bodies as they were first converted and as they were enriched, where the true error is more than a thousandth of the tolerance.\n\n| start | output | numbers | least | 5 % | median | 95 % | largest | below 1/2 |\n|---|---|---|---|---|---|---|---|---|\n");
+    for start in [Start::Calm, Start::Shock] {
+        for output in ["deflection", "stress"] {
+            let of = outcomes.iter().filter(|one| one.start == start).flat_map(|one| &one.effectivity);
+            let values: Vec<f64> = of.filter(|(name, _)| *name == output).map(|(_, value)| *value).collect();
+            let (count, low) = (values.len(), values.iter().filter(|value| **value < 0.5).count());
+            let Some(quantiles) = quantiles(values) else { continue };
+            let cells = quantiles.map(|value| format!("{value:.2}")).join(" | ");
+            let name = format!("{start:?}").to_lowercase();
+            let _ = writeln!(
+                page,
+                "| {name} | {output} | {count} | {cells} | {:.0} % |",
+                100.0 * low as f64 / count as f64
+            );
+        }
+    }
+    page.push_str(REMAINS);
+    page.push_str("\n## Verdicts: the true error of the recommended body over the tolerance\n\n| start | verdicts that say it holds | least | 5 % | median | 95 % | largest | miss the tolerance |\n|---|---|---|---|---|---|---|---|\n");
+    for start in [Start::Calm, Start::Shock] {
+        let held = outcomes.iter().filter(|one| one.start == start && one.verdict.0);
+        let values: Vec<f64> = held.map(|one| one.verdict.1).collect();
+        let all = outcomes.iter().filter(|one| one.start == start).count();
+        let (count, missed) = (values.len(), values.iter().filter(|worst| **worst > 1.0).count());
+        let Some(quantiles) = quantiles(values) else { continue };
+        let cells = quantiles.map(|value| format!("{value:.2}")).join(" | ");
+        let name = format!("{start:?}").to_lowercase();
+        let _ = writeln!(page, "| {name} | {count} of {all} | {cells} | {missed} |");
+    }
+    let mut missed: Vec<&Outcome> =
+        outcomes.iter().filter(|one| one.verdict.0 && one.verdict.1 > 1.0).collect();
+    missed.sort_by(|a, b| b.verdict.1.total_cmp(&a.verdict.1));
+    if !missed.is_empty() {
+        page.push_str("\nThose that miss it:\n\n");
+    }
+    for one in missed {
+        let _ = writeln!(
+            page,
+            "* seed {}: {}: {} {:.2} of what is allowed",
+            one.seed, one.what, one.output, one.verdict.1
+        );
+    }
+    page
+}
+
+#[test]
+fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
+    let asked = std::env::var("FLEXBODY_VERDICTS").ok().and_then(|count| count.parse().ok());
+    let (mut outcomes, mut not_run) = (Vec::new(), Vec::new());
+    for seed in 1..=asked.unwrap_or(FEW) {
+        let case = case(seed);
+        match outcome(&case) {
+            Ok(one) => {
+                println!("{seed} {}: {:?} {} {:?}", one.what, one.verdict, one.output, one.effectivity);
+                outcomes.push(one);
+            }
+            Err(error) => {
+                println!("{seed} {}: {error}", case.what);
+                not_run.push(format!("seed {seed} {}", error.diagnostics()[0].code().id()));
+            }
+        }
+    }
+    let page = page(&outcomes, &not_run);
+    println!("{page}");
+    if asked.is_some() && std::env::var_os("FLEXBODY_BLESS").is_some() {
+        std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/verdicts.md"), &page)
+            .expect("written");
+    }
+    if asked.is_none() {
+        assert!(not_run.is_empty(), "{not_run:?}");
+        for one in outcomes {
+            let (holds, worst) = one.verdict;
+            assert!(!holds || worst <= 1.0, "{}: {worst}", one.what);
+            let calm = one.start == Start::Calm;
+            assert!(
+                !calm || one.effectivity.iter().all(|(_, value)| *value > 0.4),
+                "{}: {:?}",
+                one.what,
+                one.effectivity
+            );
+        }
+    }
+}
