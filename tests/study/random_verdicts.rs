@@ -253,7 +253,7 @@ fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64)
 fn outcome(case: &Case) -> Result<Outcome> {
     let Case { seed, what, model, scene, start, modes } = case;
     let tolerance = scene.requirements.tolerance;
-    let tailoring = Tailoring { settings: settings(*modes), by_band: false };
+    let tailoring = Tailoring { settings: settings(*modes), by_band: false, of_motion: false };
     let enriched = tailoring.convert(model, scene, Resume::default(), SILENT)?;
     let made = &enriched.made.body;
     let plain = convert(model, &settings(*modes), SILENT)?.body;
