@@ -1,8 +1,9 @@
-//! Cost of one evaluation of the equations of motion at 20 and 90 modes: `cargo bench --bench dynamics`, with `-- --json` for
-//! benches/dynamics.py.
+//! Cost of one evaluation of the equations of motion at 20 and 90 modes: `cargo bench --bench dynamics`, with
+//! `-- --json` for benches/dynamics.py.
 //!
-//! Accelerations of a free body from its state, each state another, beside the same equations in dense matrices of nalgebra as
-//! they are printed (theory section 6). Processor time on Linux, best of several: other programs only ever slow a run down.
+//! Accelerations of a free body from its state, each state another, beside the same equations in dense
+//! matrices of nalgebra as they are printed (theory section 6). Processor time on Linux, best of several:
+//! other programs only ever slow a run down.
 
 #[path = "../tests/support/mod.rs"]
 mod support;

@@ -1,8 +1,10 @@
 //! Steps of the classical Runge-Kutta method with a free body, as benches/dynamics.py asks for them:
-//! `cargo bench --bench dynamics_steps -- START.json` reads body, start, step and count, and prints the last state.
+//! `cargo bench --bench dynamics_steps -- START.json` reads body, start, step and count, and prints the last
+//! state.
 //!
-//! {"body": FILE, "step": s, "steps": n, "repeats": times that the same steps are taken, "velocity": [3], "omega": [3], "q": [nf], "qd": [nf]},
-//! vectors of the frame along its axes, which are those of the world at the start.
+//! {"body": FILE, "step": s, "steps": n, "repeats": times that the same steps are taken, "velocity": [3],
+//! "omega": [3], "q": [nf], "qd": [nf]}, vectors of the frame along its axes, which are those of the world at
+//! the start.
 
 use flexbody::motion::dynamics::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms};
 use nalgebra::Vector3;

@@ -1,8 +1,8 @@
-//! Cost of the evaluation in C beside the library: `cargo bench --bench embedded`; with `-- --write` the table goes into
-//! docs/formats/embedded.md.
+//! Cost of the evaluation in C beside the library: `cargo bench --bench embedded`; with `-- --write` the
+//! table goes into docs/formats/embedded.md.
 //!
-//! Accelerations of a free body from its state, each state another. Library and C programs take turns; seconds are of the processor, the
-//! ratio of every turn is formed by itself, and medians are told.
+//! Accelerations of a free body from its state, each state another. Library and C programs take turns;
+//! seconds are of the processor, the ratio of every turn is formed by itself, and medians are told.
 
 #[path = "../tests/support/mod.rs"]
 mod support;

@@ -1,8 +1,9 @@
 //! What this machine can do, as one JSON object: `cargo bench --bench floors`.
 //!
-//! `gemm_f64`, `gemm_f32`: GF/s of faer's matrix product, the rate that no factorisation exceeds; `read`: GB/s of a sum over
-//! memory far beyond every cache, the rate that solves and products with sparse matrices cannot exceed. Each on one thread and
-//! on two; best of several, since interruptions only ever slow a run down.
+//! `gemm_f64`, `gemm_f32`: GF/s of faer's matrix product, the rate that no factorisation exceeds; `read`:
+//! GB/s of a sum over memory far beyond every cache, the rate that solves and products with sparse matrices
+//! cannot exceed. Each on one thread and on two; best of several, since interruptions only ever slow a run
+//! down.
 
 use faer::linalg::matmul::matmul;
 use faer::traits::ComplexField;

@@ -1,5 +1,5 @@
-//! A free body at the extremes of spin, step, deformation and duration: what of energy, momentum and state is kept, or how it ends.
-//! `docs/make_stability.py` makes tables of the JSON lines that this prints.
+//! A free body at the extremes of spin, step, deformation and duration: what of energy, momentum and state is
+//! kept, or how it ends. `docs/make_stability.py` makes tables of the JSON lines that this prints.
 //!
 //!     cargo run --release --example extreme_motion -- body.flex.h5
 
@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
-/// A case: spin in parts of the first circular frequency, first modal coordinate in parts of the radius of gyration times the root of
-/// the mass, duration in periods of the first mode.
+/// A case: spin in parts of the first circular frequency, first modal coordinate in parts of the radius of
+/// gyration times the root of the mass, duration in periods of the first mode.
 #[derive(Clone, Copy)]
 struct Case {
     spin: f64,
@@ -29,7 +29,8 @@ const PLAIN: Case = Case { spin: 0.05, deformation: 1e-3, periods: 20.0, nudge: 
 /// What tells a motion that nobody can follow from one that was integrated badly.
 const NUDGE: f64 = 1e-9;
 
-/// Largest change of energy and angular momentum relative to what there was,  largest |q| beside the size of the body, and the state at the end.
+/// Largest change of energy and angular momentum relative to what there was, largest |q| beside the size of
+/// the body, and the state at the end.
 struct Run {
     energy: f64,
     angular: f64,

@@ -1,4 +1,5 @@
-//! From matrices in memory to a flex-body file: a steel truss of 3 x 3 x 8 bays, its rods with consistent mass.
+//! From matrices in memory to a flex-body file: a steel truss of 3 x 3 x 8 bays, its rods with consistent
+//! mass.
 //!
 //!     cargo run --release --example from_memory -- truss.flex.h5
 

@@ -1,10 +1,11 @@
-//! A flexible pendulum: a truss of 3 m that hangs from a ball joint, released at rest, with the constraint force of the joint.
+//! A flexible pendulum: a truss of 3 m that hangs from a ball joint, released at rest, with the constraint
+//! force of the joint.
 //!
 //!     cargo run --release --example pendulum
 //!
-//! It prints its period and the impulse of the joint from one passage through the vertical to the next beside those of the rigid body in closed form, how the
-//! energy drifted, and what the impulses of joint and weight lack of the change of momentum. With four times the stiffness the period is off by a
-//! quarter.
+//! It prints its period and the impulse of the joint from one passage through the vertical to the next beside
+//! those of the rigid body in closed form, how the energy drifted, and what the impulses of joint and weight
+//! lack of the change of momentum. With four times the stiffness the period is off by a quarter.
 
 #[allow(dead_code)] // The other example uses all of it.
 mod joints;
@@ -31,9 +32,11 @@ pub struct Swing {
     pub rigid_period: f64,
     /// Change of the energy, relative to what falls.
     pub energy: f64,
-    /// What is left of the change of momentum without the impulses of joint and weight, relative to that of the weight.
+    /// What is left of the change of momentum without the impulses of joint and weight, relative to that of
+    /// the weight.
     pub impulse: f64,
-    /// Impulse of the joint from one passage through the vertical to the next, relative to that on the rigid body in closed form: along, and upwards.
+    /// Impulse of the joint from one passage through the vertical to the next, relative to that on the rigid
+    /// body in closed form: along, and upwards.
     pub passage: [f64; 2],
     /// The largest gap of the joint, relative to the length.
     pub gap: f64,

@@ -1,5 +1,5 @@
-//! Writes docs/plausibility.md: what the checks of the mass against the stiffness find on every model at hand, in the right order and in
-//! wrong ones.
+//! Writes docs/plausibility.md: what the checks of the mass against the stiffness find on every model at
+//! hand, in the right order and in wrong ones.
 //!
 //!     cargo run --release --example plausibility > docs/plausibility.md
 //!
@@ -21,7 +21,8 @@ const JUDGING: [Code; 6] = [
     Code::InertiaImplausible,
 ];
 
-/// How many exchanges of two nodes are tried for each model at the most, and with how many nodes to check in all.
+/// How many exchanges of two nodes are tried for each model at the most, and with how many nodes to check in
+/// all.
 const EXCHANGES: usize = 60;
 const CHECKED: usize = 40_000;
 
@@ -166,7 +167,8 @@ fn rows_of_nodes(raw: &RawModel) -> Vec<Vec<u32>> {
     rows.into_values().map(sorted).collect()
 }
 
-/// The model with the mass of each node at the place of another with as many rows, and by which part that changes M.
+/// The model with the mass of each node at the place of another with as many rows, and by which part that
+/// changes M.
 fn moved(raw: &RawModel, rows: &[Vec<u32>], to: &[usize]) -> (RawModel, f64) {
     let mut place: Vec<u32> = (0..raw.mass.matrix.n_cols() as u32).collect();
     for (own, &other) in rows.iter().zip(to).filter(|(own, other)| own.len() == rows[**other].len()) {

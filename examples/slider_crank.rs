@@ -1,10 +1,11 @@
-//! A slider-crank of two flexible bodies: a crank of 1 m on a hinge and a rod of 3 m, whose end slides along the axis x, both trusses. It turns freely under
-//! its weight.
+//! A slider-crank of two flexible bodies: a crank of 1 m on a hinge and a rod of 3 m, whose end slides along
+//! the axis x, both trusses. It turns freely under its weight.
 //!
 //!     cargo run --release --example slider_crank
 //!
-//! It prints how the place of the slider and the angular velocity of the crank differ from the rigid mechanism in closed form (kinematics; energy), what the
-//! impulses of hinge, guide and weight lack of the change of momentum, and how the energy drifted. With four times the stiffness a quarter of the difference
+//! It prints how the place of the slider and the angular velocity of the crank differ from the rigid
+//! mechanism in closed form (kinematics; energy), what the impulses of hinge, guide and weight lack of the
+//! change of momentum, and how the energy drifted. With four times the stiffness a quarter of the difference
 //! of the places is left, and half of that of the velocities, which is a vibration.
 
 #[allow(dead_code)] // The other example uses all of it.
@@ -30,9 +31,11 @@ const LENGTHS: [f64; 2] = [2.0 * truss::BAY, 6.0 * truss::BAY];
 
 /// What a run showed, as the largest of everything.
 pub struct Run {
-    /// Difference of the slider's place from that of the rigid mechanism at the same angle of the crank, relative to the crank.
+    /// Difference of the slider's place from that of the rigid mechanism at the same angle of the crank,
+    /// relative to the crank.
     pub slider: f64,
-    /// Difference of the crank's angular velocity from the rigid one at the same angle, root mean square, relative to that at the start.
+    /// Difference of the crank's angular velocity from the rigid one at the same angle, root mean square,
+    /// relative to that at the start.
     pub speed: f64,
     /// Change of the energy, relative to the kinetic energy of the start.
     pub energy: f64,
@@ -57,7 +60,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A truss of so many bays, of steel times a factor, with its ends as interfaces: `foot`, the two sides of it, and `head`.
+/// A truss of so many bays, of steel times a factor, with its ends as interfaces: `foot`, the two sides of
+/// it, and `head`.
 fn body(bays: i32, factor: f64) -> flexbody::Result<FlexBody> {
     let (stiffness, mass, positions) = truss::truss_of([1, 1, bays], factor * truss::YOUNGS);
     let ids: Vec<i64> = (1..=positions.len() as i64).collect();
@@ -80,7 +84,8 @@ fn body(bays: i32, factor: f64) -> flexbody::Result<FlexBody> {
     Ok(model.build()?.convert(&ConvertOptions::default().modes(MODES))?.body)
 }
 
-/// The joints: a hinge about y at the origin, a ball between the bodies, and the end of the rod on the axis x.
+/// The joints: a hinge about y at the origin, a ball between the bodies, and the end of the rod on the axis
+/// x.
 fn joints(bodies: &[FlexBody; 2]) -> flexbody::Result<Vec<Joint>> {
     let end = |body: usize, name: &str| {
         Ok::<End, flexbody::Error>(End::Body(body, bodies[body].interface_point(name)?))
@@ -94,7 +99,8 @@ fn joints(bodies: &[FlexBody; 2]) -> flexbody::Result<Vec<Joint>> {
     ])
 }
 
-/// A body whose foot is at a place; its length, z of the model, lies along the axis x of the world, and it turns about y.
+/// A body whose foot is at a place; its length, z of the model, lies along the axis x of the world, and it
+/// turns about y.
 fn start(body: &FlexBody, foot: Vector3<f64>, velocity: Vector3<f64>, omega: f64) -> flexbody::Result<Start> {
     let model: Matrix3<f64> = Matrix3::from_columns(&[-Vector3::z(), Vector3::y(), Vector3::x()]);
     let axes = model * body.frame().1;
@@ -164,7 +170,8 @@ struct Rigid {
 
 impl Rigid {
     fn new(bodies: &[FlexBody; 2]) -> Self {
-        // Width of the truss, y of the model, along the axes of the body; the centre of mass is in the middle.
+        // Width of the truss, y of the model, along the axes of the body; the centre of mass is in the
+        // middle.
         let about = |body: &FlexBody| {
             let axis = body.frame().1.tr_mul(&Vector3::y());
             axis.dot(&(body.inertia() * axis))

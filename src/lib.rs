@@ -72,8 +72,9 @@
 //! # }
 //! ```
 //!
-//! **Join bodies.** The equations of motion and the points of a body are enough for Lagrange multipliers: `examples/joints/mod.rs` holds flexible
-//! bodies together in some two hundred lines, `examples/pendulum.rs` and `examples/slider_crank.rs` use it.
+//! **Join bodies.** The equations of motion and the points of a body are enough for Lagrange multipliers:
+//! `examples/joints/mod.rs` holds flexible bodies together in some two hundred lines, `examples/pendulum.rs`
+//! and `examples/slider_crank.rs` use it.
 //!
 //! **Hand the body to another program.** Errors carry codes (`docs/codes.md`), with what to do.
 //!
@@ -92,15 +93,16 @@
 //! # }
 //! ```
 //!
-//! Rooms of the sources and the arrows between them: `ARCHITECTURE.md`; `tests/program/architecture.rs` holds them.
+//! Rooms of the sources and the arrows between them: `ARCHITECTURE.md`; `tests/program/architecture.rs` holds
+//! them.
 
 // What only tests look into is unused without them.
 #![cfg_attr(not(feature = "internals"), allow(dead_code, unused_imports))]
 
 mod api;
 
-// The rooms behind the front door. They are no part of the interface: tests and benches of this package see them by the feature
-// `internals`, which promises nothing.
+// The rooms behind the front door. They are no part of the interface: tests and benches of this package see
+// them by the feature `internals`, which promises nothing.
 #[cfg(not(feature = "internals"))]
 mod base;
 #[cfg(feature = "internals")]
@@ -156,9 +158,10 @@ pub use api::{
     Accuracy, Basis, Conversion, ConvertOptions, FlexBody, Frame, Identity, Matrix, Model, ModelBuilder,
     Motion, Scene, Selection, SparseMatrix,
 };
-/// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity forces, accelerations, momenta,
-/// energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`] makes them, [`FlexBody::node_point`] and
-/// [`FlexBody::interface_point`] the points where joints hold a body; `examples/pendulum.rs` joins one to the ground.
+/// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity
+/// forces, accelerations, momenta, energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`]
+/// makes them, [`FlexBody::node_point`] and [`FlexBody::interface_point`] the points where joints hold a
+/// body; `examples/pendulum.rs` joins one to the ground.
 pub mod dynamics {
     pub use crate::motion::dynamics::{
         AngularVelocity, BodyPoint, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes, LoadJacobian,

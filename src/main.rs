@@ -16,14 +16,14 @@ fn main() -> std::process::ExitCode {
         Ok(arguments) => arguments,
         Err(code) => return std::process::ExitCode::from(code as u8),
     };
-    // Where no handler can be set the work is done all the same: an interruption then leaves a temporary file, which the
-    // next run removes.
+    // Where no handler can be set the work is done all the same: an interruption then leaves a temporary
+    // file, which the next run removes.
     let _ = ctrlc::set_handler(interrupted);
     std::process::ExitCode::from(work(arguments) as u8)
 }
 
-/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread grows during it
-/// and ends the process by a signal where there is no memory left.
+/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread
+/// grows during it and ends the process by a signal where there is no memory left.
 fn work(arguments: Arguments) -> ExitCode {
     const STACK: usize = 8 << 20;
     std::thread::scope(|scope| {
@@ -40,14 +40,16 @@ fn work(arguments: Arguments) -> ExitCode {
     })
 }
 
-/// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by page, cleared
-/// (measured: 50 000 page faults and 1 of 15 CPU seconds on a model of 100 000 degrees of freedom).
+/// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by
+/// page, cleared (measured: 50 000 page faults and 1 of 15 CPU seconds on a model of 100 000 degrees of
+/// freedom).
 #[allow(unsafe_code)]
 fn keep_freed_memory() {
-    /// `mi_option_purge_delay` of mimalloc 3, which the bindings do not name, and its default in milliseconds.
+    /// `mi_option_purge_delay` of mimalloc 3, which the bindings do not name, and its default in
+    /// milliseconds.
     const PURGE_DELAY: (i32, i64) = (15, 1000);
-    // SAFETY: reads and sets a number inside the allocator, before any thread is started. Where the number is not the default,
-    // the user has set it, or it is another option in that version of the allocator.
+    // SAFETY: reads and sets a number inside the allocator, before any thread is started. Where the number is
+    // not the default, the user has set it, or it is another option in that version of the allocator.
     unsafe {
         if libmimalloc_sys::mi_option_get(PURGE_DELAY.0) == PURGE_DELAY.1 {
             libmimalloc_sys::mi_option_set(PURGE_DELAY.0, -1);

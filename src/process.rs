@@ -1,4 +1,5 @@
-//! What the program asks of its process: limits that give errors instead of signals, and an end without memory.
+//! What the program asks of its process: limits that give errors instead of signals, and an end without
+//! memory.
 #![allow(unsafe_code)] // an allocator, and calls of the C library that set and end a process
 
 use flexbody::ExitCode;
@@ -10,11 +11,12 @@ use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The program's allocator. Where there is no memory left it ends the program with exit code 4 and a message, since no
-/// code that merely needs a vector could go on.
+/// The program's allocator. Where there is no memory left it ends the program with exit code 4 and a message,
+/// since no code that merely needs a vector could go on.
 ///
-/// Large blocks come and go on all threads: the system allocator gives them back each time, and the page faults and
-/// interrupts of that cost more than the work (measured: half of the factorisation time on two threads).
+/// Large blocks come and go on all threads: the system allocator gives them back each time, and the page
+/// faults and interrupts of that cost more than the work (measured: half of the factorisation time on two
+/// threads).
 pub struct Allocator;
 
 // SAFETY: every call is passed on unchanged; a failure that is not expected does not return.
@@ -114,12 +116,13 @@ pub fn end(code: ExitCode) -> ! {
     std::process::exit(code as i32)
 }
 
-/// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files may be open as
-/// the system allows, since every output holds one; the C library keeps one pool of memory for all threads, not 64 MiB of
-/// address space for each.
+/// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files
+/// may be open as the system allows, since every output holds one; the C library keeps one pool of memory for
+/// all threads, not 64 MiB of address space for each.
 pub fn prepare() {
     #[cfg(unix)]
-    // SAFETY: sets limits of this process, before any thread is started; what fails leaves things as they are.
+    // SAFETY: sets limits of this process, before any thread is started; what fails leaves things as they
+    // are.
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
         let mut files = libc::rlimit { rlim_cur: 0, rlim_max: 0 };

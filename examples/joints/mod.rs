@@ -1,25 +1,28 @@
-//! Flexible bodies held together by joints: equations of motion of index 1 with Lagrange multipliers, dense and plain. It is an example of what
-//! the library is for, and no multibody program.
+//! Flexible bodies held together by joints: equations of motion of index 1 with Lagrange multipliers, dense
+//! and plain. It is an example of what the library is for, and no multibody program.
 //!
-//! Every body has the velocities nu = (V, omega, qd) and the equations Mc(q) nu' = f of `flexbody::dynamics`. A joint holds two points together
-//! along axes of the world: one row c(t) = 0 for each axis, with the rates
+//! Every body has the velocities nu = (V, omega, qd) and the equations Mc(q) nu' = f of `flexbody::dynamics`.
+//! A joint holds two points together along axes of the world: one row c(t) = 0 for each axis, with the rates
 //!
 //! ```text
 //! c' = J nu = 0,        c'' = J nu' + drift = 0
 //! ```
 //!
-//! where J nu is the difference of the velocities of the two points. The constraint forces are J'lambda ([ZG19] (57) to (60): the Jacobian of the
-//! constraints on nodes, times that of the nodes by the coordinates of the body, which is what `BodyPoint::add_force` applies), so that
+//! where J nu is the difference of the velocities of the two points. The constraint forces are J'lambda
+//! ([ZG19] (57) to (60): the Jacobian of the constraints on nodes, times that of the nodes by the coordinates
+//! of the body, which is what `BodyPoint::add_force` applies), so that
 //!
 //! ```text
 //! [Mc  -J'] [nu'   ]   [f     ]
 //! [J    0 ] [lambda] = [-drift]        (J Mc^-1 J') lambda = -drift - J Mc^-1 f
 //! ```
 //!
-//! lambda is the force along the axis that the joint exerts on its first end; the second end has the opposite. A step is one of the classical
-//! Runge-Kutta method; places and velocities are then brought back onto the constraints by the least change in the measure of the mass.
+//! lambda is the force along the axis that the joint exerts on its first end; the second end has the
+//! opposite. A step is one of the classical Runge-Kutta method; places and velocities are then brought back
+//! onto the constraints by the least change in the measure of the mass.
 //!
-//! Units are those of the bodies, all the same ones; vectors are along axes of the world unless said otherwise.
+//! Units are those of the bodies, all the same ones; vectors are along axes of the world unless said
+//! otherwise.
 
 mod steps;
 
@@ -50,8 +53,8 @@ pub struct Joint {
     pub axes: [bool; 3],
 }
 
-/// A body at the start: the origin and the axes (as columns) of its frame, their velocity and the angular velocity along the axes of the body;
-/// without deformation.
+/// A body at the start: the origin and the axes (as columns) of its frame, their velocity and the angular
+/// velocity along the axes of the body; without deformation.
 pub struct Start {
     pub origin: Vector3<f64>,
     pub axes: Matrix3<f64>,
@@ -59,7 +62,8 @@ pub struct Start {
     pub omega: Vector3<f64>,
 }
 
-/// Bodies, the joints between them, and gravity. Its state y has for every body R, the Euler parameters, q and nu = (V, omega, qd).
+/// Bodies, the joints between them, and gravity. Its state y has for every body R, the Euler parameters, q
+/// and nu = (V, omega, qd).
 pub struct Assembly<'a> {
     pub bodies: &'a [EquationsOfMotion],
     pub masses: Vec<f64>,
@@ -183,7 +187,8 @@ impl<'a> Assembly<'a> {
         Ok(row)
     }
 
-    /// The multipliers lambda with (J Mc^-1 J') lambda = `amounts`, and the answers Mc^-1 J'lambda of all bodies.
+    /// The multipliers lambda with (J Mc^-1 J') lambda = `amounts`, and the answers Mc^-1 J'lambda of all
+    /// bodies.
     fn answer(&self, rows: &[Row], amounts: DVector<f64>) -> Result<(DVector<f64>, Vec<DVector<f64>>)> {
         let shared = |a: &Row, b: &Row| -> f64 {
             let pairs = a.parts.iter().flat_map(|x| b.parts.iter().map(move |y| (x, y)));
@@ -235,7 +240,8 @@ impl<'a> Assembly<'a> {
         Ok(Rates { state, multipliers: multipliers.as_slice().to_vec() })
     }
 
-    /// Brings places and velocities back onto the constraints, by the least changes in the measure of the mass.
+    /// Brings places and velocities back onto the constraints, by the least changes in the measure of the
+    /// mass.
     pub fn settle(&self, y: &mut [f64]) -> Result<()> {
         for _ in 0..2 {
             let rows = self.rows(y)?;

@@ -3,7 +3,8 @@
 use super::{Assembly, End, Result};
 use nalgebra::Vector3;
 
-/// One step of the classical Runge-Kutta method. Answers the mean of the multipliers over the step, to the order of the method.
+/// One step of the classical Runge-Kutta method. Answers the mean of the multipliers over the step, to the
+/// order of the method.
 pub fn step(assembly: &Assembly<'_>, y: &mut [f64], width: f64) -> Result<Vec<f64>> {
     let shifted =
         |by: f64, rates: &[f64]| -> Vec<f64> { y.iter().zip(rates).map(|(y, r)| y + by * r).collect() };

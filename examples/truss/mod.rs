@@ -1,4 +1,5 @@
-// Steel trusses, their rods with consistent mass: what the examples and the guide of the library make models of.
+// Steel trusses, their rods with consistent mass: what the examples and the guide of the library make models
+// of.
 
 use sprs::{CsMat, TriMat};
 
@@ -12,7 +13,8 @@ pub fn truss() -> (CsMat<f64>, CsMat<f64>, Vec<[f64; 3]>) {
     truss_of([3, 3, 8], YOUNGS)
 }
 
-/// K, M and the positions of the joints of so many bays along x, y and z, of a material with this modulus (Pa).
+/// K, M and the positions of the joints of so many bays along x, y and z, of a material with this modulus
+/// (Pa).
 pub fn truss_of(bays: [i32; 3], youngs: f64) -> (CsMat<f64>, CsMat<f64>, Vec<[f64; 3]>) {
     let positions = joints(bays);
     let (stiffness, mass) = matrices(&positions, youngs);

@@ -16,8 +16,9 @@ use crate::study::selection::{select, select_for_cases};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
-/// A flexible body: modes and the constant invariants that the equations of motion of its floating frame are made of (theory section 2).
-/// Vectors are along the axes of the body frame, about its origin, in the units of the model.
+/// A flexible body: modes and the constant invariants that the equations of motion of its floating frame are
+/// made of (theory section 2). Vectors are along the axes of the body frame, about its origin, in the units
+/// of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlexBody(pub(super) flex_body::FlexBody);
 
@@ -39,8 +40,8 @@ impl FlexBody {
     /// Reads a flex-body file.
     ///
     /// # Errors
-    /// FB101 and FB106 when it cannot be read; FB701 to FB703 when it is another file, of a newer format, or breaks its schema; FB712 when
-    /// it was changed since it was written.
+    /// FB101 and FB106 when it cannot be read; FB701 to FB703 when it is another file, of a newer format, or
+    /// breaks its schema; FB712 when it was changed since it was written.
     #[cfg(feature = "hdf5")]
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         crate::formats::flex_body_file::read(path).map(Self)
@@ -55,12 +56,12 @@ impl FlexBody {
         crate::formats::flex_body_file::write(&self.0, path)
     }
 
-    /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the file, and others that belong
-    /// beside it. What the format cannot hold comes back as warnings.
+    /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the
+    /// file, and others that belong beside it. What the format cannot hold comes back as warnings.
     ///
     /// # Errors
-    /// FB801 for a format that is not known; FB720 when no file of this format can be made of the body; FB104 and FB602 when it cannot be
-    /// written.
+    /// FB801 for a format that is not known; FB720 when no file of this format can be made of the body; FB104
+    /// and FB602 when it cannot be written.
     pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
         let (exported, lost) = export(&self.0, find_format(format)?, &ExportOptions::default(), true)?;
         OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
@@ -127,7 +128,8 @@ impl FlexBody {
         self.0.invariants().inertia()
     }
 
-    /// W1 (3 x 3nf): inertia linear in the modal coordinates; `None` when the body was made for a scene that does not need it.
+    /// W1 (3 x 3nf): inertia linear in the modal coordinates; `None` when the body was made for a scene that
+    /// does not need it.
     pub fn w1(&self) -> Option<Matrix> {
         self.0.invariants().w1().map(|w1| shown(w1.as_ref()))
     }
@@ -137,7 +139,8 @@ impl FlexBody {
         self.0.invariants().w2().map(|w2| shown(w2.as_ref()))
     }
 
-    /// W3 (3nf x nf): coupling of rotation and modes through the modal coordinates; `None` as for [`FlexBody::w1`].
+    /// W3 (3nf x nf): coupling of rotation and modes through the modal coordinates; `None` as for
+    /// [`FlexBody::w1`].
     pub fn w3(&self) -> Option<Matrix> {
         self.0.invariants().w3().map(|w3| shown(w3.as_ref()))
     }
@@ -193,7 +196,8 @@ impl FlexBody {
         EquationsOfMotion::new(&self.0, Terms::ALL)
     }
 
-    /// The same for several load cases: the terms and modes with which every one of them is within its tolerances.
+    /// The same for several load cases: the terms and modes with which every one of them is within its
+    /// tolerances.
     ///
     /// # Errors
     /// As [`FlexBody::select`].
@@ -205,8 +209,9 @@ impl FlexBody {
         select_for_cases(&self.0, &[], &scenes, None, SILENT).map(Selection)
     }
 
-    /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v ([`BodyPoint::velocity`]), a force of a joint
-    /// is J'lambda ([`BodyPoint::add_force`]; \[ZG19\] (57) to (60)). `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies so.
+    /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v
+    /// ([`BodyPoint::velocity`]), a force of a joint is J'lambda ([`BodyPoint::add_force`]; \[ZG19\] (57) to
+    /// (60)). `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies so.
     ///
     /// ```
     /// use flexbody::dynamics::Evaluation;
@@ -250,7 +255,8 @@ impl FlexBody {
     /// Simulates the body in a scene.
     ///
     /// # Errors
-    /// FB212 where the scene does not fit the body; FB540 when the integration cannot go on; FB550 when it takes more steps than it may.
+    /// FB212 where the scene does not fit the body; FB540 when the integration cannot go on; FB550 when it
+    /// takes more steps than it may.
     pub fn simulate(&self, scene: &Scene) -> Result<Motion> {
         let (recording, diagnostics) = simulate(&self.0, &scene.0, None, |_| ())?;
         Ok(Motion { recording, diagnostics })

@@ -23,7 +23,8 @@ pub enum Basis {
     CraigBampton,
     /// Free modes, and the static responses to loads at the interfaces (Craig and Chang).
     CraigChang,
-    /// The fewest shapes that the motion of a scene is made of ([`Model::convert_for`]); another motion may need others.
+    /// The fewest shapes that the motion of a scene is made of ([`Model::convert_for`]); another motion may
+    /// need others.
     Scene,
 }
 
@@ -53,7 +54,8 @@ pub enum Frame {
     Model,
 }
 
-/// What is asked of a conversion. The default: 20 free-surface modes, proved complete, in the principal frame.
+/// What is asked of a conversion. The default: 20 free-surface modes, proved complete, in the principal
+/// frame.
 #[derive(Debug, Clone, Default)]
 pub struct ConvertOptions {
     modes: Option<usize>,
@@ -158,8 +160,9 @@ impl Model {
     /// Computes modes and invariants: the body passes every check that `flexbody check` makes.
     ///
     /// # Errors
-    /// FB501 to FB506 where the modes cannot be trusted (not converged, not complete, a mechanism), FB512 where there are none, FB514 where
-    /// the damping feeds energy to them, FB601 where the memory does not suffice; FB714 where an identity does not hold.
+    /// FB501 to FB506 where the modes cannot be trusted (not converged, not complete, a mechanism), FB512
+    /// where there are none, FB514 where the damping feeds energy to them, FB601 where the memory does not
+    /// suffice; FB714 where an identity does not hold.
     pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
         if options.basis == Basis::Scene {
             let message = "a basis made for a scene needs one: `convert_for`";

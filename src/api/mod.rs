@@ -1,5 +1,5 @@
-//! The front door: what a program that uses the library sees. It wraps the types of the other rooms, so that these can change, and shows
-//! arrays as slices.
+//! The front door: what a program that uses the library sees. It wraps the types of the other rooms, so that
+//! these can change, and shows arrays as slices.
 
 mod body;
 mod conversion;

@@ -13,11 +13,12 @@ use std::path::Path;
 pub struct SparseMatrix(pub(super) CscMatrix);
 
 impl SparseMatrix {
-    /// From compressed columns: column j has the entries `col_ptr[j]..col_ptr[j + 1]` of `row_idx` and `values`, ascending by rows.
+    /// From compressed columns: column j has the entries `col_ptr[j]..col_ptr[j + 1]` of `row_idx` and
+    /// `values`, ascending by rows.
     ///
     /// # Errors
-    /// FB303 and FB304 when the slices are no such matrix: pointers that descend or do not end at the number of entries, rows that do not
-    /// ascend or are not below `n`; FB313 for too many rows.
+    /// FB303 and FB304 when the slices are no such matrix: pointers that descend or do not end at the number
+    /// of entries, rows that do not ascend or are not below `n`; FB313 for too many rows.
     pub fn from_csc(n: usize, col_ptr: &[usize], row_idx: &[usize], values: &[f64]) -> Result<Self> {
         let refuse = |code: Code, what: String| {
             Err(Diagnostic::new(code, format!("compressed columns: {what}")).into())
@@ -73,8 +74,8 @@ impl SparseMatrix {
     }
 }
 
-/// A finite element model that passed every check: K and M are symmetric, K has the rigid motions and no other, M is positive
-/// semidefinite and fits the nodes.
+/// A finite element model that passed every check: K and M are symmetric, K has the rigid motions and no
+/// other, M is positive semidefinite and fits the nodes.
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(super) checked: FeModel,
@@ -86,7 +87,8 @@ impl Model {
     /// Reads the model of a manifest (`model.toml`, docs/input.md).
     ///
     /// # Errors
-    /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all of a stage together.
+    /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all of a
+    /// stage together.
     pub fn read(manifest: impl AsRef<Path>) -> Result<Self> {
         let files = read_manifest(manifest)?;
         Self::checked(read_model(&files)?, files.residual_vectors)
@@ -142,7 +144,8 @@ impl ModelBuilder {
         self
     }
 
-    /// Node number and direction of every row (1 to 3 displacements, 4 to 6 rotations), where rows are not x, y, z of each node.
+    /// Node number and direction of every row (1 to 3 displacements, 4 to 6 rotations), where rows are not x,
+    /// y, z of each node.
     pub fn dofs(mut self, labels: impl IntoIterator<Item = (i64, u8)>) -> Self {
         let labels = labels.into_iter().map(|(node, direction)| DofLabel { node, direction });
         self.raw.dofs = Some(labels.collect());
@@ -160,7 +163,8 @@ impl ModelBuilder {
         Ok(self)
     }
 
-    /// A set of nodes that joints and loads act on, coupled to its reference point (the mean of the nodes) by their mean motion.
+    /// A set of nodes that joints and loads act on, coupled to its reference point (the mean of the nodes) by
+    /// their mean motion.
     pub fn interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
         self.raw.interfaces.push(NodeSet::new(name, nodes));
         self

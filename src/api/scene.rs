@@ -15,8 +15,8 @@ impl Scene {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// FB101, FB106 when it or a file of its histories cannot be read; FB211, FB213 for what is wrong in it and FB215 to FB217 in these files, all of
-    /// it; FB219 when it has load cases.
+    /// FB101, FB106 when it or a file of its histories cannot be read; FB211, FB213 for what is wrong in it
+    /// and FB215 to FB217 in these files, all of it; FB219 when it has load cases.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         read_case(path, None).map(Self)
     }

@@ -1,7 +1,7 @@
 //! Memory that is not to be had: who asks for it may say that it does without.
 //!
-//! The program ends with exit code 4 where an allocation fails (`main.rs`), since almost no code could go on. Code that can
-//! go on (a size that a damaged file declares) asks inside [`or_go_without`].
+//! The program ends with exit code 4 where an allocation fails (`main.rs`), since almost no code could go on.
+//! Code that can go on (a size that a damaged file declares) asks inside [`or_go_without`].
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;

@@ -1,7 +1,8 @@
 //! Output files that appear whole or not at all: a temporary file in the same folder, synced, then renamed.
 //!
-//! A temporary file is locked as long as its process lives. A later run removes those in its output folders that nobody
-//! holds: what a process left that was killed. Several outputs of one run appear together, see [`OutputSlot::commit_all`].
+//! A temporary file is locked as long as its process lives. A later run removes those in its output folders
+//! that nobody holds: what a process left that was killed. Several outputs of one run appear together, see
+//! [`OutputSlot::commit_all`].
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -22,7 +23,8 @@ const MOST_LINKS: usize = 40;
 /// A place for one output file, reserved before the work starts.
 ///
 /// Making a slot proves that the folder exists and can be written. The target is touched only by
-/// [`OutputSlot::commit`]; dropping the slot removes the temporary file and leaves an existing target as it is.
+/// [`OutputSlot::commit`]; dropping the slot removes the temporary file and leaves an existing target as it
+/// is.
 #[derive(Debug)]
 pub struct OutputSlot {
     asked: PathBuf,
@@ -45,15 +47,15 @@ fn book() -> MutexGuard<'static, Book> {
     BOOK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary file of every slot, for a process that ends at once: from here on it can neither reserve nor
-/// finish an output file, and a thread that tries to waits for the end. Outputs that are being put in place together are
-/// waited for.
+/// Removes the temporary file of every slot, for a process that ends at once: from here on it can neither
+/// reserve nor finish an output file, and a thread that tries to waits for the end. Outputs that are being
+/// put in place together are waited for.
 pub fn abandon_unfinished() {
     abandon(book());
 }
 
-/// The same for a process without memory, which allocates nothing and does not wait for long: the thread that is out of
-/// memory may hold the list itself. What then stays is removed by the next run.
+/// The same for a process without memory, which allocates nothing and does not wait for long: the thread that
+/// is out of memory may hold the list itself. What then stays is removed by the next run.
 pub fn abandon_unfinished_soon() {
     for _ in 0..100 {
         match BOOK.try_lock() {
@@ -72,7 +74,8 @@ fn abandon(book: MutexGuard<'_, Book>) {
     std::mem::forget(book);
 }
 
-/// A temporary file that the [`Book`] knows as long as it exists, and that is locked as long as this process lives.
+/// A temporary file that the [`Book`] knows as long as it exists, and that is locked as long as this process
+/// lives.
 #[derive(Debug)]
 struct Temporary {
     path: Option<TempPath>,
@@ -131,7 +134,8 @@ impl Book {
     }
 }
 
-/// Locks the file of a slot; false where another process has it already. File systems without locks go without.
+/// Locks the file of a slot; false where another process has it already. File systems without locks go
+/// without.
 #[cfg(unix)]
 fn lock(file: &File) -> bool {
     !matches!(file.try_lock(), Err(std::fs::TryLockError::WouldBlock))
@@ -169,7 +173,8 @@ fn is_at(_: &File, _: &Path) -> bool {
     true
 }
 
-/// The file that an output path stands for: symbolic links are followed, to a file that does not exist yet as well.
+/// The file that an output path stands for: symbolic links are followed, to a file that does not exist yet as
+/// well.
 ///
 /// # Errors
 /// Links that lead in a circle.
@@ -188,13 +193,14 @@ pub fn followed(path: &Path) -> std::io::Result<PathBuf> {
 }
 
 impl OutputSlot {
-    /// Reserves `path`. A symbolic link is followed, so that the file it points to is replaced or made, not the link.
+    /// Reserves `path`. A symbolic link is followed, so that the file it points to is replaced or made, not
+    /// the link.
     ///
     /// # Errors
     /// [`OutputNotFile`](Code::OutputNotFile) when `path` is a folder, a device, empty or a circle of links;
     /// [`OutputFolderMissing`](Code::OutputFolderMissing) when the folder does not exist;
-    /// [`OutputUnwritable`](Code::OutputUnwritable) when `path` is a write-protected file, or no file can be made in
-    /// the folder.
+    /// [`OutputUnwritable`](Code::OutputUnwritable) when `path` is a write-protected file, or no file can be
+    /// made in the folder.
     pub fn prepare(path: impl AsRef<Path>) -> Result<Self> {
         let asked = path.as_ref().to_path_buf();
         let target = target_of(&asked)?;
@@ -266,9 +272,9 @@ impl OutputSlot {
         Self::commit_all([self])
     }
 
-    /// Makes the temporary files the outputs, all of them or none: every file is on the disk before the first gets its
-    /// name, and a signal that ends the program waits until all have theirs. Where one cannot be put in place, what stood
-    /// in the places of the others before comes back, on file systems with hard links.
+    /// Makes the temporary files the outputs, all of them or none: every file is on the disk before the first
+    /// gets its name, and a signal that ends the program waits until all have theirs. Where one cannot be put
+    /// in place, what stood in the places of the others before comes back, on file systems with hard links.
     ///
     /// # Errors
     /// As [`OutputSlot::write`].
@@ -278,8 +284,8 @@ impl OutputSlot {
             slot.temporary.file.sync_all().map_err(|e| slot.failure(&e))?;
         }
         let placed = place_all(&mut slots);
-        // The renames themselves are durable once the folders are synced; where folders cannot be opened they are so
-        // already or cannot be made so, and the files are in place either way.
+        // The renames themselves are durable once the folders are synced; where folders cannot be opened they
+        // are so already or cannot be made so, and the files are in place either way.
         let mut folders: Vec<&Path> = slots.iter().map(|slot| folder_of(&slot.target)).collect();
         folders.dedup();
         for folder in folders {

@@ -1,5 +1,5 @@
-//! From a checked model to a flexible body: bases, the condensation into invariants, lumped comparators, the validated body, and its
-//! verification against the model. No files and no motion.
+//! From a checked model to a flexible body: bases, the condensation into invariants, lumped comparators, the
+//! validated body, and its verification against the model. No files and no motion.
 
 pub mod basis;
 pub mod convert;

@@ -18,8 +18,8 @@ const RECOMPUTED: f64 = 1e-12;
 /// Name of K_ff among the [`primary_differences`].
 const STIFFNESS: &str = "modal_stiffness";
 
-/// What another evaluation of K psi may leave, in units of the rounding estimate eps | |K| |psi| |: the shapes were also
-/// turned into body axes and back.
+/// What another evaluation of K psi may leave, in units of the rounding estimate eps | |K| |psi| |: the
+/// shapes were also turned into body axes and back.
 const ROUNDING: f64 = 30.0;
 
 /// What must hold for `body` without its model: the identities of `flexbody check`.
@@ -133,7 +133,8 @@ impl<'a> Recomputed<'a> {
     /// What the body has of its mass, by two paths.
     fn invariants(&self) -> [IdentityCheck; 2] {
         let body = self.body;
-        // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that is more.
+        // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that
+        // is more.
         let inertia = body.invariants().inertia().diagonal();
         let recomputed = RECOMPUTED
             + body.storage().rounding()
@@ -184,8 +185,8 @@ impl<'a> Recomputed<'a> {
         ]
     }
 
-    /// Residuals, and what rounding of products with K explains: K is huge beside its lowest eigenvalues, and what its products
-    /// round away is no error of the body.
+    /// Residuals, and what rounding of products with K explains: K is huge beside its lowest eigenvalues, and
+    /// what its products round away is no error of the body.
     fn mode_errors(&self) -> ModeErrors {
         let (modes, storage) = (self.body.modes(), self.body.storage());
         let rounding: Vec<f64> = rounding_residual(self.model.stiffness(), self.modes.vectors.as_ref())
@@ -266,8 +267,9 @@ fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) ->
     largest(primary_differences(body.invariants(), own).into_iter().map(excess))
 }
 
-/// How far the Rayleigh quotient of a mode lies outside of the bounds of its eigenvalue at the most, relative. Stored modes are
-/// rounded: their quotients follow the eigenvalues to what any other check of modes allows.
+/// How far the Rayleigh quotient of a mode lies outside of the bounds of its eigenvalue at the most,
+/// relative. Stored modes are rounded: their quotients follow the eigenvalues to what any other check of
+/// modes allows.
 fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
     let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
     let modal_mass = own.modal_mass();
@@ -277,7 +279,8 @@ fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
     }))
 }
 
-/// How far stored and recomputed matrices are from each other, relative to the largest entry, and what rounding allows.
+/// How far stored and recomputed matrices are from each other, relative to the largest entry, and what
+/// rounding allows.
 #[derive(Clone, Copy)]
 struct Difference {
     largest: f64,
@@ -293,7 +296,8 @@ impl Difference {
         Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
     }
 
-    /// The one that comes closer to what is allowed, or goes further beyond it; one that is no number is worst.
+    /// The one that comes closer to what is allowed, or goes further beyond it; one that is no number is
+    /// worst.
     fn worse(self, other: Self) -> Self {
         let is_worse = other.largest.is_nan() || other.largest * self.allowed > self.largest * other.allowed;
         if is_worse { other } else { self }
@@ -362,8 +366,8 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
     Ok(loads.map(difference).reduce(Difference::worse))
 }
 
-/// How far R'MR of the unit translations and rotations of the body frame (in the plane 3 x 3) is from m, c and I0 of the body,
-/// relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
+/// How far R'MR of the unit translations and rotations of the body frame (in the plane 3 x 3) is from m, c
+/// and I0 of the body, relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
 fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
     let own = body.parts().rigid_mass();
     let error = |i: usize, j: usize| (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();

@@ -51,7 +51,8 @@ pub enum Command {
         after_help = "Examples:\n  flexbody trade rod.flex.h5 --scene tumble.toml --report trade.html\n  flexbody trade model.toml --modes 20 --scene tumble.toml --reference nodal --csv trade.csv"
     )]
     Trade(TradeArguments),
-    /// Compute the frequency response of a body between places, and how far it is from that of all nodes of its model
+    /// Compute the frequency response of a body between places, and how far it is from that of all nodes of
+    /// its model
     #[command(
         after_help = "Examples:\n  flexbody response model.toml --modes 20 --band 0..2000 --from big_end --to small_end --damping 0.01 --report response.html\n  flexbody response model.toml rod.flex.h5 --scene crank.toml --csv response.csv\n  flexbody response rod.flex.h5 --band 10..2000 --from big_end:z --to 17:x,z"
     )]
@@ -81,7 +82,9 @@ pub struct ExportArguments {
     /// With --to mbdyn: the last record group that the reader knows; short for --dialect level13 or level19
     #[arg(long, value_name = "LEVEL", value_parser = ["13", "19"], conflicts_with = "dialect")]
     pub mbdyn_level: Option<String>,
-    /// Places of the body to write: nodes, interfaces, node numbers with commas, or both as in interfaces,17,23 [default: the interfaces where the format has frames and the body interfaces, else all nodes]
+    /// Places of the body to write: nodes, interfaces, node numbers with commas, or both as in
+    /// interfaces,17,23
+    /// [default: the interfaces where the format has frames and the body interfaces, else all nodes]
     #[arg(long, value_name = "POINTS")]
     pub points: Option<String>,
     /// Units to write in [default: those of the body]
@@ -135,7 +138,8 @@ fn foreign_formats() -> clap::builder::PossibleValuesParser {
 /// Arguments of `trade`.
 #[derive(Debug, Args)]
 pub struct TradeArguments {
-    /// Flex-body file, whose modes and groups of terms are candidates; or a manifest (.toml), of which settings of `convert` are too
+    /// Flex-body file, whose modes and groups of terms are candidates; or a manifest (.toml), of which
+    /// settings of `convert` are too
     #[arg(value_name = "BODY.flex.h5|MODEL.toml")]
     pub body: PathBuf,
     /// What the body does, and the tolerances (see docs/simulate.md)
@@ -144,7 +148,8 @@ pub struct TradeArguments {
     /// Load case of the scene to take, by its name (a scene with cases needs one)
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
-    /// What errors are measured against: full, the body with all modes and groups, of a manifest twice the modes and residual vectors; nodal, the unreduced equations (manifests only)
+    /// What errors are measured against: full, the body with all modes and groups, of a manifest twice the
+    /// modes and residual vectors; nodal, the unreduced equations (manifests only)
     #[arg(long, value_enum, default_value_t = ReferenceName::Full)]
     pub reference: ReferenceName,
     /// Free modes that candidates of a manifest have at most
@@ -156,7 +161,8 @@ pub struct TradeArguments {
     /// Table to write the candidates to
     #[arg(long, value_name = "TRADE.csv")]
     pub csv: Option<PathBuf>,
-    /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: to time them in a program of your own
+    /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: to time them
+    /// in a program of your own
     #[arg(long, value_name = "FOLDER")]
     pub bodies: Option<PathBuf>,
     /// Do work that is estimated to take more than half an hour: modes, or the motion of all nodes
@@ -176,13 +182,15 @@ pub struct TradeArguments {
 /// Arguments of `response`.
 #[derive(Debug, Args)]
 pub struct ResponseArguments {
-    /// Manifest (.toml) of the model, which says how large the errors are; or a flex-body file alone, whose error is then not known
+    /// Manifest (.toml) of the model, which says how large the errors are; or a flex-body file alone, whose
+    /// error is then not known
     #[arg(value_name = "MODEL.toml|BODY.flex.h5")]
     pub model: PathBuf,
     /// Flex-body file that was made of the model [default: the model is converted]
     #[arg(value_name = "BODY.flex.h5")]
     pub body: Option<PathBuf>,
-    /// Where unit forces act: an interface or a node number, and after a colon directions of x, y, z, rx, ry, rz with commas [default: the displacements; with --scene where its loads act] (repeatable)
+    /// Where unit forces act: an interface or a node number, and after a colon directions of x, y, z, rx, ry,
+    /// rz with commas [default: the displacements; with --scene where its loads act] (repeatable)
     #[arg(long, value_name = "PLACE[:DIRECTIONS]")]
     pub from: Vec<String>,
     /// Where displacements are read, in the same way [default: with --scene what it watches] (repeatable)
@@ -282,7 +290,8 @@ pub struct SimulateArguments {
     /// What the body does (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Load case of the scene to take, by its name [default: all, one after the other; files are named by them]
+    /// Load case of the scene to take, by its name
+    /// [default: all, one after the other; files are named by them]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
     /// HDF5 file to write the motion to
@@ -335,7 +344,8 @@ pub struct ConvertArguments {
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
-    /// Number of flexible modes, up to all of them; static shapes of the basis come on top, and with --basis craig-bampton may stand alone (0: static condensation) [default: 20; imported shapes: all]
+    /// Number of flexible modes, up to all of them; static shapes of the basis come on top, and with --basis
+    /// craig-bampton may stand alone (0: static condensation) [default: 20; imported shapes: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32), conflicts_with = "max_frequency")]
     pub modes: Option<u32>,
     /// All flexible modes up to this frequency instead
@@ -347,7 +357,9 @@ pub struct ConvertArguments {
     /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array
     #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
     pub shapes: Option<PathBuf>,
-    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces, loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. Replaces [basis] of the manifest
+    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces,
+    /// loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. Replaces [basis] of the
+    /// manifest
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,
     /// Promise about the modes
@@ -359,7 +371,8 @@ pub struct ConvertArguments {
     /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
     #[arg(long, value_enum, default_value_t = StorageName::F64)]
     pub storage: StorageName,
-    /// Memory that the program may use: a number with K, M, G or T [default: what the machine and its control groups leave]
+    /// Memory that the program may use: a number with K, M, G or T
+    /// [default: what the machine and its control groups leave]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
     /// Do work that is estimated to take more than half an hour for its number of modes
@@ -374,7 +387,8 @@ pub struct ConvertArguments {
     /// Compute the modes of each lumped mass too, and compare after aligning the subspaces
     #[arg(long)]
     pub lumped_modes: bool,
-    /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose residual vectors and modes where nothing else does
+    /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose
+    /// residual vectors and modes where nothing else does
     #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
     pub scene: Option<PathBuf>,
     /// Load case of the scene to take, by its name [default: all, which one body has to serve]
@@ -383,10 +397,12 @@ pub struct ConvertArguments {
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Keep the search for modes in this file; a run that was interrupted or asks for more modes goes on from it
+    /// Keep the search for modes in this file; a run that was interrupted or asks for more modes goes on from
+    /// it
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
-    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports and checkpoint likewise)
+    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports and
+    /// checkpoint likewise)
     #[arg(long, conflicts_with = "shapes")]
     pub split: bool,
     /// Threads; results do not depend on it [default: all processors]
@@ -434,7 +450,8 @@ pub struct CompareArguments {
     /// What is compared with it
     #[arg(value_name = "B.flex.h5")]
     pub b: PathBuf,
-    /// Of bodies with different numbers of modes, compare the modes that both have: those of the body with fewer, each with the nearest of the other
+    /// Of bodies with different numbers of modes, compare the modes that both have: those of the body with
+    /// fewer, each with the nearest of the other
     #[arg(long)]
     pub common: bool,
     /// Largest relative difference of a frequency
@@ -476,7 +493,8 @@ pub struct Printing {
 pub enum BasisName {
     /// Free-surface modes, computed here
     Free,
-    /// Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit motions of the interfaces
+    /// Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit
+    /// motions of the interfaces
     CraigBampton,
     /// Free-surface modes (--modes counts them), and static responses to unit loads at the interfaces
     CraigChang,
@@ -493,7 +511,8 @@ pub enum AccuracyName {
     Fast,
     /// Residual 1e-9 or the rounding floor, completeness proved
     Standard,
-    /// Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every eigenvalue and digits of every invariant
+    /// Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every
+    /// eigenvalue and digits of every invariant
     Certified,
 }
 

@@ -238,8 +238,8 @@ impl Job<'_> {
     }
 }
 
-/// Loads of residual vectors where the command line names none: those of the manifest; without, those of the scene, of which free modes
-/// alone know nothing.
+/// Loads of residual vectors where the command line names none: those of the manifest; without, those of the
+/// scene, of which free modes alone know nothing.
 fn residual_vectors(arguments: &ConvertArguments, files: &ModelFiles, scenes: &[Scene]) -> Vec<LoadSource> {
     let free = matches!(arguments.basis, BasisName::Free | BasisName::Scene)
         && arguments.accuracy != AccuracyName::Certified;

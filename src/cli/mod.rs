@@ -1,4 +1,5 @@
-//! The command line: arguments, one file per command, progress. The only room that prints or exits; no arithmetic.
+//! The command line: arguments, one file per command, progress. The only room that prints or exits; no
+//! arithmetic.
 
 mod arguments;
 mod audit;

@@ -11,7 +11,8 @@ pub(super) fn is_manifest(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "toml")
 }
 
-/// The files that `manifest` names and the model that they are, checked; none of `outputs` replaces one of them.
+/// The files that `manifest` names and the model that they are, checked; none of `outputs` replaces one of
+/// them.
 pub(super) fn read_checked<'p>(
     manifest: &Path,
     outputs: impl Iterator<Item = &'p PathBuf>,

@@ -4,7 +4,8 @@ use super::arguments::Printing;
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 
-/// What a command found: text for stdout, the same as JSON, warnings and notes, and whether its checks passed.
+/// What a command found: text for stdout, the same as JSON, warnings and notes, and whether its checks
+/// passed.
 pub(super) struct Outcome {
     pub text: String,
     /// The `results` of the object that `--json` prints.

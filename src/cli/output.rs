@@ -10,10 +10,12 @@ use crate::report::output_json;
 use clap::{CommandFactory, Parser};
 use std::io::Write;
 
-/// The arguments of this process; where there is nothing to run, help or what is wrong is printed, and the exit code given.
+/// The arguments of this process; where there is nothing to run, help or what is wrong is printed, and the
+/// exit code given.
 ///
 /// # Errors
-/// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for a command line that is not understood.
+/// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for a command line that is not
+/// understood.
 pub fn parse() -> std::result::Result<Arguments, ExitCode> {
     Arguments::try_parse().map_err(|error| {
         let words = || std::env::args_os().skip(1).take_while(|word| word != "--");
@@ -119,7 +121,8 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
     }
 }
 
-/// Prints diagnostics to stderr: all of them, or errors only when quiet; none with `--json`, whose output has them.
+/// Prints diagnostics to stderr: all of them, or errors only when quiet; none with `--json`, whose output has
+/// them.
 fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
     if printing.json {
         return;

@@ -110,7 +110,8 @@ fn file_number(_: &Path) -> Option<(u64, u64)> {
     None
 }
 
-/// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`: with a number or a name before the extension.
+/// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`: with a number or a name before
+/// the extension.
 pub(super) fn marked(path: &Path, mark: impl std::fmt::Display) -> PathBuf {
     let (Some(stem), extension) = (path.file_stem(), path.extension()) else { return path.to_path_buf() };
     let inner = Path::new(stem);

@@ -5,8 +5,8 @@ use std::sync::{Once, mpsc};
 /// Ticks per second of the CPU times in /proc: fixed for user space on Linux.
 const TICKS: f64 = 100.0;
 
-/// Starts the threads of the whole process: as many as `asked` for, otherwise one for each processor, or as many of them as
-/// the system lets it start; the number in force. Results do not depend on it.
+/// Starts the threads of the whole process: as many as `asked` for, otherwise one for each processor, or as
+/// many of them as the system lets it start; the number in force. Results do not depend on it.
 pub(super) fn use_threads(asked: Option<u16>) -> usize {
     let environment = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok().filter(|&threads| threads > 0);
     let processors = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -15,8 +15,9 @@ pub(super) fn use_threads(asked: Option<u16>) -> usize {
     rayon::current_num_threads()
 }
 
-/// Starts up to `wanted` threads and makes them the pool; without any, this thread is the pool. The pool itself cannot be
-/// tried twice: its threads are started before, and told their work when it is known how many there are.
+/// Starts up to `wanted` threads and makes them the pool; without any, this thread is the pool. The pool
+/// itself cannot be tried twice: its threads are started before, and told their work when it is known how
+/// many there are.
 fn start(wanted: usize) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -79,8 +80,8 @@ pub(super) fn resident_bytes() -> u64 {
     kibibytes(&status, "VmRSS:").unwrap_or(0)
 }
 
-/// Bytes that may still be allocated: up to `limit` where the user gives one, otherwise what the machine has left, or what
-/// the control groups of this process leave of that. `None` where the system does not tell.
+/// Bytes that may still be allocated: up to `limit` where the user gives one, otherwise what the machine has
+/// left, or what the control groups of this process leave of that. `None` where the system does not tell.
 pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
     if let Some(limit) = limit {
         return Some(limit.saturating_sub(resident_bytes()));
@@ -89,8 +90,8 @@ pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
     machine.into_iter().chain(control_groups()).chain(process_limits()).min()
 }
 
-/// What the limits of this process leave (`ulimit -v` and `-d`). They count address space, of which more is reserved than is in
-/// use: who comes closer to a limit than that may still end at it.
+/// What the limits of this process leave (`ulimit -v` and `-d`). They count address space, of which more is
+/// reserved than is in use: who comes closer to a limit than that may still end at it.
 fn process_limits() -> Vec<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
     let bytes = |key: &str| {
@@ -101,7 +102,8 @@ fn process_limits() -> Vec<u64> {
     limits.map(|limit| limit.saturating_sub(resident_bytes())).collect()
 }
 
-/// What each memory control group of this process leaves (versions 1 and 2); files that are mapped count as free.
+/// What each memory control group of this process leaves (versions 1 and 2); files that are mapped count as
+/// free.
 fn control_groups() -> Vec<u64> {
     let groups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let mut left = Vec::new();

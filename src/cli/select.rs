@@ -59,7 +59,8 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     })
 }
 
-/// The load cases of a scene that a command is for: the one that is named, or all; of a scene without cases that scene.
+/// The load cases of a scene that a command is for: the one that is named, or all; of a scene without cases
+/// that scene.
 pub(super) fn asked_cases(scene: &Path, case: Option<&str>) -> Result<Vec<Scene>> {
     match case {
         Some(name) => Ok(vec![read_case(scene, Some(name))?]),

@@ -86,7 +86,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
 }
 
-/// The bodies of the candidates that were measured, each in a file of `folder` that is named by its number; none of `taken` is replaced.
+/// The bodies of the candidates that were measured, each in a file of `folder` that is named by its number;
+/// none of `taken` is replaced.
 fn candidate_bodies(
     folder: &Path,
     taken: &[&PathBuf],

@@ -1,4 +1,5 @@
-//! The nine inertia invariants with the numbering and the signs of Adams/Flex, for comparison with what an MNF translator prints.
+//! The nine inertia invariants with the numbering and the signs of Adams/Flex, for comparison with what an
+//! MNF translator prints.
 
 use super::export::arrays::Nested;
 use super::export::frames::{ExportFrame, frames};

@@ -1,8 +1,9 @@
-//! Project Chrono: matrices for `ChModalAssembly::DoModalReduction(M, K, Cq, ...)` and `ChModalDampingReductionR(R)` as Matrix Market files.
+//! Project Chrono: matrices for `ChModalAssembly::DoModalReduction(M, K, Cq, ...)` and
+//! `ChModalDampingReductionR(R)` as Matrix Market files.
 //!
-//! These calls take the matrices of boundary nodes, then internal nodes, six coordinates each. The boundary nodes are the frames; the
-//! amplitudes of the fixed-interface modes stand in the place of internal nodes, filled up to six by coordinates without mass, which no
-//! mode moves.
+//! These calls take the matrices of boundary nodes, then internal nodes, six coordinates each. The boundary
+//! nodes are the frames; the amplitudes of the fixed-interface modes stand in the place of internal nodes,
+//! filled up to six by coordinates without mass, which no mode moves.
 
 use super::export::interface_matrices::{InterfaceMatrices, matrix_losses};
 use super::export::{ExportFormat, ExportOptions, Exported};
@@ -32,7 +33,8 @@ impl ExportFormat for Chrono {
         let size = told.mass.nrows();
         let modal = size - 6 * told.frames.len();
         let filled = size.next_multiple_of(6);
-        // Any stiffness will do where there is no mass; one of the size of the others does no harm to their digits.
+        // Any stiffness will do where there is no mass; one of the size of the others does no harm to their
+        // digits.
         let stiffness = told.stiffness.norm_max();
         let matrix = |a: &Mat<f64>, fill: f64| {
             matrix_market(filled, |i, j| match (i < size, j < size) {
@@ -56,7 +58,8 @@ impl ExportFormat for Chrono {
     }
 }
 
-/// A symmetric matrix in all its entries, since readers of the general kind are the most common; zeros are left out.
+/// A symmetric matrix in all its entries, since readers of the general kind are the most common; zeros are
+/// left out.
 fn matrix_market(size: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<u8> {
     let places = (0..size).flat_map(|j| (0..size).map(move |i| (i, j)));
     let entries: Vec<(usize, usize, f64)> =

@@ -1,5 +1,6 @@
-//! Files of flexible bodies: our own, and one folder or file for every format of another program. What all formats share that are
-//! written stands in `export`, what all share that are read in `import`; `registry` lists them.
+//! Files of flexible bodies: our own, and one folder or file for every format of another program. What all
+//! formats share that are written stands in `export`, what all share that are read in `import`; `registry`
+//! lists them.
 
 mod adams;
 mod chrono;

@@ -1,6 +1,7 @@
 //! NumPy: the entries of the flex-body file as an `.npz` archive.
 //!
-//! Layout of the members: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>, version 1.0.
+//! Layout of the members: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>, version
+//! 1.0.
 
 use super::export::arrays::Document;
 use super::export::{ExportFormat, ExportOptions, Exported};

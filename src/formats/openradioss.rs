@@ -1,13 +1,16 @@
-//! OpenRadioss: the data file of `/FXBODY`, as the starter reads it (`hm_read_fxb.F`) and makes it from a DMIG file (`ini_fxbody.F`).
+//! OpenRadioss: the data file of `/FXBODY`, as the starter reads it (`hm_read_fxb.F`) and makes it from a
+//! DMIG file (`ini_fxbody.F`).
 //!
-//! Twelve rigid modes move a node at x (body axes) by the velocities of four points in space: the ends of the body axes, p_I, and their
-//! origin p_0. Rigid mode 3 (I - 1) + J: x_I e_J, rigid mode 9 + J: (1 - x_1 - x_2 - x_3) e_J. The columns of the rotation matrix are p_I - p_0.
-//! Where nodes have rotations, three more turn all nodes about the axes in space. Local modes turn with the body.
+//! Twelve rigid modes move a node at x (body axes) by the velocities of four points in space: the ends of the
+//! body axes, p_I, and their origin p_0. Rigid mode 3 (I - 1) + J: x_I e_J, rigid mode 9 + J: (1 - x_1 - x_2
+//! - x_3) e_J. The columns of the rotation matrix are p_I - p_0. Where nodes have rotations, three more turn
+//! all nodes about the axes in space. Local modes turn with the body.
 //!
-//! With s_I = x_I, s_0 = 1 - sum x_I and E_ab = e_a e_b', the products are those of J, c, m, Ibar and C1: s_I' Ms s_K = J_IK, s_0' Ms s_I =
-//! c_I - sum_K J_IK, s_I' Ms Psi_k = `Ibar_Ik`, s_0' Ms Psi_k = C1_k - sum_I Ibar_Ik. They give the kinetic energy of the undeformed body
-//! exactly, for any mass: J, Ibar and C1 stand for its I0, C2 and W1. The rows of the three rotations are zero: their inertia is in the other twelve, which
-//! the program ties to them.
+//! With s_I = x_I, s_0 = 1 - sum x_I and E_ab = e_a e_b', the products are those of J, c, m, Ibar and C1:
+//! s_I' Ms s_K = J_IK, s_0' Ms s_I = c_I - sum_K J_IK, s_I' Ms Psi_k = `Ibar_Ik`, s_0' Ms Psi_k = C1_k -
+//! sum_I Ibar_Ik. They give the kinetic energy of the undeformed body exactly, for any mass: J, Ibar and C1
+//! stand for its I0, C2 and W1. The rows of the three rotations are zero: their inertia is in the other
+//! twelve, which the program ties to them.
 
 use super::export::frames::{ExportFrame, frames};
 use super::export::{ExportFormat, ExportOptions, Exported, losses};
@@ -181,7 +184,8 @@ impl Deck {
             let entry = |l: usize, j: usize| if l % 3 == a && l < 12 { ibar(l / 3, b, j) } else { 0.0 };
             self.numbers((0..rigid).flat_map(|l| (0..nf).map(move |j| (l, j))).map(|(l, j)| entry(l, j)));
         }
-        // K psi_j = lambda_j M psi_j. Rigid motion strains nothing: what is antisymmetric is rounding, and so is C1.
+        // K psi_j = lambda_j M psi_j. Rigid motion strains nothing: what is antisymmetric is rounding, and so
+        // is C1.
         let strained = |set: usize, axis: usize, j: usize| {
             let symmetric_along = |k: usize| 0.5 * (ibar_told[k][axis][j] + ibar_told[axis][k][j]);
             let symmetric =
@@ -239,8 +243,8 @@ fn weights(x: &[f64; 3]) -> [f64; 4] {
     [x[0], x[1], x[2], 1.0 - x[0] - x[1] - x[2]]
 }
 
-/// The most digits that the columns take: 15 of numbers from 0.1, 11 to 13 of others, one less of negative ones. Fortran reads exponents without
-/// a letter.
+/// The most digits that the columns take: 15 of numbers from 0.1, 11 to 13 of others, one less of negative
+/// ones. Fortran reads exponents without a letter.
 fn number(value: f64) -> String {
     let fits = |text: &String| text.len() <= WIDTH;
     for digits in (1..=15).rev() {

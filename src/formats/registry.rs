@@ -40,11 +40,13 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
     })
 }
 
-/// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every setting that its program needs.
+/// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every
+/// setting that its program needs.
 ///
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
-/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of [`ExportFormat::write`].
+/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of
+/// [`ExportFormat::write`].
 pub fn export(
     body: &FlexBody,
     format: &dyn ExportFormat,

@@ -1,5 +1,6 @@
-//! Simscape Multibody: what the block Reduced Order Flexible Solid takes, with the names of the example of its documentation ("Model an
-//! Excavator Dipper Arm as a Flexible Body"): `arm = load('body.mat')` gives `arm.P0`, `arm.K`, `arm.M`, `arm.C`.
+//! Simscape Multibody: what the block Reduced Order Flexible Solid takes, with the names of the example of
+//! its documentation ("Model an Excavator Dipper Arm as a Flexible Body"): `arm = load('body.mat')` gives
+//! `arm.P0`, `arm.K`, `arm.M`, `arm.C`.
 
 use super::export::hdf5_contents::{Hdf5Contents, hdf5_bytes};
 use super::export::interface_matrices::{InterfaceMatrices, matrix_losses};

@@ -1,5 +1,5 @@
-//! From entries in file order to compressed columns, by counting: each task owns some columns and takes the entries that
-//! belong there in file order, so that the bits are the same for any number of tasks.
+//! From entries in file order to compressed columns, by counting: each task owns some columns and takes the
+//! entries that belong there in file order, so that the bits are the same for any number of tasks.
 
 use super::digits::significant_digits;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -65,8 +65,8 @@ pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> Strin
     Some(Diagnostic::new(Code::MatrixAsymmetric, message).with_help(help(stored)))
 }
 
-/// Builds the matrix (both triangles) from `pieces` of entries in file order: zeros dropped, duplicates summed in
-/// file order. `written` is the largest number of digits as written, see [`significant_digits`].
+/// Builds the matrix (both triangles) from `pieces` of entries in file order: zeros dropped, duplicates
+/// summed in file order. `written` is the largest number of digits as written, see [`significant_digits`].
 ///
 /// # Errors
 /// FB306 when a sum of duplicates is not finite, FB312 when nothing but zeros is left.
@@ -154,7 +154,8 @@ fn compress(n: usize, pieces: Vec<Vec<Entry>>, storage: Storage) -> Result<CscMa
     Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
 }
 
-/// Adds an entry to the last piece, or begins a new one: pieces that cover few columns are left out by most tasks.
+/// Adds an entry to the last piece, or begins a new one: pieces that cover few columns are left out by most
+/// tasks.
 pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
     const PIECE: usize = 1 << 15;
     match pieces.last_mut() {
@@ -231,7 +232,8 @@ fn add_up(counts: &mut [usize]) {
     }
 }
 
-/// Cuts the columns into several times as many parts as there are threads, with about equal numbers of entries.
+/// Cuts the columns into several times as many parts as there are threads, with about equal numbers of
+/// entries.
 fn equal_shares(col_ptr: &[usize]) -> Vec<usize> {
     let (n, parts) = (col_ptr.len() - 1, 4 * rayon::current_num_threads());
     let cut = |part: usize| col_ptr.partition_point(|&p| p < col_ptr[n] / parts * part).min(n);
@@ -279,8 +281,8 @@ impl List {
     }
 }
 
-/// Sorts every column by row, duplicates staying in file order; says whether there are any. `pointers` are those of the
-/// columns whose entries `rows` and `values` are.
+/// Sorts every column by row, duplicates staying in file order; says whether there are any. `pointers` are
+/// those of the columns whose entries `rows` and `values` are.
 fn sort_columns(pointers: &[usize], rows: &mut [u32], values: &mut [f64]) -> bool {
     let mut duplicates = false;
     let mut scratch: Vec<(u32, f64)> = Vec::new();

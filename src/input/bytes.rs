@@ -68,7 +68,8 @@ impl InputFile {
 
     /// Says that `range` of the bytes has been used: it need not stay in memory. It can still be read.
     pub(super) fn release(&self, range: Range<usize>) {
-        // SAFETY: pages of a file mapped for reading hold nothing but the file; dropped ones are read again when touched.
+        // SAFETY: pages of a file mapped for reading hold nothing but the file; dropped ones are read again
+        // when touched.
         #[cfg(unix)]
         unsafe {
             // A hint: where it is refused the bytes stay.

@@ -12,8 +12,8 @@ const SAMPLES: usize = 20_000;
 /// From here on the digits of the values are believed without further evidence.
 const MANY: u8 = 10;
 
-/// Significant decimal digits (1 to 17) of `count` values of which `value(k)` gives the k-th; `written` is the
-/// largest number of digits in which the file writes one (17 for binary files).
+/// Significant decimal digits (1 to 17) of `count` values of which `value(k)` gives the k-th; `written` is
+/// the largest number of digits in which the file writes one (17 for binary files).
 ///
 /// Few digits mean rounding only when there is evidence of it: the mass matrix of a uniform mesh holds a
 /// handful of exact short numbers. Such a matrix counts as exact (17).

@@ -116,7 +116,8 @@ impl std::fmt::Display for MatrixLocation {
 }
 
 impl ModelFiles {
-    /// Every file that they name, but those of [`ModelFiles::residual_vectors`], which a conversion may replace.
+    /// Every file that they name, but those of [`ModelFiles::residual_vectors`], which a conversion may
+    /// replace.
     pub fn paths(&self) -> Vec<&PathBuf> {
         let interfaces = self.interfaces.iter().filter_map(|interface| match &interface.nodes {
             InterfaceNodes::File(path) => Some(path),
@@ -129,8 +130,8 @@ impl ModelFiles {
         matrices.chain(others).chain(geometric).chain(interfaces).collect()
     }
 
-    /// A three-dimensional model without a manifest, named after its stiffness file; `units` is `length,mass,time`
-    /// as in `m,kg,s`.
+    /// A three-dimensional model without a manifest, named after its stiffness file; `units` is
+    /// `length,mass,time` as in `m,kg,s`.
     ///
     /// # Errors
     /// FB202 when the units are not three known ones.

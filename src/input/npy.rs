@@ -1,4 +1,5 @@
-//! NumPy's format of one array, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+//! NumPy's format of one array, versions 1 to 3:
+//! <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
 use super::array::Array;
 use crate::base::diagnostic::{Code, Diagnostic};

@@ -24,12 +24,12 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
     read_opened(&InputFile::open(&location.path)?, location.group.as_deref(), role)
 }
 
-/// Reads all files of a model and takes their fingerprints. The model is parsed, not yet checked: sizes, symmetry
-/// and mechanics are the business of [`crate::model`].
+/// Reads all files of a model and takes their fingerprints. The model is parsed, not yet checked: sizes,
+/// symmetry and mechanics are the business of [`crate::model`].
 ///
 /// # Errors
-/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric stiffness,
-/// interfaces.
+/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric
+/// stiffness, interfaces.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let opened = OpenFiles::new(files);
     let (parsed, fingerprints) = rayon::join(|| parse(files, &opened), || opened.fingerprints());
@@ -137,8 +137,8 @@ fn read_opened(file: &InputFile, group: Option<&str>, role: MatrixRole) -> Resul
     reader.read(&MatrixSource { file, compression, group, role })
 }
 
-/// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass matrix
-/// enter results as they are, and exact short numbers are common there.
+/// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass
+/// matrix enter results as they are, and exact short numbers are common there.
 fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
     (stiffness.digits < FEW_DIGITS).then(|| {
         let message =

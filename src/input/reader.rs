@@ -32,8 +32,8 @@ impl MatrixRole {
         }
     }
 
-    /// Whether a matrix called `name` (any case) is meant to be this one: `K` or `stiffness`, `M` or `mass`, `D`
-    /// or `damping`, `Kg` or `geometric_stiffness`.
+    /// Whether a matrix called `name` (any case) is meant to be this one: `K` or `stiffness`, `M` or `mass`,
+    /// `D` or `damping`, `Kg` or `geometric_stiffness`.
     pub fn is_named(self, name: &str) -> bool {
         let letter = match self {
             Self::Stiffness => "k",
@@ -58,8 +58,8 @@ pub struct MatrixSource<'a> {
     pub role: MatrixRole,
 }
 
-/// Reads one matrix format. A new format is one file of this room, one entry in [`READERS`](super::READERS) and one folder in
-/// `fixtures/readers/`.
+/// Reads one matrix format. A new format is one file of this room, one entry in [`READERS`](super::READERS)
+/// and one folder in `fixtures/readers/`.
 pub trait Reader: Sync {
     /// Name of the format in messages; in lower case with `-` for blanks, of its fixture folder.
     fn name(&self) -> &'static str;
@@ -68,20 +68,20 @@ pub trait Reader: Sync {
     /// content does not.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// Whether a file (unpacked) that begins with `head` is of this format. `head` has at least [`HEAD`] bytes
-    /// unless the file is shorter.
+    /// Whether a file (unpacked) that begins with `head` is of this format. `head` has at least [`HEAD`]
+    /// bytes unless the file is shorter.
     fn recognises(&self, head: &[u8]) -> bool;
 
-    /// Reads the matrix: both triangles, zeros dropped, duplicates summed; symmetry of a matrix that is stored
-    /// in full is not checked here.
+    /// Reads the matrix: both triangles, zeros dropped, duplicates summed; symmetry of a matrix that is
+    /// stored in full is not checked here.
     ///
     /// # Errors
     /// FB103, FB301 to FB313 and FB101 for what the file is not, as many as are found.
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix>;
 }
 
-/// Whether a file that begins with `head` is HDF5: the signature stands at 0 or, after a user block (MATLAB writes one), at 512, 1024,
-/// 2048, ...
+/// Whether a file that begins with `head` is HDF5: the signature stands at 0 or, after a user block (MATLAB
+/// writes one), at 512, 1024, 2048, ...
 pub(super) fn is_hdf5(head: &[u8]) -> bool {
     let signed = |&at: &usize| head.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
     [0, 512, 1024, 2048].iter().any(signed)

@@ -1,8 +1,9 @@
 //! Columns of numbers over time, as multibody programs and spreadsheets write them.
 //!
-//! Fields are separated by semicolons, tabs, commas or blanks. Lines that begin with `#`, `%` or `!` are comments. The names of the columns
-//! stand in the first line that is no comment and has no number, or in the last comment before the first row where that has as many fields; a
-//! line below the names without any number has units, which are not read.
+//! Fields are separated by semicolons, tabs, commas or blanks. Lines that begin with `#`, `%` or `!` are
+//! comments. The names of the columns stand in the first line that is no comment and has no number, or in the
+//! last comment before the first row where that has as many fields; a line below the names without any number
+//! has units, which are not read.
 
 use super::bytes::InputFile;
 use super::table::printable;
@@ -38,8 +39,8 @@ pub(crate) struct Series {
 /// Reads the column of times and other columns.
 ///
 /// # Errors
-/// FB215 for columns that the file does not have, all of them; FB216 for rows that cannot be read, the first few and how many more, for
-/// times that do not ascend and for fewer than two rows.
+/// FB215 for columns that the file does not have, all of them; FB216 for rows that cannot be read, the first
+/// few and how many more, for times that do not ascend and for fewer than two rows.
 pub(crate) fn read_series(
     file: &InputFile,
     time: &ColumnKey,

@@ -1,4 +1,5 @@
-//! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by content.
+//! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by
+//! content.
 
 use super::array::Array;
 use super::bytes::InputFile;
@@ -14,8 +15,8 @@ use crate::base::provenance::SourceFile;
 use crate::model::RawShapes;
 use faer::Mat;
 
-/// Reads shapes or loads for matrices with `n` rows: an array n x k, or k x n where k is not n too. `role` names the file
-/// in the provenance.
+/// Reads shapes or loads for matrices with `n` rows: an array n x k, or k x n where k is not n too. `role`
+/// names the file in the provenance.
 ///
 /// # Errors
 /// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.

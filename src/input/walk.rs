@@ -12,8 +12,8 @@ use toml::de::{DeTable, DeValue};
 pub(crate) type Table<'t> = DeTable<'t>;
 pub(crate) type Value<'t> = Spanned<DeValue<'t>>;
 
-/// Reads `path`, a `kind` of file, by `walk`, which returns `None` only with something in `found`. `syntax` is the code of what is not
-/// as it should be.
+/// Reads `path`, a `kind` of file, by `walk`, which returns `None` only with something in `found`. `syntax`
+/// is the code of what is not as it should be.
 ///
 /// # Errors
 /// FB101, FB106 when it cannot be read; everything that was found, in the order of lines.

@@ -8,7 +8,8 @@ use std::io::{self, ErrorKind, Read};
 /// Magic number and length of a frame that is to be skipped.
 const SKIPPED_HEADER: usize = 8;
 
-/// Reads all frames of a file, skips those that are to be skipped, and compares the checksum of each that has one.
+/// Reads all frames of a file, skips those that are to be skipped, and compares the checksum of each that has
+/// one.
 pub(super) struct ZstdFrames<'a> {
     frame: Option<StreamingDecoder<&'a [u8], FrameDecoder>>,
     /// What follows the frame, where none is open.

@@ -1,4 +1,5 @@
-//! From a model as the readers deliver it to matrices in the internal order, with the checks of matrices and tables by themselves.
+//! From a model as the readers deliver it to matrices in the internal order, with the checks of matrices and
+//! tables by themselves.
 
 use super::assembled::Assembled;
 use super::layout::{Layout, layout};
@@ -17,7 +18,8 @@ use std::collections::HashSet;
 /// Name of geometric stiffness in messages.
 const GEOMETRIC: &str = "geometric stiffness";
 
-/// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes so far.
+/// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes
+/// so far.
 pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)> {
     let mut found = std::mem::take(&mut raw.diagnostics);
     check_as_read(&raw, &mut found);
@@ -75,7 +77,8 @@ fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// What the tables say about the `nodes` that have rows: places, interfaces with their reference points, loads.
+/// What the tables say about the `nodes` that have rows: places, interfaces with their reference points,
+/// loads.
 fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     check_places(raw, nodes, found);
     check_names(raw, found);
@@ -119,7 +122,8 @@ fn check_members(interfaces: &[NodeSet], nodes: &Nodes, found: &mut Vec<Diagnost
     }
 }
 
-/// Brings the matrices of a model into the internal order, one after the other: each is given back before the next is copied.
+/// Brings the matrices of a model into the internal order, one after the other: each is given back before the
+/// next is copied.
 struct InternalOrder<'o> {
     layout: &'o Layout,
     nodes: &'o Nodes,

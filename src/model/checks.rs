@@ -58,7 +58,8 @@ impl FeModel {
 /// Checks `raw` and brings it into the internal order.
 ///
 /// # Errors
-/// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and rigid motion.
+/// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and
+/// rigid motion.
 pub fn check(raw: RawModel) -> Result<CheckedModel> {
     let (assembled, found) = assemble(raw)?;
     finish(assembled, None, found)
@@ -103,7 +104,8 @@ fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassFor
     form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
 }
 
-/// How every row moves with the rigid body, and whether K and the other matrices leave it free. Returns the residual of K.
+/// How every row moves with the rigid body, and whether K and the other matrices leave it free. Returns the
+/// residual of K.
 ///
 /// # Errors
 /// Rows without a place whose motion K does not tell, with all that was found before.
@@ -127,7 +129,8 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
     Ok(rigid_residual)
 }
 
-/// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted here.
+/// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted
+/// here.
 fn check_local_mass(
     body: &Assembled,
     form: &MassForm,
@@ -210,7 +213,8 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Densities between aerogel and osmium, for the box around the nodes: all that is known of bodies other than solids.
+/// Densities between aerogel and osmium, for the box around the nodes: all that is known of bodies other than
+/// solids.
 const DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {

@@ -1,10 +1,11 @@
 //! Densities of solid elements, from the mass of nodes and the volumes of the elements around them.
 //!
-//! No element is given, but K couples all nodes of an element with each other: elements are the largest sets of nodes of which each is
-//! coupled with each (cliques). Of a set that is an affine image of one of the usual elements the volume is a known multiple of the
-//! root of the determinant of the covariance of its positions, and each node has a known part of its mass. Beams, shells, bars and
-//! everything else have no such sets, or are left out by what marks them. Curved elements count with their corners, which changes their
-//! volume by some percent.
+//! No element is given, but K couples all nodes of an element with each other: elements are the largest sets
+//! of nodes of which each is coupled with each (cliques). Of a set that is an affine image of one of the
+//! usual elements the volume is a known multiple of the root of the determinant of the covariance of its
+//! positions, and each node has a known part of its mass. Beams, shells, bars and everything else have no
+//! such sets, or are left out by what marks them. Curved elements count with their corners, which changes
+//! their volume by some percent.
 
 use super::assembled::Assembled;
 use super::local_mass::LocalMass;
@@ -25,20 +26,21 @@ const COUPLED: usize = 63;
 /// Cliques of one node; elements of a mesh are fewer.
 const CLIQUES: usize = 200;
 
-/// Root of the determinant of the covariance relative to that of a ball of the same trace, below which nodes lie in a plane: four nodes
-/// of a curved membrane do nearly.
+/// Root of the determinant of the covariance relative to that of a ball of the same trace, below which nodes
+/// lie in a plane: four nodes of a curved membrane do nearly.
 const FLAT: f64 = 1e-6;
 const FLAT_FOUR: f64 = 0.02;
 
 /// Largest deviation of the squared Mahalanobis distance of a corner from that of an affine element.
 const CORNER: f64 = 1.0;
 
-/// Distance of the middle of an edge from the middle between its ends, relative to their distance, in a curved element.
+/// Distance of the middle of an edge from the middle between its ends, relative to their distance, in a
+/// curved element.
 const CURVED: f64 = 0.2;
 
-/// A solid element with `nodes` nodes, `corners` of them corners and the others the middles of edges: its volume is `volume` times the root of
-/// the determinant of the covariance of the corners, and the row sums of the consistent mass give each corner and each
-/// middle these parts of its mass.
+/// A solid element with `nodes` nodes, `corners` of them corners and the others the middles of edges: its
+/// volume is `volume` times the root of the determinant of the covariance of the corners, and the row sums of
+/// the consistent mass give each corner and each middle these parts of its mass.
 struct Element {
     nodes: usize,
     corners: usize,
@@ -87,7 +89,8 @@ impl Densities {
     }
 }
 
-/// The node's part of the volumes of the solid elements around it; `None` where there is something else, or too much to be taken apart.
+/// The node's part of the volumes of the solid elements around it; `None` where there is something else, or
+/// too much to be taken apart.
 fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let Assembled { nodes, rows, stiffness, .. } = body;
     let coupled = |i: usize| neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
@@ -132,8 +135,8 @@ fn is_bar(body: &Assembled, i: usize, j: usize) -> bool {
     (block - axial).norm() <= 1e-6 * block.norm()
 }
 
-/// Bron and Kerbosch's search with a pivot: every largest extension of `chosen` by `candidates`, none with `excluded`. False when there are
-/// too many.
+/// Bron and Kerbosch's search with a pivot: every largest extension of `chosen` by `candidates`, none with
+/// `excluded`. False when there are too many.
 fn maximal_cliques(
     adjacent: &[u64],
     chosen: u64,
@@ -160,8 +163,9 @@ fn maximal_cliques(
     true
 }
 
-/// The part of an element's volume that belongs to its first node; `None` when these are not the nodes of an element that is known. A
-/// diagonal mass is spread over the nodes of quadratic elements in more than one way.
+/// The part of an element's volume that belongs to its first node; `None` when these are not the nodes of an
+/// element that is known. A diagonal mass is spread over the nodes of quadratic elements in more than one
+/// way.
 fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64> {
     let element = ELEMENTS.iter().find(|element| element.nodes == positions.len())?;
     let linear = element.corners == element.nodes;

@@ -22,7 +22,8 @@ pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
     })
 }
 
-/// Which part of the displacements of nodes that have entries feels no force when the body moves along any axis.
+/// Which part of the displacements of nodes that have entries feels no force when the body moves along any
+/// axis.
 fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
     let (d, displacements) = (rows.dimension, rows.dimension * rows.nodes);
     let (mut held, mut free) = (0, 0);

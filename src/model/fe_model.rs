@@ -1,5 +1,5 @@
-//! The checked model: every used node has d displacements (d: the dimension), row d i + k is direction k of node i; other
-//! rows follow as [`Rows`] has them.
+//! The checked model: every used node has d displacements (d: the dimension), row d i + k is direction k of
+//! node i; other rows follow as [`Rows`] has them.
 
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
@@ -10,8 +10,8 @@ use crate::numerics::linalg::{CscMatrix, Pencil, SymmetricMatrix, larger};
 use faer::Mat;
 use std::borrow::Cow;
 
-/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the order of `nodes`, then
-/// what else [`rows`](FeModel::rows) says.
+/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the
+/// order of `nodes`, then what else [`rows`](FeModel::rows) says.
 #[derive(Debug, Clone)]
 pub struct FeModel {
     name: String,
@@ -94,8 +94,8 @@ impl FeModel {
         &self.stiffness
     }
 
-    /// The same model with its whole mass lumped: `masses` (one for each node) at the displacements of the nodes, none at other rows.
-    /// Damping in proportion to the mass follows it.
+    /// The same model with its whole mass lumped: `masses` (one for each node) at the displacements of the
+    /// nodes, none at other rows. Damping in proportion to the mass follows it.
     ///
     /// # Panics
     /// When there is not one mass for each node.
@@ -123,13 +123,14 @@ impl FeModel {
         &self.rows
     }
 
-    /// Ms: M = Ms kron I_d for the displacements, of nodes and then of vectors without a place, and no other row carries
-    /// mass. `None` when M has no such form.
+    /// Ms: M = Ms kron I_d for the displacements, of nodes and then of vectors without a place, and no other
+    /// row carries mass. `None` when M has no such form.
     pub fn scalar_mass(&self) -> Option<&SymmetricMatrix> {
         self.commutes.then_some(&self.mean_mass)
     }
 
-    /// The mean over the directions of the mass between displacements of nodes (n x n): what lumping starts from.
+    /// The mean over the directions of the mass between displacements of nodes (n x n): what lumping starts
+    /// from.
     pub fn nodal_mass(&self) -> Cow<'_, SymmetricMatrix> {
         let n = self.nodes.len();
         match self.rows.vectors() {
@@ -143,7 +144,8 @@ impl FeModel {
         self.damping.as_ref()
     }
 
-    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows of K.
+    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows
+    /// of K.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
         &self.geometric_stiffness
     }
@@ -156,8 +158,8 @@ impl FeModel {
         }
     }
 
-    /// The rigid fields (one row per row of K) about `centre`: translations, then rotations divided by `length`.
-    /// [`Rows::rigid_fields`].
+    /// The rigid fields (one row per row of K) about `centre`: translations, then rotations divided by
+    /// `length`. [`Rows::rigid_fields`].
     pub fn rigid_fields(&self, centre: [f64; 3], length: f64) -> Mat<f64> {
         self.rows.rigid_fields(&self.nodes.positions, centre, length)
     }
@@ -189,7 +191,8 @@ impl FeModel {
         self.rigid_residual
     }
 
-    /// Largest deviation of a mass block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj).
+    /// Largest deviation of a mass block from a multiple of the identity, relative to sqrt(alpha_ii
+    /// alpha_jj).
     pub fn mass_deviation(&self) -> f64 {
         self.mass_deviation
     }

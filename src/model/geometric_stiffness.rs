@@ -5,7 +5,8 @@ use nalgebra::Matrix3;
 /// What kind of load stresses the body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LoadKind {
-    /// Inertia forces -M a of a unit acceleration a of the frame's origin along an axis. Gravity g counts as an acceleration -g.
+    /// Inertia forces -M a of a unit acceleration a of the frame's origin along an axis. Gravity g counts as
+    /// an acceleration -g.
     Acceleration,
     /// Inertia forces -M (alpha x x) of a unit angular acceleration about an axis through the frame's origin.
     AngularAcceleration,
@@ -39,8 +40,8 @@ impl LoadKind {
         }]
     }
 
-    /// Names of its components, in their order: three axes, six products of spin rates; a named load has a single one
-    /// without a name.
+    /// Names of its components, in their order: three axes, six products of spin rates; a named load has a
+    /// single one without a name.
     pub fn components(&self) -> &'static [&'static str] {
         match self {
             Self::Spin => &["xx", "yy", "zz", "xy", "yz", "xz"],
@@ -112,8 +113,9 @@ impl UnitLoad {
         Some(Self { kind, component })
     }
 
-    /// What this load (component a, axes of the model) is in units of the loads of its kind along other axes, the columns of
-    /// `axes`: v_a = sum_i A_ai v_i' for vectors, w_a w_b = sum_ij A_ai A_bj w_i' w_j' for spin, a named load itself.
+    /// What this load (component a, axes of the model) is in units of the loads of its kind along other axes,
+    /// the columns of `axes`: v_a = sum_i A_ai v_i' for vectors, w_a w_b = sum_ij A_ai A_bj w_i' w_j' for
+    /// spin, a named load itself.
     ///
     /// # Panics
     /// When the component is not one of the kind's.
@@ -146,8 +148,8 @@ impl std::fmt::Display for UnitLoad {
     }
 }
 
-/// The stiffness that the stress of a unit load adds. `K` stands for the matrix: its place in a file, what was read, the matrix
-/// itself, or what it is reduced to.
+/// The stiffness that the stress of a unit load adds. `K` stands for the matrix: its place in a file, what
+/// was read, the matrix itself, or what it is reduced to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricStiffness<K> {
     /// The load; its components are along the axes of the model, of what is reduced along those of the body.

@@ -1,12 +1,13 @@
-//! Interfaces: named node sets, the reference point that a joint sees of them, and the motion that both share.
+//! Interfaces: named node sets, the reference point that a joint sees of them, and the motion that both
+//! share.
 
 use super::{centre_and_length, rigid_count, rigid_fields};
 use crate::numerics::linalg::gram;
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
-/// Width of a node set across the line that fits it best, relative to its length, below which it determines no rotation
-/// about that line.
+/// Width of a node set across the line that fits it best, relative to its length, below which it determines
+/// no rotation about that line.
 const COLLINEAR: f64 = 1e-6;
 
 /// How the nodes of an interface and its reference point follow each other.
@@ -107,8 +108,8 @@ impl MeanTurning {
         self.moment > self.threshold
     }
 
-    /// The weights of the rows in the motion of a point at `offset` from the centre; the rotation is the mean of those of the nodes
-    /// where it is told `by_rotations`.
+    /// The weights of the rows in the motion of a point at `offset` from the centre; the rotation is the mean
+    /// of those of the nodes where it is told `by_rotations`.
     fn weights(&self, all_rows: usize, offset: &Vector3<f64>, by_rotations: bool) -> Mat<f64> {
         let (d, count) = (self.dimension, self.arms.len() as f64);
         let axes = if d == 2 { 2..3 } else { 0..3 };
@@ -139,9 +140,9 @@ impl MeanTurning {
     }
 }
 
-/// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations along the axes, in the
-/// plane (d = 2) r = 3. Rows: the displacements of the nodes (d each), then their rotations, where they have them (three each, in the
-/// plane one).
+/// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations
+/// along the axes, in the plane (d = 2) r = 3. Rows: the displacements of the nodes (d each), then their
+/// rotations, where they have them (three each, in the plane one).
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceMotion {
     reference: [f64; 3],
@@ -151,9 +152,9 @@ pub struct InterfaceMotion {
 }
 
 impl InterfaceMotion {
-    /// For nodes at `positions` (at least one), all with or all without `rotations`, and a reference point, the mean of the positions
-    /// where none is given. The displacements tell the rotation of the reference point; where the nodes lie on one line, the mean of
-    /// their rotations does.
+    /// For nodes at `positions` (at least one), all with or all without `rotations`, and a reference point,
+    /// the mean of the positions where none is given. The displacements tell the rotation of the reference
+    /// point; where the nodes lie on one line, the mean of their rotations does.
     pub fn new(
         positions: &[[f64; 3]],
         rotations: bool,
@@ -186,14 +187,15 @@ impl InterfaceMotion {
         self.rigid.as_ref()
     }
 
-    /// A (rows x r) with A'R = I: the loads at the nodes that a unit force or torque at the reference point stands for. A' u is the
-    /// rigid motion that fits the displacements u best (least squares, all nodes with the same weight), A = R (R'R)^-1; nodal
-    /// rotations count only where these do not tell the rotation.
+    /// A (rows x r) with A'R = I: the loads at the nodes that a unit force or torque at the reference point
+    /// stands for. A' u is the rigid motion that fits the displacements u best (least squares, all nodes with
+    /// the same weight), A = R (R'R)^-1; nodal rotations count only where these do not tell the rotation.
     pub fn average(&self) -> MatRef<'_, f64> {
         self.average.as_ref()
     }
 
-    /// Whether the nodes determine the rotation: they do not lie on one line (in the plane not on one point), or have rotations.
+    /// Whether the nodes determine the rotation: they do not lie on one line (in the plane not on one point),
+    /// or have rotations.
     pub fn is_determined(&self) -> bool {
         self.determined
     }

@@ -1,5 +1,5 @@
-//! From labelled matrix rows to the internal order of [`Rows`]: every used node has as many displacements as the model has
-//! dimensions.
+//! From labelled matrix rows to the internal order of [`Rows`]: every used node has as many displacements as
+//! the model has dimensions.
 
 use super::rows::{Recovered, Rows};
 use super::wording::name_some;
@@ -56,7 +56,8 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     Some(in_order(raw, &rows.placed, occupied.used, placeless))
 }
 
-/// The label of each row, implied where none are given; `None` with a diagnostic when there are not as many as rows.
+/// The label of each row, implied where none are given; `None` with a diagnostic when there are not as many
+/// as rows.
 fn labels<'r>(raw: &'r RawModel, found: &mut Vec<Diagnostic>) -> Option<Cow<'r, [DofLabel]>> {
     let n = raw.stiffness.matrix.n_cols();
     let Some(labels) = &raw.dofs else { return implied_labels(raw, n, found).map(Cow::Owned) };
@@ -256,8 +257,8 @@ struct WithoutPlace {
     others: Vec<(DofLabel, u32)>,
 }
 
-/// Tells vectors that carry mass from massless rows; `None` with a diagnostic when there are others, or when there is `no_other`
-/// node: then the table is another model's.
+/// Tells vectors that carry mass from massless rows; `None` with a diagnostic when there are others, or when
+/// there is `no_other` node: then the table is another model's.
 fn sort_without_place(
     raw: &RawModel,
     nodes: &[(i64, [u32; 6])],

@@ -1,9 +1,11 @@
-//! The mass of every node beside the stiffness around it: speeds of sound, and masses that belong to another node.
+//! The mass of every node beside the stiffness around it: speeds of sound, and masses that belong to another
+//! node.
 //!
-//! e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i is the stiffness along the lines to the nodes around a node, times the squares
-//! of their lengths. Summed over an isotropic solid with Lame's constants l and m it is (6 l + 9 m) V, whatever the elements are, and
-//! E A L of a bar: bending does not count, so that beams and shells count with what they are stretched by. Divided by d times the mass it
-//! is the square of a speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
+//! e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i is the stiffness along the lines to the nodes
+//! around a node, times the squares of their lengths. Summed over an isotropic solid with Lame's constants l
+//! and m it is (6 l + 9 m) V, whatever the elements are, and E A L of a bar: bending does not count, so that
+//! beams and shells count with what they are stretched by. Divided by d times the mass it is the square of a
+//! speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
 
 use super::assembled::Assembled;
 use super::node_pairs::neighbours;
@@ -14,18 +16,21 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Speeds of sound of matter in m/s, with room: the softest foams have about 30, beryllium and diamond 15,000 to 20,000.
+/// Speeds of sound of matter in m/s, with room: the softest foams have about 30, beryllium and diamond 15,000
+/// to 20,000.
 const SPEEDS: (f64, f64) = (20.0, 25_000.0);
 
-/// No matter heavier than this (kg/m^3) is slower than this (m/s): lead has 3500, aluminium 8000, filled rubbers are lighter.
+/// No matter heavier than this (kg/m^3) is slower than this (m/s): lead has 3500, aluminium 8000, filled
+/// rubbers are lighter.
 const HEAVY: f64 = 2500.0;
 const SLOWEST_OF_HEAVY: f64 = 1000.0;
 
 /// Part of the diagonal entry of a node below which its row sum is too small to divide by.
 const MASSLESS: f64 = 0.01;
 
-/// The mass of a node may differ by so much of what its stiffness lets expect, relative to the largest such mass of its group, and
-/// must differ by so much to be told: nodes of the same elements keep 0.12 on all models in docs/plausibility.md.
+/// The mass of a node may differ by so much of what its stiffness lets expect, relative to the largest such
+/// mass of its group, and must differ by so much to be told: nodes of the same elements keep 0.12 on all
+/// models in docs/plausibility.md.
 const FITS: f64 = 0.15;
 const MISFITS: f64 = 0.3;
 
@@ -98,8 +103,9 @@ impl LocalMass {
         (speeds.whole > 0.0 && speeds.median > 0.0).then_some(speeds)
     }
 
-    /// Pairs of nodes whose masses would fit the stiffness if they were exchanged, and do not as they are. Only nodes of the same elements
-    /// are compared, those that K couples with the same others: whatever these are made of, it is the same for them.
+    /// Pairs of nodes whose masses would fit the stiffness if they were exchanged, and do not as they are.
+    /// Only nodes of the same elements are compared, those that K couples with the same others: whatever
+    /// these are made of, it is the same for them.
     pub fn exchanged(&self, body: &Assembled) -> Vec<[usize; 2]> {
         let mut pairs = Vec::new();
         for group in self.groups(body) {

@@ -6,12 +6,13 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 
-/// Largest size, and reciprocal of the smallest, that a quantity may have: squares of all of them then stay twenty-eight decades
-/// within the range of double precision, which is the room that modes and rounding errors have.
+/// Largest size, and reciprocal of the smallest, that a quantity may have: squares of all of them then stay
+/// twenty-eight decades within the range of double precision, which is the room that modes and rounding
+/// errors have.
 const LARGEST: f64 = 1e140;
 
-/// A refusal when K, M, the size of the body, or what units make of them, is so large or small that products overflow, or vanish
-/// without a trace.
+/// A refusal when K, M, the size of the body, or what units make of them, is so large or small that products
+/// overflow, or vanish without a trace.
 pub(super) fn check_magnitudes(
     stiffness: &SymmetricMatrix,
     mass: &SymmetricMatrix,

@@ -13,14 +13,16 @@ const NODES: usize = 2048;
 pub(super) struct MassForm {
     /// Ms (nodes, then vectors without a place): the mean of the directions of their displacements.
     pub scalar: SymmetricMatrix,
-    /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj), and where it is.
+    /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj), and
+    /// where it is.
     pub deviation: f64,
     pub worst: (usize, usize),
     /// M = Ms kron I_d to rounding, and no other row carries mass.
     pub commutes: bool,
 }
 
-/// Reduces the displacements of M (internal order, symmetric) to Ms. Deviations up to `tolerance` are rounding.
+/// Reduces the displacements of M (internal order, symmetric) to Ms. Deviations up to `tolerance` are
+/// rounding.
 ///
 /// # Errors
 /// [`MassNotPositive`](Code::MassNotPositive), [`MassDirectional`](Code::MassDirectional).
@@ -89,7 +91,8 @@ fn joined(n: usize, parts: Vec<Part>) -> (SymmetricMatrix, f64, (usize, usize)) 
     (scalar, worst, worst_at)
 }
 
-/// Sum of M along each direction over the rows of some nodes and the columns up to `end`, and the mean of the sums of the absolute values.
+/// Sum of M along each direction over the rows of some nodes and the columns up to `end`, and the mean of the
+/// sums of the absolute values.
 fn directional_mass(
     m: &SymmetricMatrix,
     dimension: usize,
@@ -121,7 +124,8 @@ struct Part {
     worst_at: (usize, usize),
 }
 
-/// Reduces the rows of some nodes, the columns up to `end`; deviations are relative to `scale` of the two nodes.
+/// Reduces the rows of some nodes, the columns up to `end`; deviations are relative to `scale` of the two
+/// nodes.
 fn reduce(
     m: &SymmetricMatrix,
     dimension: usize,

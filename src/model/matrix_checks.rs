@@ -32,8 +32,8 @@ pub(super) fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnost
     }
 }
 
-/// The matrix in internal order, symmetric, taken out of `raw`; `None` with a diagnostic when it is not symmetric to
-/// rounding.
+/// The matrix in internal order, symmetric, taken out of `raw`; `None` with a diagnostic when it is not
+/// symmetric to rounding.
 pub(super) fn symmetric(
     raw: &mut RawMatrix,
     layout: &Layout,

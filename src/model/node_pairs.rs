@@ -1,4 +1,5 @@
-//! Which pairs of nodes each matrix couples: an element that gives two nodes common mass ties them by its stiffness too.
+//! Which pairs of nodes each matrix couples: an element that gives two nodes common mass ties them by its
+//! stiffness too.
 
 use super::assembled::Assembled;
 use super::rows::Rows;
@@ -8,7 +9,8 @@ use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Mass between two rows relative to the root of their diagonal entries below which it is what rounding left of zero.
+/// Mass between two rows relative to the root of their diagonal entries below which it is what rounding left
+/// of zero.
 const NOTHING: f64 = 1e-10;
 
 /// Vertices per parallel task.
@@ -51,7 +53,8 @@ impl MassPairs {
     }
 }
 
-/// The other vertices to which `matrix` has an entry that `counts` (row, column, value) from the rows of `vertex`, ascending.
+/// The other vertices to which `matrix` has an entry that `counts` (row, column, value) from the rows of
+/// `vertex`, ascending.
 pub(super) fn neighbours(
     matrix: &SymmetricMatrix,
     rows: &Rows,
@@ -81,9 +84,9 @@ fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize)
     neighbours(mass, rows, vertex, counts)
 }
 
-/// An error when the mass couples nodes that the stiffness does not, which no order of the same elements does. A warning only where the
-/// pairs are those of mass elements, or where the user wants it so. Returns how many pairs the mass couples, and how many of them the
-/// stiffness does not.
+/// An error when the mass couples nodes that the stiffness does not, which no order of the same elements
+/// does. A warning only where the pairs are those of mass elements, or where the user wants it so. Returns
+/// how many pairs the mass couples, and how many of them the stiffness does not.
 pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) -> [usize; 2] {
     let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
     let MassPairs { count, foreign } = MassPairs::new(stiffness, mass, rows);
@@ -115,8 +118,9 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) ->
     [count, foreign.len()]
 }
 
-/// Whether the pairs fall into groups within which the mass couples every node with every other, as when a mass is spread over them. One
-/// node coupled with several others is no such group, nor are several single pairs: that is what two exchanged nodes leave.
+/// Whether the pairs fall into groups within which the mass couples every node with every other, as when a
+/// mass is spread over them. One node coupled with several others is no such group, nor are several single
+/// pairs: that is what two exchanged nodes leave.
 fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign: &[[u32; 2]]) -> bool {
     if foreign.len() * 4 > count {
         // Every other mass would belong to such elements. A single pair in a tiny model may be one.
@@ -160,8 +164,8 @@ fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign:
     true
 }
 
-/// An order that the rows of M may stand in: whether the model can have it, the row that each row of the file would stand for, and what to
-/// do about it.
+/// An order that the rows of M may stand in: whether the model can have it, the row that each row of the file
+/// would stand for, and what to do about it.
 type Order<'o> = (bool, &'o dyn Fn(usize) -> usize, &'static str);
 
 /// What to do when the mass fits the stiffness in another order of its rows.
@@ -210,8 +214,8 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
     orders.iter().find(|(possible, to, _)| *possible && fits(body, &row_of, to)).map(|(.., help)| *help)
 }
 
-/// Whether the mass couples only what the stiffness couples when each row of its file stands for the internal row `to`; `row_of` is
-/// the row of the file that each internal row stood for.
+/// Whether the mass couples only what the stiffness couples when each row of its file stands for the internal
+/// row `to`; `row_of` is the row of the file that each internal row stood for.
 fn fits(body: &Assembled, row_of: &[usize], to: &dyn Fn(usize) -> usize) -> bool {
     let Assembled { rows, stiffness, mass, .. } = body;
     let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();

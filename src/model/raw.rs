@@ -60,18 +60,20 @@ pub struct RawModel {
     pub damping: Option<Damping<RawMatrix>>,
     /// Geometric stiffness of unit loads, with the rows of K and M.
     pub geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>,
-    /// Whether findings that a person has looked at are warnings: densities that no matter has, mass between nodes that no stiffness joins.
+    /// Whether findings that a person has looked at are warnings: densities that no matter has, mass between
+    /// nodes that no stiffness joins.
     pub allow_implausible: bool,
-    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `manifest`), file name and SHA-256 (hex) of every file read.
+    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `manifest`), file name
+    /// and SHA-256 (hex) of every file read.
     pub sources: Vec<SourceFile>,
     /// Warnings and notes of the readers; never an error.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl RawModel {
-    /// A model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all digits valid, units
-    /// m, kg, s not stated. Whatever else is known about it is set in the fields. `examples/from_memory.rs` goes on
-    /// from here to a written file.
+    /// A model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all digits valid,
+    /// units m, kg, s not stated. Whatever else is known about it is set in the fields.
+    /// `examples/from_memory.rs` goes on from here to a written file.
     pub fn in_memory(name: impl Into<String>, stiffness: CscMatrix, mass: CscMatrix, nodes: Nodes) -> Self {
         let matrix = |matrix| RawMatrix { matrix, digits: 17, path: PathBuf::new() };
         Self {

@@ -5,16 +5,17 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Distance of a reference point from the middle of the nodes, relative to their largest, beyond which it is a mistake, of units as
-/// a rule. Rotations about a point so far away lose four digits.
+/// Distance of a reference point from the middle of the nodes, relative to their largest, beyond which it is
+/// a mistake, of units as a rule. Rotations about a point so far away lose four digits.
 const FARTHEST: f64 = 100.0;
 
-/// Distance from the middle of its nodes, relative to how far these reach, beyond which a reference point is asked about; nodes closer
-/// together than this part of the body count as if they reached so far.
+/// Distance from the middle of its nodes, relative to how far these reach, beyond which a reference point is
+/// asked about; nodes closer together than this part of the body count as if they reached so far.
 const REACH: f64 = 3.0;
 const SMALLEST: f64 = 0.05;
 
-/// Puts the places of reference points in place of what says where they are, and complains about those that cannot be.
+/// Puts the places of reference points in place of what says where they are, and complains about those that
+/// cannot be.
 pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut Vec<Diagnostic>) {
     let (centre, size) = centre_and_length(&used.positions);
     let places: HashMap<i64, [f64; 3]> =
@@ -65,7 +66,8 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
     }
 }
 
-/// A warning for a reference point that lies far from the nodes beside their own size, in a body of this size.
+/// A warning for a reference point that lies far from the nodes beside their own size, in a body of this
+/// size.
 fn far_reference(name: &str, reference: [f64; 3], nodes: &[[f64; 3]], size: f64) -> Option<Diagnostic> {
     let (centre, radius) = match nodes {
         [] => return None,

@@ -9,8 +9,9 @@ pub fn rigid_count(dimension: usize) -> usize {
     if dimension == 2 { 3 } else { 6 }
 }
 
-/// The rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x - centre) / `length`; in the
-/// plane (`dimension` 2) those that stay in it (2n x 3): two translations, the rotation about z.
+/// The rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x - centre) /
+/// `length`; in the plane (`dimension` 2) those that stay in it (2n x 3): two translations, the rotation
+/// about z.
 pub fn rigid_fields(positions: &[[f64; 3]], dimension: usize, centre: [f64; 3], length: f64) -> Mat<f64> {
     if dimension == 2 {
         let mut fields = Mat::zeros(2 * positions.len(), 3);
@@ -66,8 +67,9 @@ pub fn extents(positions: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
-/// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows, with r_j the size that a field has
-/// at row j in general: values near one mean a support and values near roundoff a free body.
+/// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows, with r_j the
+/// size that a field has at row j in general: values near one mean a support and values near roundoff a free
+/// body.
 pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {
     // Row by row: what a matrix entry needs lies in one or two cache lines.
     let rows: Vec<[f64; 7]> = (0..k.n())

@@ -1,4 +1,5 @@
-//! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly where it does not.
+//! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly
+//! where it does not.
 
 use super::assembled::Assembled;
 use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
@@ -7,9 +8,9 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::{Pencil, gram, largest};
 use faer::Mat;
 
-/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second limit: node tables written
-/// with few digits leave up to 1e-6, supports 0.01 to 1. Above the first, what is known of the positions is told: the invariants have
-/// no more digits than that.
+/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second
+/// limit: node tables written with few digits leave up to 1e-6, supports 0.01 to 1. Above the first, what is
+/// known of the positions is told: the invariants have no more digits than that.
 pub(super) fn check_rigid_motion(
     body: &Assembled,
     (rounded, limit): (f64, f64),
@@ -139,7 +140,8 @@ impl<'a> Readings<'a> {
     }
 }
 
-/// A mass that does not commute with rotations must still give rigid motion the inertia of a rigid body: R'MR = \[m I, -c~; c~, I0\].
+/// A mass that does not commute with rotations must still give rigid motion the inertia of a rigid body: R'MR
+/// = \[m I, -c~; c~, I0\].
 pub(super) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Diagnostic>) {
     let Assembled { raw, nodes, rows, mass, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);

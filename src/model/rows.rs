@@ -1,7 +1,8 @@
 //! What the rows of a model stand for, in the internal order, and how they move with the rigid body.
 //!
-//! First the displacements of the nodes, node-major; then those of vectors without a place, of which only K knows how they
-//! move with the body (bubbles, hierarchical shape functions); then nodal rotations; last massless rows without a place.
+//! First the displacements of the nodes, node-major; then those of vectors without a place, of which only K
+//! knows how they move with the body (bubbles, hierarchical shape functions); then nodal rotations; last
+//! massless rows without a place.
 
 use super::rigid::{rigid_count, rigid_fields};
 use super::{DofLabel, Nodes};
@@ -9,7 +10,8 @@ use crate::numerics::linalg::{SymmetricMatrix, connected_components};
 use faer::Mat;
 use std::ops::Range;
 
-/// Largest rigid motion of a row that does not move, relative to a unit translation: rounding of the stiffness.
+/// Largest rigid motion of a row that does not move, relative to a unit translation: rounding of the
+/// stiffness.
 const STILL: f64 = 1e-9;
 
 /// The rows of a model beyond its plain displacements, and the order of all of them.
@@ -68,7 +70,8 @@ impl Rows {
         self.vectors.len()
     }
 
-    /// Index of the node and axis (0, 1, 2) of every rotation; the first has the row [`displacements`](Self::displacements).
+    /// Index of the node and axis (0, 1, 2) of every rotation; the first has the row
+    /// [`displacements`](Self::displacements).
     pub fn rotations(&self) -> &[(u32, u8)] {
         &self.rotations
     }
@@ -135,8 +138,8 @@ impl Rows {
         (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < STILL))
     }
 
-    /// Connected component of every vertex, numbered from 0 in the order of their first vertices. Any entry of any of the
-    /// matrices connects, and the rows of a node belong together.
+    /// Connected component of every vertex, numbered from 0 in the order of their first vertices. Any entry
+    /// of any of the matrices connects, and the rows of a node belong together.
     pub(super) fn components(&self, matrices: &[&SymmetricMatrix]) -> Vec<usize> {
         if self.rotations.is_empty() && self.others.is_empty() {
             return connected_components(matrices, self.dimension);
@@ -173,7 +176,8 @@ impl Rows {
         first.iter().map(numbered).collect()
     }
 
-    /// Takes the rows apart by the component of their vertices: of each component the rows, ascending, and what they are.
+    /// Takes the rows apart by the component of their vertices: of each component the rows, ascending, and
+    /// what they are.
     pub(super) fn separated(&self, component: &[usize]) -> Vec<(Vec<usize>, Self)> {
         let empty = Self {
             dimension: self.dimension,
@@ -215,8 +219,8 @@ impl Rows {
         }
     }
 
-    /// The rigid fields (one row per row of the model): unit translations, then rotations e_k x (x - `centre`) / `length`
-    /// with e_k / `length` at the rotations; in the plane those that stay in it.
+    /// The rigid fields (one row per row of the model): unit translations, then rotations e_k x (x -
+    /// `centre`) / `length` with e_k / `length` at the rotations; in the plane those that stay in it.
     pub fn rigid_fields(&self, positions: &[[f64; 3]], centre: [f64; 3], length: f64) -> Mat<f64> {
         let (d, count) = (self.dimension, rigid_count(self.dimension));
         let mut fields = rigid_fields(positions, d, centre, length);

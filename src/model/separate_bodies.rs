@@ -1,4 +1,5 @@
-//! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its own.
+//! Several bodies in one pair of matrices: found by the graph of K and M together, each made a model of its
+//! own.
 
 use super::assemble::assemble;
 use super::assembled::Assembled;
@@ -14,7 +15,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
 
 impl FeModel {
-    /// The same as [`from_raw`](FeModel::from_raw) for matrices that hold several bodies: each becomes a model of its own.
+    /// The same as [`from_raw`](FeModel::from_raw) for matrices that hold several bodies: each becomes a
+    /// model of its own.
     ///
     /// # Errors
     /// See [`check_bodies`].
@@ -23,8 +25,9 @@ impl FeModel {
     }
 }
 
-/// Checks `raw`, takes the bodies in it apart and checks each. Two nodes belong to one body when K or M couples them,
-/// directly or through others. The nodes of a body keep their order, and its model is named `<name>-<number>`.
+/// Checks `raw`, takes the bodies in it apart and checks each. Two nodes belong to one body when K or M
+/// couples them, directly or through others. The nodes of a body keep their order, and its model is named
+/// `<name>-<number>`.
 ///
 /// # Errors
 /// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
@@ -107,7 +110,8 @@ fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagn
     }
 }
 
-/// Complains about geometric stiffness of a load at an interface that stiffens another body than the one of the interface.
+/// Complains about geometric stiffness of a load at an interface that stiffens another body than the one of
+/// the interface.
 fn check_loads_of_others(
     whole: &Assembled,
     component: &[usize],

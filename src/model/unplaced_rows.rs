@@ -1,4 +1,5 @@
-//! Rows without a place and rows without mass: how the first move with the body, and whether the second follow the others.
+//! Rows without a place and rows without mass: how the first move with the body, and whether the second
+//! follow the others.
 
 use super::rigid::{centre_and_length, rigid_count};
 use super::rows::{Recovered, Rows};
@@ -8,14 +9,16 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
 use faer::Mat;
 
-/// Eigenvalue of a stiffness with unit diagonal below which it does not hold its rows: rounding of sums leaves 1e-14.
+/// Eigenvalue of a stiffness with unit diagonal below which it does not hold its rows: rounding of sums
+/// leaves 1e-14.
 const LOOSE: f64 = 1e-12;
 
 /// How close to a unit translation a vector moves that is a node whose coordinates are missing.
 const NODE: f64 = 1e-6;
 
-/// Finds the rigid motion R_p of the rows without a place, K_pp R_p = -K_pn R_n: the null space of K given its values R_n
-/// at all others. Exact wherever K R = 0 holds, which is checked for these rows with all others.
+/// Finds the rigid motion R_p of the rows without a place, K_pp R_p = -K_pn R_n: the null space of K given
+/// its values R_n at all others. Exact wherever K R = 0 holds, which is checked for these rows with all
+/// others.
 ///
 /// # Errors
 /// [`RowsUnheld`](Code::RowsUnheld) when K leaves some of the rows free.
@@ -47,8 +50,8 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
     Ok(())
 }
 
-/// Nodes whose coordinates are missing: K moves them like any node, and they carry mass. What is wrong, with the place that
-/// K gives each of them.
+/// Nodes whose coordinates are missing: K moves them like any node, and they carry mass. What is wrong, with
+/// the place that K gives each of them.
 pub(super) fn misplaced(rows: &Rows) -> Option<Diagnostic> {
     let d = rows.dimension;
     let known = &rows.recovered;

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-/// Neighbours closer than this (relative) are compared as one space. Rounding p of the eigenproblem turns two modes
-/// at the relative gap g by p/g: with p = 1e-13, modes further apart than this agree to 1e-8; nearer ones would
-/// show rounding as a difference.
+/// Neighbours closer than this (relative) are compared as one space. Rounding p of the eigenproblem turns two
+/// modes at the relative gap g by p/g: with p = 1e-13, modes further apart than this agree to 1e-8; nearer
+/// ones would show rounding as a difference.
 const GAP: f64 = 1e-5;
 
 /// Whether the eigenvalue `i` (from 1) of `values` (ascending) is in one space with the one before it.

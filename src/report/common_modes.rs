@@ -6,7 +6,8 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 
-/// Which modes of two bodies are compared with each other (indices from 0, ascending, the same number of both), and what is left out.
+/// Which modes of two bodies are compared with each other (indices from 0, ascending, the same number of
+/// both), and what is left out.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CommonModes {
     pub a: Vec<usize>,
@@ -16,9 +17,10 @@ pub(super) struct CommonModes {
 }
 
 impl CommonModes {
-    /// Every mode of the body that has fewer gets a partner of the other, in ascending order, so that the ratios of frequencies deviate as
-    /// little as possible. A mode that differs is compared with its neighbour and not taken for one that the other body lacks.
-    /// Of a repeated eigenvalue all modes are compared or none: those of a part of it are not determined.
+    /// Every mode of the body that has fewer gets a partner of the other, in ascending order, so that the
+    /// ratios of frequencies deviate as little as possible. A mode that differs is compared with its
+    /// neighbour and not taken for one that the other body lacks. Of a repeated eigenvalue all modes are
+    /// compared or none: those of a part of it are not determined.
     ///
     /// # Errors
     /// [`BodyIncomparable`](Code::BodyIncomparable) when no mode is left.
@@ -55,7 +57,8 @@ impl CommonModes {
     }
 }
 
-/// For each of `fewer` eigenvalues the index of its partner among `more` (both ascending): the ascending choice with the smallest sum of
+/// For each of `fewer` eigenvalues the index of its partner among `more` (both ascending): the ascending
+/// choice with the smallest sum of
 /// |ln(lambda_i / lambda_j)|, by dynamic programming.
 fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
     let (n, m) = (fewer.len(), more.len());

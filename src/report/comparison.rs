@@ -1,5 +1,5 @@
-//! Two bodies side by side, insensitive to the signs of modes, to the basis inside repeated eigenvalues, to the
-//! order of the nodes and to the body frame.
+//! Two bodies side by side, insensitive to the signs of modes, to the basis inside repeated eigenvalues, to
+//! the order of the nodes and to the body frame.
 
 use super::clusters::clusters;
 use super::common_modes::CommonModes;
@@ -19,20 +19,23 @@ use std::ops::Range;
 
 /// Largest differences that pass, all relative.
 ///
-/// The defaults are those of two computations of the same model on different machines. Bodies from matrices that
-/// were written with few digits, or from another mesh, need larger ones.
+/// The defaults are those of two computations of the same model on different machines. Bodies from matrices
+/// that were written with few digits, or from another mesh, need larger ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerances {
     /// Of each frequency. Default 1e-9: a residual of 1e-10 bounds eigenvalues far below that.
     pub frequency: f64,
-    /// Of the mass. Default 1e-9: three orders above rounding; catches a single missing element of a large model.
+    /// Of the mass. Default 1e-9: three orders above rounding; catches a single missing element of a large
+    /// model.
     pub mass: f64,
-    /// Of the inertia about the centre of mass, each entry relative to sqrt(I_kk I_ll). Default 1e-9, as the mass.
+    /// Of the inertia about the centre of mass, each entry relative to sqrt(I_kk I_ll). Default 1e-9, as the
+    /// mass.
     pub inertia: f64,
-    /// Of invariants and shapes, relative to the Cauchy-Schwarz bounds. Default 1e-8: vectors of modes are known
-    /// to residual / gap, less than eigenvalues.
+    /// Of invariants and shapes, relative to the Cauchy-Schwarz bounds. Default 1e-8: vectors of modes are
+    /// known to residual / gap, less than eigenvalues.
     pub invariants: f64,
-    /// Of the centre of mass and of node positions, relative to the radius of gyration. Default 1e-9, as the mass.
+    /// Of the centre of mass and of node positions, relative to the radius of gyration. Default 1e-9, as the
+    /// mass.
     pub centre_of_mass: f64,
 }
 
@@ -70,16 +73,17 @@ pub struct BodyComparison {
 
 /// Compares `b` with `a`, in the frame of `a`.
 ///
-/// With the same node numbers in both (in any order), `b` is turned and shifted into the frame of `a`, its modes
-/// are aligned inside each cluster of close eigenvalues ([`align`](crate::body::invariants::align), plain product of the
-/// nodal components), and positions, shapes and every primary invariant are compared. Otherwise only what needs no
-/// common node is: mass, centre of mass, inertia, frequencies, and the norms of the invariants over clusters of
-/// modes, which no choice of signs or basis changes. A body that comes from a file of another program does not know where its frame is in the
-/// model; with such a one the body frames are taken as the same.
+/// With the same node numbers in both (in any order), `b` is turned and shifted into the frame of `a`, its
+/// modes are aligned inside each cluster of close eigenvalues ([`align`](crate::body::invariants::align),
+/// plain product of the nodal components), and positions, shapes and every primary invariant are compared.
+/// Otherwise only what needs no common node is: mass, centre of mass, inertia, frequencies, and the norms of
+/// the invariants over clusters of modes, which no choice of signs or basis changes. A body that comes from a
+/// file of another program does not know where its frame is in the model; with such a one the body frames are
+/// taken as the same.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units or numbers of modes differ; [`compare_common`] compares bodies with different
-/// numbers of modes.
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units or numbers of modes differ; [`compare_common`]
+/// compares bodies with different numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
     let placed = is_placed(a) && is_placed(b);
@@ -124,8 +128,9 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     Ok(comparison)
 }
 
-/// The same of two bodies one of which may have fewer modes: each of its modes is compared with that of the other whose frequency is nearest, in
-/// ascending order. The notes say which modes were compared and which were not.
+/// The same of two bodies one of which may have fewer modes: each of its modes is compared with that of the
+/// other whose frequency is nearest, in ascending order. The notes say which modes were compared and which
+/// were not.
 ///
 /// # Errors
 /// [`BodyIncomparable`](Code::BodyIncomparable) when units differ, or no mode is in common.
@@ -216,8 +221,8 @@ fn relative(difference: f64, scale: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / scale }
 }
 
-/// What shifting J by `distance` costs relative to its smallest entry: about a distant frame J is m d^2, with the
-/// body's own moments in its last digits.
+/// What shifting J by `distance` costs relative to its smallest entry: about a distant frame J is m d^2, with
+/// the body's own moments in its last digits.
 fn lost_by_shift(mass: f64, distance: f64, smallest: f64) -> f64 {
     8.0 * f64::EPSILON * relative(mass * distance * distance, smallest)
 }

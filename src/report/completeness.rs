@@ -7,8 +7,9 @@ use crate::body::flex_body::FlexBody;
 /// The certificate of a body, judged.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub(super) struct Completeness {
-    /// The certificate proves that none is missing of the modes that the basis is made of: modes of the free body or, of Craig-Bampton, those with
-    /// the interfaces held. Static shapes beside them have no completeness.
+    /// The certificate proves that none is missing of the modes that the basis is made of: modes of the free
+    /// body or, of Craig-Bampton, those with the interfaces held. Static shapes beside them have no
+    /// completeness.
     pub proved: bool,
     /// `proved`; `given`: shapes that claim to be no modes, of which nothing is to be proved; `open`.
     pub verdict: &'static str,

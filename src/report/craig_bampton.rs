@@ -1,5 +1,5 @@
-//! A Craig-Bampton body in its own terms: what its coordinates are, what is proved of them, and up to which frequency it stands for the free
-//! body.
+//! A Craig-Bampton body in its own terms: what its coordinates are, what is proved of them, and up to which
+//! frequency it stands for the free body.
 
 use super::numbers::{counted, percent, significant};
 use crate::body::flex_body::{FixedInterface, FlexBody};
@@ -67,8 +67,8 @@ impl CraigBamptonFacts {
         )
     }
 
-    /// Up to which frequency the reduced body stands for the free one, and what the first does that is beyond; `hertz` are its own
-    /// frequencies.
+    /// Up to which frequency the reduced body stands for the free one, and what the first does that is
+    /// beyond; `hertz` are its own frequencies.
     pub fn holds(&self, hertz: &[f64]) -> String {
         let good = self.within_one_percent;
         let kept = if self.rigid_interfaces { " (with the same rigid interfaces)" } else { "" };

@@ -22,8 +22,8 @@ const MINOR: u32 = 4;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
-/// Numbers are in the units of the model, frequencies in hertz, times in seconds. A number that is not finite is
-/// `null` in JSON.
+/// Numbers are in the units of the model, frequencies in hertz, times in seconds. A number that is not finite
+/// is `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Facts {
     format: &'static str,
@@ -86,7 +86,8 @@ pub(super) struct InterfaceFacts {
     pub coupling: Option<&'static str>,
     /// Body frame; `None`: no reference point.
     pub reference: Option<[f64; 3]>,
-    /// Largest deformation of the interface in a mode, relative to its largest motion in any; `None`: no reference point.
+    /// Largest deformation of the interface in a mode, relative to its largest motion in any; `None`: no
+    /// reference point.
     pub deformation: Option<f64>,
 }
 
@@ -130,7 +131,8 @@ pub(super) struct ModeFacts {
     /// What the modes lack of static responses, for the loads of residual vectors.
     pub truncation: Vec<Truncation>,
     pub damping_ratio: Vec<f64>,
-    /// Of the modes that are to be eigenvectors: static shapes are none; of a Craig-Bampton body that of its fixed-interface modes.
+    /// Of the modes that are to be eigenvectors: static shapes are none; of a Craig-Bampton body that of its
+    /// fixed-interface modes.
     pub worst_residual: f64,
     /// Of a Craig-Bampton body: its coordinates, and its frequencies beside those of the free body.
     pub craig_bampton: Option<CraigBamptonFacts>,
@@ -138,7 +140,8 @@ pub(super) struct ModeFacts {
     pub damping: Option<DampingFacts>,
     /// For each unit load.
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
-    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where W2 is held without geometric stiffness for spin.
+    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where W2 is held without
+    /// geometric stiffness for spin.
     pub softening_hz: Option<[Option<f64>; 3]>,
 }
 
@@ -209,8 +212,8 @@ fn as_map<S: Serializer>(pairs: &[(String, u64)], serializer: S) -> Result<S::Ok
 }
 
 impl Facts {
-    /// Collects the facts of `body` and of the `run` that made it; [`RunData::default`] for a body whose run is
-    /// not known (read from a file).
+    /// Collects the facts of `body` and of the `run` that made it; [`RunData::default`] for a body whose run
+    /// is not known (read from a file).
     pub fn new(body: &FlexBody, run: &RunData) -> Self {
         let frequency_hz = body.frequencies_hz();
         let lumped_modes = run.lumped_modes.iter().map(|l| LumpedModesFacts::of(l, &frequency_hz)).collect();
@@ -329,7 +332,8 @@ impl ModeFacts {
         }
     }
 
-    /// How many modes come from which kind of shape, in the order of their first ones; empty where all are free modes.
+    /// How many modes come from which kind of shape, in the order of their first ones; empty where all are
+    /// free modes.
     pub fn origins(&self) -> Vec<(&str, usize)> {
         let mut origins: Vec<(&str, usize)> = Vec::new();
         for origin in &self.provenance {

@@ -35,9 +35,9 @@ impl GeometricStiffnessFacts {
     }
 }
 
-/// Spin about each body axis, in hertz, at which the centrifugal term takes 1 % of the stiffness of the motion that it softens
-/// most. Nothing for a body with geometric stiffness for spin, or without W2; no number where nothing moves across the axis, nor
-/// about axes that a plane body does not spin about.
+/// Spin about each body axis, in hertz, at which the centrifugal term takes 1 % of the stiffness of the
+/// motion that it softens most. Nothing for a body with geometric stiffness for spin, or without W2; no
+/// number where nothing moves across the axis, nor about axes that a plane body does not spin about.
 pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     let given = body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
     (!given && body.groups().w2).then(|| {

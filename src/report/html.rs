@@ -104,7 +104,8 @@ fn body(html: &mut String, facts: &Facts) {
     }
 }
 
-/// What the proof of completeness rests on: of a Craig-Bampton body with the interfaces held, of others without supports.
+/// What the proof of completeness rests on: of a Craig-Bampton body with the interfaces held, of others
+/// without supports.
 fn proof(facts: &Facts) -> Vec<(&'static str, String)> {
     let (modes, c) = (&facts.modes, &facts.completeness);
     let count = |n: Option<usize>| n.map_or_else(|| "not counted".to_owned(), |n| n.to_string());

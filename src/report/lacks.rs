@@ -36,7 +36,8 @@ impl LackFacts {
     }
 }
 
-/// What everything was measured against: the last of `lacks`, the first of which was that before anything was enriched.
+/// What everything was measured against: the last of `lacks`, the first of which was that before anything was
+/// enriched.
 pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
     match lacks {
         [] => "the modes of the body; what these lack of an FE model is not known".to_owned(),

@@ -44,7 +44,8 @@ pub(super) fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a 
     html.push_str("</dl>\n");
 }
 
-/// A table: head cells, then rows whose first cell is their head; cells are markup, `text` columns are left-aligned.
+/// A table: head cells, then rows whose first cell is their head; cells are markup, `text` columns are
+/// left-aligned.
 pub(super) fn table(html: &mut String, caption: &str, head: &[String], text: &[usize], rows: &[Vec<String>]) {
     let class = |column: usize| if text.contains(&column) { " class=\"text\"" } else { "" };
     html.push_str(&format!("<div class=\"scroll\"><table>\n<caption>{caption}</caption>\n<thead><tr>"));

@@ -5,8 +5,8 @@ use crate::body::flex_body::FlexBody;
 use crate::body::invariants::Invariants;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// Products of inertia below this part of sqrt(I_kk I_ll) are rounding of a principal frame: its diagonal then is
-/// better than any eigenvalue iteration, which loses the digits of a needle's small moment.
+/// Products of inertia below this part of sqrt(I_kk I_ll) are rounding of a principal frame: its diagonal
+/// then is better than any eigenvalue iteration, which loses the digits of a needle's small moment.
 const DIAGONAL: f64 = 1e-12;
 
 /// Limits within which a frame counts as what it was made to be: the limits of the identities of the body.

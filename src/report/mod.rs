@@ -1,4 +1,5 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two bodies; simulations; selections; trade studies; frequency responses; audits.
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two
+//! bodies; simulations; selections; trade studies; frequency responses; audits.
 
 mod audit;
 mod bar_chart;

@@ -1,6 +1,7 @@
 //! Numbers and texts as people read them. JSON never uses these: its floats round-trip.
 
-/// `value` with `digits` significant digits: plain between 1e-4 and 1e7, else with an exponent; no trailing zeros.
+/// `value` with `digits` significant digits: plain between 1e-4 and 1e7, else with an exponent; no trailing
+/// zeros.
 pub(super) fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return "not finite".to_owned();
@@ -50,8 +51,8 @@ pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Text of a file for one line of a terminal or a page: what could steer a terminal or turn the direction of the
-/// text is replaced.
+/// Text of a file for one line of a terminal or a page: what could steer a terminal or turn the direction of
+/// the text is replaced.
 pub(super) fn plain(text: &str) -> String {
     let steers = |c: char| {
         c.is_control()

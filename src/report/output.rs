@@ -19,8 +19,8 @@ struct Output<'a> {
     diagnostics: &'a [Diagnostic],
 }
 
-/// The object of `command` (`None`: the command line names none), which ends with `code`. `results` is what it found, as JSON; `None`: it
-/// did not come to results.
+/// The object of `command` (`None`: the command line names none), which ends with `code`. `results` is what
+/// it found, as JSON; `None`: it did not come to results.
 ///
 /// # Panics
 /// Never: the head of the object has text keys and finite numbers.
@@ -45,7 +45,8 @@ pub fn output_json(
         diagnostics,
     };
     let head = serde_json::to_string_pretty(&head).expect("texts and numbers");
-    // Results keep the order of their keys and the digits of their numbers; no text in JSON holds a line break.
+    // Results keep the order of their keys and the digits of their numbers; no text in JSON holds a line
+    // break.
     let results = results.unwrap_or("null").trim_end().replace('\n', "\n  ");
     format!("{},\n  \"results\": {results}\n}}\n", head.trim_end_matches("\n}"))
 }

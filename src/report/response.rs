@@ -1,4 +1,5 @@
-//! What a user reads of a frequency response: facts, the compact summary, the table and the page with the plots.
+//! What a user reads of a frequency response: facts, the compact summary, the table and the page with the
+//! plots.
 
 use super::Format;
 use super::facts::UnitFacts;
@@ -430,7 +431,8 @@ fn verdict(pairs: &[PairFacts], settings: &Settings, passed: Option<bool>) -> St
     }
 }
 
-/// The response as a table of comma-separated values, a row for every frequency; numbers round-trip, cells are empty where nothing was solved.
+/// The response as a table of comma-separated values, a row for every frequency; numbers round-trip, cells
+/// are empty where nothing was solved.
 pub fn response_csv(response: &Response) -> String {
     let mut head = vec!["frequency_hz".to_owned()];
     for pair in &response.pairs {

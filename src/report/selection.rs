@@ -36,7 +36,8 @@ pub struct SelectionFacts<'a> {
     modes: ModesFacts<'a>,
     chosen: Option<TrialFacts<'a>>,
     multiplications_before: usize,
-    /// What the body, and those before it that were enriched, lack of the model; nothing where only a file is at hand.
+    /// What the body, and those before it that were enriched, lack of the model; nothing where only a file is
+    /// at hand.
     reference: Vec<LackFacts>,
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,

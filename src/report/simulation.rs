@@ -50,7 +50,8 @@ pub struct SimulationFacts<'a> {
     largest_deflection: f64,
     /// Force and torque that prescribed motion takes at most; none without such.
     reaction: Option<ReactionFacts>,
-    /// The torque that the reference conditions carry at most at the instants written; none where the frame is not a mean one.
+    /// The torque that the reference conditions carry at most at the instants written; none where the frame
+    /// is not a mean one.
     largest_conditions_torque: Option<f64>,
     points: Vec<PointFacts<'a>>,
     diagnostics: &'a [Diagnostic],

@@ -34,7 +34,8 @@ pub struct TradeFacts<'a> {
     reference: ReferenceKind,
     /// How the equations of all nodes were integrated, where they are the reference.
     nodal: Option<NodalFacts>,
-    /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only a file is at hand.
+    /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only
+    /// a file is at hand.
     reference_lacks: Vec<LackFacts>,
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,

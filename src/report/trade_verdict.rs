@@ -4,7 +4,8 @@ use super::errors_in_words::errors_in_words;
 use super::numbers::{duration, significant};
 use crate::study::trade::{Measured, Recommendation, Row, Trade};
 
-/// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in words.
+/// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in
+/// words.
 pub(super) fn verdict_lines(
     trade: &Trade,
     names: &[String],

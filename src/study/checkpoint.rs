@@ -82,8 +82,8 @@ impl ModelCheckpoint {
     }
 }
 
-/// What modes depend on: a line with role and SHA-256 of each file but the manifest, the damping and the interfaces, the groups
-/// of HDF5 files that hold several matrices, and which of several bodies it is.
+/// What modes depend on: a line with role and SHA-256 of each file but the manifest, the damping and the
+/// interfaces, the groups of HDF5 files that hold several matrices, and which of several bodies it is.
 fn identity(files: &ModelFiles, model: &FeModel) -> String {
     let relevant =
         model.sources().iter().filter(|s| !["manifest", "interface", "damping"].contains(&s.role.as_str()));

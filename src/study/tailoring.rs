@@ -1,4 +1,5 @@
-//! A body made for one scene: a conversion that computes no more than the scene may need, and keeps no more than it needs.
+//! A body made for one scene: a conversion that computes no more than the scene may need, and keeps no more
+//! than it needs.
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -22,12 +23,14 @@ pub struct Tailoring {
     pub settings: ConvertSettings,
     /// Whether a band of the scene replaces the wanted modes: all up to twice the band, if there are any.
     pub by_band: bool,
-    /// Whether the shapes that the motion is made of replace the modes that it was computed with, where fewer of them do.
+    /// Whether the shapes that the motion is made of replace the modes that it was computed with, where fewer
+    /// of them do.
     pub of_motion: bool,
 }
 
 impl Tailoring {
-    /// A body with everything that `scene` may need, enriched until what it lacks of the model no longer counts there.
+    /// A body with everything that `scene` may need, enriched until what it lacks of the model no longer
+    /// counts there.
     ///
     /// # Errors
     /// As [`convert`](crate::body::convert::convert) and [`enrich`].
@@ -57,7 +60,8 @@ impl Tailoring {
         self.enriched(model, scenes, resume, watch, |modal| Ok(modal.condense()))
     }
 
-    /// Conversions by `condense`, each with more static responses than the one before, until the body lacks nothing that counts.
+    /// Conversions by `condense`, each with more static responses than the one before, until the body lacks
+    /// nothing that counts.
     fn enriched(
         &self,
         model: &FeModel,
@@ -81,8 +85,8 @@ impl Tailoring {
         enrich_for_cases(model, scenes, settings.modes.memory, grows, watch, make, |made| &made.body)
     }
 
-    /// The body of the fewest [`MotionShapes`] that leave half of the tolerances to others, in place of the `whole` one whose motion they are made
-    /// of; that one where no number of them does.
+    /// The body of the fewest [`MotionShapes`] that leave half of the tolerances to others, in place of the
+    /// `whole` one whose motion they are made of; that one where no number of them does.
     ///
     /// # Errors
     /// Those of [`trace`] and of the conversion.
@@ -143,7 +147,8 @@ impl Tailoring {
         Some(settings)
     }
 
-    /// The modes that the band of a scene wants; those of the settings without a band, and for a body that is stiff in it.
+    /// The modes that the band of a scene wants; those of the settings without a band, and for a body that is
+    /// stiff in it.
     fn find_modes<'m>(
         &'m self,
         band_settings: Option<&'m ConvertSettings>,
@@ -163,8 +168,8 @@ impl Tailoring {
     }
 }
 
-/// The largest errors of the motion of `body` in `scene` beside that of another body of `model`, which `measure` holds; `None` where the two cannot
-/// be compared.
+/// The largest errors of the motion of `body` in `scene` beside that of another body of `model`, which
+/// `measure` holds; `None` where the two cannot be compared.
 fn errors_beside(
     body: &FlexBody,
     measure: &Measure<'_>,
@@ -182,8 +187,8 @@ fn errors_beside(
     Ok(source.errors(measure, body, &modes, &motion).map(|errors| errors.largest()))
 }
 
-/// Loads whose static responses join the modes where nobody names others: those `stated` with the model; without, those of the `scenes`, of
-/// which free modes alone know nothing.
+/// Loads whose static responses join the modes where nobody names others: those `stated` with the model;
+/// without, those of the `scenes`, of which free modes alone know nothing.
 pub fn loads_for(scenes: &[Scene], stated: &[LoadSource]) -> Vec<LoadSource> {
     if !stated.is_empty() {
         return stated.to_vec();
@@ -209,8 +214,8 @@ pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
     loads.iter().map(read).collect()
 }
 
-/// Converts `model` to a body with the terms and modes that `scene` needs: what bounds of tier 0 rule out is never computed, the rest is
-/// decided about the converted body. The scene becomes one of its sources.
+/// Converts `model` to a body with the terms and modes that `scene` needs: what bounds of tier 0 rule out is
+/// never computed, the rest is decided about the converted body. The scene becomes one of its sources.
 ///
 /// # Errors
 /// As [`convert`](crate::body::convert::convert), [`enrich_for_cases`] and [`select_for_cases`].

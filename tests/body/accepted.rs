@@ -1,5 +1,5 @@
-//! Whatever `convert` makes of a model, `check` accepts: with masses that no distribution of points has, with parts that hardly hold together,
-//! whatever the basis, the accuracy and the storage.
+//! Whatever `convert` makes of a model, `check` accepts: with masses that no distribution of points has, with
+//! parts that hardly hold together, whatever the basis, the accuracy and the storage.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::general::raw_fixture;
@@ -96,7 +96,8 @@ fn joined_pair(stiffness: f64) -> RawModel {
     raw
 }
 
-/// Products with K lose in rounding what the low frequencies of a loose joint have, whatever rigid motion loses.
+/// Products with K lose in rounding what the low frequencies of a loose joint have, whatever rigid motion
+/// loses.
 #[test]
 fn parts_that_are_joined_weakly_are_a_body() {
     for (method, exponent) in
@@ -156,8 +157,8 @@ fn bases(model: &FeModel) -> Vec<BasisChoice> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, rng_seed: RngSeed::Fixed(15), ..ProptestConfig::default() })]
 
-    /// Inertia of random sizes about random axes at random nodes, up to ten thousand times and down to a ten thousandth of that of the
-    /// frame, in every basis.
+    /// Inertia of random sizes about random axes at random nodes, up to ten thousand times and down to a ten
+    /// thousandth of that of the frame, in every basis.
     #[test]
     fn random_masses_of_nodes_are_bodies(seed in any::<u64>(), sizes in proptest::collection::vec(-4.0..4.0f64, 1..5), fast in any::<bool>()) {
         let mut raw = with_random_inertia(&raw_fixture("frame_beams"), seed, &sizes);

@@ -1,4 +1,5 @@
-//! A body in other units moves as it did: energies, momenta and accelerations change with their units and in nothing else.
+//! A body in other units moves as it did: energies, momenta and accelerations change with their units and in
+//! nothing else.
 
 use crate::support::flexible::{fixture, stressed};
 use crate::support::general::raw_fixture;

@@ -1,4 +1,5 @@
-//! Craig-Bampton and Craig-Chang bases against dense solutions that use nothing of the library but its matrix type.
+//! Craig-Bampton and Craig-Chang bases against dense solutions that use nothing of the library but its matrix
+//! type.
 
 mod free_body;
 
@@ -77,8 +78,8 @@ fn models() -> Vec<RawModel> {
     COUPLINGS.into_iter().flat_map(|c| [bracket(c), strip(c)]).collect()
 }
 
-/// The same from definitions, dense: K, M, D, a basis Z of what leaves the interface coordinates zero, and the weights C that take
-/// the coordinates.
+/// The same from definitions, dense: K, M, D, a basis Z of what leaves the interface coordinates zero, and
+/// the weights C that take the coordinates.
 struct Dense {
     k: Mat<f64>,
     m: Mat<f64>,
@@ -159,14 +160,16 @@ impl Dense {
         Mat::from_fn(self.k.nrows(), columns.len(), |i, j| columns[j][i])
     }
 
-    /// The unit loads on the interface coordinates, less the inertia forces of the rigid motion that they cause.
+    /// The unit loads on the interface coordinates, less the inertia forces of the rigid motion that they
+    /// cause.
     fn relieved(&self) -> Mat<f64> {
         let mass = self.rigid.transpose() * &self.m * &self.rigid;
         let resultants = self.rigid.transpose() * &self.weights;
         &self.weights - &self.m * (&self.rigid * mass.partial_piv_lu().solve(resultants))
     }
 
-    /// The deformations within the span of `basis`, M-orthogonal to rigid motion, that self-equilibrated forces cause.
+    /// The deformations within the span of `basis`, M-orthogonal to rigid motion, that self-equilibrated
+    /// forces cause.
     fn responses(&self, basis: Mat<f64>, forces: MatRef<'_, f64>) -> Mat<f64> {
         let (values, vectors) = symmetric_eigen((basis.transpose() * &self.k * &basis).as_ref());
         let largest = values[values.len() - 1];
@@ -324,7 +327,8 @@ fn free_frequencies_come_from_above_to_those_of_the_body() {
     }
 }
 
-/// Loads on the reference points work on the rows of the interfaces: the amplitudes are those of the nodal loads.
+/// Loads on the reference points work on the rows of the interfaces: the amplitudes are those of the nodal
+/// loads.
 #[test]
 fn rows_of_the_interfaces_are_the_motion_of_the_reference_points() {
     for raw in models() {
@@ -419,7 +423,8 @@ fn broken(body: &FlexBody) -> Vec<String> {
     wrong.map(|check| format!("{}: {:e} > {:e}", check.name, check.value, check.limit)).collect()
 }
 
-/// K of few digits annihilates rigid motion badly, and a slender body magnifies that: its rigid mass is exact all the same.
+/// K of few digits annihilates rigid motion badly, and a slender body magnifies that: its rigid mass is exact
+/// all the same.
 #[test]
 fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
     let mesh = Mesh::block(Kind::Hex8, [30, 1, 1], [3.0, 0.05, 0.04]);
@@ -448,8 +453,8 @@ fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
     }
 }
 
-/// Reduced integration leaves patterns without mass, also among the motions of single nodes: they are left out and told, and what
-/// stays keeps its digits.
+/// Reduced integration leaves patterns without mass, also among the motions of single nodes: they are left
+/// out and told, and what stays keeps its digits.
 #[test]
 fn motions_without_mass_are_left_out_and_told() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/bar_c3d8r");
@@ -595,7 +600,8 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
     assert!(refused(raw, &below).has(Code::ShapesNone), "nothing but rigid motion");
 }
 
-/// Two blocks that share an edge: a mechanism when one is held, and also when both are, since the interfaces move.
+/// Two blocks that share an edge: a mechanism when one is held, and also when both are, since the interfaces
+/// move.
 #[test]
 fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
     let mesh = Mesh::hinge(Kind::Hex8, 2);

@@ -1,4 +1,5 @@
-//! Craig-Bampton bases of bodies whose nodes have rotations: single nodes are whole joints, rigid interfaces tie rotations too.
+//! Craig-Bampton bases of bodies whose nodes have rotations: single nodes are whole joints, rigid interfaces
+//! tie rotations too.
 
 use crate::support::reference::symmetric_eigen;
 use faer::linalg::solvers::Solve;
@@ -128,7 +129,8 @@ fn a_single_node_with_rotations_is_a_joint() {
     }
 }
 
-/// The reference node of an eliminated constraint, held; and an edge of a shell, whose rotations a rigid interface ties.
+/// The reference node of an eliminated constraint, held; and an edge of a shell, whose rotations a rigid
+/// interface ties.
 #[test]
 fn rigid_interfaces_tie_rotations() {
     let mpc = fixture("mpc_block");

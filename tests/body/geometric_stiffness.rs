@@ -1,4 +1,5 @@
-//! Geometric stiffness of unit loads: against direct nodal products, beams in closed form, and itself in other axes.
+//! Geometric stiffness of unit loads: against direct nodal products, beams in closed form, and itself in
+//! other axes.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh, entries};

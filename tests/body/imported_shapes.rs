@@ -1,5 +1,5 @@
-//! Shapes from elsewhere give the same body as modes computed here, whatever basis, precision, order and file they come in; what
-//! they are not is said.
+//! Shapes from elsewhere give the same body as modes computed here, whatever basis, precision, order and file
+//! they come in; what they are not is said.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{DofOrder, Numbering, reordered};

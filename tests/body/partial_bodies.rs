@@ -1,4 +1,5 @@
-//! Bodies that hold some modes and some groups of the kinetic energy only: what is left is what it was, and a body of its own.
+//! Bodies that hold some modes and some groups of the kinetic energy only: what is left is what it was, and a
+//! body of its own.
 
 use crate::support::flexible::{body_of, fixture, lively_state, soft_block};
 use crate::support::general::quasi_velocities;
@@ -185,7 +186,8 @@ fn an_evaluation_of_inertia_alone_takes_a_tenth_at_ninety_modes() {
     let body = fixture("bracket_hex20", 90, BodyFrame::Principal);
     let rigid = with_groups(&body, Groups::NONE);
     let of = |body: &FlexBody| EquationsOfMotion::new(body, Terms::ALL).multiplications();
-    // 2 panels of 32 rows for what is linear in q, 12 rows in forces and momenta, 33 in the elimination, 4 of K_ff and D.
+    // 2 panels of 32 rows for what is linear in q, 12 rows in forces and momenta, 33 in the elimination, 4 of
+    // K_ff and D.
     assert_eq!(of(&rigid), 90 * (2 * 32 + 12 + 33 + 4));
     // W1 6 rows; W2 17 panels and 18 rows; W3 twice 9 panels and 6 rows.
     assert_eq!(of(&body), of(&rigid) + 90 * (6 + 17 * 32 + 18 + 2 * 9 * 32 + 6));

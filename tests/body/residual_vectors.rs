@@ -1,4 +1,5 @@
-//! Residual vectors: what a basis cut off by frequency lacks of static responses, against the modal sum over all modes.
+//! Residual vectors: what a basis cut off by frequency lacks of static responses, against the modal sum over
+//! all modes.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh, grid};
@@ -138,8 +139,9 @@ fn solved_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
     responses
 }
 
-/// The experiment of theory section 8: a plate of 1 x 0.75 x 0.01 m, bent to 0.8 rad. Its response to spin about the axes is
-/// mostly bending, which the first modes have, and to a tenth stretching, which none of the first 50 has.
+/// The experiment of theory section 8: a plate of 1 x 0.75 x 0.01 m, bent to 0.8 rad. Its response to spin
+/// about the axes is mostly bending, which the first modes have, and to a tenth stretching, which none of the
+/// first 50 has.
 #[test]
 fn fifty_modes_miss_a_tenth_of_the_centrifugal_response_and_six_vectors_nothing() {
     let mesh = Mesh::from_cells(Kind::Hex20, &grid([8, 6, 1]), |p| {

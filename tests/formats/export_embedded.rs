@@ -1,5 +1,5 @@
-//! The embedded format: the C header, compiled as a real-time program does it, computes what the library computes. Needs a C compiler, as
-//! the project itself does.
+//! The embedded format: the C header, compiled as a real-time program does it, computes what the library
+//! computes. Needs a C compiler, as the project itself does.
 
 use crate::support::flexible::{body_of, fixture, lively_state, soft_block, stressed};
 use crate::support::partial::{combinations, with_groups};
@@ -266,7 +266,8 @@ fn some_points(body: &FlexBody) -> Points {
     }
 }
 
-/// Roundings of the largest number of a result that two orders of its sums, and what the elimination cancels, may differ by.
+/// Roundings of the largest number of a result that two orders of its sums, and what the elimination cancels,
+/// may differ by.
 const ROUNDINGS: f64 = 500.0;
 
 #[track_caller]
@@ -328,7 +329,8 @@ fn a_body_without_some_terms_has_neither_their_numbers_nor_their_forces() {
     }
 }
 
-/// What no fixture has: geometric stiffness of all kinds, full stiffness and damping matrices, and modes that are not mass-normalised.
+/// What no fixture has: geometric stiffness of all kinds, full stiffness and damping matrices, and modes that
+/// are not mass-normalised.
 fn laden(body: FlexBody, random: &mut Random) -> FlexBody {
     let names: Vec<String> = body.interfaces().iter().map(|interface| interface.name.clone()).collect();
     let at = |make: fn(String) -> LoadKind| names.iter().cloned().map(make);

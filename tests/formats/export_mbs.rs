@@ -1,4 +1,5 @@
-//! Exports to Exudyn, MBDyn and MBSim: every number against the body, and against sums over the mass matrix; read back; losses told.
+//! Exports to Exudyn, MBDyn and MBSim: every number against the body, and against sums over the mass matrix;
+//! read back; losses told.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::{body_of, fixture, soft_block, stressed};
@@ -119,7 +120,8 @@ fn values(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
     same(&held(body), &told(found), own_w2, case);
 }
 
-/// Equal but for what these programs do not look at: the part of W2 that is skew in its axes, where it is not what W3 is.
+/// Equal but for what these programs do not look at: the part of W2 that is skew in its axes, where it is not
+/// what W3 is.
 fn same(expected: &Invariants, found: &Invariants, with_w2: bool, case: &str) {
     let composed = expected.general().is_some() || !expected.groups().w3;
     for (what, difference) in primary_differences(expected, found) {
@@ -295,7 +297,8 @@ fn arrays_of_exudyn_are_the_products_of_fem_py() {
     });
 }
 
-/// What Exudyn's marker makes of the nodes, their mean and the rotation that fits them best, moves as the interface of the body.
+/// What Exudyn's marker makes of the nodes, their mean and the rotation that fits them best, moves as the
+/// interface of the body.
 #[test]
 fn interfaces_of_exudyn_are_nodes_whose_mean_motion_is_that_of_the_interface() {
     let body = fixture("bracket_hex20", 5, BodyFrame::Principal);
@@ -580,7 +583,8 @@ fn mbdyn_says_what_its_input_must_have() {
     assert!(nodes.contains("2 or more interface nodes"), "{nodes}");
 }
 
-/// Six nodes on a cross have the place and the rotation of the interface, also of nodal rotations that Exudyn has no other form for.
+/// Six nodes on a cross have the place and the rotation of the interface, also of nodal rotations that Exudyn
+/// has no other form for.
 #[test]
 fn interfaces_of_exudyn_are_crosses_of_six_nodes_where_places_are_asked_for() {
     for model in ["bracket_hex20", "car_frame"] {

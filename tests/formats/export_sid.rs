@@ -1,4 +1,5 @@
-//! SID_FEM text: what is written is the body. The equations of motion are evaluated from the file as public readers print them.
+//! SID_FEM text: what is written is the body. The equations of motion are evaluated from the file as public
+//! readers print them.
 
 use crate::support::flexible::{fixture, stressed};
 use crate::support::partial::{combinations, with_groups};
@@ -206,7 +207,8 @@ struct State {
 }
 
 impl State {
-    /// A state whose modal coordinates and rates are `size` of what the body's inertia is; in the plane of a plane body.
+    /// A state whose modal coordinates and rates are `size` of what the body's inertia is; in the plane of a
+    /// plane body.
     fn random(body: &FlexBody, size: f64, random: &mut Random) -> Self {
         let (nf, plane) = (body.n_modes(), body.dimension() == 2);
         let inertia = body.invariants().inertia().trace().sqrt();
@@ -245,7 +247,8 @@ impl State {
     }
 }
 
-/// Largest difference of the equations of SID and those of the body beside the largest entry: of force, torque, and modal forces.
+/// Largest difference of the equations of SID and those of the body beside the largest entry: of force,
+/// torque, and modal forces.
 fn equations_apart(body: &FlexBody, arrays: &Arrays, state: &State) -> [f64; 3] {
     let (sid, own) = (State::rows(body, &arrays.balance(state)), state.own(body));
     let d = if body.dimension() == 2 { 2 } else { 3 };
@@ -358,7 +361,8 @@ fn difference(body: &FlexBody, arrays: &Arrays, state: &State) -> DVector<f64> {
     State::rows(body, &arrays.balance(state)) - state.own(body)
 }
 
-/// What SID leaves out of the modal forces of a solid without geometric stiffness is nothing: these are exact at any deformation.
+/// What SID leaves out of the modal forces of a solid without geometric stiffness is nothing: these are exact
+/// at any deformation.
 #[test]
 fn modal_forces_of_solids_are_exact_at_any_deformation() {
     for model in ["bracket_hex20", "cube_hex8", "gear_disc"] {
@@ -433,7 +437,8 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
     }
 }
 
-/// Readers of the files of FEMBS and PY_SID split the line at a sign of equality; MatMorembs and FEMBeam write none.
+/// Readers of the files of FEMBS and PY_SID split the line at a sign of equality; MatMorembs and FEMBeam
+/// write none.
 #[test]
 fn the_part_has_a_name_in_the_dialects_that_have_one() {
     let mut parts = fixture("hex8_edges", 4, BodyFrame::Model).into_parts();

@@ -1,4 +1,5 @@
-//! Files of MBDyn, MBSim and Exudyn: each fault gives its finding and no other, damaged ones an error with a line, none a panic.
+//! Files of MBDyn, MBSim and Exudyn: each fault gives its finding and no other, damaged ones an error with a
+//! line, none a panic.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::body_of;
@@ -479,7 +480,8 @@ static EXPORTS: LazyLock<Vec<(&str, Vec<u8>)>> =
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is changed, reading ends in a body or in a report, and so do audit and import of what is read.
+    /// Whatever is changed, reading ends in a body or in a report, and so do audit and import of what is
+    /// read.
     #[test]
     fn damaged_files_never_panic(which in 0..3usize, damages in proptest::collection::vec(damage(), 1..4)) {
         let (format, bytes) = &EXPORTS[which];

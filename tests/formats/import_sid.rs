@@ -1,4 +1,5 @@
-//! SID_FEM text of other writers: every fault gives the finding that names it, and nothing else; no file makes the reader panic.
+//! SID_FEM text of other writers: every fault gives the finding that names it, and nothing else; no file
+//! makes the reader panic.
 
 use crate::support::flexible::{fixture, stressed};
 use crate::support::random::Random;
@@ -56,7 +57,8 @@ fn findings(imported: &ImportedFile) -> Vec<String> {
     failed.map(|check| format!("{} {}", check.code.id(), check.name)).collect()
 }
 
-/// The file with every entry of its objects as `change` has it: object, key without blanks, value; `None` takes it out.
+/// The file with every entry of its objects as `change` has it: object, key without blanks, value; `None`
+/// takes it out.
 fn edited(text: &str, change: impl Fn(&str, &str, &str) -> Option<(String, String)>) -> String {
     let mut inside: Vec<&str> = Vec::new();
     let mut out = String::new();
@@ -301,7 +303,8 @@ fn in_radians(_: &str, key: &str, v: &str) -> Option<(String, String)> {
     }
 }
 
-/// What no first line tells: a Ct of order 1 has geometric stiffness, and then Oe1 has some too; without it Oe1 that is not Me is a finding.
+/// What no first line tells: a Ct of order 1 has geometric stiffness, and then Oe1 has some too; without it
+/// Oe1 that is not Me is a finding.
 #[test]
 fn geometric_stiffness_is_known_by_ct_where_nothing_declares_it() {
     let sid = find_format("sid").expect("a format");
@@ -521,7 +524,8 @@ fn samples_of_other_programs_have_the_findings_that_they_are_known_for() {
     let root = std::env::var_os("FLEXBODY_SHARED")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), Into::into);
     for (name, dialect, modes, expected) in [
-        // Columns 4 to 6 of Oe1 are not symmetric; rotational inertia of the nodes is in Me and Cr, not in Oe and Gr.
+        // Columns 4 to 6 of Oe1 are not symmetric; rotational inertia of the nodes is in Me and Cr, not in Oe
+        // and Gr.
         (
             "Beam_3m.SID_FEM",
             "py-sid",

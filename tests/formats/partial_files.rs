@@ -1,4 +1,5 @@
-//! Files of bodies that lack groups of the kinetic energy: they hold what the body holds, say what was dropped, and no less.
+//! Files of bodies that lack groups of the kinetic energy: they hold what the body holds, say what was
+//! dropped, and no less.
 
 use crate::support::file_bodies::{fingerprint, wild_body};
 use crate::support::flexible::{body_of, fixture, soft_block};

@@ -1,4 +1,5 @@
-//! Every format that is read, on every body of the fixtures: what was written comes back, is recognised, and passes its audit.
+//! Every format that is read, on every body of the fixtures: what was written comes back, is recognised, and
+//! passes its audit.
 
 use crate::support::flexible::fixture;
 use faer::Mat;
@@ -13,7 +14,8 @@ use flexbody::input::InputFile;
 use flexbody::model::LoadKind;
 use std::path::Path;
 
-/// Bodies of the fixtures: all models in the principal frame, some in that of the model, where the origin is not the centre of mass.
+/// Bodies of the fixtures: all models in the principal frame, some in that of the model, where the origin is
+/// not the centre of mass.
 fn bodies() -> Vec<(String, FlexBody)> {
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models");
     let mut names: Vec<String> = std::fs::read_dir(models)
@@ -105,7 +107,8 @@ fn what_is_written_comes_back() {
             let (own, told) = (body.invariants(), back.invariants());
             let general = own.general().is_some();
             for (quantity, apart) in primary_differences(&without_w0(own), told) {
-                // Of S and W3 of such a mass the formats keep what their equations have, each its own part; and say so.
+                // Of S and W3 of such a mass the formats keep what their equations have, each its own part;
+                // and say so.
                 if general && ["S", "W3"].contains(&quantity.as_str()) {
                     if quantity == "W3" && apart > 1e-12 && lossless {
                         complain(format!("W3 is lost by {apart:.1e}, which is not told"));
@@ -127,7 +130,8 @@ fn what_is_written_comes_back() {
             if difference(&body.modes().shape, &back.modes().shape) > 1e-15 {
                 complain("the shapes differ".to_owned());
             }
-            // SID knows W2 and the geometric stiffness for spin as one: it comes back as the latter, and the equations are the same.
+            // SID knows W2 and the geometric stiffness for spin as one: it comes back as the latter, and the
+            // equations are the same.
             let joined = back.groups() != body.groups();
             for one in
                 back.geometric_stiffness().iter().filter(|one| !(joined && one.load.kind == LoadKind::Spin))

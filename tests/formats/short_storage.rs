@@ -1,4 +1,5 @@
-//! Bodies whose large arrays are 32-bit floats: what is measured is what the file holds, and checks know its rounding and no more.
+//! Bodies whose large arrays are 32-bit floats: what is measured is what the file holds, and checks know its
+//! rounding and no more.
 
 use crate::support::file_bodies::wild_body;
 use crate::support::flexible::{lively_state, soft_block};

@@ -1,4 +1,5 @@
-//! A flex-body file that was changed since it was written is refused, with the name of what was changed; how HDF5 lays it out does not matter.
+//! A flex-body file that was changed since it was written is refused, with the name of what was changed; how
+//! HDF5 lays it out does not matter.
 
 use crate::support::file_bodies::{body, fingerprint, seal};
 use faer::Mat;

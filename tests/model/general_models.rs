@@ -1,4 +1,5 @@
-//! Models with rotations of nodes, rows without a place and masses that do not commute with rotations, from reading to the file.
+//! Models with rotations of nodes, rows without a place and masses that do not commute with rotations, from
+//! reading to the file.
 
 use crate::support::general::{FIXTURES, raw_fixture as raw};
 use crate::support::random::Random;
@@ -164,7 +165,8 @@ fn bodies_come_back_from_their_files_to_the_last_bit() {
     }
 }
 
-/// The body about another origin and in other axes is what its invariants say of it there, in the plane as well.
+/// The body about another origin and in other axes is what its invariants say of it there, in the plane as
+/// well.
 #[test]
 fn invariants_follow_the_frame() {
     for name in FIXTURES {
@@ -297,7 +299,8 @@ fn spin_compliance(body: &FlexBody, spin: Vector3<f64>) -> f64 {
     body.modes().eigenvalue.iter().enumerate().map(|(j, lambda)| load(j).powi(2) / lambda).sum()
 }
 
-/// The centrifugal residual vectors of bodies with rotations: with them a few modes respond to spin as all modes do.
+/// The centrifugal residual vectors of bodies with rotations: with them a few modes respond to spin as all
+/// modes do.
 #[test]
 fn centrifugal_vectors_carry_the_response_that_all_modes_have() {
     for name in ["frame_beams", "shell_folded", "mpc_block", "hex8_edges", "plane_frame"] {
@@ -334,7 +337,8 @@ fn straight_beams_fulfil_every_identity() {
     }
 }
 
-/// A bar that stretches, twists and bends: unit lumped inertia at its nodes, springs between the neighbours' relative motions.
+/// A bar that stretches, twists and bends: unit lumped inertia at its nodes, springs between the neighbours'
+/// relative motions.
 fn straight_beam(parts: usize, direction: Vector3<f64>) -> RawModel {
     let n = parts + 1;
     let place = |i: usize| direction * (i as f64 / parts as f64);

@@ -1,4 +1,5 @@
-//! Damaged files: whatever is changed in a valid file, reading it ends in a model or in a report, never in a panic.
+//! Damaged files: whatever is changed in a valid file, reading it ends in a model or in a report, never in a
+//! panic.
 
 use crate::support::cases::Case;
 use flexbody::base::diagnostic::Severity;
@@ -157,7 +158,8 @@ proptest! {
 }
 
 proptest! {
-    // Always the same cases: what the HDF5 library itself does with a damaged file is not ours to find by chance.
+    // Always the same cases: what the HDF5 library itself does with a damaged file is not ours to find by
+    // chance.
     #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(20), ..cases(600) })]
 
     #[test]

@@ -1,5 +1,5 @@
-//! What a manifest says beside the matrices, through the program: residual vectors and geometric stiffness; and the same on the
-//! command line.
+//! What a manifest says beside the matrices, through the program: residual vectors and geometric stiffness;
+//! and the same on the command line.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{Triangle, matrix_market, write_model};
@@ -29,7 +29,8 @@ fn json(folder: &Path, line: &str) -> Value {
     told.get_mut("results").map(Value::take).unwrap_or(told)
 }
 
-/// A block with two interfaces, nodal loads `F.mtx`, a geometric stiffness `Kg.mtx`, and `more` at the end of the manifest.
+/// A block with two interfaces, nodal loads `F.mtx`, a geometric stiffness `Kg.mtx`, and `more` at the end of
+/// the manifest.
 fn model(more: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = Mesh::block(Kind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);

@@ -58,8 +58,8 @@ fn rigid_properties_of_a_turned_rectangle_are_exact() {
     assert_eq!(body.frame().axes.column(2).as_slice(), [0.0, 0.0, 1.0]);
 }
 
-/// The kinetic energy of every nodal motion equals that of the condensed terms: the mass matrix of theory section 4,
-/// J0 = I0_zz, b = W1_zz / 2, C2 and W3 their z rows.
+/// The kinetic energy of every nodal motion equals that of the condensed terms: the mass matrix of theory
+/// section 4, J0 = I0_zz, b = W1_zz / 2, C2 and W3 their z rows.
 #[test]
 fn kinetic_energy_equals_that_of_the_nodes() {
     for frame in BodyFrame::ALL {
@@ -130,7 +130,8 @@ fn identities_and_recomputation_hold() {
     }
 }
 
-/// Bending of a slender bar: Euler and Bernoulli's first frequency, to the shear and rotary inertia that they leave out.
+/// Bending of a slender bar: Euler and Bernoulli's first frequency, to the shear and rotary inertia that they
+/// leave out.
 #[test]
 fn first_bending_frequency_is_that_of_a_beam() {
     let body = converted(&model(rectangle(160, 12, 0.0, [0.0, 0.0])), 1, BodyFrame::Principal).body;

@@ -1,5 +1,5 @@
-//! Mass beside stiffness and positions: M in another order or of another mesh, units that disagree, exchanged matrices. Every mistake is
-//! made on a sound model, of which nothing is told.
+//! Mass beside stiffness and positions: M in another order or of another mesh, units that disagree, exchanged
+//! matrices. Every mistake is made on a sound model, of which nothing is told.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::general::raw_fixture;
@@ -22,7 +22,8 @@ const NEW: [Code; 7] = [
     Code::InterfaceFar,
 ];
 
-/// Solids, beams, shells, a plane model, eliminated constraints, lumped and singular masses, bubbles, springs.
+/// Solids, beams, shells, a plane model, eliminated constraints, lumped and singular masses, bubbles,
+/// springs.
 const ALL: [&str; 19] = [
     "bar_c3d8r",
     "bracket_hex20",
@@ -156,8 +157,8 @@ fn a_random_order_of_the_mass_is_refused() {
     }
 }
 
-/// On linear elements every exchange is told. On quadratic ones nodes of the same elements that have the same mass are left, whose
-/// exchange changes little.
+/// On linear elements every exchange is told. On quadratic ones nodes of the same elements that have the same
+/// mass are left, whose exchange changes little.
 #[test]
 fn two_exchanged_nodes_are_told() {
     for (name, all) in [
@@ -196,7 +197,8 @@ fn two_exchanged_nodes_are_told() {
 
 #[test]
 fn nodes_of_one_element_that_are_exchanged_are_named() {
-    // A corner and the middle of an edge that belong to one element alone: K couples them with the same nodes.
+    // A corner and the middle of an edge that belong to one element alone: K couples them with the same
+    // nodes.
     let raw = Mesh::block(Kind::Hex20, [3, 1, 1], [3.0, 1.0, 1.0])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();

@@ -1,4 +1,5 @@
-//! Several bodies in one pair of matrices: found, named, and on `--split` converted as each would be by itself.
+//! Several bodies in one pair of matrices: found, named, and on `--split` converted as each would be by
+//! itself.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{Triangle, write_model};

@@ -1,4 +1,5 @@
-//! Bodies that hang from an interface, against dense solutions of the clamped model, closed forms and the way of the interface.
+//! Bodies that hang from an interface, against dense solutions of the clamped model, closed forms and the way
+//! of the interface.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::{body_of, fixture};
@@ -60,7 +61,8 @@ fn matrix(a: &Mat<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// K and M of what is left when the mean motion of the nodes of `root` is held, and the motions that are left.
+/// K and M of what is left when the mean motion of the nodes of `root` is held, and the motions that are
+/// left.
 struct Clamped {
     motions: DMatrix<f64>,
     stiffness: DMatrix<f64>,
@@ -73,7 +75,8 @@ impl Clamped {
         let nodes: Vec<usize> = raw.interfaces[0].nodes.iter().map(|id| *id as usize - 1).collect();
         let at = |i: usize| Vector3::from(raw.nodes.positions[i]);
         let centre = nodes.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / nodes.len() as f64;
-        // The mean rigid motion vanishes where the displacements are orthogonal to all rigid motions of the nodes.
+        // The mean rigid motion vanishes where the displacements are orthogonal to all rigid motions of the
+        // nodes.
         let mut rigid = DMatrix::zeros(k.nrows(), 6);
         for &i in &nodes {
             for axis in 0..3 {

@@ -1,4 +1,5 @@
-//! Errors, extremes and verdicts belong to the continuous motion: which instants a scene writes has no part in them.
+//! Errors, extremes and verdicts belong to the continuous motion: which instants a scene writes has no part
+//! in them.
 
 use crate::support::flexible::soft_block;
 use crate::support::scenes::{bodies, doing, seeded};
@@ -70,7 +71,8 @@ fn written(recording: &Recording) -> f64 {
     recording.paths.iter().flat_map(|path| &path.deflection).map(|d| d.norm()).fold(0.0, f64::max)
 }
 
-/// The largest difference of the deflections of two motions at the same instants, relative to the largest deflection.
+/// The largest difference of the deflections of two motions at the same instants, relative to the largest
+/// deflection.
 fn apart(reference: &Recording, other: &Recording) -> f64 {
     let pairs = reference.paths.iter().zip(&other.paths);
     let all = pairs.flat_map(|(a, b)| a.deflection.iter().zip(&b.deflection));

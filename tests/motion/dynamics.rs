@@ -1,4 +1,5 @@
-//! The reduced equations of motion of the library against equations written out term by term, nodes and conservation laws.
+//! The reduced equations of motion of the library against equations written out term by term, nodes and
+//! conservation laws.
 
 use crate::support::equations::{Coriolis, State};
 use crate::support::flexible::{
@@ -164,7 +165,8 @@ fn dropped_terms_are_zero_arrays() {
     }
 }
 
-/// The forces are polynomials, of second degree in each coordinate and velocity: central differences of any step are exact.
+/// The forces are polynomials, of second degree in each coordinate and velocity: central differences of any
+/// step are exact.
 #[test]
 fn jacobians_are_the_differences_of_the_forces() {
     let bodies = (0..6).flat_map(|seed| [random_solid(seed).1, random_general(seed).1]);

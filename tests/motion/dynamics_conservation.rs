@@ -1,4 +1,5 @@
-//! What motion keeps: energy and momenta of all terms, of every truncation and of general masses; and what misprints lose.
+//! What motion keeps: energy and momenta of all terms, of every truncation and of general masses; and what
+//! misprints lose.
 
 use crate::support::flexible::{fixture, oracle, soft_block, stressed};
 use crate::support::integrate;
@@ -80,7 +81,8 @@ fn energy_is_kept_with_geometric_stiffness() {
     for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Model)] {
         let lambda = body.modes().eigenvalue[0];
         let radius = (body.invariants().inertia()[(1, 1)] / body.invariants().mass()).sqrt();
-        // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first stiffness.
+        // Motion of second order of nodes whose modes move like the body turns: some hundredths of the first
+        // stiffness.
         let sizes = [0.5, 0.5 / radius, 0.5];
         let single = (0..3).map(|at| at..at + 1);
         for kinds in single.chain(std::iter::once(0..3)) {

@@ -200,7 +200,8 @@ fn plane_bodies_have_the_terms_of_section_four() {
     assert!((&forces - &expected).norm() < 1e-13 * expected.norm(), "{forces} {expected}");
 }
 
-/// Section 6 in the plane by differences of the kinetic energy, which is quadratic in q: h = dMc/dt nu + (omega x p, V x p, -dT/dq).
+/// Section 6 in the plane by differences of the kinetic energy, which is quadratic in q: h = dMc/dt nu +
+/// (omega x p, V x p, -dT/dq).
 #[test]
 fn plane_bodies_with_any_mass_follow_from_their_kinetic_energy() {
     let body = fixture("plane_frame", 8, BodyFrame::Model);

@@ -1,4 +1,5 @@
-//! Geometric stiffness in the equations of motion: it is the stiffness that theory (7.3) says, and motion of second order of the nodes.
+//! Geometric stiffness in the equations of motion: it is the stiffness that theory (7.3) says, and motion of
+//! second order of the nodes.
 
 use crate::support::flexible::{fixture, invariants_of, made_of, stressed};
 use crate::support::general::{NodalBody, Row, RowKind, random_matrix, to_faer};
@@ -101,8 +102,8 @@ impl Points {
         to_faer(&sum)
     }
 
-    /// With geometric stiffness by its definition: the inertia forces -M a of a unit load do the work -q'K q / 2 on the motion of second
-    /// order.
+    /// With geometric stiffness by its definition: the inertia forces -M a of a unit load do the work -q'K q
+    /// / 2 on the motion of second order.
     fn body(&self) -> FlexBody {
         let (n, nf) = (self.mass.len(), self.shapes.ncols());
         let mass = DMatrix::from_fn(3 * n, 3 * n, |i, j| if i == j { self.mass[i / 3] } else { 0.0 });
@@ -162,7 +163,8 @@ impl Points {
     }
 }
 
-/// Kinetic energy, momentum and first moment are those of masses whose motion is known to second order: what is left is of third.
+/// Kinetic energy, momentum and first moment are those of masses whose motion is known to second order: what
+/// is left is of third.
 #[test]
 fn geometric_stiffness_is_the_inertia_of_motion_of_second_order() {
     let mut random = Random(17);
@@ -200,7 +202,8 @@ fn geometric_stiffness_is_the_inertia_of_motion_of_second_order() {
     }
 }
 
-/// The momenta change as p' = F - omega x p, h' = tau - omega x h - V x p and `modal_momentum_rate` say: they are cubic in time along straight lines, for which five points are exact.
+/// The momenta change as p' = F - omega x p, h' = tau - omega x h - V x p and `modal_momentum_rate` say: they
+/// are cubic in time along straight lines, for which five points are exact.
 #[test]
 fn momenta_change_as_their_rates_say() {
     for (at, name) in ["bracket_hex20", "frame_beams"].into_iter().enumerate() {

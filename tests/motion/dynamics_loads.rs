@@ -1,4 +1,5 @@
-//! Forces and torques at nodes and interfaces: the power that they do, the motion that they act on, and their derivatives.
+//! Forces and torques at nodes and interfaces: the power that they do, the motion that they act on, and their
+//! derivatives.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::{body_of, fixture, stressed};
@@ -94,7 +95,8 @@ fn derivative(step: f64, mut f: impl FnMut(f64) -> DVector<f64>) -> DVector<f64>
     (near * 8.0 - (f(2.0 * step) - f(-2.0 * step))) / (12.0 * step)
 }
 
-/// f at time 0 and its rate while the velocities nu stay what they are in body axes; the evaluation is left at time 0.
+/// f at time 0 and its rate while the velocities nu stay what they are in body axes; the evaluation is left
+/// at time 0.
 fn along(
     evaluation: &mut Evaluation<'_>,
     (q, nu): (&[f64], &[f64]),
@@ -216,7 +218,8 @@ fn loads_at_an_interface_are_forces_at_its_nodes() {
     }
 }
 
-/// Every load of a body at one state; the axes of the body are turned by a small rotation from where the loads were resolved.
+/// Every load of a body at one state; the axes of the body are turned by a small rotation from where the
+/// loads were resolved.
 fn apply(
     evaluation: &Evaluation<'_>,
     point: &BodyPoint,

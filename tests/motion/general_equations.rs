@@ -1,5 +1,5 @@
-//! Bodies whose mass matrix does not commute with rotations (theory section 6): the equations in constant invariants against the
-//! unreduced nodal body, and both against what nature keeps.
+//! Bodies whose mass matrix does not commute with rotations (theory section 6): the equations in constant
+//! invariants against the unreduced nodal body, and both against what nature keeps.
 
 use crate::support::equations::{Coriolis, State};
 use crate::support::general::{
@@ -48,7 +48,8 @@ fn invariants_give_the_accelerations_of_the_nodes() {
     }
 }
 
-/// Where M = Ms kron I, inner vectors included, section 6 is section 3, and the nodal formula of [ZG19] holds.
+/// Where M = Ms kron I, inner vectors included, section 6 is section 3, and the nodal formula of [ZG19]
+/// holds.
 #[test]
 fn rotation_invariant_mass_gives_the_equations_of_section_three() {
     for seed in 0..10 {
@@ -153,7 +154,8 @@ fn invariants_of_the_fixtures_are_the_reference() {
         assert!((reduced.mass / mass - 1.0).abs() < 1e-13, "{name}");
         assert!(reduced.first_moment.norm() < 1e-13 * size * mass.sqrt(), "{name}");
         let inertia = DMatrix::from_fn(3, 3, |k, l| reduced.inertia[(k, l)]);
-        // Scaled as the Cauchy-Schwarz inequality bounds them: C1, C2 vanish, W0 where M is rotation invariant.
+        // Scaled as the Cauchy-Schwarz inequality bounds them: C1, C2 vanish, W0 where M is rotation
+        // invariant.
         for (what, found, scale) in [
             ("I0", &inertia, size * size),
             ("W0", &w0, mass.sqrt()),
@@ -174,7 +176,8 @@ fn invariants_of_the_fixtures_are_the_reference() {
 
 const MODES: usize = 6;
 
-/// A body that spins about its middle axis with a fifth of its first circular frequency, bent and moving at the start.
+/// A body that spins about its middle axis with a fifth of its first circular frequency, bent and moving at
+/// the start.
 fn tumble(fixture: &Fixture, periods: f64, rate: impl Fn(&DVector<f64>) -> DVector<f64>) -> Drift {
     let (body, omega) = (&fixture.body, fixture.eigenvalues.iter().map(|l| l.sqrt()).collect::<Vec<f64>>());
     let eigen = body.invariants().reduced.inertia.symmetric_eigen();
@@ -223,8 +226,8 @@ fn tumbling_bodies_keep_energy_and_momenta() {
 fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
     let fixture = fixture("frame_beams", MODES);
     let (body, exact) = (&fixture.body, fixture.body.invariants());
-    // The nodal formula of [ZG19]; section 3 with the right invariants, though W3 is not skew and W0 is not e x C1; section 6 with
-    // W0 as it would follow from C1, which vanishes.
+    // The nodal formula of [ZG19]; section 3 with the right invariants, though W3 is not skew and W0 is not e
+    // x C1; section 6 with W0 as it would follow from C1, which vanishes.
     let nodes = |y: &DVector<f64>| rates(y, |s| body.accelerations_for_rotation_invariant_mass(s));
     let section_three =
         |y: &DVector<f64>| rates(y, |s| exact.reduced.free_accelerations(s, Coriolis::Correct));
@@ -279,7 +282,8 @@ fn signed(conversion: &Conversion, like: &GeneralBody) -> GeneralBody {
     result
 }
 
-/// Rows that describe the rotation about z and displacements in the plane, of a matrix with these blocks of rows.
+/// Rows that describe the rotation about z and displacements in the plane, of a matrix with these blocks of
+/// rows.
 fn in_plane(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
     a.select_rows(rows).select_columns(columns)
 }
@@ -349,7 +353,8 @@ fn conversions_have_these_invariants_and_move_like_the_nodes() {
     }
 }
 
-/// The unreduced model of a fixture with the modes that its body has, rotations and rows without a place included.
+/// The unreduced model of a fixture with the modes that its body has, rotations and rows without a place
+/// included.
 fn nodal_body(name: &str, body: &FlexBody) -> NodalBody {
     let raw = raw_fixture(name);
     let (modes, ids) = (body.modes(), &body.nodes().ids);

@@ -1,5 +1,5 @@
-//! Histories and rigid motion from files: they mean what the same numbers mean in the scene, a recorded motion that is fed back is reproduced, and as
-//! many rows as there are change nothing.
+//! Histories and rigid motion from files: they mean what the same numbers mean in the scene, a recorded
+//! motion that is fed back is reproduced, and as many rows as there are change nothing.
 
 use super::scene_frames::block;
 use crate::support::flexible::body_of;
@@ -77,8 +77,9 @@ fn driven(spin: &str) -> String {
     )
 }
 
-/// A free motion that was recorded and is fed back as the rotation is reproduced with no torque, the better the more rows there are: the error of
-/// a cubic spline through the angular velocity falls with the fourth power of the distance of the rows, that of its derivative with the third.
+/// A free motion that was recorded and is fed back as the rotation is reproduced with no torque, the better
+/// the more rows there are: the error of a cubic spline through the angular velocity falls with the fourth
+/// power of the distance of the rows, that of its derivative with the third.
 #[test]
 fn a_free_motion_that_is_fed_back_is_reproduced_without_a_torque() {
     let body = body(6);
@@ -129,7 +130,8 @@ fn a_free_motion_that_is_fed_back_is_reproduced_without_a_torque() {
     }
 }
 
-/// Three columns along one direction are a rate about this axis: with straight lines and with cubics, along axes of the model, the body and the world.
+/// Three columns along one direction are a rate about this axis: with straight lines and with cubics, along
+/// axes of the model, the body and the world.
 #[test]
 fn columns_of_one_direction_are_the_spin_about_an_axis() {
     let body = body(5);
@@ -175,7 +177,8 @@ fn columns_of_one_direction_are_the_spin_about_an_axis() {
     }
 }
 
-/// Loads in columns are the loads that the same numbers make in the scene, with units and times changed on the way.
+/// Loads in columns are the loads that the same numbers make in the scene, with units and times changed on
+/// the way.
 #[test]
 fn loads_from_columns_are_those_of_the_scene() {
     let body = body(5);
@@ -216,7 +219,8 @@ fn loads_from_columns_are_those_of_the_scene() {
     }
 }
 
-/// What carries a body follows columns as it follows an axis and a direction; the way, the velocity and the acceleration are one motion.
+/// What carries a body follows columns as it follows an axis and a direction; the way, the velocity and the
+/// acceleration are one motion.
 #[test]
 fn a_carried_body_follows_columns() {
     let body = body(8);
@@ -307,7 +311,8 @@ fn rows_are_no_steps() {
     assert!(apart(&sine, &sampled) < 1e-8);
 }
 
-/// Outside of a file a history holds where the scene says so, and only there; one that ends within rounding of the end goes on.
+/// Outside of a file a history holds where the scene says so, and only there; one that ends within rounding
+/// of the end goes on.
 #[test]
 fn a_file_covers_the_run_or_the_scene_says_what_is_outside() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -7,7 +7,8 @@ mod pendulum;
 #[path = "../../examples/slider_crank.rs"]
 mod slider_crank;
 
-/// Four times the stiffness leaves a quarter of what the flexible pendulum differs by from the rigid one in closed form.
+/// Four times the stiffness leaves a quarter of what the flexible pendulum differs by from the rigid one in
+/// closed form.
 #[test]
 fn the_pendulum_has_the_period_of_the_rigid_body_in_the_limit() {
     let [soft, stiff] = [1.0, 4.0].map(|factor| pendulum::swing(factor).expect("a swing"));
@@ -23,7 +24,8 @@ fn the_pendulum_has_the_period_of_the_rigid_body_in_the_limit() {
     assert!((3.5..4.5).contains(&ratio), "{:e} {:e}", difference(&soft), difference(&stiff));
 }
 
-/// So it does for the slider-crank; the constraint forces of hinge and guide are what changes the momentum besides the weight.
+/// So it does for the slider-crank; the constraint forces of hinge and guide are what changes the momentum
+/// besides the weight.
 #[test]
 fn the_slider_crank_moves_as_the_rigid_mechanism_in_the_limit() {
     let [soft, stiff] = [1.0, 4.0].map(|factor| slider_crank::run(factor, 0.06).expect("a run"));

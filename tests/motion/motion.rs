@@ -1,4 +1,5 @@
-//! Motion of one body by the integrators: against another integrator in other variables, what is kept, loads and prescribed motion.
+//! Motion of one body by the integrators: against another integrator in other variables, what is kept, loads
+//! and prescribed motion.
 
 use crate::support::flexible::{fixture, soft_block};
 use crate::support::integrate as reference;
@@ -119,7 +120,8 @@ fn methods_converge_with_their_order_on_a_tumbling_body() {
 
 #[test]
 fn a_free_body_keeps_momenta_to_rounding_and_its_energy_for_a_hundred_thousand_steps() {
-    // Spatial, plane, and of a general mass whose frame is away from the centre of mass: there the method is not symplectic.
+    // Spatial, plane, and of a general mass whose frame is away from the centre of mass: there the method is
+    // not symplectic.
     for (body, order, limit) in [
         (soft_block(6), 4, 1e-6),
         (fixture("plane_frame", 6, BodyFrame::Principal), 4, 1e-7),

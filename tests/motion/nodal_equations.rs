@@ -1,4 +1,5 @@
-//! The nodal equations of the library against the dense oracles, the reduced equations and what must hold of them.
+//! The nodal equations of the library against the dense oracles, the reduced equations and what must hold of
+//! them.
 
 use crate::support::elements::Kind;
 use crate::support::equations::State;
@@ -48,7 +49,8 @@ fn held_shapes(body: &Unreduced, held: &[DofLabel]) -> Mat<f64> {
     to_faer(&left)
 }
 
-/// Accelerations, momenta and energies against the oracle, whose modes are a basis of all displacements that the conditions allow.
+/// Accelerations, momenta and energies against the oracle, whose modes are a basis of all displacements that
+/// the conditions allow.
 fn assert_oracle(
     what: &str,
     body: &Unreduced,
@@ -228,8 +230,8 @@ fn velocities(equations: &EquationsOfMotion, state: &Configuration) -> Vec<f64> 
     rigid.into_iter().chain(state.qd.iter().copied()).collect()
 }
 
-/// [ZG19] eq. 67 to 72: with H = blkdiag(I, I, Psi), H'(M of all nodes) H and the velocity forces are those of the reduced
-/// equations, for modes of any kind.
+/// [ZG19] eq. 67 to 72: with H = blkdiag(I, I, Psi), H'(M of all nodes) H and the velocity forces are those
+/// of the reduced equations, for modes of any kind.
 fn assert_projection(name: &str, raw: RawModel) {
     let (model, free) = converted(raw, 10);
     let state = modal_state(3, &free);
@@ -459,7 +461,8 @@ fn damping_matrices_act_on_the_nodes() {
     }
 }
 
-/// Of a solid the conditions take the moment that linear elastic forces have about the deformed body, and nothing else.
+/// Of a solid the conditions take the moment that linear elastic forces have about the deformed body, and
+/// nothing else.
 #[test]
 fn conditions_of_solids_hold_the_moment_of_elastic_forces() {
     for (name, raw) in [("hex8", soft_block(Kind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {

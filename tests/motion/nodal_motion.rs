@@ -1,4 +1,5 @@
-//! Trajectories of all nodes: what they keep, that the reduced equations follow them, and what shortened or misprinted equations do.
+//! Trajectories of all nodes: what they keep, that the reduced equations follow them, and what shortened or
+//! misprinted equations do.
 
 use crate::support::elements::Kind;
 use crate::support::flexible::oracle;
@@ -39,8 +40,8 @@ fn radius(body: &FlexBody) -> f64 {
     (body.invariants().inertia().trace() / body.invariants().mass()).sqrt()
 }
 
-/// Spin about nearly the middle axis (of a plane body z) with `spin` times the first circular frequency, and flight; without
-/// deformation.
+/// Spin about nearly the middle axis (of a plane body z) with `spin` times the first circular frequency, and
+/// flight; without deformation.
 fn spinning(body: &FlexBody, spin: f64) -> Configuration {
     let rate = spin * body.modes().eigenvalue[0].sqrt();
     let plane = body.dimension() == 2;
@@ -135,7 +136,8 @@ fn stretch(path: &Path) -> f64 {
     pairs.fold(0.0, |m, (now, i)| m.max(((now[i] - now[0]).norm() - (first[i] - first[0]).norm()).abs()))
 }
 
-/// Solids, a body with nodal rotations, one with massless rows, plane bodies: with all modes the reduced equations are the nodal ones.
+/// Solids, a body with nodal rotations, one with massless rows, plane bodies: with all modes the reduced
+/// equations are the nodal ones.
 #[test]
 fn all_modes_move_as_the_nodes_do() {
     let raws = [
@@ -161,7 +163,8 @@ fn all_modes_move_as_the_nodes_do() {
     }
 }
 
-/// Distance between the motions with mean axes and with a frame fixed to nodes, and the deformation, for spins that are halved.
+/// Distance between the motions with mean axes and with a frame fixed to nodes, and the deformation, for
+/// spins that are halved.
 fn between_frames(model: &FeModel, body: &FlexBody, conditions: &ReferenceConditions) -> Vec<(f64, f64)> {
     let path = |conditions: &ReferenceConditions, spin: f64| {
         let equations = NodalEquations::new(model, body.frame(), conditions).expect("equations");
@@ -176,8 +179,9 @@ fn between_frames(model: &FeModel, body: &FlexBody, conditions: &ReferenceCondit
     spins.map(of_spin).to_vec()
 }
 
-/// The frame of a solid is a matter of description but for K u, which is linear in the displacements from it: motions differ by the
-/// square of the deformation. Where M does not turn with the body, they differ by what M lacks.
+/// The frame of a solid is a matter of description but for K u, which is linear in the displacements from it:
+/// motions differ by the square of the deformation. Where M does not turn with the body, they differ by what
+/// M lacks.
 #[test]
 fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
     let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
@@ -196,8 +200,8 @@ fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
     }
 }
 
-/// Linear momentum and angular momentum about the centre of mass of a solid: sums of m_ij v_j and x_i x m_ij v_j over places and
-/// velocities of its nodes in the world.
+/// Linear momentum and angular momentum about the centre of mass of a solid: sums of m_ij v_j and x_i x m_ij
+/// v_j over places and velocities of its nodes in the world.
 fn momenta_of_nodes(model: &FeModel, at: &NodalEvaluation<'_>) -> (Vector3<f64>, Vector3<f64>) {
     let mass = model.scalar_mass().expect("a solid");
     let weighted = |of: &dyn Fn(usize) -> Vector3<f64>, i: usize| -> Vector3<f64> {
@@ -215,7 +219,8 @@ fn momenta_of_nodes(model: &FeModel, at: &NodalEvaluation<'_>) -> (Vector3<f64>,
     (linear, angular)
 }
 
-/// Largest relative drifts of energy, linear and angular momentum in the first and in the second half of a motion.
+/// Largest relative drifts of energy, linear and angular momentum in the first and in the second half of a
+/// motion.
 fn drifts(
     equations: &NodalEquations<'_>,
     start: &NodalConfiguration,

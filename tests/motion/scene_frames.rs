@@ -1,4 +1,5 @@
-//! A scene means the same whatever frame a body was converted with: one golden scene, three frames, one motion, one selection, one study.
+//! A scene means the same whatever frame a body was converted with: one golden scene, three frames, one
+//! motion, one selection, one study.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::body_of;

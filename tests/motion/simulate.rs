@@ -1,4 +1,5 @@
-//! `flexbody simulate`, through the program: what it writes, that it is what the library computes, and that it can be repeated.
+//! `flexbody simulate`, through the program: what it writes, that it is what the library computes, and that
+//! it can be repeated.
 
 use crate::support::program::{fixtures, flexbody};
 use flexbody::base::diagnostic::Code;
@@ -82,7 +83,8 @@ fn scenes_of_the_fixtures_fit_their_schema_and_run() {
     }
 }
 
-/// A drive motion a cos(w1 t) and a steady spin push the sense mode by the Coriolis force alone, 2 spin W3 a w1 sin(w1 t).
+/// A drive motion a cos(w1 t) and a steady spin push the sense mode by the Coriolis force alone, 2 spin W3 a
+/// w1 sin(w1 t).
 #[test]
 fn the_gyroscope_senses_its_rate() {
     let folder = folder_with("mems_gyroscope", 6);

@@ -1,5 +1,5 @@
-//! Velocity and acceleration of watched points, and what the reference conditions carry: as differences of the places, as the unreduced
-//! equations have them, and in closed form.
+//! Velocity and acceleration of watched points, and what the reference conditions carry: as differences of
+//! the places, as the unreduced equations have them, and in closed form.
 
 use crate::support::elements::Kind;
 use crate::support::flexible::fixture;
@@ -29,7 +29,8 @@ fn recorded(body: &FlexBody, scene: &Scene) -> Recording {
     simulate(body, scene, None, |_| ()).expect("a motion").0
 }
 
-/// What is left of the velocity and of the acceleration when central differences of the places are taken from them, relative to the largest.
+/// What is left of the velocity and of the acceleration when central differences of the places are taken from
+/// them, relative to the largest.
 fn beside_differences(path: &Path, width: f64) -> [f64; 2] {
     let inner = 1..path.place.len() - 1;
     let largest = |vectors: &[Vector3<f64>]| vectors.iter().map(|v| v.norm()).fold(0.0, f64::max);
@@ -41,7 +42,8 @@ fn beside_differences(path: &Path, width: f64) -> [f64; 2] {
     [most(&velocity) / largest(&path.velocity), most(&acceleration) / largest(&path.acceleration)]
 }
 
-/// Half the distance of the instants leaves a quarter of the difference. Nothing is compared at kinks: these scenes have none.
+/// Half the distance of the instants leaves a quarter of the difference. Nothing is compared at kinks: these
+/// scenes have none.
 #[test]
 fn velocities_and_accelerations_are_derivatives_of_the_places() {
     let tumbling = "gravity = [0, 0, -9810]\n[initial]\nvelocity = [500, 0, 2000]\nangular_velocity = [28, 900, 4]\n\
@@ -75,7 +77,8 @@ fn velocities_and_accelerations_are_derivatives_of_the_places() {
     }
 }
 
-/// Steady spin about a held axis: every point moves on a circle, whatever the deformation is that the spin holds.
+/// Steady spin about a held axis: every point moves on a circle, whatever the deformation is that the spin
+/// holds.
 #[test]
 fn a_steady_spin_has_centripetal_accelerations() {
     let body = fixture("bracket_hex20", 6, BodyFrame::Principal);
@@ -122,8 +125,8 @@ fn lively(body: &FlexBody) -> Scene {
     scene
 }
 
-/// With all modes the nodes of the reduced body have the velocities and accelerations of the unreduced equations, and the reference conditions
-/// carry what lambda does there; of damped bodies too.
+/// With all modes the nodes of the reduced body have the velocities and accelerations of the unreduced
+/// equations, and the reference conditions carry what lambda does there; of damped bodies too.
 #[test]
 fn watched_nodes_and_conditions_are_those_of_the_unreduced_equations() {
     let solid = |mut raw: RawModel, damping: Option<Damping<RawMatrix>>| {
@@ -182,7 +185,8 @@ fn watched_nodes_and_conditions_are_those_of_the_unreduced_equations() {
             assert!(torque.norm() > 0.0 && force.norm() < 1e-10 * size * body.invariants().mass());
             let error = (found - torque).norm() / torque.norm();
             println!("{name}: torque of the conditions {:.3e}, difference {error:.1e}", torque.norm());
-            // Where M does not commute with rotations, inertia adds what the invariants do not hold (theory, what the conditions do).
+            // Where M does not commute with rotations, inertia adds what the invariants do not hold (theory,
+            // what the conditions do).
             assert!(!is_solid || error < 1e-8, "{name}: {found} {torque}");
         }
     }

@@ -1,5 +1,5 @@
-//! Extreme bodies: what is kept of their digits, and which refusal they get. `docs/make_stability.py` measures such cases against
-//! high precision and writes `docs/stability.md`.
+//! Extreme bodies: what is kept of their digits, and which refusal they get. `docs/make_stability.py`
+//! measures such cases against high precision and writes `docs/stability.md`.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{Triangle, write_model};
@@ -26,7 +26,8 @@ fn bar() -> Mesh {
     Mesh::block(Kind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25])
 }
 
-/// A mesh of `inner` material where the first node of an element has x between `from` and `to`, of `outer` elsewhere.
+/// A mesh of `inner` material where the first node of an element has x between `from` and `to`, of `outer`
+/// elsewhere.
 fn layered(mesh: &Mesh, (from, to): (f64, f64), inner: Material, outer: Material) -> Assembly {
     let inside = |x: [f64; 3]| (from..to).contains(&x[0]);
     let part =
@@ -316,7 +317,8 @@ fn hinges_are_refused_whether_free_or_of_a_stiffness_that_rounding_hides() {
     }
 }
 
-/// What rounding the matrices to so many digits changes of the first eigenvalue is told where it is above 1e-6.
+/// What rounding the matrices to so many digits changes of the first eigenvalue is told where it is above
+/// 1e-6.
 #[test]
 fn digits_of_files_are_told_when_they_are_gone_and_only_then() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -29,7 +29,8 @@ fn cube() -> tempfile::TempDir {
     folder
 }
 
-/// Runs `flexbody convert model.toml -o b.h5` on one thread, where memory does not depend on who gets the processor.
+/// Runs `flexbody convert model.toml -o b.h5` on one thread, where memory does not depend on who gets the
+/// processor.
 fn convert(folder: &Path, options: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flexbody"))
         .args(["convert", "model.toml", "-o", "b.h5", "--threads", "1"])
@@ -89,7 +90,8 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
     assert_eq!(*phases.lock().expect("one thread"), ["ordering"], "nothing was factored");
 }
 
-/// In the library, where nothing but the plan decides: what reading leaves behind differs from run to run of the program.
+/// In the library, where nothing but the plan decides: what reading leaves behind differs from run to run of
+/// the program.
 #[test]
 fn a_factor_that_does_not_fit_is_taken_in_single_precision() {
     let model = check(block([15; 3], [1.0; 3]).raw_model()).expect("a sound model").model;

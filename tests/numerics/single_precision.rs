@@ -1,4 +1,5 @@
-//! The single-precision factor: the same modes and the same promises as with a double one, or a plain word that it fails.
+//! The single-precision factor: the same modes and the same promises as with a double one, or a plain word
+//! that it fails.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::Mesh;

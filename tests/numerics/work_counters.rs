@@ -1,5 +1,6 @@
-//! The work of the eigen-solver on the fixture models, counted: a slower algorithm fails here without any clock.
-//! `FLEXBODY_BLESS=1 cargo test --test numerics work_counters` writes the table after a change that is meant.
+//! The work of the eigen-solver on the fixture models, counted: a slower algorithm fails here without any
+//! clock. `FLEXBODY_BLESS=1 cargo test --test numerics work_counters` writes the table after a change that is
+//! meant.
 
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::{ModalBasis, ModeSettings, free_surface};

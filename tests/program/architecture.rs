@@ -1,7 +1,7 @@
 //! The arrows between the rooms of `src/`, and the rules that keep the library a library (`ARCHITECTURE.md`).
 //!
-//! Sources are read as tokens: comments, strings and documentation examples do not count, and neither do modules
-//! under `#[cfg(test)]`.
+//! Sources are read as tokens: comments, strings and documentation examples do not count, and neither do
+//! modules under `#[cfg(test)]`.
 
 use proc_macro2::{Delimiter, Ident, Spacing, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
@@ -245,8 +245,8 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The room of a file below `src/` and the depth of its module (`crate::a` is 1); `lib.rs` is no room; `main.rs` and its
-/// module `process.rs` belong to the command line.
+/// The room of a file below `src/` and the depth of its module (`crate::a` is 1); `lib.rs` is no room;
+/// `main.rs` and its module `process.rs` belong to the command line.
 fn room_of(relative: &Path) -> Option<(String, usize)> {
     let parts: Vec<String> =
         relative.iter().map(|p| p.to_string_lossy().trim_end_matches(".rs").to_owned()).collect();
@@ -312,7 +312,8 @@ fn arrows_make_no_circle() {
     }
 }
 
-/// A source file as a module: its path below the crate, and every path that it writes, from the root of the crate.
+/// A source file as a module: its path below the crate, and every path that it writes, from the root of the
+/// crate.
 struct Module {
     name: Vec<String>,
     /// `mod.rs`: declarations and re-exports alone.
@@ -360,7 +361,8 @@ fn from_root(path: &[String], name: &[String], known: &BTreeSet<Vec<String>>) ->
     Some([base, rest].concat())
 }
 
-/// The file that holds what a path means: the longest module in it, or where the index of that module has it from.
+/// The file that holds what a path means: the longest module in it, or where the index of that module has it
+/// from.
 fn holder(path: &[String], modules: &BTreeMap<Vec<String>, &Module>) -> Option<Vec<String>> {
     let depth = (1..=path.len()).rev().find(|&depth| modules.contains_key(&path[..depth]))?;
     let module = modules[&path[..depth]];

@@ -1,8 +1,9 @@
-//! Every broken input of `fixtures/codes/<code>/<case>/` gives exactly the report that lies beside it, the exit code of
-//! the table, and leaves nothing behind.
+//! Every broken input of `fixtures/codes/<code>/<case>/` gives exactly the report that lies beside it, the
+//! exit code of the table, and leaves nothing behind.
 //!
-//! A case is a folder with two files: `case.toml`, and `expected.txt`, which is what the program then tells on stderr
-//! (of `audit` also the findings on stdout), warnings of a case that succeeds included. A new case needs no code:
+//! A case is a folder with two files: `case.toml`, and `expected.txt`, which is what the program then tells
+//! on stderr (of `audit` also the findings on stdout), warnings of a case that succeeds included. A new case
+//! needs no code:
 //!
 //! ```toml
 //! what = "The damping ratio is given in percent."   # one sentence, shown when the case fails
@@ -24,10 +25,11 @@
 //! | `[take]` | other files of `fixtures/` by the names that they have here: `"K.h5" = "small/tet4_two_groups/K.h5"` |
 //! | `[files]` | whole texts of files, for short ones: `"scene.toml" = """..."""` |
 //!
-//! Any other file beside `case.toml`, binary or long, is there too. Files come in the order base, `[take]`, beside, `[files]`,
-//! and each replaces one of the same name; then texts are replaced, then appended. All of it is put together in a folder of its
-//! own, in which the command runs. Keys that are not known are errors, and so is a file that is that of the base.
-//! `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes the reports; read the difference.
+//! Any other file beside `case.toml`, binary or long, is there too. Files come in the order base, `[take]`,
+//! beside, `[files]`, and each replaces one of the same name; then texts are replaced, then appended. All of
+//! it is put together in a folder of its own, in which the command runs. Keys that are not known are errors,
+//! and so is a file that is that of the base. `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes
+//! the reports; read the difference.
 
 use crate::support::cases::{Case, contents};
 use crate::support::program::{fixtures, flexbody, members};
@@ -175,7 +177,8 @@ fn every_code_about_inputs_and_models_has_a_case() {
     let known: BTreeSet<&str> = Code::ALL.iter().map(|code| code.id()).collect();
     let unknown: Vec<&String> = codes.iter().filter(|id| !known.contains(id.as_str())).collect();
     assert!(unknown.is_empty(), "no codes: {unknown:?}");
-    // These need another state of the program; outputs are in tests/formats/store_output.rs and tests/program/command_line.rs.
+    // These need another state of the program; outputs are in tests/formats/store_output.rs and
+    // tests/program/command_line.rs.
     let elsewhere = ["FB104", "FB105", "FB107"];
     let missing: Vec<&str> = known
         .into_iter()

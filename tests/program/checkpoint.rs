@@ -1,5 +1,5 @@
-//! A search for modes that goes on from a checkpoint gives what a fresh one gives, with less work; a file that is no
-//! checkpoint of the model is refused.
+//! A search for modes that goes on from a checkpoint gives what a fresh one gives, with less work; a file
+//! that is no checkpoint of the model is refused.
 
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::{ModalBasis, ModeSettings, free_surface, free_surface_resumed};

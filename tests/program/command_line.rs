@@ -1,4 +1,5 @@
-//! The program as scripts and people meet it: exit codes, what goes to stdout and stderr, what is left on disk.
+//! The program as scripts and people meet it: exit codes, what goes to stdout and stderr, what is left on
+//! disk.
 
 #[allow(dead_code)] // its `main`
 #[path = "../../examples/from_memory.rs"]
@@ -298,7 +299,8 @@ fn modes_up_to_a_frequency_are_those_below_it() {
 
 #[test]
 fn compare_agrees_on_a_model_in_another_order_and_differs_beyond_tolerance() {
-    // A cube: repeated eigenvalues, and nodes of equal displacement, so that order decides about signs and bases.
+    // A cube: repeated eigenvalues, and nodes of equal displacement, so that order decides about signs and
+    // bases.
     let cube = |material: &Material| {
         Mesh::block(Kind::Hex8, [5; 3], [0.2; 3]).assemble(material, MassRule::Consistent).raw_model()
     };
@@ -355,7 +357,8 @@ fn check_passes_on_what_convert_wrote_and_recomputes_it_from_the_matrices() {
 
 #[test]
 fn check_allows_for_what_rounding_takes_from_a_slender_body() {
-    // The stiffest element is 1e9 times as stiff as the first bending mode: so many digits of psi' K psi are lost.
+    // The stiffest element is 1e9 times as stiff as the first bending mode: so many digits of psi' K psi are
+    // lost.
     let folder = tempfile::tempdir().unwrap();
     let beam = Mesh::block(Kind::Hex20, [40, 1, 1], [4.0, 0.03, 0.02]);
     let raw = beam.assemble(&Material::STEEL, MassRule::Consistent).raw_model();

@@ -1,5 +1,6 @@
-//! Generated documents are what the code generates. `FLEXBODY_BLESS=1 cargo test --test program docs_generated` writes them.
-//! Written ones lead to files and codes that exist.
+//! Generated documents are what the code generates.
+//! `FLEXBODY_BLESS=1 cargo test --test program docs_generated` writes them. Written ones lead to files and
+//! codes that exist.
 
 use flexbody::base::diagnostic;
 use flexbody::base::diagnostic::{Code, Severity};

@@ -96,7 +96,8 @@ fn an_interrupted_convert_goes_on_from_its_checkpoint() {
     assert_eq!(members(&out), ["body.flex.h5", "search.h5"]);
 }
 
-/// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of these names.
+/// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of
+/// these names.
 fn small_convert(out: &Path) -> Command {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/cube_hex8/model.toml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));

@@ -1,5 +1,5 @@
-//! With `--json` every command prints one object, as `schemas/output.schema.json` says, whatever became of the run; warnings end a run
-//! where they are denied.
+//! With `--json` every command prints one object, as `schemas/output.schema.json` says, whatever became of
+//! the run; warnings end a run where they are denied.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{Triangle, write_model};

@@ -26,7 +26,8 @@ const PERMISSIVE: &[&str] = &[
 /// Packages that give a file instead of an expression: what must stand in that file.
 const BY_FILE: &[(&str, &str)] = &[("hdf5-metno-src", "covered by the 3-clause BSD License")];
 
-/// Whether an SPDX expression can be met by permissive licences alone: one of the sides of `OR`, both of `AND`.
+/// Whether an SPDX expression can be met by permissive licences alone: one of the sides of `OR`, both of
+/// `AND`.
 ///
 /// `/` is the old way to write `OR`. `None` for what is no expression.
 fn is_permissive(expression: &str) -> Option<bool> {

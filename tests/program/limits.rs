@@ -1,5 +1,5 @@
-//! Little memory, small files, few open files: the program does its work or ends with exit code 4 and a message, and leaves
-//! nothing behind. Never a signal, never a panic.
+//! Little memory, small files, few open files: the program does its work or ends with exit code 4 and a
+//! message, and leaves nothing behind. Never a signal, never a panic.
 #![cfg(target_os = "linux")]
 
 use crate::support::program::members;

@@ -1,4 +1,5 @@
-//! The program as people and scripts meet it: command line, messages, reports, limits; documents and the structure of the sources.
+//! The program as people and scripts meet it: command line, messages, reports, limits; documents and the
+//! structure of the sources.
 
 #[path = "../support/mod.rs"]
 mod support;

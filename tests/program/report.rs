@@ -114,7 +114,8 @@ fn the_file_name_says_the_format() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
-    /// Names with control characters, numbers from 1e-300 to 1e300: every report of a valid body is well-formed.
+    /// Names with control characters, numbers from 1e-300 to 1e300: every report of a valid body is
+    /// well-formed.
     #[test]
     fn every_valid_body_has_a_well_formed_report(
         seed in any::<u64>(), n in 1usize..12, modes in 1usize..20, schemes in 0usize..9, interfaces in 0usize..4,

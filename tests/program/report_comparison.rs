@@ -1,4 +1,5 @@
-//! `compare` sees every difference of two bodies, and none that is only a matter of signs, bases, order or frames.
+//! `compare` sees every difference of two bodies, and none that is only a matter of signs, bases, order or
+//! frames.
 
 use crate::support::random::Random;
 use crate::support::report_bodies::{block, condensed, engine_mount, mesh, shapes};
@@ -253,7 +254,8 @@ fn a_distant_origin_costs_the_digits_that_it_costs_and_no_more() {
         let comparison = compared(a, b);
         assert!(comparison.passed(), "{}", comparison.text());
         let widest = comparison.rows().iter().map(|r| r.tolerance).fold(0.0, f64::max);
-        // 8 eps m d^2 / J_min, d = 2.3e4, m = 6, J_min = 0.5: far below the difference that must be seen next.
+        // 8 eps m d^2 / J_min, d = 2.3e4, m = 6, J_min = 0.5: far below the difference that must be seen
+        // next.
         assert!(widest < 1.2e-5, "{}", comparison.text());
     }
     let other = changed(&principal, |p| p.invariants.primary_mut().second_moment *= 1.0 + 1e-4);

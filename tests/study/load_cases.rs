@@ -135,7 +135,8 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     for (told, case) in both.cases.iter().zip(&cases) {
         let worst = measured(&whole, &both, case);
         let chosen = told.chosen.as_ref().expect("measured");
-        // Of half of the tolerances bounds have ruled terms out of the motion that a case is measured against.
+        // Of half of the tolerances bounds have ruled terms out of the motion that a case is measured
+        // against.
         assert!(worst <= 1.0 && (chosen.worst - worst).abs() <= 0.5, "{}: {worst} {chosen:?}", told.name);
     }
     let fast = &both.cases[1];

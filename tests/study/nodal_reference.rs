@@ -26,15 +26,17 @@ const ALL: usize = 10_000;
 /// Implicit steps: the nodes take the same, so that what is left between them is the rounding of both.
 const SAME_STEPS: f64 = 1e-7;
 
-/// Ratio of the fastest to the slowest mode above which steps that the reduced equations can iterate are too many for a test.
+/// Ratio of the fastest to the slowest mode above which steps that the reduced equations can iterate are too
+/// many for a test.
 const STIFF: f64 = 100.0;
 
-/// Explicit steps with the tolerances 1e-9 of the body and 1e-8 of the nodes, thousands of them: what is left is that of the steps, and falls
-/// with their tolerance.
+/// Explicit steps with the tolerances 1e-9 of the body and 1e-8 of the nodes, thousands of them: what is left
+/// is that of the steps, and falls with their tolerance.
 const EXPLICIT: f64 = 1e-5;
 const FALLS: f64 = 10.0;
 
-/// A model with the interfaces `left` (averaging, its reference point beside its nodes) and `right` (rigid) at both ends along x.
+/// A model with the interfaces `left` (averaging, its reference point beside its nodes) and `right` (rigid)
+/// at both ends along x.
 fn with_ends(mut raw: RawModel) -> RawModel {
     let x: Vec<f64> = raw.nodes.positions.iter().map(|x| x[0]).collect();
     let (least, most) = x.iter().fold((f64::INFINITY, -f64::INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -309,8 +311,9 @@ fn what_carries_a_body_moves_it() {
     }
 }
 
-/// A node carries beams. What turns of a carried body with nodal rotations is that of a solid with the same inertia (theory, section 5), so that
-/// it only moves along a line; the reaction has the accelerations of the fastest modes, with the errors that the steps leave there.
+/// A node carries beams. What turns of a carried body with nodal rotations is that of a solid with the same
+/// inertia (theory, section 5), so that it only moves along a line; the reaction has the accelerations of the
+/// fastest modes, with the errors that the steps leave there.
 #[test]
 fn a_node_carries_beams() {
     let raw = with_ends(raw_fixture("frame_beams"));

@@ -143,7 +143,8 @@ fn watched_points_and_reactions_count_relative_to_their_largest() {
     let errors = history.largest();
     assert!((errors.reaction.expect("a reaction") - 0.02).abs() < 1e-4);
     assert!((errors.deflection.expect("a path") - 0.1).abs() < 1e-15);
-    // What grows like time is twice as large in the end as in the middle of the run, however unevenly it was looked at.
+    // What grows like time is twice as large in the end as in the middle of the run, however unevenly it was
+    // looked at.
     let grown = history.growth(&a, &Tolerance::default());
     assert!((1.8..2.1).contains(&grown.expect("an error that grows")), "{grown:?}");
     let tolerant = Tolerance { deflection: 2.0, ..Tolerance::default() };

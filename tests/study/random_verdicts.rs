@@ -1,8 +1,8 @@
-//! A random search for bodies and scenes that break the estimate of what a body lacks of its model, or the verdict of a selection: both are held
-//! to the motion of all nodes.
+//! A random search for bodies and scenes that break the estimate of what a body lacks of its model, or the
+//! verdict of a selection: both are held to the motion of all nodes.
 //!
-//! The suite runs a few seeds. `FLEXBODY_VERDICTS=200 cargo test --test study random_verdicts -- --nocapture` runs so many and prints the
-//! distribution; with `FLEXBODY_BLESS=1` it becomes `docs/verdicts.md`.
+//! The suite runs a few seeds. `FLEXBODY_VERDICTS=200 cargo test --test study random_verdicts -- --nocapture`
+//! runs so many and prints the distribution; with `FLEXBODY_BLESS=1` it becomes `docs/verdicts.md`.
 
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::general::raw_fixture;
@@ -33,8 +33,8 @@ use std::path::Path;
 /// Seeds that the suite runs.
 const FEW: u64 = 6;
 
-/// Largest deflection that a load makes by itself, relative to the extent of the body: equations of all nodes and estimates are of small
-/// deformation.
+/// Largest deflection that a load makes by itself, relative to the extent of the body: equations of all nodes
+/// and estimates are of small deformation.
 const DEFLECTION: f64 = 2e-3;
 
 /// Errors below this part of a tolerance are those of integration and rounding.
@@ -66,7 +66,8 @@ struct Outcome {
     seed: u64,
     what: String,
     start: Start,
-    /// Estimated over true error of the body before and after it was enriched: deflection and stress, where the true error counts.
+    /// Estimated over true error of the body before and after it was enriched: deflection and stress, where
+    /// the true error counts.
     effectivity: Vec<(&'static str, f64)>,
     /// Whether the selection says that its tolerances hold, and its true error over the tolerance.
     verdict: (bool, f64),

@@ -1,4 +1,5 @@
-//! What a body lacks of its model, as it is estimated, against the motion of all nodes; bodies that are enriched; starts without a shock.
+//! What a body lacks of its model, as it is estimated, against the motion of all nodes; bodies that are
+//! enriched; starts without a shock.
 
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::mesh::{Mesh, grid};
@@ -47,7 +48,8 @@ fn first_rate(model: &FeModel) -> f64 {
     body(model, 1).modes().eigenvalue[0].sqrt()
 }
 
-/// A free body that turns and is pulled at a node by a force that swings from zero, for some of its first periods.
+/// A free body that turns and is pulled at a node by a force that swings from zero, for some of its first
+/// periods.
 fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: Vector3<f64>) -> Scene {
     let rate = first_rate(model);
     Scene {
@@ -104,8 +106,8 @@ fn a_body_with_all_modes_lacks_nothing() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The estimate is quasi-static and linear: it holds to a factor where what excites the body is slower than what it lacks, and deflections
-    /// are small.
+    /// The estimate is quasi-static and linear: it holds to a factor where what excites the body is slower
+    /// than what it lacks, and deflections are small.
     #[test]
     fn the_estimate_is_near_the_true_error(
         (modes, node) in (3usize..9, 0usize..20),

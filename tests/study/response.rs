@@ -1,4 +1,5 @@
-//! Frequency responses: closed forms, identities of the receptance, the dense modal sum of all modes, and estimates held to direct solutions.
+//! Frequency responses: closed forms, identities of the receptance, the dense modal sum of all modes, and
+//! estimates held to direct solutions.
 
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::mesh::Mesh;
@@ -135,7 +136,8 @@ fn receptances_are_reciprocal() {
     assert!(reduced > 9 * 50 && full > 9 * 8, "{reduced} {full}");
 }
 
-/// A bar of bricks without transverse strain (Poisson's ratio zero) is, under forces that are even over its ends, a chain of rod elements.
+/// A bar of bricks without transverse strain (Poisson's ratio zero) is, under forces that are even over its
+/// ends, a chain of rod elements.
 #[test]
 fn a_chain_of_rods_has_its_closed_form() {
     let cells = 12;
@@ -151,7 +153,8 @@ fn a_chain_of_rods_has_its_closed_form() {
     }
     let model = FeModel::from_raw(raw).expect("a model").model;
     let body = free(&model, 30);
-    // Linear elements of a rod with consistent mass: (k/h) (2 - 2 cos t) = w^2 (rho A h / 6) (4 + 2 cos t) on the inner nodes, u_j = cos(j t) + ...
+    // Linear elements of a rod with consistent mass: (k/h) (2 - 2 cos t) = w^2 (rho A h / 6) (4 + 2 cos t) on
+    // the inner nodes, u_j = cos(j t) + ...
     let h = length / f64::from(cells);
     let (k, m) = (material.youngs * area / h, material.density * area * h / 6.0);
     let first = (material.youngs / material.density).sqrt() / (2.0 * length);
@@ -174,7 +177,8 @@ fn a_chain_of_rods_has_its_closed_form() {
 fn damping_is_that_of_the_modes_in_both() {
     let model = block(Some(0.03));
     let body = free(&model, 10);
-    // Frequencies where the tenth mode still answers and the missing ones are static: what is missing is no matter of damping.
+    // Frequencies where the tenth mode still answers and the missing ones are static: what is missing is no
+    // matter of damping.
     let settings = over(0.02 * body.frequencies_hz()[0], 1.02 * body.frequencies_hz()[3], 40);
     let response = study(&model, &body, "left", "left", &settings);
     // At the first resonance the response is that of one mode, 1 / (2 i zeta lambda) psi^2.
@@ -198,7 +202,8 @@ fn more_modes_and_residual_vectors_come_closer() {
     let basis = |loads| BasisChoice::Free(FreeSurface { residual_vectors: vec![loads] });
     let with_vectors = error(&body_of(&model, 8, basis(Loads::Interfaces)));
     assert!(with_vectors < 0.05 * plain[0], "{with_vectors:e} {plain:?}");
-    // A Craig-Bampton body answers at frequencies of its own until there are enough modes with the interfaces held.
+    // A Craig-Bampton body answers at frequencies of its own until there are enough modes with the interfaces
+    // held.
     let fixed =
         [6, 20, 34].map(|modes| error(&body_of(&model, modes, BasisChoice::CraigBampton(CraigBampton))));
     assert!(fixed[0] > fixed[1] && fixed[1] > fixed[2] && fixed[2] < 0.05 * fixed[0], "{fixed:?}");
@@ -206,7 +211,8 @@ fn more_modes_and_residual_vectors_come_closer() {
 
 #[test]
 fn residual_vectors_make_the_static_limit_exact() {
-    // Low down only the static response of the deformation is left, beside rigid motion: (H - H_rigid) tends to K^+.
+    // Low down only the static response of the deformation is left, beside rigid motion: (H - H_rigid) tends
+    // to K^+.
     let model = block(None);
     let basis = BasisChoice::Free(FreeSurface { residual_vectors: vec![Loads::Interfaces] });
     let (vectors, plain) = (body_of(&model, 4, basis), free(&model, 4));
@@ -223,8 +229,9 @@ fn residual_vectors_make_the_static_limit_exact() {
     assert!(with < 1e-4 * without && without > 0.0, "{with:e} {without:e}");
 }
 
-/// What the estimate is worth, over bases and bands, at the solves, near resonances and antiresonances included: it is the error up to half the
-/// first frequency that the bodies lack, and on the whole; where a mode is missing next to the band it is too small.
+/// What the estimate is worth, over bases and bands, at the solves, near resonances and antiresonances
+/// included: it is the error up to half the first frequency that the bodies lack, and on the whole; where a
+/// mode is missing next to the band it is too small.
 #[test]
 fn the_estimate_is_near_the_error() {
     let model = block(Some(0.01));

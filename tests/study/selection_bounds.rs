@@ -105,7 +105,8 @@ impl Broken {
     }
 }
 
-/// What breaks a bound in a scene: of amplitudes and errors, with every set of groups, at both tiers, a priori and along the motion.
+/// What breaks a bound in a scene: of amplitudes and errors, with every set of groups, at both tiers, a
+/// priori and along the motion.
 fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     let stage = Stage::new(body, scene).expect("one frame");
     let (body, scene) = (&*stage.body, &*stage.scene);
@@ -137,7 +138,8 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
         for norms in tested.tiers() {
             let tier = norms.tier;
             let energy = most(&|i| weighted(&own.states[i].q, &root));
-            // What integration is accurate to: that of the motion, and that of centrifugal loads, which are there or not.
+            // What integration is accurate to: that of the motion, and that of centrifugal loads, which are
+            // there or not.
             let spun = tested.tiers()[0].centrifugal_energy * driven.rotation.largest.powi(2);
             let size = energy.max(spun).max(most(&|i| weighted(&whole.states[i].q, &root)));
             if let Some(amplitude) = driven.amplitude(kept, &norms) {
@@ -317,7 +319,8 @@ proptest! {
 proptest! {
     #![proptest_config(seeded(16, 4))]
 
-    /// The same where torques turn with the deformation, which is large: interfaces of the rod turn by up to half a radian.
+    /// The same where torques turn with the deformation, which is large: interfaces of the rod turn by up to
+    /// half a radian.
     #[test]
     fn no_motion_under_torques_breaks_a_bound(
         bits in any::<u8>(),

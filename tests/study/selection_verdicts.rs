@@ -1,4 +1,5 @@
-//! What `select` decides holds when it is measured: the selected body against the whole one, in the scene and at the limits of it.
+//! What `select` decides holds when it is measured: the selected body against the whole one, in the scene and
+//! at the limits of it.
 
 use crate::support::scenes::{bodies, doing, nothing_happens, seeded, some_modes};
 use flexbody::base::progress::SILENT;
@@ -33,7 +34,8 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
     scene
 }
 
-/// The largest error over its tolerance of a selected body in a scene; `None` where the whole body cannot follow it.
+/// The largest error over its tolerance of a selected body in a scene; `None` where the whole body cannot
+/// follow it.
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f64> {
     let (reference, _) = trace(whole, scene, None, |_| ()).ok()?;
     let own = reduced(whole, selection);

@@ -1,4 +1,5 @@
-//! `flexbody convert --scene`: the file holds what the scene needs, says why, and nothing is computed that bounds rule out before.
+//! `flexbody convert --scene`: the file holds what the scene needs, says why, and nothing is computed that
+//! bounds rule out before.
 
 use flexbody::base::progress::SILENT;
 use flexbody::base::provenance::{SourceFile, sha256_hex};

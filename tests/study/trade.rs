@@ -1,4 +1,5 @@
-//! What accuracy costs: who must win does, errors are those of an independent comparison, and nothing but times depends on threads.
+//! What accuracy costs: who must win does, errors are those of an independent comparison, and nothing but
+//! times depends on threads.
 
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::flexible::{fixture, soft_block};
@@ -25,7 +26,8 @@ use std::fs;
 
 const QUICK: Settings = Settings { repeat: 1, memory: None, reserved: 0.0, longest: None };
 
-/// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns` turns.
+/// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns`
+/// turns.
 fn tumble(spin: f64, turns: f64) -> Scene {
     let axis = Vector3::new(0.2, 1.0, 0.1).normalize();
     Scene {
@@ -106,7 +108,8 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let lumped =
         body.lumped().iter().find(|lumped| lumped.scheme == "diagonal-scaling").expect("a scheme").clone();
     let mut parts = body.clone().into_parts();
-    // The modes keep their modal mass; all that couples them with the rigid motion is summed over nodal masses.
+    // The modes keep their modal mass; all that couples them with the rigid motion is summed over nodal
+    // masses.
     parts.invariants = lumped.invariants.with_modal_mass(body.invariants().modal_mass());
     parts.source.mass_structure = MassStructure::General;
     let other = FlexBody::new(parts).expect("a body");
@@ -245,7 +248,8 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
     assert_eq!(found.reference, ReferenceKind::Nodal);
     let stress = |row: &Row| row.outcome.as_ref().expect("a motion").errors.stress.expect("a deformed body");
-    // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not, and lacking W1 nothing is.
+    // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not,
+    // and lacking W1 nothing is.
     let of = |source: &str, groups: Groups| {
         let row = found.rows.iter().find(|row| {
             row.source == source && row.candidate.groups == groups && row.candidate.kind() != Kind::Lumped

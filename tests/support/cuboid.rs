@@ -1,5 +1,5 @@
-//! Homogeneous cuboids of trilinear hexahedra: the consistent mass is a tensor product of the mass matrices of
-//! linear bars, written down here without any element code.
+//! Homogeneous cuboids of trilinear hexahedra: the consistent mass is a tensor product of the mass matrices
+//! of linear bars, written down here without any element code.
 
 use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 

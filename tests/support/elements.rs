@@ -1,4 +1,5 @@
-//! Isoparametric solid elements: shape functions, quadrature, stiffness and scalar mass matrix of one element.
+//! Isoparametric solid elements: shape functions, quadrature, stiffness and scalar mass matrix of one
+//! element.
 
 /// Isotropic linear elastic material.
 #[derive(Debug, Clone, Copy)]
@@ -162,8 +163,8 @@ impl Kind {
 }
 
 impl Kind {
-    /// Scalar geometric stiffness (m x m, row-major): sum over the points of grad N_a' sigma grad N_b, with the stress that the
-    /// displacements `moved` of the nodes cause. The element's K_geo is that kron I3.
+    /// Scalar geometric stiffness (m x m, row-major): sum over the points of grad N_a' sigma grad N_b, with
+    /// the stress that the displacements `moved` of the nodes cause. The element's K_geo is that kron I3.
     pub fn geometric_stiffness(
         self,
         nodes: &[[f64; 3]],

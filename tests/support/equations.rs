@@ -1,5 +1,5 @@
-//! The reduced equations of motion written out as docs/theory.md section 3 prints them, for tests: the oracle is the
-//! nodal model, so nothing here is optimised and nothing is shared with the library.
+//! The reduced equations of motion written out as docs/theory.md section 3 prints them, for tests: the oracle
+//! is the nodal model, so nothing here is optimised and nothing is shared with the library.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -22,7 +22,8 @@ pub struct ReducedBody {
     pub modal_stiffness: DMatrix<f64>,
 }
 
-/// Position and velocity: R and A (body to world), velocity of the origin (world), omega (body), q and its rate.
+/// Position and velocity: R and A (body to world), velocity of the origin (world), omega (body), q and its
+/// rate.
 #[derive(Clone)]
 pub struct State {
     pub origin: Vector3<f64>,

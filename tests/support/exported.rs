@@ -1,5 +1,5 @@
-//! Bodies of every kind for the tests of exports: all fixture models, with free modes and with those of their interfaces, damped, in the
-//! plane, general, partial.
+//! Bodies of every kind for the tests of exports: all fixture models, with free modes and with those of their
+//! interfaces, damped, in the plane, general, partial.
 #![allow(dead_code)] // every test file uses a part of it
 
 use super::flexible::soft_block;

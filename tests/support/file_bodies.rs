@@ -143,7 +143,8 @@ fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
     }
 }
 
-/// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and `interfaces` interfaces.
+/// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and
+/// `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
     eigenvalue.sort_by(f64::total_cmp);

@@ -75,7 +75,8 @@ pub fn reordered(raw: &RawModel, order: DofOrder, numbering: Numbering) -> RawMo
     }
 }
 
-/// Writes `K.mtx`, `M.mtx`, `nodes.csv`, `dofs.csv` (when rows are labelled) and `model.toml`; gives the manifest.
+/// Writes `K.mtx`, `M.mtx`, `nodes.csv`, `dofs.csv` (when rows are labelled) and `model.toml`; gives the
+/// manifest.
 pub fn write_model(folder: &Path, raw: &RawModel, triangle: Triangle) -> PathBuf {
     let save = |name: &str, text: String| std::fs::write(folder.join(name), text).expect("test folder");
     save("K.mtx", matrix_market(&raw.stiffness.matrix, triangle));

@@ -184,7 +184,8 @@ pub fn accelerations(
     found
 }
 
-/// A state whose rates and deformation suit a body: spin and modes of one time scale, so that no force hides the others.
+/// A state whose rates and deformation suit a body: spin and modes of one time scale, so that no force hides
+/// the others.
 pub fn lively_state(random: &mut Random, body: &FlexBody) -> State {
     let (nf, inertia) = (body.n_modes(), body.invariants().inertia());
     let size = inertia.norm().sqrt();

@@ -1,5 +1,5 @@
-//! Bodies with any symmetric mass matrix (docs/theory.md section 6): the unreduced nodal body and its equations in constant
-//! invariants. Dense, written as the theory prints it, nothing shared with the library.
+//! Bodies with any symmetric mass matrix (docs/theory.md section 6): the unreduced nodal body and its
+//! equations in constant invariants. Dense, written as the theory prints it, nothing shared with the library.
 
 use super::equations::{ReducedBody, State, skew};
 use super::random::Random;
@@ -167,7 +167,8 @@ impl NodalBody {
         map.transpose() * &self.mass * map
     }
 
-    /// (R'' world, alpha body, q'') of the free undamped body: (p, h, pi) = B'M vbar, each term from nodal products.
+    /// (R'' world, alpha body, q'') of the free undamped body: (p, h, pi) = B'M vbar, each term from nodal
+    /// products.
     pub fn accelerations(&self, state: &State) -> DVector<f64> {
         let map = self.velocity_map(&state.q);
         let map_rate = self.modal_rotation(&state.qd);
@@ -184,8 +185,8 @@ impl NodalBody {
         solve(state, map.transpose() * weighted_map, &momenta, &rate, &energy_slope, &elastic)
     }
 
-    /// The same by the nodal formula of [ZG19], which lets the rotation of the body pass through M: B'M (vbar' + omega~ vbar).
-    /// Wrong where M is not rotation invariant.
+    /// The same by the nodal formula of [ZG19], which lets the rotation of the body pass through M: B'M
+    /// (vbar' + omega~ vbar). Wrong where M is not rotation invariant.
     pub fn accelerations_for_rotation_invariant_mass(&self, state: &State) -> DVector<f64> {
         let map = self.velocity_map(&state.q);
         let velocity = DMatrix::from_columns(&[&map * quasi_velocities(state)]);
@@ -265,8 +266,8 @@ impl NodalBody {
     }
 }
 
-/// The invariants of a body with any mass matrix: those of the file, and W0 (3 x 3nf), column b nf + j: Phi_t'M B_j e_b, which is
-/// e_b x C1_j where M is rotation invariant.
+/// The invariants of a body with any mass matrix: those of the file, and W0 (3 x 3nf), column b nf + j:
+/// Phi_t'M B_j e_b, which is e_b x C1_j where M is rotation invariant.
 pub struct GeneralBody {
     pub reduced: ReducedBody,
     pub w0: DMatrix<f64>,
@@ -449,8 +450,9 @@ pub fn to_faer(a: &DMatrix<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M is any positive
-/// definite matrix with the given rigid mass matrix: T'M T with T R = R S, and S taking R'M R to what it has to be.
+/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M
+/// is any positive definite matrix with the given rigid mass matrix: T'M T with T R = R S, and S taking R'M R
+/// to what it has to be.
 pub fn random_body(seed: u64) -> NodalBody {
     let mut random = Random(seed);
     let positions: Vec<[f64; 3]> = (0..5).map(|_| random.vector::<3>()).collect();

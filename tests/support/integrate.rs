@@ -1,4 +1,5 @@
-//! Time integration by extrapolation of Gragg's midpoint rule: order 12, fixed step, error far below what tests ask.
+//! Time integration by extrapolation of Gragg's midpoint rule: order 12, fixed step, error far below what
+//! tests ask.
 
 use nalgebra::DVector;
 

@@ -27,7 +27,8 @@ pub struct Assembly {
 }
 
 impl Mesh {
-    /// The unit cells with lower corners `cells`, as `kind` elements (tetrahedra: six per cell), mapped to space.
+    /// The unit cells with lower corners `cells`, as `kind` elements (tetrahedra: six per cell), mapped to
+    /// space.
     ///
     /// Tetrahedra stay straight under any map: their mid-edge nodes lie half way between the mapped corners.
     pub fn from_cells(kind: Kind, cells: &[[i32; 3]], map: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
@@ -67,7 +68,8 @@ impl Mesh {
         })
     }
 
-    /// A cylinder about the z axis, of 2n x 2n hexahedra over the section and `layers` along it; four-fold symmetric.
+    /// A cylinder about the z axis, of 2n x 2n hexahedra over the section and `layers` along it; four-fold
+    /// symmetric.
     pub fn cylinder(kind: Kind, n: i32, layers: i32, radius: f64, length: f64) -> Self {
         Self::from_cells(kind, &grid([2 * n, 2 * n, layers]), |p| {
             let (x, y) = (p[0] / f64::from(n) - 1.0, p[1] / f64::from(n) - 1.0);

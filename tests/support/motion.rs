@@ -24,7 +24,8 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Adds a state: what it keeps of the first, |q| beside the size of the body, radians turned since the last.
+    /// Adds a state: what it keeps of the first, |q| beside the size of the body, radians turned since the
+    /// last.
     pub fn add(&mut self, first: &Kept, now: &Kept, deformation: f64, turned: f64) {
         self.energy = self.energy.max((now.energy / first.energy - 1.0).abs());
         self.linear = self.linear.max((now.linear - first.linear).norm() / first.linear.norm());
@@ -71,7 +72,8 @@ pub fn conserving(order: usize, step: f64) -> impl Fn(usize) -> Method {
     move |n| Method::Gauss { method: Gauss::new(n, order), step }
 }
 
-/// y' of y = (R, Euler parameters, q, V, omega, qd), V in body axes; forces are added by `load`, which knows A.
+/// y' of y = (R, Euler parameters, q, V, omega, qd), V in body axes; forces are added by `load`, which knows
+/// A.
 pub fn velocity_rates(
     equations: &EquationsOfMotion,
     y: &DVector<f64>,

@@ -56,8 +56,8 @@ fn weighted(mass: &[(usize, usize, f64)], a: &[f64], b: &[f64]) -> f64 {
     sum.value()
 }
 
-/// The primary data by their definitions as products of 3n-vectors with M, with twice the digits: rigid fields
-/// e_a and x_k e_a, and fields of one component of a mode moved to one direction.
+/// The primary data by their definitions as products of 3n-vectors with M, with twice the digits: rigid
+/// fields e_a and x_k e_a, and fields of one component of a mode moved to one direction.
 pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes: &Mat<f64>) -> Invariants {
     let (n, nf) = (positions.len(), shapes.ncols());
     let field = |direction: usize, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
@@ -86,8 +86,8 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
     })
 }
 
-/// Forces on (R world, rotation about the origin body, modes) that M times the nodal accelerations sum to, and the
-/// size of the summed terms in each group.
+/// Forces on (R world, rotation about the origin body, modes) that M times the nodal accelerations sum to,
+/// and the size of the summed terms in each group.
 pub fn inertia_forces(
     mass: &[(usize, usize, f64)],
     positions: &[[f64; 3]],

@@ -75,8 +75,8 @@ pub fn try_modes(raw: RawModel, count: usize, method: Method) -> Result<Body> {
     )
 }
 
-/// The lowest `count` flexible modes of a sound body, with their completeness proved: the inertia count says that
-/// none is missed.
+/// The lowest `count` flexible modes of a sound body, with their completeness proved: the inertia count says
+/// that none is missed.
 pub fn modes(body: &Assembly, count: usize) -> Body {
     proved(body.raw_model(), count, Method::Auto)
 }

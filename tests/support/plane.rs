@@ -10,7 +10,8 @@ pub const YOUNGS: f64 = 70e9;
 pub const POISSON: f64 = 0.3;
 pub const DENSITY: f64 = 2700.0;
 
-/// A rectangle of unit thickness from bilinear elements in plane stress, turned by `angle` about the origin and moved.
+/// A rectangle of unit thickness from bilinear elements in plane stress, turned by `angle` about the origin
+/// and moved.
 pub fn rectangle(columns: usize, rows: usize, angle: f64, origin: [f64; 2]) -> RawModel {
     let (a, b) = (LENGTH / columns as f64, HEIGHT / rows as f64);
     let node = |i: usize, j: usize| (j * (columns + 1) + i) as u32;

@@ -24,8 +24,8 @@ pub fn dense_modes(assembly: &Assembly) -> DenseModes {
     modes_of(&dense(&assembly.stiffness), &dense(&assembly.mass()))
 }
 
-/// Solves K psi = lambda M psi in full, through theta = 1 / (lambda - sigma) with sigma near -lambda_7, so that low
-/// eigenvalues keep all their digits and a singular M needs no care.
+/// Solves K psi = lambda M psi in full, through theta = 1 / (lambda - sigma) with sigma near -lambda_7, so
+/// that low eigenvalues keep all their digits and a singular M needs no care.
 pub fn modes_of(k: &Mat<f64>, m: &Mat<f64>) -> DenseModes {
     let n = k.nrows();
     let trace = |a: &Mat<f64>| (0..n).map(|i| a[(i, i)]).sum::<f64>();
@@ -65,8 +65,8 @@ fn shifted(k: MatRef<f64>, m: MatRef<f64>, sigma: f64) -> (Vec<f64>, Mat<f64>) {
     (theta, vectors)
 }
 
-/// Eigenvalues (ascending) and orthonormal eigenvectors of the symmetric part of `a`, by another library than the
-/// one under test uses.
+/// Eigenvalues (ascending) and orthonormal eigenvectors of the symmetric part of `a`, by another library than
+/// the one under test uses.
 pub fn symmetric_eigen(a: MatRef<f64>) -> (Vec<f64>, Mat<f64>) {
     let n = a.nrows();
     let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| 0.5 * (a[(i, j)] + a[(j, i)])).symmetric_eigen();
@@ -102,8 +102,9 @@ pub fn rigid_data(nodes: &[[f64; 3]], scalar_mass: &CscMatrix) -> (f64, Vector3<
     (mass, com, inertia)
 }
 
-/// The 18 flexible eigenvalues, ascending, of a free unit cube of unit density that is one trilinear element with
-/// consistent mass: the products of coordinates that span its displacements are orthogonal in both K and M.
+/// The 18 flexible eigenvalues, ascending, of a free unit cube of unit density that is one trilinear element
+/// with consistent mass: the products of coordinates that span its displacements are orthogonal in both K and
+/// M.
 pub fn unit_cube_eigenvalues(lambda: f64, mu: f64) -> Vec<f64> {
     let mut values = vec![12.0 * (3.0 * lambda + 2.0 * mu), 48.0 * mu];
     values.extend([12.0 * mu; 2]);

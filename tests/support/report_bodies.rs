@@ -1,4 +1,5 @@
-//! Two small bodies: one of typed numbers, whose report is the same on every machine, and one condensed from a mesh.
+//! Two small bodies: one of typed numbers, whose report is the same on every machine, and one condensed from
+//! a mesh.
 
 #![allow(dead_code)]
 
@@ -172,7 +173,8 @@ pub fn mesh(cells: [usize; 3]) -> (SymmetricMatrix, Vec<[f64; 3]>) {
 /// Squares of the circular frequencies of [`block`]: two pairs are repeated, one to rounding.
 pub const EIGENVALUES: [f64; 6] = [100.0, 100.0 * (1.0 + 1e-13), 250.0, 400.0, 400.0, 900.0];
 
-/// Mass-normalised free-surface shapes on the cuboid: polynomials, M-orthonormal to rigid motion and each other.
+/// Mass-normalised free-surface shapes on the cuboid: polynomials, M-orthonormal to rigid motion and each
+/// other.
 pub fn shapes(mass: &SymmetricMatrix, positions: &[[f64; 3]]) -> Mat<f64> {
     let fields: [fn([f64; 3]) -> [f64; 3]; 12] = [
         |_| [1.0, 0.0, 0.0],

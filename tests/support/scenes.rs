@@ -1,4 +1,5 @@
-//! Random scenes for a body, unit-free: rates are relative to the first frequency of the body, times to its first period.
+//! Random scenes for a body, unit-free: rates are relative to the first frequency of the body, times to its
+//! first period.
 
 use super::flexible::{body_of, fixture, soft_block};
 use super::plane::rectangle;

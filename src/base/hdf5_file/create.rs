@@ -9,8 +9,9 @@ use std::path::Path;
 /// An empty file at a temporary `path`.
 pub(crate) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
     hdf5::File::with_options()
-        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else knows the file, and
-        // a process started meanwhile would inherit a lock and hold it on the finished file.
+        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else
+        // knows the file, and a process started meanwhile would inherit a lock and hold it on the finished
+        // file.
         .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
         // Time stamps would make equal bodies differ.
         .with_fcpl(|p| p.obj_track_times(false))

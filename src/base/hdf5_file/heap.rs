@@ -1,10 +1,10 @@
 //! Checks the global heaps of an HDF5 file before the HDF5 library sees them.
 //!
-//! Texts of variable length lie in global heaps, the only metadata of our files without a checksum, and the library
-//! (2.2) trusts the sizes in them: an empty object 0 makes it loop for ever, a size near 2^64 makes it read beyond its
-//! buffer. The format (HDF5 File Format Specification, III.E): `GCOL`, version 1, three zero bytes, size of the
-//! collection (8 bytes); then objects: index (2), references (2), zero (4), size (8), data padded to 8 bytes; object 0
-//! is the free space, its size includes its header and ends the collection.
+//! Texts of variable length lie in global heaps, the only metadata of our files without a checksum, and the
+//! library (2.2) trusts the sizes in them: an empty object 0 makes it loop for ever, a size near 2^64 makes
+//! it read beyond its buffer. The format (HDF5 File Format Specification, III.E): `GCOL`, version 1, three
+//! zero bytes, size of the collection (8 bytes); then objects: index (2), references (2), zero (4), size (8),
+//! data padded to 8 bytes; object 0 is the free space, its size includes its header and ends the collection.
 
 use std::io::{Read, Result, Seek, SeekFrom};
 
@@ -60,7 +60,8 @@ fn sound(file: &mut (impl Read + Seek), position: u64) -> Result<bool> {
     Ok(true)
 }
 
-/// First two and last eight bytes of a header of 16 bytes: index (objects) and size; `None` at the end of the file.
+/// First two and last eight bytes of a header of 16 bytes: index (objects) and size; `None` at the end of the
+/// file.
 fn header(file: &mut (impl Read + Seek), position: u64) -> Result<Option<(u16, u64)>> {
     let mut bytes = [0; HEADER as usize];
     file.seek(SeekFrom::Start(position))?;

@@ -7,7 +7,8 @@ use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
-/// Opens an HDF5 file whose texts can be read without harm; `what` it should be, and the code when it is not HDF5.
+/// Opens an HDF5 file whose texts can be read without harm; `what` it should be, and the code when it is not
+/// HDF5.
 pub(crate) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
@@ -21,7 +22,8 @@ pub(crate) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5
         let why = format!("the text heap at byte {position} is damaged");
         return Err(unreadable(foreign, why));
     }
-    // Without a lock: no file of this program changes once it has its name, and some file systems know no locks.
+    // Without a lock: no file of this program changes once it has its name, and some file systems know no
+    // locks.
     let opened = hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path);
     let file = opened.map_err(|e| unreadable(foreign, e.to_string()))?;
     // The check of the heaps knows 8-byte sizes only; nothing else is in use.

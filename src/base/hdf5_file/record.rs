@@ -4,7 +4,8 @@ use super::value::{Stored, elements, storage, text};
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5_metno as hdf5;
 
-/// A dataset or an attribute: what it holds, whatever its chunks, its compression, and the byte order and string type of the file are.
+/// A dataset or an attribute: what it holds, whatever its chunks, its compression, and the byte order and
+/// string type of the file are.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Record {
     /// `float64`, `float32`, `int8` to `int64`, `uint8` to `uint64`, `text`.

@@ -43,8 +43,8 @@ impl BasisChoice {
         }
     }
 
-    /// The same basis with the static responses to what a motion leaves unbalanced at the nodes (N x m) beside its modes; `None` for a basis
-    /// that takes none.
+    /// The same basis with the static responses to what a motion leaves unbalanced at the nodes (N x m)
+    /// beside its modes; `None` for a basis that takes none.
     pub fn with_motion(&self, loads: &Mat<f64>) -> Option<Self> {
         let mut own = self.clone();
         let residual_vectors = match &mut own {

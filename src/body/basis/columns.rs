@@ -8,8 +8,8 @@ use faer::Mat;
 /// The columns of `raw` (called `what`) in the model's order of degrees of freedom.
 ///
 /// # Errors
-/// [`ShapesSize`](Code::ShapesSize) when the rows are not those of the matrices, [`MatrixNotFinite`](Code::MatrixNotFinite)
-/// and [`ShapesZero`](Code::ShapesZero), all that are found.
+/// [`ShapesSize`](Code::ShapesSize) when the rows are not those of the matrices,
+/// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
 pub(super) fn columns(model: &FeModel, raw: RawShapes, what: &str) -> Result<Mat<f64>> {
     let (n, k) = (raw.matrix.nrows(), raw.matrix.ncols());
     let refuse = |code, message: String| Diagnostic::new(code, message).in_file(&raw.path);

@@ -1,10 +1,11 @@
-//! Craig-Bampton basis: modes with the interfaces held, and static shapes for unit motions of the interfaces (Craig and Bampton,
-//! AIAA J. 6 (1968) 1313; theory section 5), turned into pseudo-free-surface modes.
+//! Craig-Bampton basis: modes with the interfaces held, and static shapes for unit motions of the interfaces
+//! (Craig and Bampton, AIAA J. 6 (1968) 1313; theory section 5), turned into pseudo-free-surface modes.
 //!
-//! All couplings are one transformation, u = D q + T y: D q moves the nodes of the interfaces as a rigid body with the
-//! interface coordinates q, and T y leaves q zero. A node of a rigid or free interface has no y; of an averaging one all but as
-//! many degrees of freedom as it has coordinates are free, and the mean determines these. The fixed-interface problem is then the
-//! pencil (T'KT, T'MT): the search, its proof of completeness and its residuals are those of any other.
+//! All couplings are one transformation, u = D q + T y: D q moves the nodes of the interfaces as a rigid body
+//! with the interface coordinates q, and T y leaves q zero. A node of a rigid or free interface has no y; of
+//! an averaging one all but as many degrees of freedom as it has coordinates are free, and the mean
+//! determines these. The fixed-interface problem is then the pencil (T'KT, T'MT): the search, its proof of
+//! completeness and its residuals are those of any other.
 
 use super::failure::explain;
 use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
@@ -83,7 +84,8 @@ impl Basis for CraigBampton {
     }
 }
 
-/// Refuses what the basis cannot promise, and what does not fit the memory, before anything of that size is made.
+/// Refuses what the basis cannot promise, and what does not fit the memory, before anything of that size is
+/// made.
 fn check_possible(model: &FeModel, settings: &ModeSettings) -> Result<()> {
     if settings.accuracy == Accuracy::Certified {
         let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
@@ -113,7 +115,8 @@ struct Parts<'a> {
     reduced: ReducedPencil,
     /// Fixed-interface modes y = Phi, (T'MT)-orthonormal.
     fixed: EigenSolution,
-    /// D + T Y (N x c): the body for unit interface coordinates, nothing loaded but the interfaces, (T'KT) Y = -T'K D.
+    /// D + T Y (N x c): the body for unit interface coordinates, nothing loaded but the interfaces, (T'KT) Y
+    /// = -T'K D.
     constraint: Mat<f64>,
     /// What the basis lacks of the responses to the inertia of the constraint modes.
     lacking: MissingResponses,
@@ -146,7 +149,8 @@ impl<'a> Parts<'a> {
         }
         let reduced = elimination.reduced(&pencil);
         let held = reduced.pencil();
-        // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of the free body will do.
+        // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of
+        // the free body will do.
         let rigid = rigid_modes(model, &pencil)?;
         let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
         let none = Mat::zeros(held.n(), 0);
@@ -202,13 +206,15 @@ impl<'a> Parts<'a> {
         removed
     }
 
-    /// Whether the shapes that add nothing are constraint modes, as many as there are rigid motions, which the constraint modes hold.
+    /// Whether the shapes that add nothing are constraint modes, as many as there are rigid motions, which
+    /// the constraint modes hold.
     fn lacks_rigid_motion_only(&self, found: &Independent, rigid: usize) -> bool {
         let removed = Self::removed_shapes(found);
         removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
     }
 
-    /// The shape with the largest share in each mode; `parted` are the products of the shapes `kept` with the modes.
+    /// The shape with the largest share in each mode; `parted` are the products of the shapes `kept` with the
+    /// modes.
     fn provenance(&self, kept: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
         let told = |(j, share): (usize, f64)| {
             let (kind, name) = self.name(kept[j]);
@@ -241,8 +247,8 @@ impl<'a> Parts<'a> {
         vec![note]
     }
 
-    /// What the basis is made of; `whole`: it spans all motions of the interfaces, without which there are no lower bounds. `None` where
-    /// the estimates leave the range of numbers.
+    /// What the basis is made of; `whole`: it spans all motions of the interfaces, without which there are no
+    /// lower bounds. `None` where the estimates leave the range of numbers.
     fn fixed_interface(
         &self,
         rigid: MatRef<'_, f64>,
@@ -311,7 +317,8 @@ impl<'a> Parts<'a> {
         notes
     }
 
-    /// The modes of the span are no eigenvectors of the free body; what is proved is proved of the fixed-interface modes.
+    /// The modes of the span are no eigenvectors of the free body; what is proved is proved of the
+    /// fixed-interface modes.
     fn completeness(&self, model: &FeModel, solution: &EigenSolution) -> Completeness {
         let (fixed, held) = (self.fixed.eigenvalues.len(), &self.fixed.completeness);
         let hertz = model.units().frequency_of(held.shift);
@@ -339,7 +346,8 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// K and M in the coordinates of the interfaces and of the fixed-interface modes, and what the modes are in them.
+    /// K and M in the coordinates of the interfaces and of the fixed-interface modes, and what the modes are
+    /// in them.
     fn coordinates(
         &self,
         problem: &EigenProblem<'_>,
@@ -383,7 +391,8 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in space.
+    /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in
+    /// space.
     fn vectors(&self, d: usize) -> Vec<usize> {
         let starts_of_vectors = |(joint, first): (&CoupledInterface, usize)| {
             let (moving, all) = (joint.displacements, joint.coordinates.len());
@@ -398,8 +407,8 @@ impl<'a> Parts<'a> {
 /// Relative error of a fixed-interface eigenvalue that was computed, far above what the residuals leave.
 const KNOWN: f64 = 1e-8;
 
-/// The fixed-interface modes that are wanted. Where none are (static condensation) the first is computed nevertheless: it says how far the
-/// basis goes.
+/// The fixed-interface modes that are wanted. Where none are (static condensation) the first is computed
+/// nevertheless: it says how far the basis goes.
 fn fixed_modes(
     problem: &EigenProblem<'_>,
     settings: &ModeSettings,
@@ -420,7 +429,8 @@ fn fixed_modes(
     })
 }
 
-/// G and H of the responses y to the inertia of the constraint modes, without their part along the fixed-interface modes.
+/// G and H of the responses y to the inertia of the constraint modes, without their part along the
+/// fixed-interface modes.
 fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> MissingResponses {
     let pencil = &problem.pencil;
     let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
@@ -439,9 +449,9 @@ fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolu
     }
 }
 
-/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi + (R - Psi Q) Q^+ with their
-/// coordinates Q = C'R: K annihilates them only as well as its digits allow, and a slender body magnifies that. The
-/// coordinates of the shapes stay what they are.
+/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi + (R
+/// - Psi Q) Q^+ with their coordinates Q = C'R: K annihilates them only as well as its digits allow, and a
+/// slender body magnifies that. The coordinates of the shapes stay what they are.
 fn restore_rigid_motion(
     joints: &[CoupledInterface],
     rigid: MatRef<'_, f64>,

@@ -1,13 +1,13 @@
-//! Craig-Chang basis: free modes with the attachment modes of the interfaces (Craig and Chang, NASA CR-2781, 1977; theory
-//! section 5).
+//! Craig-Chang basis: free modes with the attachment modes of the interfaces (Craig and Chang, NASA CR-2781,
+//! 1977; theory section 5).
 
 use super::Loads;
 use super::free_surface::free_modes_with;
 use super::modal_basis::{Basis, ModalBasis, Task};
 use crate::base::error::Result;
 
-/// Free-surface modes and inertia-relief attachment modes: the part that the modes lack of the static responses of the free
-/// body to unit loads at its interfaces.
+/// Free-surface modes and inertia-relief attachment modes: the part that the modes lack of the static
+/// responses of the free body to unit loads at its interfaces.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CraigChang {
     /// Further loads whose static responses join the modes.

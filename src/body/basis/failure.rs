@@ -6,8 +6,8 @@ use crate::model::{FeModel, rigid_count};
 use crate::numerics::eigen::EigenFailure;
 use faer::Mat;
 
-/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then. Energies are
-/// another matter: they come from K in double precision.
+/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then.
+/// Energies are another matter: they come from K in double precision.
 fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
     let (code, why) = match failure {
         EigenFailure::NotConverged { converged, wanted } => {

@@ -15,7 +15,8 @@ pub struct FixedInterface {
     pub next: Option<f64>,
     /// Largest residual of a fixed-interface mode, relative as those of modes; 0 without any.
     pub residual: f64,
-    /// For each mode of the reduced body the eigenvalue of the free body as estimated, which is an upper bound of it. Unit: 1/time^2.
+    /// For each mode of the reduced body the eigenvalue of the free body as estimated, which is an upper
+    /// bound of it. Unit: 1/time^2.
     pub free_estimate: Vec<f64>,
     /// Lower bounds of these, to rounding; 0: none. Unit: 1/time^2.
     pub free_lower: Vec<f64>,

@@ -1,14 +1,16 @@
 //! How near the frequencies of a Craig-Bampton body are to those of the free body (theory section 5).
 //!
-//! The constraint modes and the fixed-interface modes that were kept span V, those that were left out span W. K couples neither with
-//! the other, M does: b = T'M Psi, without its part along the modes that were kept. The corrections y = (T'KT)^-1 b lie in W and give
-//! the coupling G = y'K y = b'y and the mass H = y'M y. With the cut mu, a lower bound of every eigenvalue of W, the eigenvalues
-//! below mu obey by Sylvester's law
+//! The constraint modes and the fixed-interface modes that were kept span V, those that were left out span W.
+//! K couples neither with the other, M does: b = T'M Psi, without its part along the modes that were kept.
+//! The corrections y = (T'KT)^-1 b lie in W and give the coupling G = y'K y = b'y and the mass H = y'M y.
+//! With the cut mu, a lower bound of every eigenvalue of W, the eigenvalues below mu obey by Sylvester's law
 //!
-//! eigenvalues of (K_V, M_V + c G) <= lambda_j <= eigenvalues of (\[K_V, 0; 0, G\], \[M_V, G; G, H\]), c = theta_j mu / (mu - theta_j),
+//! eigenvalues of (K_V, M_V + c G) <= lambda_j <= eigenvalues of (\[K_V, 0; 0, G\], \[M_V, G; G, H\]), c =
+//! theta_j mu / (mu - theta_j),
 //!
-//! where theta_j >= lambda_j are those of the reduced body. The right side adds the corrections to V and is the estimate: on the bracket of the
-//! fixtures it finds 99.7 % of theta_j - lambda_j or more where theta_j < mu / 4, and 94 % below mu.
+//! where theta_j >= lambda_j are those of the reduced body. The right side adds the corrections to V and is
+//! the estimate: on the bracket of the fixtures it finds 99.7 % of theta_j - lambda_j or more where theta_j <
+//! mu / 4, and 94 % below mu.
 
 use crate::numerics::linalg::{combine, gram, symmetric_eigen};
 use faer::{Mat, MatRef};
@@ -36,13 +38,14 @@ pub(super) struct MissingResponses {
 pub struct FreeEstimate {
     /// Estimates, which are upper bounds (nf).
     pub estimate: Vec<f64>,
-    /// Lower bounds (nf), to rounding; 0 where there is none: above the cut, or without a proof of what is left out.
+    /// Lower bounds (nf), to rounding; 0 where there is none: above the cut, or without a proof of what is
+    /// left out.
     pub lower: Vec<f64>,
 }
 
-/// Estimates and bounds for the eigenvalues `theta` (nf, ascending) of a reduced body, whose modes have the interface coordinates `q`
-/// (c x nf), and the M-orthonormal rigid motions `rigid` (c x r). `cut` is a lower bound of the eigenvalues of the fixed-interface
-/// modes that were left out.
+/// Estimates and bounds for the eigenvalues `theta` (nf, ascending) of a reduced body, whose modes have the
+/// interface coordinates `q` (c x nf), and the M-orthonormal rigid motions `rigid` (c x r). `cut` is a lower
+/// bound of the eigenvalues of the fixed-interface modes that were left out.
 ///
 /// `None` when a number is not finite.
 pub(super) fn free_estimate(
@@ -108,7 +111,8 @@ fn corrected(
     Some((0..nf).map(|j| (1.0 / flexibility.values[nf + k - 1 - j]).min(theta[j])).collect())
 }
 
-/// Eigenvalues of (diag(0, theta), I + c G) but the zero ones, for the blocks rigid-rigid, rigid-modes, modes-modes of G.
+/// Eigenvalues of (diag(0, theta), I + c G) but the zero ones, for the blocks rigid-rigid, rigid-modes,
+/// modes-modes of G.
 fn weighed_down(theta: &[f64], blocks: &[Mat<f64>; 3], c: f64) -> Option<Vec<f64>> {
     let [rigid, mixed, modes] = blocks;
     let (r, nf) = (rigid.nrows(), theta.len());
@@ -128,10 +132,12 @@ fn weighed_down(theta: &[f64], blocks: &[Mat<f64>; 3], c: f64) -> Option<Vec<f64
 mod tests {
     use super::*;
 
-    /// Masses m, n, m joined by springs k, held at the first: the interface motion is rigid, the fixed-interface modes are those of two masses.
+    /// Masses m, n, m joined by springs k, held at the first: the interface motion is rigid, the
+    /// fixed-interface modes are those of two masses.
     #[test]
     fn the_estimate_of_a_chain_is_exact_where_one_mode_is_left_out_and_the_bound_encloses() {
-        // Free: masses 1, 2, 1, springs 1, 1: lambda = 1, 2. V: rigid motion, first fixed mode; W: the second.
+        // Free: masses 1, 2, 1, springs 1, 1: lambda = 1, 2. V: rigid motion, first fixed mode; W: the
+        // second.
         let a = (4.0f64 - 2.0 * 2.0f64.sqrt()) / 4.0;
         let fixed = |lambda: f64| {
             // Masses 2 and 1, springs 1 (to the wall), 1: (2 - 2 lambda) x = y with x = 1.

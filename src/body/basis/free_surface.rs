@@ -135,7 +135,8 @@ fn describe(
     }
 }
 
-/// A note about a mass matrix that leaves some motions without mass; `finite` modes have a frequency, where that is known.
+/// A note about a mass matrix that leaves some motions without mass; `finite` modes have a frequency, where
+/// that is known.
 fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Option<Diagnostic> {
     let pencil = &problem.pencil;
     let at_most = pencil.n() - problem.rigid.ncols();
@@ -154,9 +155,9 @@ fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Opti
     Some(Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {singular}")))
 }
 
-/// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an upper
-/// bound of the first flexible eigenvalue, within a factor of two for a uniform body. Nodal rotations are half the curl of
-/// the field, rows without a place stay zero.
+/// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an
+/// upper bound of the first flexible eigenvalue, within a factor of two for a uniform body. Nodal rotations
+/// are half the curl of the field, rows without a place stay zero.
 pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
     let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);

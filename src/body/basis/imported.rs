@@ -1,5 +1,6 @@
-//! Shapes that were computed elsewhere, in a file or from a motion: checked, brought into the order of the model, freed from rigid motion,
-//! M-orthonormalised. Nothing is factored unless eigenvectors are to be proved complete.
+//! Shapes that were computed elsewhere, in a file or from a motion: checked, brought into the order of the
+//! model, freed from rigid motion, M-orthonormalised. Nothing is factored unless eigenvectors are to be
+//! proved complete.
 
 use super::columns::columns;
 use super::failure::explain;
@@ -64,7 +65,8 @@ impl ImportedShapes {
         self.source.as_ref()
     }
 
-    /// Part of its M-norm that must be left of a shape after those before it: digits that the values do not have say nothing.
+    /// Part of its M-norm that must be left of a shape after those before it: digits that the values do not
+    /// have say nothing.
     fn dependent(&self) -> f64 {
         10f64.powi(2 - i32::from(self.digits)).max(1e-8)
     }

@@ -4,16 +4,17 @@ use crate::numerics::linalg::combine;
 use faer::Mat;
 use nalgebra::Matrix3;
 
-/// K and M of a body in the motions q of its interfaces and the amplitudes eta of its fixed-interface modes (c + m in all), in this
-/// order, and the transformation from the modes of the body: \[q; eta\] = B p for modal amplitudes p, so that B'K B = diag(lambda),
-/// B'M B = I.
+/// K and M of a body in the motions q of its interfaces and the amplitudes eta of its fixed-interface modes
+/// (c + m in all), in this order, and the transformation from the modes of the body: \[q; eta\] = B p for
+/// modal amplitudes p, so that B'K B = diag(lambda), B'M B = I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceCoordinates {
     /// What each coordinate is: `left ux`, `left rz`, `fixed-interface mode 1`.
     pub names: Vec<String>,
     /// First of the d coordinates of each vector among them: these change with the axes, all others do not.
     pub(super) vectors: Vec<usize>,
-    /// blkdiag(K_cc, diag(lambda of the fixed-interface modes)): as many zero-energy motions as the body has rigid ones.
+    /// blkdiag(K_cc, diag(lambda of the fixed-interface modes)): as many zero-energy motions as the body has
+    /// rigid ones.
     pub stiffness: Mat<f64>,
     /// \[M_cc, M_cm; M_mc, I\].
     pub mass: Mat<f64>,
@@ -22,7 +23,8 @@ pub struct InterfaceCoordinates {
 }
 
 impl InterfaceCoordinates {
-    /// The same with vectors along the columns of `axes` (right-handed, in the plane about z), for modes multiplied by `signs`.
+    /// The same with vectors along the columns of `axes` (right-handed, in the plane about z), for modes
+    /// multiplied by `signs`.
     pub fn in_axes(&self, axes: &Matrix3<f64>, dimension: usize, signs: &[f64]) -> Self {
         let size = self.names.len();
         let mut turn = Mat::<f64>::identity(size, size);

@@ -1,4 +1,5 @@
-//! Interfaces as rows of the matrices: the coordinates of a joint, what they do to the nodes, and what they measure of them.
+//! Interfaces as rows of the matrices: the coordinates of a joint, what they do to the nodes, and what they
+//! measure of them.
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -11,7 +12,8 @@ use std::collections::HashMap;
 /// Axes in names.
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// An interface with r coordinates: the motion of its reference point, or, without one, all displacements of its nodes.
+/// An interface with r coordinates: the motion of its reference point, or, without one, all displacements of
+/// its nodes.
 pub(super) struct CoupledInterface {
     pub name: String,
     pub coupling: Coupling,
@@ -23,15 +25,18 @@ pub(super) struct CoupledInterface {
     pub coordinates: Vec<String>,
     /// The load that works on each coordinate, as in `force x` or `torque z`.
     pub loads: Vec<String>,
-    /// Displacements of the rows for unit coordinates that deform nothing at the interface, and weights of the rows with
-    /// measure' motion = I, which are also the loads that work on unit coordinates (both rows x r).
+    /// Displacements of the rows for unit coordinates that deform nothing at the interface, and weights of
+    /// the rows with measure' motion = I, which are also the loads that work on unit coordinates (both rows x
+    /// r).
     motion: Mat<f64>,
     measure: Mat<f64>,
-    /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference point costs no digits.
+    /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference
+    /// point costs no digits.
     centred: Mat<f64>,
     /// Number of coordinates that are displacements; rotations follow.
     pub displacements: usize,
-    /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its rotations or none has one.
+    /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its
+    /// rotations or none has one.
     determined: bool,
     /// Whether it holds the body by itself, not only together with others.
     holds: bool,
@@ -117,8 +122,8 @@ impl CoupledInterface {
         self.motion.as_ref()
     }
 
-    /// A (rows x r), A'R = I: weights that take the coordinates from the displacements, and nodal forces of unit loads on the
-    /// coordinates.
+    /// A (rows x r), A'R = I: weights that take the coordinates from the displacements, and nodal forces of
+    /// unit loads on the coordinates.
     pub fn measure(&self) -> MatRef<'_, f64> {
         self.measure.as_ref()
     }
@@ -189,10 +194,12 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
     Ok(model.interfaces().iter().map(|set| CoupledInterface::new(model, set, &places)).collect())
 }
 
-/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are zero.
+/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are
+/// zero.
 ///
 /// # Errors
-/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that are found.
+/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that
+/// are found.
 pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -> Result<()> {
     let mut found: Vec<Diagnostic> =
         joints.iter().filter(|joint| !joint.determined).map(|joint| undetermined(model, joint)).collect();
@@ -266,11 +273,12 @@ fn body_not_held(model: &FeModel, joints: &[CoupledInterface]) -> Option<Diagnos
     Some(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help))
 }
 
-/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of averaging ones have no
-/// mean.
+/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of
+/// averaging ones have no mean.
 ///
 /// # Errors
-/// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not fit.
+/// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not
+/// fit.
 pub(super) fn hold(
     n: usize,
     joints: &[CoupledInterface],
@@ -288,7 +296,8 @@ pub(super) fn hold(
     Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
 }
 
-/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of the size of one.
+/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of
+/// the size of one.
 fn without_mean(joint: &CoupledInterface) -> Dependents {
     let measure = joint.centred.as_ref();
     let (rows, r) = (measure.nrows(), measure.ncols());

@@ -9,7 +9,8 @@ use crate::numerics::eigen::{EigenProblem, EigenSolution, Resume, Wanted, energy
 use crate::numerics::linalg::{gram, larger};
 use faer::MatRef;
 
-/// A kind of basis. A new one is one file of this room and one variant of [`BasisChoice`](super::BasisChoice).
+/// A kind of basis. A new one is one file of this room and one variant of
+/// [`BasisChoice`](super::BasisChoice).
 pub trait Basis {
     /// Name on the command line and in files.
     fn name(&self) -> &'static str;
@@ -17,8 +18,8 @@ pub trait Basis {
     /// The modes of a model in this basis: mass-normalised, M-orthogonal to the rigid motions, ascending.
     ///
     /// # Errors
-    /// Input that does not fit the model: exit code 2; mechanisms, indefinite matrices, no convergence, a count that
-    /// contradicts the modes: 3.
+    /// Input that does not fit the model: exit code 2; mechanisms, indefinite matrices, no convergence, a
+    /// count that contradicts the modes: 3.
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis>;
 }
 
@@ -35,8 +36,8 @@ pub struct Task<'a> {
     pub watch: Watch<'a>,
 }
 
-/// What a basis lacks of the static response x = K^+ f to a load: |x - x_basis| / |x| in the norm of K, which is
-/// sqrt(1 - sum_p (psi_p'f)^2 / lambda_p / f'K^+ f).
+/// What a basis lacks of the static response x = K^+ f to a load: |x - x_basis| / |x| in the norm of K, which
+/// is sqrt(1 - sum_p (psi_p'f)^2 / lambda_p / f'K^+ f).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truncation {
     /// Name of the load.
@@ -50,11 +51,11 @@ pub struct Truncation {
 /// Modes of a model, in model axes, whatever basis they come from.
 #[derive(Debug, Clone)]
 pub struct ModalBasis {
-    /// Eigenvalues, shapes (N x nf, by internal rows), residuals, completeness, work. Ritz values and vectors of the basis'
-    /// span where these are no eigenvectors, which the residuals tell.
+    /// Eigenvalues, shapes (N x nf, by internal rows), residuals, completeness, work. Ritz values and vectors
+    /// of the basis' span where these are no eigenvectors, which the residuals tell.
     pub solution: EigenSolution,
-    /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what digits and
-    /// node positions leave of rigid motion.
+    /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what
+    /// digits and node positions leave of rigid motion.
     pub rigid_noise: f64,
     /// For each mode, the standard deviation of lambda that the digits of K explain, relative to lambda.
     pub input_noise: Vec<f64>,
@@ -70,7 +71,8 @@ pub struct ModalBasis {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Relative energy of rigid motion above which the first mode is not a free mode: the body is tied to ground weakly.
+/// Relative energy of rigid motion above which the first mode is not a free mode: the body is tied to ground
+/// weakly.
 const RIGID_ENERGY: f64 = 0.05;
 
 /// Decimal digits of numbers written without loss.
@@ -84,7 +86,8 @@ pub(super) fn input_error(model: &FeModel) -> f64 {
     0.5 * 10f64.powi(1 - i32::from(model.digits()))
 }
 
-/// The eigenproblem of a model for vectors that are there already: nothing is searched, so no estimate is needed.
+/// The eigenproblem of a model for vectors that are there already: nothing is searched, so no estimate is
+/// needed.
 pub(super) fn problem_of_span<'a>(
     model: &'a FeModel,
     rigid: MatRef<'a, f64>,
@@ -98,8 +101,8 @@ impl ModalBasis {
     /// Takes a solution, all of whose modes are called `provenance`, and measures the noise of its input.
     ///
     /// # Errors
-    /// [`NoModes`](Code::NoModes) when it is empty;
-    /// [`RigidMotionStrained`](Code::RigidMotionStrained) when rigid motion has energy beside that of the first mode.
+    /// [`NoModes`](Code::NoModes) when it is empty; [`RigidMotionStrained`](Code::RigidMotionStrained) when
+    /// rigid motion has energy beside that of the first mode.
     pub(super) fn new(
         model: &FeModel,
         problem: &EigenProblem<'_>,

@@ -1,19 +1,22 @@
-//! Pseudo-free-surface modes from any shapes (theory section 5): the rigid part is removed, what is left M-orthonormalised,
-//! and the small eigenproblem solved. Every identity of theory section 10 then holds, whatever the shapes were.
+//! Pseudo-free-surface modes from any shapes (theory section 5): the rigid part is removed, what is left
+//! M-orthonormalised, and the small eigenproblem solved. Every identity of theory section 10 then holds,
+//! whatever the shapes were.
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::{Pencil, column_products, gram, subtract_combination};
 use faer::{Mat, MatRef};
 
-/// A shape of which rigid motion leaves less than this part of its M-norm is a rigid motion: those that eigen-solvers give
-/// stand at 1e-6 and below.
+/// A shape of which rigid motion leaves less than this part of its M-norm is a rigid motion: those that
+/// eigen-solvers give stand at 1e-6 and below.
 const RIGID: f64 = 1e-5;
 
-/// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which it moves no mass: rounding leaves 1e-15.
+/// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which it moves no mass: rounding leaves
+/// 1e-15.
 const MASSLESS: f64 = 1e-12;
 
-/// The same for what is left of a shape beside others: a singular M sees almost nothing of some combinations of shapes that it sees.
-/// Below, such a shape would be so large, and its eigenvalue so high, that the others lose their digits beside it.
+/// The same for what is left of a shape beside others: a singular M sees almost nothing of some combinations
+/// of shapes that it sees. Below, such a shape would be so large, and its eigenvalue so high, that the others
+/// lose their digits beside it.
 const NEARLY_MASSLESS: f64 = 1e-4;
 
 /// The part of a set of shapes that spans deformations, and what became of the rest (indices from 0).
@@ -29,9 +32,9 @@ pub(super) struct Independent {
     pub dependent: Vec<(usize, f64)>,
 }
 
-/// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns in their order by the modified
-/// Gram-Schmidt process, twice. A column of which less than `dependent` of its M-norm is left after those before it is
-/// left out.
+/// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns in
+/// their order by the modified Gram-Schmidt process, twice. A column of which less than `dependent` of its
+/// M-norm is left after those before it is left out.
 ///
 /// `None`: a column has a negative M-norm beyond rounding, M is indefinite.
 pub(super) fn independent(
@@ -124,7 +127,8 @@ impl<'a> ShapeSet<'a> {
         }
     }
 
-    /// The Gram-Schmidt process. The vectors found so far are the first columns of the shapes and of their products.
+    /// The Gram-Schmidt process. The vectors found so far are the first columns of the shapes and of their
+    /// products.
     fn orthonormalised(self, dependent: f64) -> Independent {
         let Self { pencil, mass_diagonal, mut shapes, is_in, mut outcome } = self;
         let mut products = pencil.apply_mass(shapes.as_ref());
@@ -174,7 +178,8 @@ fn diagonal_square(mass_diagonal: &[f64], a: &Mat<f64>, j: usize) -> f64 {
 }
 
 impl Independent {
-    /// What the user should know of the shapes that were left out; `what` names them, as in `imported shapes`, and `name` each.
+    /// What the user should know of the shapes that were left out; `what` names them, as in
+    /// `imported shapes`, and `name` each.
     pub fn notes(&self, what: &str, criterion: f64, name: impl Fn(usize) -> String) -> Vec<Diagnostic> {
         let all = self.kept.len() + self.rigid.len() + self.massless.len() + self.dependent.len();
         let mut notes = Vec::new();
@@ -215,8 +220,8 @@ fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
     a.as_mut().col_mut(j).iter_mut().for_each(|value| *value *= factor);
 }
 
-/// For each mode, the shape with the largest share in it, and that share: the square of its amplitude in `parts` (shapes x modes) for
-/// M-orthonormal shapes and modes.
+/// For each mode, the shape with the largest share in it, and that share: the square of its amplitude in
+/// `parts` (shapes x modes) for M-orthonormal shapes and modes.
 pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {
     let shares = |p: usize| parts.col(p).iter().map(|a| a * a).enumerate();
     let largest = |p: usize| shares(p).fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most });

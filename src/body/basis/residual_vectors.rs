@@ -1,4 +1,5 @@
-//! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have (theory section 8).
+//! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have (theory section
+//! 8).
 
 use super::columns::columns;
 use super::failure::explain;
@@ -22,10 +23,12 @@ use faer::{Mat, MatRef};
 /// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
 const LEFT: f64 = 1e-8;
 
-/// Part of a load that must be left without its resultants: what moves the body only as a whole needs no mode.
+/// Part of a load that must be left without its resultants: what moves the body only as a whole needs no
+/// mode.
 const SELF_EQUILIBRATED: f64 = 1e-10;
 
-/// K^+ f of every column of `loads` (N x m), which are made self-equilibrated by inertia relief; to some digits, for estimates.
+/// K^+ f of every column of `loads` (N x m), which are made self-equilibrated by inertia relief; to some
+/// digits, for estimates.
 ///
 /// * `first`: about the first flexible eigenvalue.
 ///
@@ -40,9 +43,9 @@ pub fn free_static_responses(model: &FeModel, loads: Mat<f64>, first: f64) -> Re
         .map_err(|failure| explain(model, failure))
 }
 
-/// Nodal forces (N x 6, in the plane N x 3) of unit forces and unit torques along the model axes at the reference point of the interface
-/// `name`; which are also the weights that take the motion of that point from the displacements. `None` where the model has no such
-/// interface, or it has no reference point.
+/// Nodal forces (N x 6, in the plane N x 3) of unit forces and unit torques along the model axes at the
+/// reference point of the interface `name`; which are also the weights that take the motion of that point
+/// from the displacements. `None` where the model has no such interface, or it has no reference point.
 ///
 /// # Errors
 /// [`InterfaceNode`](Code::InterfaceNode).
@@ -59,13 +62,13 @@ pub fn interface_loads(model: &FeModel, name: &str) -> Result<Option<Mat<f64>>> 
 /// Loads whose static responses are to be in the basis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Loads {
-    /// The six centrifugal loads that any constant angular velocity about the centre of mass is made of, f(w) = sum_kl w_k w_l f_kl:
-    /// f_kl = -e_k x (M B_x e_l) - e_l x (M B_x e_k), once for k = l, at displacements (theory sections 3 and 6). For M = Ms kron I3
-    /// f_kl = -Ms (e_k x (e_l x x) + e_l x (e_k x x)).
+    /// The six centrifugal loads that any constant angular velocity about the centre of mass is made of, f(w)
+    /// = sum_kl w_k w_l f_kl: f_kl = -e_k x (M B_x e_l) - e_l x (M B_x e_k), once for k = l, at displacements
+    /// (theory sections 3 and 6). For M = Ms kron I3 f_kl = -Ms (e_k x (e_l x x) + e_l x (e_k x x)).
     Centrifugal,
-    /// Unit force and unit torque along every model axis at the reference point of every interface, distributed over its nodes as
-    /// a rigid motion of these would be (averaging coupling, also where another joins the nodes rigidly); unit forces at the
-    /// nodes of a free interface.
+    /// Unit force and unit torque along every model axis at the reference point of every interface,
+    /// distributed over its nodes as a rigid motion of these would be (averaging coupling, also where another
+    /// joins the nodes rigidly); unit forces at the nodes of a free interface.
     Interfaces,
     /// Nodal forces.
     User(UserLoads),
@@ -193,8 +196,8 @@ impl NamedLoads {
     /// The loads of a model.
     ///
     /// # Errors
-    /// [`InterfaceNode`](Code::InterfaceNode) without interfaces, [`Usage`](Code::Usage) at accuracy `certified`: residual vectors have no
-    /// guaranteed bounds.
+    /// [`InterfaceNode`](Code::InterfaceNode) without interfaces, [`Usage`](Code::Usage) at accuracy
+    /// `certified`: residual vectors have no guaranteed bounds.
     pub fn new(
         problem: &EigenProblem<'_>,
         model: &FeModel,
@@ -213,8 +216,8 @@ impl NamedLoads {
     }
 }
 
-/// Adds the static responses to `loads` to free-surface modes: M-orthonormalised against them and among each other, Ritz
-/// vectors of the span. What they add nothing to is left out and said.
+/// Adds the static responses to `loads` to free-surface modes: M-orthonormalised against them and among each
+/// other, Ritz vectors of the span. What they add nothing to is left out and said.
 pub(super) fn with_residual_vectors(
     model: &FeModel,
     problem: &EigenProblem<'_>,
@@ -371,8 +374,8 @@ struct Added {
 }
 
 impl Added {
-    /// What each mode is made of: a free mode, or mostly the response to a load. `parts` (span x modes) are the products of the
-    /// modes with the vectors of the span, `free` of which are free modes.
+    /// What each mode is made of: a free mode, or mostly the response to a load. `parts` (span x modes) are
+    /// the products of the modes with the vectors of the span, `free` of which are free modes.
     fn provenance(&self, loads: &NamedLoads, parts: MatRef<'_, f64>, free: usize) -> Vec<String> {
         let origin = |p: usize| {
             let share = |c: usize| parts[(c, p)].powi(2);

@@ -6,7 +6,8 @@ use crate::model::{FeModel, centre_and_length};
 use crate::numerics::linalg::{Pencil, combine, gram, symmetric_eigen};
 use faer::Mat;
 
-/// The rigid modes of a model from its node positions (N x 6, in the plane N x 3); orthonormal in the mass of `pencil`.
+/// The rigid modes of a model from its node positions (N x 6, in the plane N x 3); orthonormal in the mass of
+/// `pencil`.
 ///
 /// # Errors
 /// [`BodyDegenerate`](Code::BodyDegenerate) where the nodes or the mass lie on one line.

@@ -59,8 +59,8 @@ pub(crate) struct BodyModes {
 }
 
 impl BodyModes {
-    /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest magnitude is
-    /// positive, rotations of nodes times the size of the body.
+    /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest
+    /// magnitude is positive, rotations of nodes times the size of the body.
     pub fn new(model: &FeModel, place: &NodesInFrame, vectors: &Mat<f64>) -> Self {
         let rows = model.rows();
         let (nodes, nf) = (model.nodes().len(), vectors.ncols());
@@ -166,7 +166,8 @@ impl BodyModes {
     }
 }
 
-/// The rows without a place of modes in model rows (`vectors`), of which `displacements` has the vectors in body axes.
+/// The rows without a place of modes in model rows (`vectors`), of which `displacements` has the vectors in
+/// body axes.
 fn internal(model: &FeModel, vectors: &Mat<f64>, displacements: &Mat<f64>) -> Option<InternalRows> {
     let [moving, massless] = model.rows().without_place();
     let label = |row: usize| {

@@ -29,9 +29,10 @@ pub(super) fn certificate(model: &FeModel, found: &ModalBasis, guarantee: Option
 
 /// What rounding of the products with K may leave in Psi' K Psi, relative to sqrt(lambda_p lambda_q).
 ///
-/// Errors of the size of a roundoff in the entries of K change psi_p' K psi_q by sum_ij dK_ij psi_ip psi_jq, whose standard deviation the
-/// Cauchy-Schwarz inequality bounds by the root of those of psi_p' K psi_p and psi_q' K psi_q: the matrix of the squares K_ij^2 is positive
-/// semidefinite like K. The largest of these relative to its eigenvalue bounds every entry.
+/// Errors of the size of a roundoff in the entries of K change psi_p' K psi_q by sum_ij dK_ij psi_ip psi_jq,
+/// whose standard deviation the Cauchy-Schwarz inequality bounds by the root of those of psi_p' K psi_p and
+/// psi_q' K psi_q: the matrix of the squares K_ij^2 is positive semidefinite like K. The largest of these
+/// relative to its eigenvalue bounds every entry.
 fn eigenvalue_rounding(model: &FeModel, found: &ModalBasis) -> f64 {
     let solution = &found.solution;
     let noise = energy_noise(model.stiffness(), solution.vectors.as_ref(), f64::EPSILON);

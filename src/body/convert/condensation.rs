@@ -4,10 +4,11 @@ use super::ModalModel;
 use crate::body::flex_body::{Group, Groups, Guarantee, TermDecision};
 use crate::body::invariants::{Invariants, condense_certified};
 
-/// The mass of a model condensed on its modes: what the invariants are, how sure their digits are, and what is left out.
+/// The mass of a model condensed on its modes: what the invariants are, how sure their digits are, and what
+/// is left out.
 ///
-/// Without W2 and W3 no product with M is formed but that of rigid motion, and of solids no nf x nf array but K_ff and m_ff (theory
-/// section 4).
+/// Without W2 and W3 no product with M is formed but that of rigid motion, and of solids no nf x nf array but
+/// K_ff and m_ff (theory section 4).
 #[derive(Debug, Clone)]
 pub struct Condensation {
     pub(super) invariants: Invariants,
@@ -45,8 +46,8 @@ impl ModalModel<'_> {
         Condensation { invariants, guarantee, terms: Vec::new(), columns }
     }
 
-    /// What `terms` keep of the groups, where `linear` is known. Accuracy `certified` condenses everything first: its digits are about the
-    /// whole.
+    /// What `terms` keep of the groups, where `linear` is known. Accuracy `certified` condenses everything
+    /// first: its digits are about the whole.
     pub fn condense_kept(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
         let dropped = terms.iter().filter(|term| !term.kept);
         let groups = dropped.fold(Groups::ALL, |groups, term| groups.and(Groups::without(term.group)));

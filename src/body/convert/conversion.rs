@@ -1,4 +1,5 @@
-//! The last stage of a conversion: the body, what lumped masses would have given, and what the user should know.
+//! The last stage of a conversion: the body, what lumped masses would have given, and what the user should
+//! know.
 
 use super::certificate::certificate;
 use super::geometric_stiffness::softening_warning;
@@ -42,7 +43,8 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) ->
     convert_resuming(model, settings, Resume::default(), watch)
 }
 
-/// As [`convert`], with a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+/// As [`convert`], with a search for modes that starts where an earlier one stood, or that is kept (a
+/// checkpoint).
 ///
 /// # Errors
 /// As [`convert`].
@@ -94,7 +96,8 @@ impl ModalModel<'_> {
         })
     }
 
-    /// Everything that a body is made of, and a warning about modes that are damped beyond the critical damping.
+    /// Everything that a body is made of, and a warning about modes that are damped beyond the critical
+    /// damping.
     fn parts(
         &self,
         condensed: &Condensation,

@@ -1,4 +1,5 @@
-//! Geometric stiffness of the modes: what the user gives for unit loads, reduced to them and turned into body axes.
+//! Geometric stiffness of the modes: what the user gives for unit loads, reduced to them and turned into body
+//! axes.
 
 use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -18,9 +19,10 @@ const ALIKE: f64 = 1e-9;
 /// Beyond this what follows from the entries would not be finite.
 const LARGEST: f64 = 1e290;
 
-/// Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit loads along the
-/// columns of `axes`. Components that were not given count as zero, so that K_geo of any load is the same in all axes; what
-/// nothing given contributes to is left out. Kinds in the order of the model, components in theirs.
+/// Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit loads along
+/// the columns of `axes`. Components that were not given count as zero, so that K_geo of any load is the same
+/// in all axes; what nothing given contributes to is left out. Kinds in the order of the model, components in
+/// theirs.
 ///
 /// # Errors
 /// [`MatrixNotFinite`](Code::MatrixNotFinite) when the products overflow.
@@ -51,8 +53,8 @@ pub(crate) fn modal_geometric_stiffness(
     Ok(out)
 }
 
-/// A warning when centrifugal loads are wanted in the basis, so that the body spins, but geometric stiffness for spin is
-/// not given: at what rate the softening begins to count.
+/// A warning when centrifugal loads are wanted in the basis, so that the body spins, but geometric stiffness
+/// for spin is not given: at what rate the softening begins to count.
 pub(super) fn softening_warning(
     model: &FeModel,
     basis: &BasisChoice,

@@ -1,4 +1,5 @@
-//! What lumped masses would have given: invariants on the same modes, and the pipeline with modes of their own.
+//! What lumped masses would have given: invariants on the same modes, and the pipeline with modes of their
+//! own.
 
 use super::body_modes::reduced;
 use super::{BodyModes, Lumping, ModalModel};
@@ -23,7 +24,8 @@ pub struct LumpedPipeline {
     pub scheme: String,
     /// Its eigenvalues, ascending; empty when it has no real modes.
     pub eigenvalues: Vec<f64>,
-    /// Smallest singular value of Psi' M Psi_l: the cosine of the largest angle between the two modal subspaces.
+    /// Smallest singular value of Psi' M Psi_l: the cosine of the largest angle between the two modal
+    /// subspaces.
     pub subspace_cosine: f64,
     /// Error norms of its invariants after the subspaces were aligned.
     pub comparison: Vec<(String, f64)>,
@@ -72,8 +74,8 @@ pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &
     }
 }
 
-/// What lumped masses make of the groups that the body holds. Of a plane body with a general mass nothing but the rotation about z is
-/// known, and lumped masses are compared in this alone.
+/// What lumped masses make of the groups that the body holds. Of a plane body with a general mass nothing but
+/// the rotation about z is known, and lumped masses are compared in this alone.
 fn lumped_invariants(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,

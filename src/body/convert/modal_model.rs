@@ -41,7 +41,8 @@ impl<'m> ModalModel<'m> {
     ///
     /// # Errors
     /// Those of [`free_surface`](crate::body::basis::free_surface) and [`choose_frame`];
-    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes (found before any work).
+    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes (found before any
+    /// work).
     pub fn find(
         model: &'m FeModel,
         settings: &'m ConvertSettings,
@@ -103,7 +104,8 @@ fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperti
     }
 }
 
-/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where none was stated.
+/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where
+/// none was stated.
 fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     let in_body = |reference: &Reference| match reference {

@@ -20,14 +20,16 @@ pub struct FlexBody {
 impl FlexBody {
     /// Checks `parts` and makes a body of them.
     ///
-    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1, 1 <= nf <= 3n (where the nodes are all of a model); every array has the shape that [`Parts`] states and
-    /// only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and damping
-    /// ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are unique;
-    /// the body number lies between 1 and the number of bodies; names of lumping schemes and of interfaces are unique and not empty;
-    /// loads of geometric stiffness are those of the dimension, each once; interfaces name existing nodes, those declared free have no
-    /// reference point; matrices in interface coordinates are symmetric;
-    /// a group of the kinetic energy is dropped by a decision of [`Parts::terms`] or held, here and by the lumped comparators;
-    /// no text contains a NUL character (no file could hold it).
+    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1,
+    /// 1 <= nf <= 3n (where the nodes are all of a model); every array has the shape that [`Parts`] states
+    /// and only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and
+    /// damping ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are
+    /// unique; the body number lies between 1 and the number of bodies; names of lumping schemes and of
+    /// interfaces are unique and not empty; loads of geometric stiffness are those of the dimension, each
+    /// once; interfaces name existing nodes, those declared free have no reference point; matrices in
+    /// interface coordinates are symmetric; a group of the kinetic energy is dropped by a decision of
+    /// [`Parts::terms`] or held, here and by the lumped comparators; no text contains a NUL character (no
+    /// file could hold it).
     ///
     /// # Errors
     /// [`BodySchema`](crate::base::diagnostic::Code::BodySchema), one diagnostic per violation.
@@ -168,8 +170,9 @@ impl FlexBody {
         self.parts.invariants.groups()
     }
 
-    /// Every identity that the file itself can be held to (theory section 10), those of the interface coordinates included; `frame` is what the
-    /// body frame was meant to be. Limits of a body with 32-bit arrays have room for their rounding.
+    /// Every identity that the file itself can be held to (theory section 10), those of the interface
+    /// coordinates included; `frame` is what the body frame was meant to be. Limits of a body with 32-bit
+    /// arrays have room for their rounding.
     pub fn identities(&self, frame: BodyFrame) -> Vec<IdentityCheck> {
         let expected = Expected {
             mass_normalised: true,
@@ -190,7 +193,8 @@ impl FlexBody {
     }
 }
 
-/// Limits of identities of a body whose arrays are rounded, which adds `rounding` to what rounding of 64-bit floats leaves.
+/// Limits of identities of a body whose arrays are rounded, which adds `rounding` to what rounding of 64-bit
+/// floats leaves.
 fn relaxed(mut checks: Vec<IdentityCheck>, rounding: f64) -> Vec<IdentityCheck> {
     // What has no tolerance, as being finite, does not get any.
     for check in checks.iter_mut().filter(|check| check.limit > 0.0) {

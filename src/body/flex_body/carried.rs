@@ -6,9 +6,10 @@
 //! psi'_j(x) = psi_j(x) - t_j - theta_j x x,    x from the reference point
 //! ```
 //!
-//! are modes in which the interface rests in the body frame. They span, with the rigid motion of the frame, the motions of the old modes, K_ff
-//! is what it was, and the prescribed motion of the frame *is* that of the interface: no constraint is left to solve. The body that hangs
-//! from the interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
+//! are modes in which the interface rests in the body frame. They span, with the rigid motion of the frame,
+//! the motions of the old modes, K_ff is what it was, and the prescribed motion of the frame *is* that of the
+//! interface: no constraint is left to solve. The body that hangs from the interface has the eigenpairs of
+//! (K_ff, m_ff), with m_ff of the new modes.
 
 use super::{FlexBody, Groups, LoadKind};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -54,14 +55,16 @@ struct CarriedPoint {
 }
 
 impl FlexBody {
-    /// The same body in the frame of `carrier`: its reference point is the origin, the axes are those of the model, and the modes are those
-    /// of the head of this module. A body that is carried already is returned as it is.
+    /// The same body in the frame of `carrier`: its reference point is the origin, the axes are those of the
+    /// model, and the modes are those of the head of this module. A body that is carried already is returned
+    /// as it is.
     ///
-    /// Geometric stiffness is left out: what stresses the carried body are the loads together with the reaction at the interface.
+    /// Geometric stiffness is left out: what stresses the carried body are the loads together with the
+    /// reaction at the interface.
     ///
     /// # Errors
-    /// FB212 for names that the body has not; FB214 where `carrier` has no reference point or no orientation, and for a body without all
-    /// groups of the kinetic energy.
+    /// FB212 for names that the body has not; FB214 where `carrier` has no reference point or no orientation,
+    /// and for a body without all groups of the kinetic energy.
     pub fn carried(&self, carrier: &Carrier) -> Result<Self> {
         if self.groups() != Groups::ALL {
             let lacking: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
@@ -107,14 +110,14 @@ impl FlexBody {
         self.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)))
     }
 
-    /// lambda of the body in its frame: eigenvalues of (K_ff, m_ff), ascending. Those of free modes are their own; those of a carried body
-    /// are of the body held at its interface. Unit: 1/time^2.
+    /// lambda of the body in its frame: eigenvalues of (K_ff, m_ff), ascending. Those of free modes are their
+    /// own; those of a carried body are of the body held at its interface. Unit: 1/time^2.
     pub fn eigenvalues_in_frame(&self) -> Option<Vec<f64>> {
         Some(self.eigenpairs_in_frame()?.0)
     }
 
-    /// The same body with the damping ratio `ratio` for each of its eigenpairs in its frame: D = m_ff X diag(2 ratio omega) X' m_ff. For a body
-    /// of free modes these are the modes.
+    /// The same body with the damping ratio `ratio` for each of its eigenpairs in its frame: D = m_ff X
+    /// diag(2 ratio omega) X' m_ff. For a body of free modes these are the modes.
     ///
     /// # Errors
     /// Those of [`FlexBody::new`].
@@ -134,11 +137,12 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// A warning where the modes of a body that is carried leave more than a hundredth of its static response to accelerations of the
-    /// interface.
+    /// A warning where the modes of a body that is carried leave more than a hundredth of its static response
+    /// to accelerations of the interface.
     ///
-    /// The estimate is what the upper half of the modes adds to the elastic energy: that of free modes converges like the inverse of their
-    /// number, so that as much again is missing. Residual vectors of the interface and a Craig-Bampton basis with it need none.
+    /// The estimate is what the upper half of the modes adds to the elastic energy: that of free modes
+    /// converges like the inverse of their number, so that as much again is missing. Residual vectors of the
+    /// interface and a Craig-Bampton basis with it need none.
     pub(crate) fn unresolved(&self, carrier: &Carrier, original: &Self) -> Option<Diagnostic> {
         if original.resolves(carrier) {
             return None;
@@ -164,8 +168,8 @@ impl FlexBody {
         })
     }
 
-    /// A warning where an interface is to be rigid and the modes of this body, as it was before it was carried, deform it: its mean motion
-    /// is carried then.
+    /// A warning where an interface is to be rigid and the modes of this body, as it was before it was
+    /// carried, deform it: its mean motion is carried then.
     pub(crate) fn softened(&self, carrier: &Carrier) -> Option<Diagnostic> {
         let Carrier::Interface(name) = carrier else { return None };
         let interface = self.interfaces().iter().find(|interface| interface.name == *name)?;

@@ -1,5 +1,5 @@
-//! What parts of a body say of each other that no theorem about one of them alone does (theory section 10): a file whose digests were stated
-//! anew after a change is found by these where mechanics can tell.
+//! What parts of a body say of each other that no theorem about one of them alone does (theory section 10): a
+//! file whose digests were stated anew after a change is found by these where mechanics can tell.
 
 use super::{MassStructure, Parts};
 use crate::body::invariants::{CauchySchwarz, IdentityCheck};

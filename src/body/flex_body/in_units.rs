@@ -133,8 +133,9 @@ impl Change {
 }
 
 impl FlexBody {
-    /// The same body with every number in `units`, which count as stated. Modes stay mass-normalised: their shapes change with the unit of
-    /// mass. Geometric stiffness of a load that is known by its name only keeps the unit of its load.
+    /// The same body with every number in `units`, which count as stated. Modes stay mass-normalised: their
+    /// shapes change with the unit of mass. Geometric stiffness of a load that is known by its name only
+    /// keeps the unit of its load.
     ///
     /// # Errors
     /// Those of [`FlexBody::new`], where numbers leave the range of double precision.

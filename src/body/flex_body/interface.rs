@@ -17,21 +17,24 @@ pub struct Interface {
     pub reference: Option<[f64; 3]>,
 }
 
-/// What the modes do at the reference point of an interface, in body axes: the rigid motion that fits that of the nodes best.
+/// What the modes do at the reference point of an interface, in body axes: the rigid motion that fits that of
+/// the nodes best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceRows {
     /// 3 x nf.
     pub translation: Mat<f64>,
     /// 3 x nf; none where the nodes lie on one line and determine no rotation.
     pub rotation: Option<Mat<f64>>,
-    /// Root mean square over the nodes of what the fit leaves of the displacement (nf): zero where they move as a rigid body.
+    /// Root mean square over the nodes of what the fit leaves of the displacement (nf): zero where they move
+    /// as a rigid body.
     pub misfit: Vec<f64>,
     /// Root mean square over the nodes of their largest displacement in any mode.
     largest: f64,
 }
 
 impl InterfaceRows {
-    /// The mode in which the interface deforms most, and how much, relative to its largest motion in any mode.
+    /// The mode in which the interface deforms most, and how much, relative to its largest motion in any
+    /// mode.
     pub fn deformation(&self) -> (usize, f64) {
         let worst = |most: (usize, f64), (j, &e): (usize, &f64)| if e > most.1 { (j, e) } else { most };
         let (mode, misfit) = self.misfit.iter().enumerate().fold((0, 0.0), worst);
@@ -40,8 +43,8 @@ impl InterfaceRows {
 }
 
 impl Interface {
-    /// The rows of the modes (`shape` and, where nodes have rotations, `rotation`: 3n x nf) at the reference point; `None` without one,
-    /// or where they are no finite numbers.
+    /// The rows of the modes (`shape` and, where nodes have rotations, `rotation`: 3n x nf) at the reference
+    /// point; `None` without one, or where they are no finite numbers.
     pub fn rows(
         &self,
         nodes: &Nodes,
@@ -85,12 +88,14 @@ impl Interface {
     }
 }
 
-/// K and M of a body in the motions of its interfaces and the amplitudes of its fixed-interface modes, and the transformation from
-/// its modes. In body axes: the coordinates of an interface are those of its reference point (three translations, three
-/// rotations; in the plane two and one) or, of a free one, the displacements of its nodes in the order of the nodes of the body.
+/// K and M of a body in the motions of its interfaces and the amplitudes of its fixed-interface modes, and
+/// the transformation from its modes. In body axes: the coordinates of an interface are those of its
+/// reference point (three translations, three rotations; in the plane two and one) or, of a free one, the
+/// displacements of its nodes in the order of the nodes of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceCoordinates {
-    /// What each of the nc coordinates is: those of the interfaces in their order, then the fixed-interface modes.
+    /// What each of the nc coordinates is: those of the interfaces in their order, then the fixed-interface
+    /// modes.
     pub names: Vec<String>,
     /// K (nc x nc), with as many zero-energy motions as the body has rigid ones.
     pub stiffness: Mat<f64>,

@@ -12,7 +12,8 @@ use std::collections::BTreeSet;
 const ENERGY: f64 = 1e-9;
 
 impl Parts {
-    /// What must hold for the interface coordinates: they carry the energies of the modes and the mass of the rigid body.
+    /// What must hold for the interface coordinates: they carry the energies of the modes and the mass of the
+    /// rigid body.
     pub fn interface_identities(&self) -> Vec<IdentityCheck> {
         let Some(coordinates) = &self.coordinates else { return Vec::new() };
         let InterfaceCoordinates { stiffness, mass, of_modes, .. } = coordinates;
@@ -64,8 +65,8 @@ impl Parts {
         checks
     }
 
-    /// R (nc x 6, in the plane nc x 3): rigid motion about the origin of the body frame in interface coordinates. `None` when the
-    /// coordinates are not those of the interfaces.
+    /// R (nc x 6, in the plane nc x 3): rigid motion about the origin of the body frame in interface
+    /// coordinates. `None` when the coordinates are not those of the interfaces.
     pub fn rigid_coordinates(&self) -> Option<Mat<f64>> {
         let (coordinates, d) = (self.coordinates.as_ref()?, self.dimension);
         let fields = |positions: &[[f64; 3]]| rigid_fields(positions, d, [0.0; 3], 1.0);
@@ -95,8 +96,8 @@ impl Parts {
         })
     }
 
-    /// The mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the origin of the body frame, body
-    /// axes: translations, then rotations.
+    /// The mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the origin of
+    /// the body frame, body axes: translations, then rotations.
     pub fn rigid_mass(&self) -> Mat<f64> {
         let (m, c, inertia) =
             (self.invariants.mass(), self.invariants.first_moment(), self.invariants.inertia());

@@ -10,11 +10,13 @@ use nalgebra::{Matrix3, Vector3};
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl FlexBody {
-    /// The same body in a frame whose axes are those of the model and whose origin is at `origin` (body frame). Nothing but the
-    /// description changes: modal coordinates, mode shapes in space and energies stay what they are. Interface coordinates are left out.
+    /// The same body in a frame whose axes are those of the model and whose origin is at `origin` (body
+    /// frame). Nothing but the description changes: modal coordinates, mode shapes in space and energies stay
+    /// what they are. Interface coordinates are left out.
     ///
-    /// Positions x' = A (x - d), shapes A psi with A = `frame().axes`; the invariants by (5.1) of the theory. Geometric stiffness for spin and
-    /// angular acceleration about the new origin follows from that for acceleration, a = a' - alpha x d - omega x (omega x d).
+    /// Positions x' = A (x - d), shapes A psi with A = `frame().axes`; the invariants by (5.1) of the theory.
+    /// Geometric stiffness for spin and angular acceleration about the new origin follows from that for
+    /// acceleration, a = a' - alpha x d - omega x (omega x d).
     ///
     /// # Errors
     /// Those of [`FlexBody::new`], when numbers overflow.

@@ -5,8 +5,8 @@ use crate::model::FeModel;
 use faer::Mat;
 
 impl FlexBody {
-    /// The modes Psi (N x nf) in the rows and axes of the model that the body was made of; `None` when it lacks rows of the model, or
-    /// has others.
+    /// The modes Psi (N x nf) in the rows and axes of the model that the body was made of; `None` when it
+    /// lacks rows of the model, or has others.
     pub fn vectors_of(&self, model: &FeModel) -> Option<Mat<f64>> {
         let split = self.rows_in_space(model)? - 3 * self.n_nodes();
         let (rows, modes, d) = (model.rows(), self.modes(), model.dimension());
@@ -38,7 +38,8 @@ impl FlexBody {
         Some(Mat::from_fn(rows, self.n_modes(), |row, j| self.displacement(row, j)))
     }
 
-    /// Displacement rows in space of nodes and vectors without a place, where the body has the rows of the model.
+    /// Displacement rows in space of nodes and vectors without a place, where the body has the rows of the
+    /// model.
     fn rows_in_space(&self, model: &FeModel) -> Option<usize> {
         let (rows, modes) = (model.rows(), self.modes());
         let massless = rows.without_place()[1].len();

@@ -64,7 +64,8 @@ pub struct Modes {
     pub modal_damping: Option<Mat<f64>>,
     /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
     pub shape: Mat<f64>,
-    /// Rotations of the nodes (3n x nf) in the same way, zero where the model has none; `None` for models of displacements.
+    /// Rotations of the nodes (3n x nf) in the same way, zero where the model has none; `None` for models of
+    /// displacements.
     pub rotation: Option<Mat<f64>>,
     /// Rows without a place.
     pub internal: Option<InternalRows>,
@@ -92,17 +93,21 @@ pub struct Certificate {
     pub rigid_modes: usize,
     /// Why the proof is missing, or what limits it; empty when nothing does.
     pub remark: String,
-    /// Largest |lambda| of the exact rigid modes relative to the first flexible lambda: the input's noise floor.
+    /// Largest |lambda| of the exact rigid modes relative to the first flexible lambda: the input's noise
+    /// floor.
     pub rigid_noise: f64,
     /// max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix.
     pub rigid_residual: f64,
-    /// What rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0 when not known.
+    /// What rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p
+    /// lambda_q); 0 when not known.
     pub eigenvalue_rounding: f64,
-    /// To what part of their Cauchy-Schwarz bounds the inertia data were known: the digits of a file of another program; 0: to rounding.
+    /// To what part of their Cauchy-Schwarz bounds the inertia data were known: the digits of a file of
+    /// another program; 0: to rounding.
     pub inertia_rounding: f64,
     /// What accuracy `certified` adds.
     pub guarantee: Option<Guarantee>,
-    /// Of a Craig-Bampton basis, whose modes are none of the free body: what it is made of and how far it goes.
+    /// Of a Craig-Bampton basis, whose modes are none of the free body: what it is made of and how far it
+    /// goes.
     pub fixed_interface: Option<FixedInterface>,
 }
 
@@ -119,7 +124,8 @@ pub struct Guarantee {
     pub eigenvalue_upper: Vec<f64>,
     /// Upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the norm of M.
     pub shape_error: Vec<f64>,
-    /// Guaranteed digits of each invariant of [`DIGITS`], of its worst entry relative to its Cauchy-Schwarz bound.
+    /// Guaranteed digits of each invariant of [`DIGITS`], of its worst entry relative to its Cauchy-Schwarz
+    /// bound.
     pub digits: [f64; DIGITS.len()],
 }
 
@@ -132,7 +138,8 @@ pub struct LumpedBody {
     pub invariants: Invariants,
     /// Number of negative nodal masses.
     pub negative_masses: usize,
-    /// Error norms against the exact invariants, by name (`I0_frobenius`, `W2_spectral`, ...), in table order.
+    /// Error norms against the exact invariants, by name (`I0_frobenius`, `W2_spectral`, ...), in table
+    /// order.
     pub comparison: Vec<(String, f64)>,
 }
 
@@ -155,8 +162,9 @@ pub struct Parts {
     pub modes: Modes,
     /// Exact invariants about the frame origin, body axes.
     pub invariants: Invariants,
-    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes: the stressed body has the stiffness K_ff plus the sum of these
-    /// times their loads. What is not here is zero or not known. Unit: 1/time^2 over that of the load.
+    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes: the stressed body has the stiffness K_ff plus
+    /// the sum of these times their loads. What is not here is zero or not known. Unit: 1/time^2 over that of
+    /// the load.
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     /// Lumped comparators.
     pub lumped: Vec<LumpedBody>,
@@ -166,7 +174,8 @@ pub struct Parts {
     pub interfaces: Vec<Interface>,
     /// K and M in interface coordinates, of a basis that has them (Craig-Bampton).
     pub coordinates: Option<InterfaceCoordinates>,
-    /// What was decided about the groups of the kinetic energy; empty where nobody asked, and then all are held.
+    /// What was decided about the groups of the kinetic energy; empty where nobody asked, and then all are
+    /// held.
     pub terms: Vec<TermDecision>,
     /// Precision of shapes and of the inertia of the modes.
     pub storage: Storage,

@@ -11,15 +11,17 @@ use crate::model::GeometricStiffness;
 use faer::Mat;
 
 impl FlexBody {
-    /// The same body with the modes `modes` (indices, ascending) and the groups of its kinetic energy that are in `groups`.
+    /// The same body with the modes `modes` (indices, ascending) and the groups of its kinetic energy that
+    /// are in `groups`.
     ///
-    /// `terms` says why; about groups that it does not name, what was decided before stays. Without some of the modes, what belongs to all
-    /// of them is left out: interface coordinates, the records of residual vectors and, unless the lowest are kept, the proof that no mode
-    /// is missing, which the remark of the certificate then says. Bounds and digits of what stays are as true as they were.
+    /// `terms` says why; about groups that it does not name, what was decided before stays. Without some of
+    /// the modes, what belongs to all of them is left out: interface coordinates, the records of residual
+    /// vectors and, unless the lowest are kept, the proof that no mode is missing, which the remark of the
+    /// certificate then says. Bounds and digits of what stays are as true as they were.
     ///
     /// # Errors
-    /// [`Usage`](Code::Usage) when the indices do not ascend or are not below the number of modes; those of [`FlexBody::new`] when
-    /// `terms` contradict the groups.
+    /// [`Usage`](Code::Usage) when the indices do not ascend or are not below the number of modes; those of
+    /// [`FlexBody::new`] when `terms` contradict the groups.
     pub fn reduced(&self, modes: &[usize], groups: Groups, terms: Vec<TermDecision>) -> Result<Self> {
         let nf = self.n_modes();
         if modes.is_empty() || modes.windows(2).any(|w| w[0] >= w[1]) || modes[modes.len() - 1] >= nf {

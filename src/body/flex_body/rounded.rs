@@ -5,12 +5,13 @@ use crate::base::error::Result;
 use faer::Mat;
 
 impl FlexBody {
-    /// The body that a file of 32-bit floats holds: shapes, rotations, internal rows, Ibar, S, W0 and W3 rounded to the nearest, the lumped
-    /// comparators too. C1, K_ff, eigenvalues and everything rigid stay. The bounds of accuracy `certified`, which are about what was rounded,
-    /// are left out.
+    /// The body that a file of 32-bit floats holds: shapes, rotations, internal rows, Ibar, S, W0 and W3
+    /// rounded to the nearest, the lumped comparators too. C1, K_ff, eigenvalues and everything rigid stay.
+    /// The bounds of accuracy `certified`, which are about what was rounded, are left out.
     ///
     /// # Errors
-    /// [`BodySchema`](crate::base::diagnostic::Code::BodySchema) when a number is too large for a 32-bit float.
+    /// [`BodySchema`](crate::base::diagnostic::Code::BodySchema) when a number is too large for a 32-bit
+    /// float.
     pub fn rounded_to_f32(&self) -> Result<Self> {
         let mut parts = self.parts().clone();
         parts.storage = Storage::F32;

@@ -22,8 +22,8 @@ impl Storage {
         }
     }
 
-    /// What rounding of the arrays may add to sums of entries that are relative to their Cauchy-Schwarz bounds; zero for 64-bit floats,
-    /// whose rounding every limit knows.
+    /// What rounding of the arrays may add to sums of entries that are relative to their Cauchy-Schwarz
+    /// bounds; zero for 64-bit floats, whose rounding every limit knows.
     pub fn rounding(self) -> f64 {
         match self {
             Self::F64 => 0.0,

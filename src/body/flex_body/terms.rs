@@ -9,7 +9,8 @@ pub struct TermDecision {
     pub group: Group,
     /// Whether the body holds it.
     pub kept: bool,
-    /// What decided (theory section 7): 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated.
+    /// What decided (theory section 7): 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a
+    /// motion that was integrated.
     pub tier: u8,
     /// Largest error that dropping the group makes, in the quantity that `reason` names.
     pub bound: f64,

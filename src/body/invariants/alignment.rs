@@ -13,19 +13,19 @@ const MAX_SVD_ITERATIONS: usize = 10_000;
 pub struct Alignment {
     /// T (nf x nf), orthogonal, block-diagonal over the groups: Psi_b T is closest to Psi_a.
     pub basis: Mat<f64>,
-    /// Smallest singular value of the blocks of the cross-Gram matrix: for mass-normalised modes and the M inner
-    /// product the smallest cosine between the subspaces of a group, 1 when all agree. NaN when an entry of a
-    /// block is not finite.
+    /// Smallest singular value of the blocks of the cross-Gram matrix: for mass-normalised modes and the M
+    /// inner product the smallest cosine between the subspaces of a group, 1 when all agree. NaN when an
+    /// entry of a block is not finite.
     pub agreement: f64,
 }
 
 /// Finds the orthogonal T, block-diagonal over `groups`, that minimises |Psi_a - Psi_b T|.
 ///
-/// `cross_gram` (nf x nf) = Psi_a' G Psi_b for an inner product G. Per group T is the orthogonal polar factor of
-/// the transposed block. When the modes of a group span the same space, Psi_b = Psi_a R, the block is P R with P
-/// positive definite for ANY such G, and T = R' exactly: without the mass matrix G = I, the plain product of
-/// the nodal components, serves as well. `groups` are the clusters of repeated eigenvalues, ascending and
-/// disjoint; a mode outside of them is a group of its own, and T is its sign.
+/// `cross_gram` (nf x nf) = Psi_a' G Psi_b for an inner product G. Per group T is the orthogonal polar factor
+/// of the transposed block. When the modes of a group span the same space, Psi_b = Psi_a R, the block is P R
+/// with P positive definite for ANY such G, and T = R' exactly: without the mass matrix G = I, the plain
+/// product of the nodal components, serves as well. `groups` are the clusters of repeated eigenvalues,
+/// ascending and disjoint; a mode outside of them is a group of its own, and T is its sign.
 ///
 /// # Panics
 /// When the matrix is not square, or the groups overlap or go beyond it.
@@ -76,8 +76,8 @@ impl Alignment {
     }
 }
 
-/// Compares the primary data of two bodies whose modes may differ in sign and inside repeated eigenvalues: aligns
-/// `b` to `a` ([`align`]) and gives the alignment and the differences of [`primary_differences`].
+/// Compares the primary data of two bodies whose modes may differ in sign and inside repeated eigenvalues:
+/// aligns `b` to `a` ([`align`]) and gives the alignment and the differences of [`primary_differences`].
 ///
 /// # Panics
 /// When the sizes disagree.

@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 /// Cauchy-Schwarz bounds of the entries of a body's invariants, in the inner product of its mass.
 ///
-/// With |x_k| = sqrt(J_kk) and |psi_p| = sqrt(m_ff,pp): |Ibar_kl,p| <= |x_k| |psi_p|, |S_kl,pq| <= |psi_p| |psi_q|
-/// and so on. A rounding error or a lumping error divided by its bound has a meaning where the exact entry is
-/// zero by symmetry, and in any units.
+/// With |x_k| = sqrt(J_kk) and |psi_p| = sqrt(m_ff,pp): |Ibar_kl,p| <= |x_k| |psi_p|, |S_kl,pq| <= |psi_p|
+/// |psi_q| and so on. A rounding error or a lumping error divided by its bound has a meaning where the exact
+/// entry is zero by symmetry, and in any units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CauchySchwarz {
     mass: f64,
@@ -20,8 +20,8 @@ pub struct CauchySchwarz {
 }
 
 impl CauchySchwarz {
-    /// Bounds of a body's own entries. A direction in which the body has no extent counts with the rounding of
-    /// the others, J_kk >= 2.2e-16 tr J.
+    /// Bounds of a body's own entries. A direction in which the body has no extent counts with the rounding
+    /// of the others, J_kk >= 2.2e-16 tr J.
     pub fn of(invariants: &Invariants) -> Self {
         let floor = f64::EPSILON * invariants.0.second_moment.trace();
         let norm = |p| {
@@ -106,7 +106,8 @@ impl CauchySchwarz {
         self.second_moment[(k + 1) % 3] + self.second_moment[(k + 2) % 3]
     }
 
-    /// The largest I0_kk: what entries of J and Ibar that are sums of several of I0, of W1 and C2, are relative to.
+    /// The largest I0_kk: what entries of J and Ibar that are sums of several of I0, of W1 and C2, are
+    /// relative to.
     fn largest_moment(&self) -> f64 {
         (0..3).map(|k| self.moment(k)).fold(0.0, f64::max)
     }
@@ -117,12 +118,14 @@ pub(super) fn scaled(difference: f64, bound: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / bound }
 }
 
-/// Largest difference of each primary quantity of two bodies of the same nodes, frame and basis, relative to the
-/// Cauchy-Schwarz bounds of `a`: `mass`, `first_moment`, `second_moment`, `C1`, `Ibar`, `S`, and
-/// `modal_stiffness` relative to sqrt(K_pp K_qq); `W0`, `W3` and `modal_mass` where M does not commute with rotations. NaN when a
-/// number is. J and Ibar of such a body have the bounds of I0, and of W1 and C2, which they stand for.
+/// Largest difference of each primary quantity of two bodies of the same nodes, frame and basis, relative to
+/// the Cauchy-Schwarz bounds of `a`: `mass`, `first_moment`, `second_moment`, `C1`, `Ibar`, `S`, and
+/// `modal_stiffness` relative to sqrt(K_pp K_qq); `W0`, `W3` and `modal_mass` where M does not commute with
+/// rotations. NaN when a number is. J and Ibar of such a body have the bounds of I0, and of W1 and C2, which
+/// they stand for.
 ///
-/// What both hold is compared: C2 in place of Ibar where one does not hold W1, W3 and m_ff in place of S where one does not hold W2.
+/// What both hold is compared: C2 in place of Ibar where one does not hold W1, W3 and m_ff in place of S
+/// where one does not hold W2.
 ///
 /// Two independent evaluations agree to 1e-12 in all of them.
 ///
@@ -177,8 +180,8 @@ struct Pair<'a> {
     a: &'a Invariants,
     b: &'a Invariants,
     bound: CauchySchwarz,
-    /// Whether one has a mass that does not commute with rotations: J and Ibar then stand for I0, W1 and C2, and have the
-    /// bounds of these.
+    /// Whether one has a mass that does not commute with rotations: J and Ibar then stand for I0, W1 and C2,
+    /// and have the bounds of these.
     general: bool,
 }
 

@@ -1,7 +1,7 @@
 //! The condensation in double-double arithmetic, with a guaranteed bound of the rounding in every invariant.
 //!
-//! The guarantee is about the numbers that a flex-body file holds: nodes, modes and axes as stored, M and K as given.
-//! What separates these modes from the exact ones is another matter (`/modes/shape_error`).
+//! The guarantee is about the numbers that a flex-body file holds: nodes, modes and axes as stored, M and K
+//! as given. What separates these modes from the exact ones is another matter (`/modes/shape_error`).
 
 use super::condense::{CHUNK, MAX_GROUPS, SolidColumns, fill_symmetric, from_gram, group_length};
 use super::derived::CYCLIC;
@@ -46,8 +46,9 @@ pub const DIGITS: [&str; 13] = [
 pub struct CertifiedInvariants {
     /// Every number is the nearest f64 to its double-double value.
     pub invariants: Invariants,
-    /// For each of [`DIGITS`], -log10 of the largest error of an entry relative to its Cauchy-Schwarz bound: digits that
-    /// are guaranteed of the worst entry, also where I0, W1, W2, W3, C2 and m_ff are formed in f64 from the others.
+    /// For each of [`DIGITS`], -log10 of the largest error of an entry relative to its Cauchy-Schwarz bound:
+    /// digits that are guaranteed of the worst entry, also where I0, W1, W2, W3, C2 and m_ff are formed in
+    /// f64 from the others.
     pub digits: [f64; DIGITS.len()],
 }
 
@@ -89,7 +90,8 @@ fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Ma
         let block = gram_block(mass, columns, start..end);
         fill_symmetric(&mut gram, start..end, |row, column| block[row][column - start].hi);
     }
-    // sum_ij |x_i| |M_ij| |y_j| <= sqrt(sum_i rho_i x_i^2) sqrt(sum_i rho_i y_i^2) with rho_i the row sums of |M|.
+    // sum_ij |x_i| |M_ij| |y_j| <= sqrt(sum_i rho_i x_i^2) sqrt(sum_i rho_i y_i^2) with rho_i the row sums of
+    // |M|.
     let weights: Vec<f64> = (0..n).map(|i| mass.row(i).1.iter().map(|v| v.abs()).sum()).collect();
     let size: Vec<f64> = (0..count)
         .map(|c| (0..n).map(|i| weights[i] * columns.get(i, c) * columns.get(i, c)).sum::<f64>().sqrt())
@@ -220,7 +222,8 @@ fn modal_stiffness(
     (value, error)
 }
 
-/// -log10 of the worst error of each of [`DIGITS`] relative to its scale; `errors` holds a bound for each entry.
+/// -log10 of the worst error of each of [`DIGITS`] relative to its scale; `errors` holds a bound for each
+/// entry.
 fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
     let nf = value.n_modes();
     let entries = EntryErrors { value, errors, bound: CauchySchwarz::of(value), nf };

@@ -10,12 +10,12 @@ use nalgebra::{Matrix3, Vector3};
 /// Name and meaning of every number of [`error_norms`], in its order. X stands for the exact invariant, D for
 /// the lumped one minus X. Every number is dimensionless and zero when nothing differs.
 ///
-/// Each invariant has one scale. `I0`, `W2` and the modal mass never vanish: their norms are relative to the same
-/// norm of X. `W1` and `W3` vanish for symmetric bodies, `C1` and `C2` for free-surface modes: their norms are
-/// relative to the same norm of X or, where that is smaller, to the bound of theory section 7 for a unit of modal
-/// coordinate, with mu^2 the largest eigenvalue of m_ff (1 for mass-normalised modes) and I_max that of I0. The
-/// `max` numbers are entry by entry relative to the Cauchy-Schwarz bound ([`CauchySchwarz`]), which shows an
-/// error about a slender axis that a norm hides.
+/// Each invariant has one scale. `I0`, `W2` and the modal mass never vanish: their norms are relative to the
+/// same norm of X. `W1` and `W3` vanish for symmetric bodies, `C1` and `C2` for free-surface modes: their
+/// norms are relative to the same norm of X or, where that is smaller, to the bound of theory section 7 for a
+/// unit of modal coordinate, with mu^2 the largest eigenvalue of m_ff (1 for mass-normalised modes) and I_max
+/// that of I0. The `max` numbers are entry by entry relative to the Cauchy-Schwarz bound ([`CauchySchwarz`]),
+/// which shows an error about a slender axis that a norm hides.
 pub const ERROR_NORMS: [(&str, &str); 23] = [
     ("mass", "|m_l - m| / m"),
     ("com_shift", "distance of the centres of mass / radius of gyration sqrt(tr J_com / m)"),
@@ -42,8 +42,9 @@ pub const ERROR_NORMS: [(&str, &str); 23] = [
     ("C2_max", "largest |D_kp| / (sqrt(I0_kk) |psi_p|)"),
 ];
 
-/// Error norms of `other` against `exact`, by name, in the order of [`ERROR_NORMS`], without those of W1, W2 and W3 that one of them
-/// does not hold. Both belong to the same modes and the same frame; a NaN in either shows as NaN.
+/// Error norms of `other` against `exact`, by name, in the order of [`ERROR_NORMS`], without those of W1, W2
+/// and W3 that one of them does not hold. Both belong to the same modes and the same frame; a NaN in either
+/// shows as NaN.
 ///
 /// # Panics
 /// When the numbers of modes differ.
@@ -82,8 +83,8 @@ pub fn error_norms(exact: &Invariants, other: &Invariants) -> Vec<(String, f64)>
     named.filter_map(|((name, _), value)| Some(((*name).to_owned(), value?))).collect()
 }
 
-/// Frobenius, spectral and largest scaled entry of b - a, the first two relative to the norm of a but never to
-/// less than `least`.
+/// Frobenius, spectral and largest scaled entry of b - a, the first two relative to the norm of a but never
+/// to less than `least`.
 fn norms(a: &Mat<f64>, b: &Mat<f64>, least: f64, bound: impl Fn(usize, usize) -> f64) -> [f64; 3] {
     let difference = Mat::from_fn(a.nrows(), a.ncols(), |p, q| b[(p, q)] - a[(p, q)]);
     let relative =

@@ -1,10 +1,11 @@
 //! The exact condensation: one pass over the mass matrix turns nodes and shapes into the primary data.
 //!
-//! All of theory section 2 is one weighted Gram matrix X' Ms X of the columns X = [1, x, y, z, psi_1x, psi_1y,
-//! psi_1z, psi_2x, ...]. Columns are taken in panels of a fixed width (20 modes: one panel, so that the mass matrix is read
-//! once), rows in chunks of a fixed length; chunks belong to groups that depend on the number of nodes only, and groups are
-//! summed in order. The result is therefore the same to the last bit at any number of threads, and no sum is longer than a
-//! chunk, the chunks of a group or the groups: rounding does not grow with the model.
+//! All of theory section 2 is one weighted Gram matrix X' Ms X of the columns X =
+//! [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]. Columns are taken in panels of a fixed width (20 modes:
+//! one panel, so that the mass matrix is read once), rows in chunks of a fixed length; chunks belong to
+//! groups that depend on the number of nodes only, and groups are summed in order. The result is therefore
+//! the same to the last bit at any number of threads, and no sum is longer than a chunk, the chunks of a
+//! group or the groups: rounding does not grow with the model.
 
 use super::{Groups, Invariants, PrimaryData};
 use crate::numerics::linalg::SymmetricMatrix;
@@ -73,14 +74,15 @@ impl NodalMass for [f64] {
 /// S_kl = Psi_k' Ms Psi_l, for M = Ms kron I3.
 ///
 /// * `mass`: Ms (n x n). Unit: mass.
-/// * `positions`: node positions in the frame that the result refers to. Unit: length. Any origin is
-///   right; digits are kept best with the origin at the centre of mass ([`super::choose_frame`]). Rows of Ms beyond them are
-///   vectors that rigid motion does not move (bubbles): their 1 and x are zero.
-/// * `shapes`: 3n x nf, row 3 i + k is component k of row i of Ms along the axes of the same frame; any basis.
+/// * `positions`: node positions in the frame that the result refers to. Unit: length. Any origin is right;
+///   digits are kept best with the origin at the centre of mass ([`super::choose_frame`]). Rows of Ms beyond
+///   them are vectors that rigid motion does not move (bubbles): their 1 and x are zero.
+/// * `shapes`: 3n x nf, row 3 i + k is component k of row i of Ms along the axes of the same frame; any
+///   basis.
 /// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
 ///
-/// J and the diagonal blocks S_kk are exactly symmetric and S_lk = S_kl' exactly. The result does not depend on
-/// the number of threads.
+/// J and the diagonal blocks S_kk are exactly symmetric and S_lk = S_kl' exactly. The result does not depend
+/// on the number of threads.
 ///
 /// ```
 /// use faer::{Mat, mat};
@@ -157,7 +159,8 @@ fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
     std::array::from_fn(f)
 }
 
-/// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]; 1, x, y, z are zero beyond the positions.
+/// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]; 1, x, y, z are zero beyond the
+/// positions.
 #[derive(Clone, Copy)]
 pub(super) struct SolidColumns<'a> {
     pub positions: &'a [[f64; 3]],
@@ -193,7 +196,8 @@ impl SolidColumns<'_> {
         }
     }
 
-    /// Copies some columns of the nodes `first`, `first + 1`, ... into rows of `width` values, as many as there is room for.
+    /// Copies some columns of the nodes `first`, `first + 1`, ... into rows of `width` values, as many as
+    /// there is room for.
     pub fn by_node(&self, first: usize, columns: Range<usize>, width: usize, rows: &mut [f64]) {
         for (slot, column) in columns.enumerate() {
             for (k, row) in rows.chunks_exact_mut(width).enumerate() {
@@ -260,7 +264,8 @@ pub(super) fn group_length(n: usize) -> usize {
     CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
 }
 
-/// The sum of what each group of the `n` nodes contributes to a matrix of this size, in the order of the groups.
+/// The sum of what each group of the `n` nodes contributes to a matrix of this size, in the order of the
+/// groups.
 pub(super) fn sum_of_groups(
     n: usize,
     (rows, columns): (usize, usize),
@@ -278,7 +283,8 @@ pub(super) fn sum_of_groups(
     total
 }
 
-/// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the panel.
+/// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the
+/// panel.
 fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel: Range<usize>) -> Mat<f64> {
     let n = columns.rows();
     let lanes = panel.len().div_ceil(LANE);

@@ -1,4 +1,5 @@
-//! The condensation without S: what a body has that holds neither W2 nor W3, from the products of M with rigid motion alone.
+//! The condensation without S: what a body has that holds neither W2 nor W3, from the products of M with
+//! rigid motion alone.
 
 use super::condense::{
     Aligned, CHUNK, LANE, Lane, NodalMass, SolidColumns, mass_times, rigid_part, sum_of_groups,
@@ -10,8 +11,9 @@ use faer::{Accum, Mat, MatRef, Par};
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// [`condense`](super::condense()) for modes that are mass-normalised, without W2 and W3: four columns are multiplied by Ms, not 4 + 3 nf,
-/// and m_ff = I is taken for granted. m, c, J, C1, C2 and W1 are those of [`condense`](super::condense()) to rounding.
+/// [`condense`](super::condense()) for modes that are mass-normalised, without W2 and W3: four columns are
+/// multiplied by Ms, not 4 + 3 nf, and m_ff = I is taken for granted. m, c, J, C1, C2 and W1 are those of
+/// [`condense`](super::condense()) to rounding.
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -25,7 +27,8 @@ pub fn condense_linear(
     of_rigid_products(mass, SolidColumns { positions, shapes }, modal_stiffness, &Mat::identity(nf, nf))
 }
 
-/// [`condense_lumped`](super::condense_lumped) without W2 and W3. m_ff, of which lumped masses make no identity, is there.
+/// [`condense_lumped`](super::condense_lumped) without W2 and W3. m_ff, of which lumped masses make no
+/// identity, is there.
 ///
 /// # Panics
 /// When the sizes disagree.

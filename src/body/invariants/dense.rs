@@ -32,8 +32,8 @@ pub(super) fn frobenius_norm(a: MatRef<'_, f64>) -> f64 {
     scale * entries(a).map(|v| (v / scale) * (v / scale)).sum::<f64>().sqrt()
 }
 
-/// Spectral norm: the square root of the largest eigenvalue of the smaller Gram matrix. NaN when an entry is not
-/// finite.
+/// Spectral norm: the square root of the largest eigenvalue of the smaller Gram matrix. NaN when an entry is
+/// not finite.
 pub(super) fn spectral_norm(a: MatRef<'_, f64>) -> f64 {
     let scale = largest_entry(a);
     if scale == 0.0 {
@@ -46,8 +46,8 @@ pub(super) fn spectral_norm(a: MatRef<'_, f64>) -> f64 {
     largest.map_or(f64::NAN, |value| scale * value.max(0.0).sqrt())
 }
 
-/// Eigenvalues of a symmetric matrix (its lower triangle), ascending; `None` when an entry is not finite or the
-/// iteration fails.
+/// Eigenvalues of a symmetric matrix (its lower triangle), ascending; `None` when an entry is not finite or
+/// the iteration fails.
 pub(super) fn symmetric_eigenvalues(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
     let n = a.nrows();
     if !largest_entry(a).is_finite() {

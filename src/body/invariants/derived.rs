@@ -41,7 +41,8 @@ impl Invariants {
         self.0.c1.ncols()
     }
 
-    /// I0 = tr(J) I - J: inertia of the undeformed body about the frame origin, frame axes. Unit: mass length^2.
+    /// I0 = tr(J) I - J: inertia of the undeformed body about the frame origin, frame axes. Unit: mass
+    /// length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         inertia_of(&self.0.second_moment)
     }
@@ -54,8 +55,8 @@ impl Invariants {
         })
     }
 
-    /// W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk). `None` where the body does not
-    /// hold it: dropped is not zero.
+    /// W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk). `None` where
+    /// the body does not hold it: dropped is not zero.
     pub fn w1(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
         let w1 = |k: usize, column: usize| {
@@ -70,7 +71,8 @@ impl Invariants {
         self.0.groups.w1.then(|| Mat::from_fn(3, 3 * nf, w1))
     }
 
-    /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk. `None` where the body does not hold it.
+    /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk. `None` where the body does not hold
+    /// it.
     pub fn w2(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
         let w2 = |row: usize, column: usize| {
@@ -85,8 +87,8 @@ impl Invariants {
         self.0.groups.w2.then(|| Mat::from_fn(3 * nf, 3 * nf, w2))
     }
 
-    /// W0 (3 x 3nf): how modes move the coupling of translation and rotation, block b column j = -C1_j~ e_b or, for a mass that
-    /// does not commute with rotations, Phi_t' M B_j e_b. s~ = c~ - W0 Q.
+    /// W0 (3 x 3nf): how modes move the coupling of translation and rotation, block b column j = -C1_j~ e_b
+    /// or, for a mass that does not commute with rotations, Phi_t' M B_j e_b. s~ = c~ - W0 Q.
     pub fn w0(&self) -> Mat<f64> {
         if let Some(general) = &self.0.general {
             return general.w0.clone();
@@ -104,8 +106,8 @@ impl Invariants {
         })
     }
 
-    /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew; B_i' M Psi for a mass that does not commute with
-    /// rotations. `None` where the body does not hold it.
+    /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew; B_i' M Psi for a mass that does not
+    /// commute with rotations. `None` where the body does not hold it.
     pub fn w3(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
         let difference = |row: usize, q: usize| {

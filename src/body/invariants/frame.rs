@@ -1,4 +1,5 @@
-//! The body frame: its choice from the mass and the undeformed nodes, and the change of nodes and shapes to it.
+//! The body frame: its choice from the mass and the undeformed nodes, and the change of nodes and shapes to
+//! it.
 
 use super::condense::condense_rigid;
 use super::derived::inertia_of;
@@ -45,8 +46,8 @@ impl Frame {
         }
     }
 
-    /// Turns rigid fields (six columns: unit translations along the model axes, unit rotations about them; in the plane two and one) to
-    /// those of the body axes, in place.
+    /// Turns rigid fields (six columns: unit translations along the model axes, unit rotations about them; in
+    /// the plane two and one) to those of the body axes, in place.
     ///
     /// # Panics
     /// When there are neither six columns nor three.
@@ -113,7 +114,8 @@ pub struct MassProperties {
 /// first moment of the body frame is that rounding times m, not zero.
 ///
 /// Axes are canonical: an axis of a distinct moment is positive along its largest component; axes of equal
-/// moments (to 1e-9 of the largest) are the projections of the model axes, so that a cube keeps the model axes.
+/// moments (to 1e-9 of the largest) are the projections of the model axes, so that a cube keeps the model
+/// axes.
 ///
 /// # Errors
 /// `MassNotPositive` when 1' Ms 1 is not a positive finite number, `CoordinateNotFinite` when the moments are
@@ -129,8 +131,8 @@ pub fn choose_frame(
     scalar_frame(mass, positions, choice, false)
 }
 
-/// The same for a body that stays in the plane z = 0: the third axis is z whatever the moments are, the first the axis of the
-/// smaller moment in the plane.
+/// The same for a body that stays in the plane z = 0: the third axis is z whatever the moments are, the first
+/// the axis of the smaller moment in the plane.
 ///
 /// # Errors
 /// As [`choose_frame`].

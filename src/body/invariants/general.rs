@@ -1,9 +1,9 @@
-//! The condensation of mass matrices that do not commute with rotations (theory section 6): nodal rotations, eliminated
-//! constraints, vectors without a place that move with the body.
+//! The condensation of mass matrices that do not commute with rotations (theory section 6): nodal rotations,
+//! eliminated constraints, vectors without a place that move with the body.
 //!
-//! One Gram matrix X' M X of the columns X = [Phi_t, B_x, B_1, ..., B_nf, Psi] holds every product. With rows of -psi_j~ at the
-//! displacements and zeros at the rotations in B_j, the body-frame velocities of all rows are (Phi_t, B_x + sum_j q_j B_j, Psi)
-//! times (V, omega, qd).
+//! One Gram matrix X' M X of the columns X = [Phi_t, B_x, B_1, ..., B_nf, Psi] holds every product. With rows
+//! of -psi_j~ at the displacements and zeros at the rotations in B_j, the body-frame velocities of all rows
+//! are (Phi_t, B_x + sum_j q_j B_j, Psi) times (V, omega, qd).
 
 use super::{GeneralTerms, Groups, Invariants, PrimaryData};
 use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
@@ -20,10 +20,12 @@ pub const GENERAL_REMARK: &str = "exact: m, c, I0, C1, C2, m_ff; W0 to W3 take t
 /// How the rows of a model, which are components along the model axes, move with the body frame.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidMotion<'a> {
-    /// N x 6: unit translations along the body axes, then unit rotations about them; of a plane body N x 3. Turned before they are
-    /// multiplied ([`Frame::rotate_rigid`](super::Frame::rotate_rigid)), so that slender bodies keep the digits of their small moments.
+    /// N x 6: unit translations along the body axes, then unit rotations about them; of a plane body N x 3.
+    /// Turned before they are multiplied ([`Frame::rotate_rigid`](super::Frame::rotate_rigid)), so that
+    /// slender bodies keep the digits of their small moments.
     pub fields: MatRef<'a, f64>,
-    /// Rows of displacements, d per vector, which come first; all others keep their values when the body turns.
+    /// Rows of displacements, d per vector, which come first; all others keep their values when the body
+    /// turns.
     pub displacements: usize,
     /// Columns are the body axes in model axes.
     pub axes: Matrix3<f64>,
@@ -31,18 +33,18 @@ pub struct RigidMotion<'a> {
 
 /// Condenses the nodal equations of motion for any symmetric M (theory section 6).
 ///
-/// I0 = B_x' M B_x, C1 = Phi_t' M Psi, C2 = B_x' M Psi, m_ff = Psi' M Psi; block b, column j: W0 = Phi_t' M B_j e_b,
-/// W1 = (B_x' M B_j + B_j' M B_x) e_b; W2 = e_a' B_i' M B_j e_b at row a nf + i, column b nf + j; W3 = e_a' B_i' M psi_j at row
-/// a nf + i.
+/// I0 = B_x' M B_x, C1 = Phi_t' M Psi, C2 = B_x' M Psi, m_ff = Psi' M Psi; block b, column j: W0 = Phi_t' M
+/// B_j e_b, W1 = (B_x' M B_j + B_j' M B_x) e_b; W2 = e_a' B_i' M B_j e_b at row a nf + i, column b nf + j; W3
+/// = e_a' B_i' M psi_j at row a nf + i.
 ///
 /// * `mass`: M (N x N), model axes.
 /// * `motion`: of its rows.
 /// * `shapes`: N x nf, the modes, model axes.
 /// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
 ///
-/// The result is in body axes about the origin of the body frame. Of a plane body only the rotation about z is known: the
-/// entries about the other axes are those of a lamina of the same inertia about z. The result does not depend on the number of
-/// threads.
+/// The result is in body axes about the origin of the body frame. Of a plane body only the rotation about z
+/// is known: the entries about the other axes are those of a lamina of the same inertia about z. The result
+/// does not depend on the number of threads.
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -56,8 +58,8 @@ pub fn condense_general(
     columns.products(columns.gram(mass)).invariants(modal_stiffness)
 }
 
-/// The same for modes that are mass-normalised, without W2 and W3: the columns \[Phi_t, B_x\] alone are multiplied by M, and m_ff = I is
-/// taken for granted.
+/// The same for modes that are mass-normalised, without W2 and W3: the columns \[Phi_t, B_x\] alone are
+/// multiplied by M, and m_ff = I is taken for granted.
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -288,8 +290,8 @@ fn by_axes(ibar: &[Matrix3<f64>]) -> [[Vec<f64>; 3]; 3] {
     [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect()))
 }
 
-/// m, c and J of R'MR = \[m I, -c~; c~, I0\] for unit translations and unit rotations R; of a plane body \[m I, (-c_y, c_x)'; ., I0_zz\]
-/// and J that of a lamina.
+/// m, c and J of R'MR = \[m I, -c~; c~, I0\] for unit translations and unit rotations R; of a plane body
+/// \[m I, (-c_y, c_x)'; ., I0_zz\] and J that of a lamina.
 pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
     if g.ncols() == 3 {
         let (mass, c) = (0.5 * (g[(0, 0)] + g[(1, 1)]), Vector3::new(g[(1, 2)], -g[(0, 2)], 0.0));
@@ -304,8 +306,8 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
     (mass, Vector3::from_fn(|k, _| moment(k)), second_moment_of(&inertia))
 }
 
-/// J that gives I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small where the third moment
-/// is, and a needle keeps the digits of its small moment, J_ll + J_mm.
+/// J that gives I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small
+/// where the third moment is, and a needle keeps the digits of its small moment, J_ll + J_mm.
 pub(super) fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|k, l| {
         let (a, b) = (inertia[((k + 1) % 3, (k + 1) % 3)], inertia[((k + 2) % 3, (k + 2) % 3)]);
@@ -313,13 +315,14 @@ pub(super) fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     })
 }
 
-/// J of a plane body of which the moment about z is known alone: the same in all directions about its centre of mass, so that it
-/// changes with the origin as J does.
+/// J of a plane body of which the moment about z is known alone: the same in all directions about its centre
+/// of mass, so that it changes with the origin as J does.
 fn plane_second_moment(about_z: f64, mass: f64, c: &Vector3<f64>) -> Matrix3<f64> {
     lamina(about_z - c.norm_squared() / mass) + c * c.transpose() / mass
 }
 
-/// Ibar of a mode of a plane body from W1_zz = 2 (Ibar_xx + Ibar_yy), half of which is given, and C2_z = Ibar_xy - Ibar_yx.
+/// Ibar of a mode of a plane body from W1_zz = 2 (Ibar_xx + Ibar_yy), half of which is given, and C2_z =
+/// Ibar_xy - Ibar_yx.
 pub(super) fn plane_ibar(half_w1: f64, c2: f64) -> Matrix3<f64> {
     let mut ibar = lamina(half_w1);
     (ibar[(0, 1)], ibar[(1, 0)]) = (0.5 * c2, -0.5 * c2);
@@ -332,8 +335,9 @@ fn lamina(about_z: f64) -> Matrix3<f64> {
 }
 
 impl Invariants {
-    /// These invariants with another modal mass m_ff (nf x nf), everything else as it is: what a program computes with that takes the
-    /// modal mass of the FE program and sums the couplings over nodal masses. S no longer tells m_ff, so that the mass is a general one.
+    /// These invariants with another modal mass m_ff (nf x nf), everything else as it is: what a program
+    /// computes with that takes the modal mass of the FE program and sums the couplings over nodal masses. S
+    /// no longer tells m_ff, so that the mass is a general one.
     ///
     /// # Panics
     /// When the modal mass has another number of modes.
@@ -349,8 +353,8 @@ impl Invariants {
         self
     }
 
-    /// The same body with nothing but its rotation about z: J, Ibar and S of a lamina that has the same I0, W1, W2, C2 about z.
-    /// What a plane body is compared with whose mass does not commute with rotations.
+    /// The same body with nothing but its rotation about z: J, Ibar and S of a lamina that has the same I0,
+    /// W1, W2, C2 about z. What a plane body is compared with whose mass does not commute with rotations.
     pub fn about_z(mut self) -> Self {
         let half = |a: f64, b: f64| 0.5 * (a + b);
         let j = &self.0.second_moment;
@@ -372,8 +376,8 @@ impl Invariants {
     }
 }
 
-/// Ibar of a mode that gives W1_j = G + G' for G = B_x' M B_j and C2_j by the formulas of theory section 2: W1_kk = 2 (Ibar_ll +
-/// Ibar_mm), W1_kl = -(Ibar_kl + Ibar_lk), C2_k = Ibar_lm - Ibar_ml.
+/// Ibar of a mode that gives W1_j = G + G' for G = B_x' M B_j and C2_j by the formulas of theory section 2:
+/// W1_kk = 2 (Ibar_ll + Ibar_mm), W1_kl = -(Ibar_kl + Ibar_lk), C2_k = Ibar_lm - Ibar_ml.
 pub(super) fn ibar_of(half: &Matrix3<f64>, c2: &Vector3<f64>) -> Matrix3<f64> {
     let w1 = half + half.transpose();
     let trace = 0.25 * w1.trace();

@@ -12,8 +12,8 @@ const ROUNDING: f64 = 1e-12;
 /// Limit of what holds for modes: the solver separates them from each other and from rigid motion to 1e-13, a
 /// residual of 1e-10 leaves 1e-10 in close pairs; worse modes are not modes.
 const MODAL: f64 = 1e-9;
-/// Limit of the products of inertia about principal axes: moments within 1e-9 of each other count as equal and
-/// keep the model axes.
+/// Limit of the products of inertia about principal axes: moments within 1e-9 of each other count as equal
+/// and keep the model axes.
 const PRINCIPAL: f64 = 2e-9;
 
 /// One identity: what it says, how far the body is from it, and whether that is near enough.
@@ -47,22 +47,23 @@ pub struct Expected<'a> {
     pub free_surface: bool,
     /// Body frame.
     pub frame: BodyFrame,
-    /// Origin of the body frame in model coordinates: about a distant origin the centre of mass is known to the
-    /// spacing of numbers there.
+    /// Origin of the body frame in model coordinates: about a distant origin the centre of mass is known to
+    /// the spacing of numbers there.
     pub origin: Vector3<f64>,
     /// lambda, when Psi' K Psi is to be diag(lambda).
     pub eigenvalues: Option<&'a [f64]>,
     /// Relative noise of the lowest eigenvalue that the digits of the input leave (the certificate's
     /// `rigid_noise`); 0 when unknown.
     pub eigenvalue_noise: f64,
-    /// What rounding of the products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0 when unknown.
+    /// What rounding of the products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p
+    /// lambda_q); 0 when unknown.
     pub eigenvalue_rounding: f64,
 }
 
 /// Evaluates every identity that the primary data of a body must fulfil, in a fixed order.
 ///
-/// None depends on the units, the origin or the axes, nor on the basis except where [`Expected`] says more of it. What is about
-/// groups of the kinetic energy that the body does not hold is not among them.
+/// None depends on the units, the origin or the axes, nor on the basis except where [`Expected`] says more of
+/// it. What is about groups of the kinetic energy that the body does not hold is not among them.
 pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityCheck> {
     let bound = CauchySchwarz::of(body);
     let check = IdentityCheck::new;
@@ -149,8 +150,9 @@ fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityC
     checks
 }
 
-/// What the inertia of the rigid body must be. J is the sum of products of places where M = Ms kron I3; masses with inertia of their own, as
-/// of a wheel on a beam, have I0 that is positive semidefinite, and no J of any places.
+/// What the inertia of the rigid body must be. J is the sum of products of places where M = Ms kron I3;
+/// masses with inertia of their own, as of a wheel on a beam, have I0 that is positive semidefinite, and no J
+/// of any places.
 fn rigid_identities(body: &Invariants) -> Vec<IdentityCheck> {
     let check = IdentityCheck::new;
     if body.0.general.is_some() {
@@ -210,9 +212,9 @@ fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCh
 
 /// Evaluates that stored invariants follow from the primary data, and W3 from the stored W2.
 ///
-/// The blocks of W3 are W2(2,3) - W2(3,2), W2(3,1) - W2(1,3), W2(1,2) - W2(2,1) (theory section 2), unless M does not commute
-/// with rotations. A stored array of the wrong shape, one that is missing, and one that the body does not hold miss their identity
-/// infinitely.
+/// The blocks of W3 are W2(2,3) - W2(3,2), W2(3,1) - W2(1,3), W2(1,2) - W2(2,1) (theory section 2), unless M
+/// does not commute with rotations. A stored array of the wrong shape, one that is missing, and one that the
+/// body does not hold miss their identity infinitely.
 pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCheck> {
     let nf = body.n_modes();
     let bound = CauchySchwarz::of(body);

@@ -150,7 +150,8 @@ pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> 
     })
 }
 
-/// Gram matrix of [Phi_t, B, Psi], the columns in units of their modes: kinetic energy is never negative, whatever the modes do.
+/// Gram matrix of [Phi_t, B, Psi], the columns in units of their modes: kinetic energy is never negative,
+/// whatever the modes do.
 pub(super) fn velocity_gram_negative(
     body: &Invariants,
     w2: &Mat<f64>,
@@ -233,13 +234,16 @@ pub(super) fn matrix(a: &Matrix3<f64>) -> Mat<f64> {
     Mat::from_fn(3, 3, |k, l| a[(k, l)])
 }
 
-/// Matrices of more rows than this are held to a Cholesky factorisation: eigenvalues take a hundred times as long.
+/// Matrices of more rows than this are held to a Cholesky factorisation: eigenvalues take a hundred times as
+/// long.
 const MANY_ROWS: usize = 400;
 
-/// What a large matrix is shifted by to be factored, relative to its scale: a part of what rounding may leave.
+/// What a large matrix is shifted by to be factored, relative to its scale: a part of what rounding may
+/// leave.
 const SHIFT: f64 = 2e-13;
 
-/// How negative the smallest eigenvalue of a symmetric matrix is, relative to `scale`; of a large matrix, at most.
+/// How negative the smallest eigenvalue of a symmetric matrix is, relative to `scale`; of a large matrix, at
+/// most.
 fn negative(a: &Mat<f64>, scale: f64) -> f64 {
     let shifted = || {
         let entry = |i: usize, j: usize| a[(i, j)] + if i == j { SHIFT * scale } else { 0.0 };

@@ -101,7 +101,8 @@ impl LumpedMasses {
         self.masses.iter().filter(|&&m| m < -zero).count()
     }
 
-    /// Number of nodes without mass: magnitude below 1e-14 of the largest, the rounding of a sum that cancels.
+    /// Number of nodes without mass: magnitude below 1e-14 of the largest, the rounding of a sum that
+    /// cancels.
     pub fn zero(&self) -> usize {
         let zero = self.zero_bound();
         self.masses.iter().filter(|m| m.abs() <= zero).count()
@@ -112,8 +113,8 @@ impl LumpedMasses {
     }
 }
 
-/// The primary data that lumped masses give with the same modes, about the SAME frame: [`super::condense`] with
-/// Ms = diag(masses). A centre of mass that moved shows as first moment.
+/// The primary data that lumped masses give with the same modes, about the SAME frame: [`super::condense`]
+/// with Ms = diag(masses). A centre of mass that moved shows as first moment.
 ///
 /// # Panics
 /// When the sizes disagree.

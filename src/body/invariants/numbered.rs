@@ -1,4 +1,5 @@
-//! The invariants as other programs number them: I1 to I9 of Adams and MBDyn, from which every other set of names follows.
+//! The invariants as other programs number them: I1 to I9 of Adams and MBDyn, from which every other set of
+//! names follows.
 
 use super::general::{s_of, second_moment_of};
 use super::{CauchySchwarz, GeneralTerms, Groups, Invariants, PrimaryData, s_of_modal_mass};
@@ -6,11 +7,12 @@ use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
-/// The nine inertia invariants (MBDyn manual, technical appendix; Adams/Flex), with the signs of the code of MBDyn.
+/// The nine inertia invariants (MBDyn manual, technical appendix; Adams/Flex), with the signs of the code of
+/// MBDyn.
 ///
-/// With S_j the shape of mode j: I1 = m, I2 = c, I3_j = int S_j, I4_j = int x~ S_j, I5_jk = int S_j x S_k, I6_jk = int S_j . S_k,
-/// I7 = I0, I8_j = int x~ S_j~', I9_jk = int S_j~ S_k~. Inertia about the origin: I7 + sum_j (I8_j + I8_j') q_j - sum_jk I9_jk q_j q_k.
-/// Adams has I8 with the other sign.
+/// With S_j the shape of mode j: I1 = m, I2 = c, I3_j = int S_j, I4_j = int x~ S_j, I5_jk = int S_j x S_k,
+/// I6_jk = int S_j . S_k, I7 = I0, I8_j = int x~ S_j~', I9_jk = int S_j~ S_k~. Inertia about the origin: I7 +
+/// sum_j (I8_j + I8_j') q_j - sum_jk I9_jk q_j q_k. Adams has I8 with the other sign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Numbered {
     /// m. Unit: mass.
@@ -27,8 +29,8 @@ pub struct Numbered {
     pub i6: Mat<f64>,
     /// I0, about the origin. Unit: mass length^2.
     pub i7: Matrix3<f64>,
-    /// I8_j (nf of 3 x 3): `I8_j(a,b) = d_ab sum_c Ibar_cc,j - Ibar_ba,j`. Its symmetric part is W1 / 2, its skew part C2; antisymmetric
-    /// where the body does not hold W1.
+    /// I8_j (nf of 3 x 3): `I8_j(a,b) = d_ab sum_c Ibar_cc,j - Ibar_ba,j`. Its symmetric part is W1 / 2, its
+    /// skew part C2; antisymmetric where the body does not hold W1.
     pub i8: Vec<Matrix3<f64>>,
     /// I9_jk(a,b) in row a nf + j, column b nf + k (3nf x 3nf): -W2. `None` where the body does not hold it.
     pub i9: Option<Mat<f64>>,
@@ -57,9 +59,10 @@ impl Invariants {
         }
     }
 
-    /// The body with these invariants: the inverse of [`Invariants::numbered`], to rounding. C2 is that of I8. Where I5 or I6 differ by more
-    /// than `rounding` from what I9 says of them, relative to their Cauchy-Schwarz bounds, the mass does not commute with rotations, and
-    /// W0 = -C1~ is taken, which none of the nine tells.
+    /// The body with these invariants: the inverse of [`Invariants::numbered`], to rounding. C2 is that of
+    /// I8. Where I5 or I6 differ by more than `rounding` from what I9 says of them, relative to their
+    /// Cauchy-Schwarz bounds, the mass does not commute with rotations, and W0 = -C1~ is taken, which none of
+    /// the nine tells.
     ///
     /// # Panics
     /// When the sizes disagree.

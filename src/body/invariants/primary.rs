@@ -6,11 +6,12 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Constant inertia data of a body about its frame origin, in frame axes (theory section 2).
 ///
-/// `nf` modes; coordinates x (n x 3) and modes Psi_k (n x nf, component k) are in the same frame. Only the primary data are stored;
-/// [`Invariants::inertia`], [`Invariants::w1`] and the others follow from them.
+/// `nf` modes; coordinates x (n x 3) and modes Psi_k (n x nf, component k) are in the same frame. Only the
+/// primary data are stored; [`Invariants::inertia`], [`Invariants::w1`] and the others follow from them.
 ///
-/// The arrays have shapes that belong together, and nothing can be read that the body does not hold: what a dropped group would give
-/// answers `None`, and [`kind`](Invariants::kind) says whether S and Ibar tell all there is.
+/// The arrays have shapes that belong together, and nothing can be read that the body does not hold: what a
+/// dropped group would give answers `None`, and [`kind`](Invariants::kind) says whether S and Ibar tell all
+/// there is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Invariants(pub(super) PrimaryData);
 
@@ -38,19 +39,22 @@ pub struct PrimaryData {
     pub c1: Mat<f64>,
     /// `Ibar[k][l]` (nf) = x_k' Ms Psi_l. Antisymmetric, no more than what gives C2, where W1 is not held.
     pub ibar: [[Vec<f64>; 3]; 3],
-    /// `S[k][l]` (nf x nf) = Psi_k' Ms Psi_l. No more than what gives m_ff and, where it is held, W3, where W2 is not held.
+    /// `S[k][l]` (nf x nf) = Psi_k' Ms Psi_l. No more than what gives m_ff and, where it is held, W3, where
+    /// W2 is not held.
     pub s: [[Mat<f64>; 3]; 3],
     /// K_ff (nf x nf) = Psi' K Psi.
     pub modal_stiffness: Mat<f64>,
     /// What S and C1 do not determine when M does not commute with rotations.
     pub general: Option<GeneralTerms>,
-    /// The groups of the kinetic energy that are held; the arrays know nothing of others ([`Invariants::with_groups`]).
+    /// The groups of the kinetic energy that are held; the arrays know nothing of others
+    /// ([`Invariants::with_groups`]).
     pub groups: Groups,
 }
 
 impl Invariants {
-    /// The invariants with these arrays. Their numbers are checked by [`FlexBody::new`](crate::body::flex_body::FlexBody::new), which
-    /// tells all that is wrong with a body at once.
+    /// The invariants with these arrays. Their numbers are checked by
+    /// [`FlexBody::new`](crate::body::flex_body::FlexBody::new), which tells all that is wrong with a body at
+    /// once.
     ///
     /// # Panics
     /// When the arrays have other shapes than [`PrimaryData`] says.
@@ -92,7 +96,8 @@ impl Invariants {
         self.0.groups.w2.then_some(&self.0.s)
     }
 
-    /// What C2 is the difference of: Ibar or, where the body does not hold W1, the antisymmetric arrays that give the same C2.
+    /// What C2 is the difference of: Ibar or, where the body does not hold W1, the antisymmetric arrays that
+    /// give the same C2.
     pub fn ibar_or_half_c2(&self) -> &[[Vec<f64>; 3]; 3] {
         &self.0.ibar
     }
@@ -134,11 +139,11 @@ impl Invariants {
     }
 }
 
-/// Terms of a mass matrix that does not commute with rotations (theory section 6), with Phi_t the unit translations and the
-/// rows of B_j those of -psi_j~ at displacements and zero at rotations.
+/// Terms of a mass matrix that does not commute with rotations (theory section 6), with Phi_t the unit
+/// translations and the rows of B_j those of -psi_j~ at displacements and zero at rotations.
 ///
-/// J, Ibar and S of such a body are those that give its I0, W1, C2 and W2 by the formulas of theory section 2; no other
-/// formula may use them: W3, m_ff and the coupling of translation and rotation stand here.
+/// J, Ibar and S of such a body are those that give its I0, W1, C2 and W2 by the formulas of theory section
+/// 2; no other formula may use them: W3, m_ff and the coupling of translation and rotation stand here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeneralTerms {
     /// W0 (3 x 3nf): Phi_t' M B_j, column b nf + j for axis b. -C1_j~ when M commutes with rotations.
@@ -147,7 +152,7 @@ pub struct GeneralTerms {
     pub w3: Mat<f64>,
     /// m_ff (nf x nf) = Psi' M Psi.
     pub modal_mass: Mat<f64>,
-    /// Of a plane body: nothing but its rotation about z is known, the entries of J, Ibar and S about the other axes are those of a
-    /// lamina that is the same in all directions about its centre of mass.
+    /// Of a plane body: nothing but its rotation about z is known, the entries of J, Ibar and S about the
+    /// other axes are those of a lamina that is the same in all directions about its centre of mass.
     pub plane: bool,
 }

@@ -1,10 +1,11 @@
-//! Principal axes of inertia, canonical: the same for every numbering, thread count and starting orientation of
-//! a symmetric body.
+//! Principal axes of inertia, canonical: the same for every numbering, thread count and starting orientation
+//! of a symmetric body.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// Moments closer than this, relative to the largest, count as equal: rounding of the moments is some 1e-15,
-/// so that the axes of moments this close are known to six digits; closer ones would show noise as a rotation.
+/// so that the axes of moments this close are known to six digits; closer ones would show noise as a
+/// rotation.
 const EQUAL_MOMENTS: f64 = 1e-9;
 /// Components this close count as equal when the largest is looked for, so that rounding does not decide.
 const EQUAL_COMPONENTS: f64 = 1e-6;
@@ -12,8 +13,8 @@ const EQUAL_COMPONENTS: f64 = 1e-6;
 /// Principal axes (columns, right-handed, moments ascending) of an inertia in model axes.
 ///
 /// An axis of a distinct moment is positive along its largest component (the first such). Within a plane of
-/// equal moments the first axis is the projection of the model axis closest to the plane (the first such); three
-/// equal moments give the model axes themselves. The last axis closes the right-handed frame.
+/// equal moments the first axis is the projection of the model axis closest to the plane (the first such);
+/// three equal moments give the model axes themselves. The last axis closes the right-handed frame.
 pub(super) fn principal_axes(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     let (moments, vectors) = jacobi(inertia);
     let equal = |a: usize, b: usize| moments[b] - moments[a] <= EQUAL_MOMENTS * moments[2].abs();
@@ -58,8 +59,8 @@ fn in_plane(normal: &Vector3<f64>) -> Vector3<f64> {
 
 /// Eigenvalues, ascending, and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 ///
-/// Jacobi, not QR: an off-diagonal entry at rounding level is left alone, so that a body whose principal axes are
-/// the model axes keeps its coordinates to the last bit, and small moments of needles keep their digits.
+/// Jacobi, not QR: an off-diagonal entry at rounding level is left alone, so that a body whose principal axes
+/// are the model axes keeps its coordinates to the last bit, and small moments of needles keep their digits.
 fn jacobi(matrix: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
     let mut a = *matrix;
     let mut v = Matrix3::<f64>::identity();

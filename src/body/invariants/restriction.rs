@@ -6,8 +6,8 @@ use super::{GeneralTerms, Groups, Invariants, PrimaryData};
 use faer::Mat;
 
 impl Invariants {
-    /// The same body with those of its groups only that are in `groups`: a kinetic energy of its own, which keeps itself and both
-    /// momenta. m, c, J, C1, C2, W0, m_ff and K_ff stay what they are.
+    /// The same body with those of its groups only that are in `groups`: a kinetic energy of its own, which
+    /// keeps itself and both momenta. m, c, J, C1, C2, W0, m_ff and K_ff stay what they are.
     pub fn with_groups(mut self, groups: Groups) -> Self {
         let groups = self.0.groups.and(groups);
         let nf = self.n_modes();
@@ -57,8 +57,8 @@ impl Invariants {
         })
     }
 
-    /// The same with `round` of every entry of Ibar, S, W0 and W3 that the body holds for its groups. What gives C2 and m_ff where W1 and
-    /// W2 are not held stays.
+    /// The same with `round` of every entry of Ibar, S, W0 and W3 that the body holds for its groups. What
+    /// gives C2 and m_ff where W1 and W2 are not held stays.
     pub(crate) fn rounded(&self, round: impl Fn(f64) -> f64) -> Self {
         let matrix = |a: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| round(a[(i, j)]));
         let mut rounded = self.clone();
@@ -86,7 +86,8 @@ impl Invariants {
         Self(PrimaryData { general: Some(terms), ..self.0 })
     }
 
-    /// The same with exactly symmetric J, S_kk and m_ff and with S_lk = S_kl', as every body has them and files of few digits do not.
+    /// The same with exactly symmetric J, S_kk and m_ff and with S_lk = S_kl', as every body has them and
+    /// files of few digits do not.
     pub(crate) fn with_symmetries(mut self) -> Self {
         let data = &mut self.0;
         data.second_moment = (data.second_moment + data.second_moment.transpose()) * 0.5;
@@ -152,8 +153,8 @@ pub(crate) fn ibar_of_c2(c2: &Mat<f64>) -> [[Vec<f64>; 3]; 3] {
     ibar
 }
 
-/// S of a body that lacks W2: what gives m_ff and W3 by their formulas, halves so that sums restore them to the last bit; zero where
-/// these are information of their own, or not held.
+/// S of a body that lacks W2: what gives m_ff and W3 by their formulas, halves so that sums restore them to
+/// the last bit; zero where these are information of their own, or not held.
 pub(crate) fn s_of_modal_mass(
     nf: usize,
     modal_mass: Option<&Mat<f64>>,

@@ -1,4 +1,5 @@
-//! Rigid motion as modes: M in rigid motions and modes, and the same body with other amounts of rigid motion in its modes.
+//! Rigid motion as modes: M in rigid motions and modes, and the same body with other amounts of rigid motion
+//! in its modes.
 
 use super::{GeneralTerms, Groups, Invariants, PrimaryData};
 use faer::{Mat, MatRef};
@@ -19,7 +20,8 @@ impl Invariants {
         })
     }
 
-    /// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes before the others.
+    /// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes
+    /// before the others.
     pub(crate) fn with_rigid_modes(&self) -> Self {
         let old = self;
         let nf = old.n_modes();
@@ -78,11 +80,12 @@ impl Invariants {
         solid.w3().expect("held")
     }
 
-    /// The same body with the modes psi_j - t_j - theta_j x x: `taken` has the translation t_j and the rotation theta_j of every mode
-    /// (6 x nf). Rigid motion takes no elastic energy, so that K_ff stays.
+    /// The same body with the modes psi_j - t_j - theta_j x x: `taken` has the translation t_j and the
+    /// rotation theta_j of every mode (6 x nf). Rigid motion takes no elastic energy, so that K_ff stays.
     ///
-    /// What is linear in the modes, C1, C2 and m_ff, is exact for every mass matrix, and everything is where M commutes with rotations.
-    /// Where it does not, W0 to W3 of the rigid motion that is taken are those of a body that does and has the same J.
+    /// What is linear in the modes, C1, C2 and m_ff, is exact for every mass matrix, and everything is where
+    /// M commutes with rotations. Where it does not, W0 to W3 of the rigid motion that is taken are those of
+    /// a body that does and has the same J.
     ///
     /// # Panics
     /// When the sizes disagree, or a group is not held: of what is not there nothing can be taken.

@@ -7,8 +7,9 @@ use faer::{Mat, MatRef};
 /// Part of the stiffness of a motion at which the centrifugal term counts.
 const PART: f64 = 0.01;
 
-/// Largest |kappa| of A v = kappa K v for symmetric A and K (nf x nf), K positive definite: by which part of its own a unit
-/// of A changes the stiffness of any motion at the most. `None` when K is not positive definite or entries are not finite.
+/// Largest |kappa| of A v = kappa K v for symmetric A and K (nf x nf), K positive definite: by which part of
+/// its own a unit of A changes the stiffness of any motion at the most. `None` when K is not positive
+/// definite or entries are not finite.
 pub fn relative_norm(a: MatRef<'_, f64>, k: MatRef<'_, f64>) -> Option<f64> {
     let n = k.nrows();
     // To a unit diagonal first: stiffnesses of modes spread over many orders of magnitude.
@@ -24,10 +25,11 @@ pub fn relative_norm(a: MatRef<'_, f64>, k: MatRef<'_, f64>) -> Option<f64> {
 }
 
 impl Invariants {
-    /// The spin rate about frame axis `axis` at which the centrifugal term w^2 (W2)_kk takes 1 % of the stiffness K_ff of the
-    /// motion that it softens most: w = sqrt(0.01 / mu), mu the largest eigenvalue of (W2)_kk v = mu K_ff v. The
-    /// stiffness of that motion is lost at ten times this rate unless geometric stiffness makes up for it. `None` when nothing
-    /// moves across the axis, when K_ff is not positive definite, or when the body does not hold W2. Unit: 1/time.
+    /// The spin rate about frame axis `axis` at which the centrifugal term w^2 (W2)_kk takes 1 % of the
+    /// stiffness K_ff of the motion that it softens most: w = sqrt(0.01 / mu), mu the largest eigenvalue of
+    /// (W2)_kk v = mu K_ff v. The stiffness of that motion is lost at ten times this rate unless geometric
+    /// stiffness makes up for it. `None` when nothing moves across the axis, when K_ff is not positive
+    /// definite, or when the body does not hold W2. Unit: 1/time.
     ///
     /// # Panics
     /// When `axis` is not below 3.

@@ -9,9 +9,10 @@ use nalgebra::{Matrix3, Vector3};
 impl Invariants {
     /// The same body about the origin `d` (frame coordinates): x' = x - d.
     ///
-    /// c' = c - m d; J' = J - c d' - d c' + m d d'; Ibar'_kl = Ibar_kl - d_k C1_l; S unchanged. For a mass that does not commute
-    /// with rotations, B_x' = B_x + Phi_t d~ gives W1' = W1 - d~ W0 - (d~ W0)' block by block and C2' = C2 - d~ C1. Cancels when d
-    /// is far compared with the body: to get data about the centre of mass, shift the coordinates and condense.
+    /// c' = c - m d; J' = J - c d' - d c' + m d d'; Ibar'_kl = Ibar_kl - d_k C1_l; S unchanged. For a mass
+    /// that does not commute with rotations, B_x' = B_x + Phi_t d~ gives W1' = W1 - d~ W0 - (d~ W0)' block by
+    /// block and C2' = C2 - d~ C1. Cancels when d is far compared with the body: to get data about the centre
+    /// of mass, shift the coordinates and condense.
     pub fn shifted(&self, d: Vector3<f64>) -> Self {
         let c = &self.0.first_moment;
         let mixed = c * d.transpose();
@@ -40,7 +41,8 @@ impl Invariants {
         shifted.with_groups(self.0.groups)
     }
 
-    /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same origin.
+    /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same
+    /// origin.
     pub fn rotated(&self, axes: &Matrix3<f64>) -> Self {
         let nf = self.n_modes();
         let second_moment = axes.transpose() * self.0.second_moment * axes;

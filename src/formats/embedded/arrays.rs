@@ -164,8 +164,9 @@ impl Places {
     }
 }
 
-/// Geometric stiffness for forces and moments at a frame, with the bit of `components`: what the reference point of an interface has, as
-/// [`BodyPoint::interface`](crate::motion::dynamics::BodyPoint::interface) takes it.
+/// Geometric stiffness for forces and moments at a frame, with the bit of `components`: what the reference
+/// point of an interface has, as [`BodyPoint::interface`](crate::motion::dynamics::BodyPoint::interface)
+/// takes it.
 pub(crate) fn loads<'b>(
     body: &'b FlexBody,
     frames: &[ExportFrame],

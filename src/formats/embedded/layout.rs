@@ -1,4 +1,5 @@
-//! What stands where in the file: the tables that drive the writer, the C header and `docs/formats/embedded.md`.
+//! What stands where in the file: the tables that drive the writer, the C header and
+//! `docs/formats/embedded.md`.
 
 use std::fmt::Write;
 
@@ -60,7 +61,8 @@ impl Kind {
     }
 }
 
-/// Entry of the table of arrays: where the array starts, rows, columns, and numbers from one column to the next; four u32.
+/// Entry of the table of arrays: where the array starts, rows, columns, and numbers from one column to the
+/// next; four u32.
 pub(crate) const ENTRY: usize = 16;
 
 /// An array of the file: name, rows and columns, content.

@@ -13,8 +13,9 @@ use crate::formats::export::losses::geometric_stiffness;
 use crate::formats::export::{ExportFormat, ExportOptions, Exported, Points, frames};
 use flate2::Crc;
 
-/// The numbers of the equations of motion (theory 6 and 7.4) in a fixed little-endian layout, and a freestanding C99 header that evaluates
-/// them in place. Dialects: `double` and `float`, the numbers of file and header.
+/// The numbers of the equations of motion (theory 6 and 7.4) in a fixed little-endian layout, and a
+/// freestanding C99 header that evaluates them in place. Dialects: `double` and `float`, the numbers of file
+/// and header.
 pub struct Embedded;
 
 impl ExportFormat for Embedded {
@@ -106,7 +107,8 @@ fn bytes(
     Ok((file, places))
 }
 
-/// Appends the numbers; fails with one that is too large for its precision, or with the largest of an array that is too small.
+/// Appends the numbers; fails with one that is too large for its precision, or with the largest of an array
+/// that is too small.
 fn append(file: &mut Vec<u8>, array: &Array, precision: usize) -> std::result::Result<(), f64> {
     match &array.numbers {
         Numbers::I32(values) => file.extend(values.iter().flat_map(|v| v.to_le_bytes())),

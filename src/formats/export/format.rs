@@ -23,11 +23,13 @@ pub trait ExportFormat: Sync {
         false
     }
 
-    /// What this format cannot hold of `body` with these options: fragments of sentences with the facts, in the order of importance.
-    /// What concerns the origin of the numbers only (certificate, lumped comparators, provenance) is in no format and is not told.
+    /// What this format cannot hold of `body` with these options: fragments of sentences with the facts, in
+    /// the order of importance. What concerns the origin of the numbers only (certificate, lumped
+    /// comparators, provenance) is in no format and is not told.
     fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String>;
 
-    /// What its program must be told to use all of the file: settings without which a part of it is ignored. Sentences without a full stop.
+    /// What its program must be told to use all of the file: settings without which a part of it is ignored.
+    /// Sentences without a full stop.
     fn needs(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {
         Vec::new()
     }
@@ -84,8 +86,9 @@ impl Points {
 pub struct Exported {
     /// The file itself.
     pub file: Vec<u8>,
-    /// Further files, each with the ending that takes the place of the extension of the file: `M.mtx` stands for a file `body.M.mtx` beside
-    /// `body.csv`, `_exudyn.py` for a file `body_exudyn.py` beside `body.hdf5`.
+    /// Further files, each with the ending that takes the place of the extension of the file: `M.mtx` stands
+    /// for a file `body.M.mtx` beside `body.csv`, `_exudyn.py` for a file `body_exudyn.py` beside
+    /// `body.hdf5`.
     pub beside: Vec<(&'static str, Vec<u8>)>,
 }
 
@@ -102,7 +105,8 @@ impl Exported {
         }
     }
 
-    /// Fills `slot`, which is for the file, and a slot for each of the others; they appear together when all are committed.
+    /// Fills `slot`, which is for the file, and a slot for each of the others; they appear together when all
+    /// are committed.
     ///
     /// # Errors
     /// FB104, FB602 when one cannot be written.

@@ -7,7 +7,8 @@ use faer::Mat;
 /// One place of a body and its motion in every mode, body axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportFrame {
-    /// Number: that of the node; of the reference point of an interface that is no node of the body, one above all node numbers.
+    /// Number: that of the node; of the reference point of an interface that is no node of the body, one
+    /// above all node numbers.
     pub id: i64,
     /// Name of the interface.
     pub name: Option<String>,
@@ -19,8 +20,9 @@ pub struct ExportFrame {
     pub rotation: Option<Mat<f64>>,
 }
 
-/// The places of `body` that `points` names: nodes in the order of the body, reference points in the order of the interfaces. Of a free
-/// interface, and of one whose nodes determine no motion of a reference point, all nodes.
+/// The places of `body` that `points` names: nodes in the order of the body, reference points in the order of
+/// the interfaces. Of a free interface, and of one whose nodes determine no motion of a reference point, all
+/// nodes.
 ///
 /// [`Points::Usual`] stands for the interfaces where there are some, else for all nodes.
 pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
@@ -69,8 +71,8 @@ fn interfaces(body: &FlexBody) -> Vec<ExportFrame> {
     found
 }
 
-/// The reference point of the interface with this `number` (from 0); of a free interface, and of one whose nodes determine no motion of a
-/// reference point, all nodes.
+/// The reference point of the interface with this `number` (from 0); of a free interface, and of one whose
+/// nodes determine no motion of a reference point, all nodes.
 pub fn interface_frames(body: &FlexBody, interface: &Interface, number: usize) -> Vec<ExportFrame> {
     let above = body.nodes().ids.iter().copied().max().unwrap_or(0);
     let named = |i: usize| ExportFrame { name: Some(interface.name.clone()), ..node(body, i) };

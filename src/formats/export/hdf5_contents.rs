@@ -85,8 +85,8 @@ impl Hdf5Entry {
 /// Bytes that a text of a file can have.
 const LONGEST_TEXT: usize = 1 << 16;
 
-/// A text of its own length, in ASCII where it is that: Octave stops at texts of variable length, and at those of UTF-8. The library writes it
-/// into the type of the file from a longer one.
+/// A text of its own length, in ASCII where it is that: Octave stops at texts of variable length, and at
+/// those of UTF-8. The library writes it into the type of the file from a longer one.
 fn put_fixed_text(place: &hdf5::Group, name: &str, text: &str) -> hdf5::Result<hdf5::Dataset> {
     let wrong = |e: &dyn std::fmt::Display| hdf5::Error::from(format!("{name}: {e}"));
     let (ascii, length) = (text.is_ascii(), text.len().max(1));

@@ -1,5 +1,5 @@
-//! K, M and D in the motions of interface frames, as reduced-order blocks take them: six coordinates for each frame, then the
-//! fixed-interface modes.
+//! K, M and D in the motions of interface frames, as reduced-order blocks take them: six coordinates for each
+//! frame, then the fixed-interface modes.
 
 use super::losses;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -8,8 +8,8 @@ use crate::body::flex_body::FlexBody;
 use crate::numerics::linalg::combine;
 use faer::Mat;
 
-/// The body in interface coordinates \[q; eta\]: translations and rotations of each frame along body axes, in the order of the frames, then
-/// the amplitudes of the fixed-interface modes.
+/// The body in interface coordinates \[q; eta\]: translations and rotations of each frame along body axes, in
+/// the order of the frames, then the amplitudes of the fixed-interface modes.
 pub(crate) struct InterfaceMatrices<'a> {
     /// Name and origin of each frame, body axes. Unit: length.
     pub frames: Vec<(&'a str, [f64; 3])>,
@@ -17,12 +17,14 @@ pub(crate) struct InterfaceMatrices<'a> {
     pub stiffness: &'a Mat<f64>,
     /// M (nc x nc).
     pub mass: &'a Mat<f64>,
-    /// D (nc x nc), where the body has damping: M B D_ff B' M, so that B' D B = D_ff and rigid motion is not damped.
+    /// D (nc x nc), where the body has damping: M B D_ff B' M, so that B' D B = D_ff and rigid motion is not
+    /// damped.
     pub damping: Option<Mat<f64>>,
 }
 
 impl<'a> InterfaceMatrices<'a> {
-    /// Of a body with Craig-Bampton coordinates in space, all of whose interfaces have reference points. `format` is named in messages.
+    /// Of a body with Craig-Bampton coordinates in space, all of whose interfaces have reference points.
+    /// `format` is named in messages.
     ///
     /// # Errors
     /// [`ExportLoses`](Code::ExportLoses) for any other body.

@@ -5,7 +5,8 @@ use crate::body::invariants::CauchySchwarz;
 use crate::model::UnitLoad;
 use faer::Mat;
 
-/// Differences of numbers that are relative to their Cauchy-Schwarz bounds: below this they are rounding, and nothing is lost.
+/// Differences of numbers that are relative to their Cauchy-Schwarz bounds: below this they are rounding, and
+/// nothing is lost.
 const ROUNDING: f64 = 1e-12;
 
 /// A format in space knows nothing of the plane.
@@ -85,7 +86,8 @@ pub(crate) fn internal_rows(body: &FlexBody) -> Option<String> {
     Some(format!("{} rows of the modes that belong to no node", internal.shape.nrows()))
 }
 
-/// The groups of the kinetic energy, for a format with the inertia of the undeformed body; `w1` says what of W1 it lacks.
+/// The groups of the kinetic energy, for a format with the inertia of the undeformed body; `w1` says what of
+/// W1 it lacks.
 pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Option<String> {
     let groups = body.groups();
     let held = [(groups.w1, w1), (groups.w2, "W2"), (groups.w3, "W3")];

@@ -64,7 +64,8 @@ fn variable(name: &str, value: &Mat5Value<'_>) -> Option<Vec<u8>> {
     Some(body)
 }
 
-/// Type, number of bytes, and the bytes filled up to a multiple of eight; up to four bytes stand in the tag itself.
+/// Type, number of bytes, and the bytes filled up to a multiple of eight; up to four bytes stand in the tag
+/// itself.
 fn element(kind: u32, bytes: &[u8]) -> Option<Vec<u8>> {
     let length = u32::try_from(bytes.len()).ok()?;
     let mut out = if (1..=4).contains(&length) {

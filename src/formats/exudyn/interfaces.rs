@@ -1,7 +1,8 @@
 //! Interfaces of a body for Exudyn's markers, which take hold of mesh nodes, counted from 0, with weights.
 //!
-//! `MarkerSuperElementRigid` takes the weighted mean of the nodes as its place and, by its "alternative approach", the rotation that fits their
-//! displacements best. With equal weights this is the motion of our interfaces; `offset` leads from the mean to the reference point.
+//! `MarkerSuperElementRigid` takes the weighted mean of the nodes as its place and, by its "alternative
+//! approach", the rotation that fits their displacements best. With equal weights this is the motion of our
+//! interfaces; `offset` leads from the mean to the reference point.
 
 use super::mesh::{Mesh, MeshInterface};
 use crate::body::flex_body::{FlexBody, Interface};
@@ -14,7 +15,8 @@ pub(crate) const SCRIPT: &str = include_str!("run.py");
 /// What takes the place of the file's extension in the name of that program.
 pub(crate) const SCRIPT_NAME: &str = "_exudyn.py";
 
-/// The numbers that nodes have in the FE model, and the interfaces in their order; Exudyn's loader passes over both.
+/// The numbers that nodes have in the FE model, and the interfaces in their order; Exudyn's loader passes
+/// over both.
 pub(crate) fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let held = body.interfaces().iter().zip(&mesh.interfaces).enumerate();
     let interfaces = held.map(|(number, (own, nodes))| interface(number, own, nodes, mesh)).collect();

@@ -1,8 +1,9 @@
 //! What Exudyn calls the mesh: the nodes that its markers take hold of, and the interfaces as sets of them.
 //!
-//! A marker over all nodes of an interface costs as much in every step as these are many. Where places are asked for, an interface with a
-//! rotation is six nodes on a cross about its reference point instead, which move rigidly with it: the mean of them is the reference point, and
-//! the rotation that fits them best is that of the interface, both exactly.
+//! A marker over all nodes of an interface costs as much in every step as these are many. Where places are
+//! asked for, an interface with a rotation is six nodes on a cross about its reference point instead, which
+//! move rigidly with it: the mean of them is the reference point, and the rotation that fits them best is
+//! that of the interface, both exactly.
 
 use crate::body::flex_body::{FlexBody, Interface};
 use crate::formats::export::Points;
@@ -10,7 +11,8 @@ use crate::formats::export::frames::{ExportFrame, interface_frames, named_nodes}
 use faer::Mat;
 use nalgebra::Vector3;
 
-/// Length of the arms of a cross where the nodes of the interface are all at its reference point, as part of the extent of the body.
+/// Length of the arms of a cross where the nodes of the interface are all at its reference point, as part of
+/// the extent of the body.
 const ARM: f64 = 0.01;
 
 /// Nodes with their motion, and the interfaces that hold them.

@@ -1,4 +1,5 @@
-//! Reader and checks. Names as in FEM.py of Exudyn 1.13.6; row or column 3 j + a of a large array belongs to axis a of mode j.
+//! Reader and checks. Names as in FEM.py of Exudyn 1.13.6; row or column 3 j + a of a large array belongs to
+//! axis a of mode j.
 
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;

@@ -1,9 +1,10 @@
 //! Exudyn: the file that `ObjectFFRFreducedOrderInterface.LoadFromFile` reads (FEM.py, 1.13.6).
 //!
-//! The nodal formulation of Zwölfer and Gerstmayr (Acta Mech. 2021) with matrices that are blocked by modes: three columns, along x, y and
-//! z, for each mode. With S_j~ the skew matrices of a mode shape and x~ those of the positions, mPsiTildePsi = int S_j~' S_k = -I5,
-//! mPsiTildePsiTilde = int S_j~' S_k~ = -I9, mPhitTPsi = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4,
-//! mXRefTildePsiTilde = int x~' S_j~ = I8.
+//! The nodal formulation of Zwölfer and Gerstmayr (Acta Mech. 2021) with matrices that are blocked by modes:
+//! three columns, along x, y and z, for each mode. With S_j~ the skew matrices of a mode shape and x~ those
+//! of the positions, mPsiTildePsi = int S_j~' S_k = -I5, mPsiTildePsiTilde = int S_j~' S_k~ = -I9, mPhitTPsi
+//! = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4, mXRefTildePsiTilde = int x~'
+//! S_j~ = I8.
 
 use super::interfaces;
 use super::mesh::Mesh;
@@ -56,7 +57,8 @@ impl ExportFormat for Exudyn {
     }
 }
 
-/// Contents of the file, in the order of the program's own writer. The attribute `datatype` is the Python type.
+/// Contents of the file, in the order of the program's own writer. The attribute `datatype` is the Python
+/// type.
 fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let (n, nf) = (mesh.numbers.len(), body.n_modes());
     let told = inertia(body);
@@ -87,8 +89,8 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     all
 }
 
-/// m_ff; for a mass that does not commute with rotations with an attribute that says so, as no array of the file tells: m_ff and
-/// mPsiTildePsiTilde then need not agree. Exudyn does not look at it.
+/// m_ff; for a mass that does not commute with rotations with an attribute that says so, as no array of the
+/// file tells: m_ff and mPsiTildePsiTilde then need not agree. Exudyn does not look at it.
 fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
     let entry = array("massMatrixReduced", Hdf5Contents::matrix(&told.i6));
     match body.invariants().general() {

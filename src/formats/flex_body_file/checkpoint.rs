@@ -1,4 +1,5 @@
-//! The checkpoint of a search for modes: a small HDF5 file of its own format, described in `docs/checkpoint.md`.
+//! The checkpoint of a search for modes: a small HDF5 file of its own format, described in
+//! `docs/checkpoint.md`.
 
 use super::extents::{Sizes, dataset};
 use super::item::Extent;
@@ -29,7 +30,8 @@ pub struct Checkpoint {
 /// Writes the state of a search on `model` to a place reserved by [`prepare_output`](super::prepare_output).
 ///
 /// # Errors
-/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
+/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then
+/// as it was.
 pub fn write_checkpoint(snapshot: &Snapshot, model: &str, slot: OutputSlot) -> Result<()> {
     fill(snapshot, model, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))?;
     slot.commit()
@@ -100,8 +102,8 @@ fn digest(snapshot: &Snapshot, model: &str) -> String {
 /// Reads a checkpoint.
 ///
 /// # Errors
-/// [`FileUnreadable`](Code::FileUnreadable); [`CheckpointUnreadable`](Code::CheckpointUnreadable): not one, or damaged;
-/// [`CheckpointVersion`](Code::CheckpointVersion): of another format version.
+/// [`FileUnreadable`](Code::FileUnreadable); [`CheckpointUnreadable`](Code::CheckpointUnreadable): not one,
+/// or damaged; [`CheckpointVersion`](Code::CheckpointVersion): of another format version.
 pub fn read_checkpoint(path: impl AsRef<Path>) -> Result<Checkpoint> {
     let path = path.as_ref();
     let (file, bytes) = open_sound(path, "checkpoint", Code::CheckpointUnreadable)?;

@@ -1,4 +1,5 @@
-//! What a flex-body file holds of a body, as plain data: for formats that carry the same entries in another container.
+//! What a flex-body file holds of a body, as plain data: for formats that carry the same entries in another
+//! container.
 
 use super::names;
 use super::names::place;
@@ -41,9 +42,11 @@ pub struct NamedAttributes {
     pub values: Vec<(String, serde_json::Value)>,
 }
 
-/// Every array and every attribute of the flex-body file of `body` (`docs/format.md`), in the order of the file.
+/// Every array and every attribute of the flex-body file of `body` (`docs/format.md`), in the order of the
+/// file.
 ///
-/// Of a body with 32-bit floats these are rounded as in the file; what follows from them is not rounded again.
+/// Of a body with 32-bit floats these are rounded as in the file; what follows from them is not rounded
+/// again.
 pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
     let (mut attributes, mut arrays) = (Vec::new(), Vec::new());
     for group in TABLE {

@@ -9,7 +9,8 @@ use super::value::{Value, View};
 use crate::base::diagnostic::Code;
 use crate::body::flex_body::Parts;
 
-/// Adds a problem for every derived entry of the scanned file that contradicts `body`, made of its primary entries.
+/// Adds a problem for every derived entry of the scanned file that contradicts `body`, made of its primary
+/// entries.
 pub(super) fn check_derived(scan: &mut Scan, body: &Parts) {
     for group in TABLE {
         let links: Vec<Option<String>> = match group.per {

@@ -1,5 +1,5 @@
-//! The digest of all content of a flex-body file, as `docs/format.md` describes it: a SHA-256 of every group and dataset, listed by path, and
-//! one of this list.
+//! The digest of all content of a flex-body file, as `docs/format.md` describes it: a SHA-256 of every group
+//! and dataset, listed by path, and one of this list.
 
 use super::schema::{LIST, WHOLE};
 use crate::base::hdf5_file::{Record, Stored, attribute_names, attribute_record, dataset_record};
@@ -58,7 +58,8 @@ pub(super) fn of_numbers<T: Number>(shape: &[usize], values: &[T]) -> Fingerprin
     fingerprint
 }
 
-/// What stands before the bytes of a dataset (without a name) or of an attribute. The lengths make it unambiguous.
+/// What stands before the bytes of a dataset (without a name) or of an attribute. The lengths make it
+/// unambiguous.
 fn header(name: &str, kind: &str, shape: &[usize], bytes: usize) -> String {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     format!("{} {name} {kind} {} {bytes}\n", name.len(), shape.join("x"))

@@ -179,7 +179,8 @@ fn shape(item: &Item) -> String {
     item.shape().unwrap_or(&[]).iter().map(|e| symbol(*e)).collect::<Vec<_>>().join(" x ")
 }
 
-/// `schemas/flexbody-file.schema.json`: a JSON Schema of what [`structure`](super::structure) says about a file.
+/// `schemas/flexbody-file.schema.json`: a JSON Schema of what [`structure`](super::structure) says about a
+/// file.
 pub fn format_schema() -> String {
     let mut root = json!({});
     for group in TABLE {
@@ -232,8 +233,8 @@ fn of_group(held: TermGroup) -> Value {
     })
 }
 
-/// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those that are not
-/// required.
+/// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those
+/// that are not required.
 fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));

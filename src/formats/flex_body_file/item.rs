@@ -52,14 +52,14 @@ pub(super) enum Origin {
     ConstantInt(i64),
     /// Information of its own.
     Primary(Get),
-    /// Follows from the primary entries; the reader recomputes it. Floats agree to [`DERIVED_TOLERANCE`] of the
-    /// largest magnitude in the named dataset of the same group, everything else exactly.
+    /// Follows from the primary entries; the reader recomputes it. Floats agree to [`DERIVED_TOLERANCE`] of
+    /// the largest magnitude in the named dataset of the same group, everything else exactly.
     Derived(Get, &'static str),
 }
 use Origin::{ConstantInt, ConstantText, Derived, Primary};
 
-/// This program's files agree to the last bit; other writers may evaluate W1, W2, W3 by themselves, and 1e-12 is what
-/// independent evaluations of the invariants reach.
+/// This program's files agree to the last bit; other writers may evaluate W1, W2, W3 by themselves, and 1e-12
+/// is what independent evaluations of the invariants reach.
 pub(super) const DERIVED_TOLERANCE: f64 = 1e-12;
 
 /// The same of an array of 32-bit floats, which is rounded by itself.
@@ -85,7 +85,8 @@ pub(super) struct Item {
     /// Minor version of the format that brought it.
     pub since: i64,
     pub origin: Origin,
-    /// The group of the kinetic energy that the entry belongs to: there where the body holds it, required or not there at all.
+    /// The group of the kinetic energy that the entry belongs to: there where the body holds it, required or
+    /// not there at all.
     pub of: Option<TermGroup>,
     /// A large array, of 32-bit floats where the body is stored so.
     pub large: bool,

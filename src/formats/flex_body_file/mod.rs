@@ -1,4 +1,5 @@
-//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; the checkpoint of a search; the file of a simulation.
+//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; the checkpoint of a
+//! search; the file of a simulation.
 
 #[cfg(feature = "hdf5")]
 mod assemble;

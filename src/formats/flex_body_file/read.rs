@@ -15,14 +15,16 @@ use std::path::Path;
 /// Reads a body; every number is bit for bit the one that was written.
 ///
 /// # Errors
-/// [`FileUnreadable`](Code::FileUnreadable); [`BodyUnreadable`](Code::BodyUnreadable): not HDF5, or not of this
-/// program; [`BodyVersion`](Code::BodyVersion): a newer format; [`BodySchema`](Code::BodySchema): missing, mis-shaped
-/// or not finite, one diagnostic per entry; [`BodyIdentity`](Code::BodyIdentity): entries that contradict each other.
+/// [`FileUnreadable`](Code::FileUnreadable); [`BodyUnreadable`](Code::BodyUnreadable): not HDF5, or not of
+/// this program; [`BodyVersion`](Code::BodyVersion): a newer format; [`BodySchema`](Code::BodySchema):
+/// missing, mis-shaped or not finite, one diagnostic per entry; [`BodyIdentity`](Code::BodyIdentity): entries
+/// that contradict each other.
 pub fn read(path: impl AsRef<Path>) -> Result<FlexBody> {
     read_with_notes(path).map(|(body, _)| body)
 }
 
-/// The same, with what there is to say of a file that is sound: [`BodyWithoutDigest`](Code::BodyWithoutDigest) of an older format.
+/// The same, with what there is to say of a file that is sound:
+/// [`BodyWithoutDigest`](Code::BodyWithoutDigest) of an older format.
 ///
 /// # Errors
 /// As [`read`].

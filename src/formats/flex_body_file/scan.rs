@@ -1,5 +1,5 @@
-//! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing that
-//! the file declares before it is checked against the rest.
+//! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing
+//! that the file declares before it is checked against the rest.
 
 use super::digest::{self, Numbers, digests_of, of_numbers};
 use super::extents::{Sizes, dataset, index};
@@ -113,7 +113,8 @@ impl Scan {
         self.instances.get(first).cloned().unwrap_or_default()
     }
 
-    /// Looks up the instances of a group that occurs several times; groups of the same kind have the same ones.
+    /// Looks up the instances of a group that occurs several times; groups of the same kind have the same
+    /// ones.
     fn list(&mut self, file: &hdf5::File, group: &Group) {
         let parent = group.parent();
         let links = match hdf5_file::open_group(file, parent).and_then(|g| hdf5_file::members(&g)) {
@@ -260,7 +261,8 @@ impl Scan {
         }
     }
 
-    /// What belongs to a group of the kinetic energy is there where `/terms` says that the group is kept, and only there.
+    /// What belongs to a group of the kinetic energy is there where `/terms` says that the group is kept, and
+    /// only there.
     fn groups(&mut self) {
         let Some(held) = self.held() else { return };
         for (name, item, there) in std::mem::take(&mut self.of_groups) {
@@ -276,7 +278,8 @@ impl Scan {
         }
     }
 
-    /// The groups of the kinetic energy that the file says the body holds; `None` when it says something else.
+    /// The groups of the kinetic energy that the file says the body holds; `None` when it says something
+    /// else.
     pub fn held(&mut self) -> Option<Groups> {
         let mut says = |group: TermGroup| match self.values.get(&format!("/terms@{}", group.name())) {
             Some(Value::Text(text)) if text == KEPT => Some(true),

@@ -1,4 +1,5 @@
-//! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow it.
+//! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow
+//! it.
 
 use super::item::Extent::{Fixed, InternalRows, Modes, Nodes, ThreeModes};
 use super::item::Kind::{Floats, Int, Ints, Named, Text};

@@ -22,7 +22,8 @@ const fn unit(mass_halves: i8, length: i8, time: i8) -> Units {
     Units::Of { mass_halves, length, time }
 }
 
-/// Writes the motion of a body whose numbers are in `units` to the temporary file of `slot`; it appears with the slot's commit.
+/// Writes the motion of a body whose numbers are in `units` to the temporary file of `slot`; it appears with
+/// the slot's commit.
 ///
 /// # Errors
 /// FB104, FB602.
@@ -87,7 +88,8 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     writer.file.close()
 }
 
-/// The file and what it is to hold. Everything is written in a fixed order, so that equal recordings give equal bytes.
+/// The file and what it is to hold. Everything is written in a fixed order, so that equal recordings give
+/// equal bytes.
 struct Writer<'a> {
     recording: &'a Recording,
     units: &'a UnitSystem,

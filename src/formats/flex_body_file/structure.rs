@@ -16,8 +16,8 @@ const DEEPEST: usize = 8;
 /// Groups may contain themselves, so that even a small file can unfold without end.
 const MOST_MEMBERS: usize = 20_000;
 
-/// Groups, datasets (type, shape and describing attributes) and attributes of a file, entries unknown to this version
-/// included; `schemas/flexbody-file.schema.json` describes the result.
+/// Groups, datasets (type, shape and describing attributes) and attributes of a file, entries unknown to this
+/// version included; `schemas/flexbody-file.schema.json` describes the result.
 ///
 /// # Errors
 /// As [`read`](super::read) for files that cannot be opened, are not of this program or of a newer format;

@@ -91,8 +91,8 @@ pub(super) enum Units {
 }
 
 impl Units {
-    /// With the unit names of a body: `kg m^2`, `tonne^(1/2) mm`, `s^-2`; a unit that the user gave as a number
-    /// is written in SI: `(0.0254 m)^2`.
+    /// With the unit names of a body: `kg m^2`, `tonne^(1/2) mm`, `s^-2`; a unit that the user gave as a
+    /// number is written in SI: `(0.0254 m)^2`.
     pub fn concrete(self, system: &UnitSystem) -> String {
         let name = |unit: &Unit, si: &str| match unit.name().parse::<f64>() {
             Ok(_) => format!("({} {si})", unit.name()),

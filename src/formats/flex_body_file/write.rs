@@ -23,7 +23,8 @@ const DEFLATE_LEVEL: u8 = 1;
 /// Reserves `path` for a body file, so that a long computation does not end at an unwritable output.
 ///
 /// # Errors
-/// See [`OutputSlot::prepare`]; also [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot take.
+/// See [`OutputSlot::prepare`]; also [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot
+/// take.
 pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
     let slot = OutputSlot::prepare(path)?;
     if slot.temporary().to_str().is_none() {
@@ -44,7 +45,8 @@ pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
 /// Writes `body` to a place reserved by [`prepare_output`].
 ///
 /// # Errors
-/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then as it was.
+/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then
+/// as it was.
 pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
     fill_slot(body, &slot)?;
     slot.commit()

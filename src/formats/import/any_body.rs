@@ -14,13 +14,15 @@ pub(crate) const ANY_BODY: Expected<'static> = Expected {
     eigenvalue_rounding: 0.0,
 };
 
-/// What counts as rounding in files of 10 digits and more, relative to Cauchy-Schwarz bounds; what is told twice differs by no more.
+/// What counts as rounding in files of 10 digits and more, relative to Cauchy-Schwarz bounds; what is told
+/// twice differs by no more.
 pub(crate) const DIGITS: f64 = 1e-9;
 
 /// What a principal moment of zero means.
 pub(crate) const NO_INERTIA: &str = "rotation about an axis through the centre of mass has no inertia: all masses lie on a line, or the inertia of the nodes is missing";
 
-/// Number of principal moments about the centre of mass that are zero but for rounding; NaN where they cannot be computed.
+/// Number of principal moments about the centre of mass that are zero but for rounding; NaN where they cannot
+/// be computed.
 pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
     const NOTHING: f64 = 1e-12;
     let centre = inertia.i2 / inertia.i1;

@@ -8,8 +8,8 @@ use crate::body::invariants::{IdentityCheck, Invariants, identities};
 use crate::numerics::linalg::{dense_cholesky, symmetric_eigen};
 use faer::Mat;
 
-/// Radius of gyration relative to the extent of the places of the body: a rod has 0.29, a ring 0.5. Far outside lengths have different
-/// units; frames may stand for a part of a body only.
+/// Radius of gyration relative to the extent of the places of the body: a rod has 0.29, a ring 0.5. Far
+/// outside lengths have different units; frames may stand for a part of a body only.
 const GYRATION: (f64, f64) = (0.02, 5.0);
 
 /// Facts and checks of a file.
@@ -47,8 +47,8 @@ impl Audit {
     }
 }
 
-/// Holds a file to its format and to theory section 10. Identities pass up to `tolerance`, relative to the size of their terms, or the
-/// rounding of their formulas where that is more.
+/// Holds a file to its format and to theory section 10. Identities pass up to `tolerance`, relative to the
+/// size of their terms, or the rounding of their formulas where that is more.
 pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
     let body = &file.body;
     let invariants =

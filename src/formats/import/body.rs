@@ -5,8 +5,8 @@ use crate::body::invariants::Numbered;
 use crate::model::GeometricStiffness;
 use faer::Mat;
 
-/// A body as a file of another program describes it. Nothing of it is checked beyond its shapes: modes may be any, matrices not
-/// symmetric, numbers not finite.
+/// A body as a file of another program describes it. Nothing of it is checked beyond its shapes: modes may be
+/// any, matrices not symmetric, numbers not finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedBody {
     /// Name, where the file has one.

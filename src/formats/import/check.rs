@@ -15,7 +15,8 @@ pub struct AuditCheck {
     pub limit: f64,
     /// Code of the finding when it does not pass.
     pub code: Code,
-    /// What it means when it does not pass: a fragment in plain words with the facts in it, without the value.
+    /// What it means when it does not pass: a fragment in plain words with the facts in it, without the
+    /// value.
     pub meaning: String,
 }
 

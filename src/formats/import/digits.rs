@@ -55,7 +55,8 @@ impl Digits {
         }
     }
 
-    /// Half a unit of the last digit of an array whose largest number is `size`: short numbers of a file with long ones are exact.
+    /// Half a unit of the last digit of an array whose largest number is `size`: short numbers of a file with
+    /// long ones are exact.
     pub(crate) fn rounding(self, size: f64) -> f64 {
         let half = |digits: u32| 0.5 * 0.1f64.powi(digits.min(400) as i32);
         match self.fixed.filter(|_| !self.exponents) {

@@ -13,9 +13,11 @@ pub struct ImportedFile {
     pub dialect: String,
     /// Why it is taken for that variant, and other facts that are no fault: sentences without a full stop.
     pub notes: Vec<String>,
-    /// What must hold in files of this format: redundant arrays, digits, layout. What every body must fulfil is checked elsewhere.
+    /// What must hold in files of this format: redundant arrays, digits, layout. What every body must fulfil
+    /// is checked elsewhere.
     pub checks: Vec<AuditCheck>,
-    /// Why no body must be made of the file although it can be read: whole sentences without a full stop. Checks say the same.
+    /// Why no body must be made of the file although it can be read: whole sentences without a full stop.
+    /// Checks say the same.
     pub unsound: Vec<String>,
     /// The body.
     pub body: ImportedBody,
@@ -26,13 +28,14 @@ pub trait ImportFormat: Sync {
     /// Name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Whether the file can be of this format, by what stands at its beginning (of an HDF5 file by the names in it).
+    /// Whether the file can be of this format, by what stands at its beginning (of an HDF5 file by the names
+    /// in it).
     fn recognises(&self, file: &InputFile) -> bool;
 
     /// Reads a file.
     ///
     /// # Errors
-    /// [`ForeignUnreadable`](Code::ForeignUnreadable) with the line, [`ForeignIncomplete`](Code::ForeignIncomplete) for a file from
-    /// which not even shapes of arrays follow.
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) with the line,
+    /// [`ForeignIncomplete`](Code::ForeignIncomplete) for a file from which not even shapes of arrays follow.
     fn read(&self, file: &InputFile) -> Result<ImportedFile>;
 }

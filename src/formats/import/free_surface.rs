@@ -12,11 +12,12 @@ use faer::Mat;
 /// A mode of which less than this part of its squared M-norm is left without rigid motion is a rigid motion.
 const RIGID: f64 = 1e-10;
 
-/// What the digits of FE matrices leave of K_ff beside its diagonal, and more: so near to it, eigenvalues differ from the diagonal by the
-/// square of this.
+/// What the digits of FE matrices leave of K_ff beside its diagonal, and more: so near to it, eigenvalues
+/// differ from the diagonal by the square of this.
 const NEARLY_DIAGONAL: f64 = 1e-6;
 
-/// How far the modes are from mass-normalised free-surface modes, the worst of the identities that say so; `None` when they are such modes.
+/// How far the modes are from mass-normalised free-surface modes, the worst of the identities that say so;
+/// `None` when they are such modes.
 pub(crate) fn is_free_surface(invariants: &Invariants) -> Option<f64> {
     let about_modes = ["modal_mass_identity", "c1_zero", "c2_zero"];
     let missed = of_modes(invariants)
@@ -86,7 +87,8 @@ impl FreeSurface {
         Ok(Self { rigid: solve_upper(&lower, &whitened), modes, dropped })
     }
 
-    /// The note that the modes were changed: those of the file miss the identities of free-surface modes by `missed`.
+    /// The note that the modes were changed: those of the file miss the identities of free-surface modes by
+    /// `missed`.
     pub(crate) fn note(&self, missed: f64) -> Diagnostic {
         let mut message = format!(
             "modes of the file are no mass-normalised free-surface modes (by {missed:.1e}): they were made such"
@@ -125,8 +127,8 @@ impl FreeSurface {
         })
     }
 
-    /// The invariants in the new modes. Where M does not commute with rotations, what S does not tell of W3 is taken as that of the modes,
-    /// none of it as that of the rigid motion in them.
+    /// The invariants in the new modes. Where M does not commute with rotations, what S does not tell of W3
+    /// is taken as that of the modes, none of it as that of the rigid motion in them.
     pub(crate) fn invariants(&self, old: &Invariants) -> Invariants {
         let nf = old.n_modes();
         let taken = self.taken();
@@ -155,7 +157,8 @@ fn refuse<T>(message: &str) -> Result<T> {
     Err(Diagnostic::new(Code::ForeignIncomplete, message).with_help(help).into())
 }
 
-/// X (nf x nf'): the eigenmodes of the stiffness of the modes `kept`, with their mass `elastic` beside rigid motion.
+/// X (nf x nf'): the eigenmodes of the stiffness of the modes `kept`, with their mass `elastic` beside rigid
+/// motion.
 fn eigenmodes(invariants: &Invariants, elastic: Mat<f64>, kept: &[usize]) -> Result<Mat<f64>> {
     let Some(factor) = dense_cholesky(elastic).filter(|_| !kept.is_empty()) else {
         return refuse(

@@ -17,7 +17,8 @@ use crate::numerics::linalg::larger;
 use faer::Mat;
 use std::collections::HashSet;
 
-/// How far inertia may be from that of a body before nothing can be computed with it: rounding of few digits is far below.
+/// How far inertia may be from that of a body before nothing can be computed with it: rounding of few digits
+/// is far below.
 const BROKEN: f64 = 1e-2;
 
 /// A body that was made of a file, and the diagnostics of the way.
@@ -31,13 +32,15 @@ pub struct Imported {
 
 /// Makes a body of `file`, which was read from `source`; `units` count where the file states none.
 ///
-/// Modes that are mass-normalised, free-surface and diagonal in K to 1e-9 are taken as they are, to the last bit. Others are made so: the
-/// rigid part is removed and the small eigenproblem solved, with the products that the invariants hold (theory 5.2). The body is the
-/// same, in other coordinates; its frame is that which rides on the mean motion.
+/// Modes that are mass-normalised, free-surface and diagonal in K to 1e-9 are taken as they are, to the last
+/// bit. Others are made so: the rigid part is removed and the small eigenproblem solved, with the products
+/// that the invariants hold (theory 5.2). The body is the same, in other coordinates; its frame is that which
+/// rides on the mean motion.
 ///
 /// # Errors
-/// [`ForeignUnsound`](Code::ForeignUnsound) for what the reader says; [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes are rigid motions or depend on each other, or
-/// the stiffness is not positive; those of [`FlexBody::new`].
+/// [`ForeignUnsound`](Code::ForeignUnsound) for what the reader says;
+/// [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes are rigid motions
+/// or depend on each other, or the stiffness is not positive; those of [`FlexBody::new`].
 pub fn import_body(file: &ImportedFile, source: SourceFile, units: UnitSystem) -> Result<Imported> {
     refuse_unsound(file)?;
     let given = &file.body;
@@ -227,7 +230,8 @@ fn certificate(file: &ImportedFile, invariants: &Invariants) -> Certificate {
     }
 }
 
-/// The body with what the digits of its file leave of the identities of inertia, and a warning where this is more than rounding.
+/// The body with what the digits of its file leave of the identities of inertia, and a warning where this is
+/// more than rounding.
 fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
     let missed = body.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed);
     let missed = missed.map(|check| check.value).fold(0.0, larger);

@@ -1,4 +1,5 @@
-//! What the formats that are read share: the trait, the body as a file has it, its audit, and the way to a flexible body.
+//! What the formats that are read share: the trait, the body as a file has it, its audit, and the way to a
+//! flexible body.
 
 mod any_body;
 mod audit;

@@ -1,7 +1,7 @@
 //! What files that list the nine invariants tell twice.
 //!
-//! I4 is the skew part of I8, I5 that of I9, I6 half the trace of -I9. Values are relative to the Cauchy-Schwarz bounds that I6 and I7
-//! set, so that 1 is as far as two numbers can be apart.
+//! I4 is the skew part of I8, I5 that of I9, I6 half the trace of -I9. Values are relative to the
+//! Cauchy-Schwarz bounds that I6 and I7 set, so that 1 is as far as two numbers can be apart.
 
 use super::AuditCheck;
 use crate::base::diagnostic::Code;
@@ -122,8 +122,8 @@ impl<'n> Redundant<'n> {
     }
 }
 
-/// Makes findings of another order of the entries out of checks that fail, where all of these hold in that order: `other` has the names of
-/// checks that the order is seen by, with their values in the other one.
+/// Makes findings of another order of the entries out of checks that fail, where all of these hold in that
+/// order: `other` has the names of checks that the order is seen by, with their values in the other one.
 pub(crate) fn in_other_order(checks: &mut [AuditCheck], other: &[(&str, f64)], meaning: &str) {
     let failed = |name: &str| checks.iter().any(|check| check.name == name && !check.passed());
     let seen: Vec<(&str, f64)> = other.iter().copied().filter(|(name, _)| failed(name)).collect();

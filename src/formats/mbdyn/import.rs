@@ -44,7 +44,8 @@ impl ImportFormat for Mbdyn {
     }
 }
 
-/// Numbers that MBDyn skips and that are no zeros: the header counts other nodes or modes than the file has, and matrices are read wrong.
+/// Numbers that MBDyn skips and that are no zeros: the header counts other nodes or modes than the file has,
+/// and matrices are read wrong.
 fn unsound(records: &Records) -> Vec<String> {
     let numbers = records.skipped.iter().filter(|(_, surplus)| surplus.numbers && !surplus.zero);
     let sentence = |(group, surplus): &(Option<usize>, Surplus)| {

@@ -1,9 +1,11 @@
-//! MBDyn: the `.fem` file of its modal joint (mbdyn/struct/modal.cc, commit ab748d7; manual, "Modal FEM format").
+//! MBDyn: the `.fem` file of its modal joint (mbdyn/struct/modal.cc, commit ab748d7; manual, "Modal FEM
+//! format").
 //!
-//! Numbered record groups, read as blank-separated numbers. The modal node lies in the origin of the file's coordinates, so that I4 and
-//! I8 are about the origin of the body frame: MBDyn moves groups 5 to 7 and 12 when the joint names another origin, but not groups 15 and
-//! 16. Group 11, lumped masses, would be added to groups 14 to 18 and is never written. I9_jk(a,b) of group 18 stands at the a-th of
-//! three rows, in column 3 (j nf + k) + b.
+//! Numbered record groups, read as blank-separated numbers. The modal node lies in the origin of the file's
+//! coordinates, so that I4 and I8 are about the origin of the body frame: MBDyn moves groups 5 to 7 and 12
+//! when the joint names another origin, but not groups 15 and
+//! 16. Group 11, lumped masses, would be added to groups 14 to 18 and is never written. I9_jk(a,b) of group
+//!     18 stands at the a-th of three rows, in column 3 (j nf + k) + b.
 
 use crate::base::error::Result;
 use crate::base::provenance::generator;
@@ -102,7 +104,8 @@ fn is_exact(options: &ExportOptions) -> bool {
 const GENERAL_MASS: &str =
     "** GENERAL MASS: IT DOES NOT COMMUTE WITH ROTATIONS, RECORD GROUPS 9 AND 18 NEED NOT AGREE\n";
 
-/// Comments for people: where the numbers come from and what they are about. MBDyn reads lines into a buffer of limited length.
+/// Comments for people: where the numbers come from and what they are about. MBDyn reads lines into a buffer
+/// of limited length.
 fn head(body: &FlexBody) -> String {
     const LONGEST_NAME: usize = 200;
     let units = body.units();
@@ -130,8 +133,9 @@ fn label(places: &[ExportFrame], place: &ExportFrame) -> String {
     place.name.as_ref().filter(alone).cloned().unwrap_or_else(|| place.id.to_string())
 }
 
-/// Index of a unit load in record group 19: 1 to 6 products of angular velocities, 7 to 9 angular and 10 to 12 linear acceleration, then
-/// six for each place, force and moment. Interface nodes must stand in the joint in the order of the file.
+/// Index of a unit load in record group 19: 1 to 6 products of angular velocities, 7 to 9 angular and 10 to
+/// 12 linear acceleration, then six for each place, force and moment. Interface nodes must stand in the joint
+/// in the order of the file.
 fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
     let first = match &load.kind {
         LoadKind::Spin => 1,

@@ -1,7 +1,9 @@
-//! MBSim: the HDF5 file of its `ExternalFlexibleFfrBody` (external_flexible_ffr_body.cc, generic_flexible_ffr_body.cc).
+//! MBSim: the HDF5 file of its `ExternalFlexibleFfrBody` (external_flexible_ffr_body.cc,
+//! generic_flexible_ffr_body.cc).
 //!
-//! The integrals from which MBSim itself forms everything else: of a symmetric pair of shape functions, x_a S_b and S_a S_b. The modal
-//! mass has no place of its own, it is the sum of the integrals of S_a S_a; W2 and W3 follow from the same integrals.
+//! The integrals from which MBSim itself forms everything else: of a symmetric pair of shape functions, x_a
+//! S_b and S_a S_b. The modal mass has no place of its own, it is the sum of the integrals of S_a S_a; W2 and
+//! W3 follow from the same integrals.
 
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
@@ -49,7 +51,8 @@ impl ExportFormat for Mbsim {
     }
 }
 
-/// S_aa of the file: those of W2 and, where the sum of these is not the modal mass, what lacks in equal parts.
+/// S_aa of the file: those of W2 and, where the sum of these is not the modal mass, what lacks in equal
+/// parts.
 fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
     let invariants = body.invariants();
     let s = invariants.s();
@@ -67,7 +70,8 @@ fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
     })
 }
 
-/// W2 that is not what gives the modal mass: of a mass that does not commute with rotations, or of a body that does not hold W2.
+/// W2 that is not what gives the modal mass: of a mass that does not commute with rotations, or of a body
+/// that does not hold W2.
 fn other_w2(body: &FlexBody) -> Option<String> {
     let invariants = body.invariants();
     let nf = body.n_modes();

@@ -1,5 +1,5 @@
-//! One sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy,
-//! anndata, MATLAB and PETSc (`docs/input.md`).
+//! One sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of
+//! scipy, anndata, MATLAB and PETSc (`docs/input.md`).
 
 use super::super::assemble::{
     ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, check_size, push, undeclared_triangle,
@@ -124,7 +124,8 @@ impl GroupReader<'_> {
                 Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"),
             ]);
         }
-        // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to say.
+        // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to
+        // say.
         let mut columns = ColumnEntries::with_room(n, entries);
         let mut major = 0usize;
         let place = |k: usize, [index]: [i64; 1]| {
@@ -156,8 +157,8 @@ impl GroupReader<'_> {
         Ok(Parsed { n, entries: Entries::Listed(pieces), sides, single_precision })
     }
 
-    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices, `keep` takes the
-    /// entries that are not zero.
+    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices,
+    /// `keep` takes the entries that are not zero.
     fn visit<const N: usize>(
         &self,
         values: &Vector,

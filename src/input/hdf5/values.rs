@@ -43,8 +43,8 @@ impl Numbers {
     /// Opens the dataset `name` of a group.
     ///
     /// # Errors
-    /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values that are
-    /// not in this file.
+    /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values that
+    /// are not in this file.
     pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
         let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
         let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
@@ -209,9 +209,9 @@ fn heaps_end(bytes: &[u8]) -> bool {
     heaps.all(|(at, _)| heap_ends(&bytes[at..]).is_some())
 }
 
-/// HDF5 file format specification, III.E: signature and version (8 bytes), size of the heap (8), then objects:
-/// index (2), references (2), reserved (4), size (8), contents in multiples of 8. Index 0 is the free space,
-/// whose size counts its own head.
+/// HDF5 file format specification, III.E: signature and version (8 bytes), size of the heap (8), then
+/// objects: index (2), references (2), reserved (4), size (8), contents in multiples of 8. Index 0 is the
+/// free space, whose size counts its own head.
 fn heap_ends(heap: &[u8]) -> Option<()> {
     let number = |at: usize| {
         let bytes: [u8; 8] = heap.get(at..at + 8)?.try_into().ok()?;

@@ -1,5 +1,5 @@
-//! The table `[basis]`: what the command line may say about the basis, kept with the model. What the command line says
-//! replaces it.
+//! The table `[basis]`: what the command line may say about the basis, kept with the model. What the command
+//! line says replaces it.
 
 use super::{MatrixLocation, Table, Walk};
 use crate::base::diagnostic::Code;
@@ -10,7 +10,8 @@ use toml::de::DeValue;
 pub(super) const BASIS: &[&str] = &["residual_vectors", "loads"];
 
 impl Walk<'_> {
-    /// The loads of residual vectors; empty without the table, and with something in `found` when it is wrong.
+    /// The loads of residual vectors; empty without the table, and with something in `found` when it is
+    /// wrong.
     pub(super) fn residual_vectors(&mut self, top: &Table) -> Vec<LoadSource> {
         let Some((table, _)) = self.table(top, "basis") else { return Vec::new() };
         self.known_keys(table, "[basis]", BASIS);

@@ -46,8 +46,8 @@ impl Walk<'_> {
             self.complain(Code::ManifestSyntax, span.clone(), "interface has no name".into());
         }
         let name = self.string(table, "name")?;
-        // The name becomes a group of the flex-body file, where a slash is encoded, and a word in files of text, where a line
-        // break cannot be.
+        // The name becomes a group of the flex-body file, where a slash is encoded, and a word in files of
+        // text, where a line break cannot be.
         if name.is_empty() || name.chars().any(char::is_control) {
             let message =
                 format!("interface name `{}` is empty or has control characters", name.escape_debug());

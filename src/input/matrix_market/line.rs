@@ -1,5 +1,5 @@
-//! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect and
-//! says what is wrong.
+//! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect
+//! and says what is wrong.
 
 use super::{Entry, header::excerpt, written_digits};
 use crate::base::diagnostic::Code;
@@ -82,8 +82,8 @@ impl Piece {
     }
 }
 
-/// `row col value` with single-line blanks, plain exponents and a line end; else `None`. Also gives the number as
-/// written and where the next line begins.
+/// `row col value` with single-line blanks, plain exponents and a line end; else `None`. Also gives the
+/// number as written and where the next line begins.
 fn fast(text: &[u8], at: usize, limits: Limits) -> Option<(Entry, &[u8], usize)> {
     let (row, at) = fast_index(text, at, limits.n)?;
     let (col, at) = fast_index(text, at, limits.n)?;
@@ -163,7 +163,8 @@ fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Bad> {
     }
 }
 
-/// A number in the dialects of Fortran too: `1.0D+05`, `1.0Q5`, and `1.0-105` as three-digit exponents come out.
+/// A number in the dialects of Fortran too: `1.0D+05`, `1.0Q5`, and `1.0-105` as three-digit exponents come
+/// out.
 pub(super) fn real(field: &[u8]) -> Option<f64> {
     if let Ok(value) = fast_float2::parse(field) {
         return Some(value);

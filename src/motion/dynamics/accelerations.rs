@@ -8,9 +8,9 @@ use nalgebra::{Vector3, Vector6};
 impl Evaluation<'_> {
     /// nu' from Mc(q) nu' = applied - h_nu - (0, 0, K_ff q + D qd).
     ///
-    /// `applied` are the generalised forces (F, tau, Q) other than elastic and damping forces; V' is the rate of the components in
-    /// body axes, so that R'' = A (V' + omega x V). Block elimination: with m_ff = L L' and Y = L^-1 \[C1' C(q)'\] the rigid
-    /// motions are left with Mc_rr - Y'Y, 6 x 6 (of a plane body 3 x 3).
+    /// `applied` are the generalised forces (F, tau, Q) other than elastic and damping forces; V' is the rate
+    /// of the components in body axes, so that R'' = A (V' + omega x V). Block elimination: with m_ff = L L'
+    /// and Y = L^-1 \[C1' C(q)'\] the rigid motions are left with Mc_rr - Y'Y, 6 x 6 (of a plane body 3 x 3).
     ///
     /// # Errors
     /// [`NotPositiveDefinite`]; `acceleration` is then without meaning.
@@ -25,8 +25,8 @@ impl Evaluation<'_> {
         self.prescribed_accelerations(applied, &Prescribed::NOTHING, acceleration)
     }
 
-    /// [`Evaluation::accelerations`] where V' or omega' are given: the forces of `applied` that belong to them are not read.
-    /// [`Evaluation::balance`] of the result has the forces that such motion takes.
+    /// [`Evaluation::accelerations`] where V' or omega' are given: the forces of `applied` that belong to
+    /// them are not read. [`Evaluation::balance`] of the result has the forces that such motion takes.
     ///
     /// # Errors
     /// As there.
@@ -59,10 +59,11 @@ impl Evaluation<'_> {
         Ok(())
     }
 
-    /// Goes to the state with modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of nu. At the cost of
-    /// [`Evaluation::set`] and one solution with Mc.
+    /// Goes to the state with modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of
+    /// nu. At the cost of [`Evaluation::set`] and one solution with Mc.
     ///
-    /// * `prescribed`: V or omega that are given instead; the momenta that belong to them follow, and those of `momenta` are not read.
+    /// * `prescribed`: V or omega that are given instead; the momenta that belong to them follow, and those
+    ///   of `momenta` are not read.
     ///
     /// # Errors
     /// [`NotPositiveDefinite`]; the state is then without meaning.

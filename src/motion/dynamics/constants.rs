@@ -6,12 +6,14 @@ use super::kernels::Panels;
 use super::modal_matrix::{ModalMass, ModalMatrix};
 use faer::Mat;
 
-/// What [`EquationsOfMotion`] evaluate, for the rigid motions that the body has: T translations (3, in the plane 2) and A axes that it
-/// turns about (3, in the plane 1), with P pairs of axes xx, yy, zz, yz, xz, xy (in the plane zz). Matrices on top of each other are nf x nf.
+/// What [`EquationsOfMotion`] evaluate, for the rigid motions that the body has: T translations (3, in the
+/// plane 2) and A axes that it turns about (3, in the plane 1), with P pairs of axes xx, yy, zz, yz, xz, xy
+/// (in the plane zz). Matrices on top of each other are nf x nf.
 pub(crate) struct Constants {
     /// (m, c, I0): 1 + T + P entries.
     pub rigid: Vec<f64>,
-    /// What is linear in q, a row each: W0 (translation by translation, T A rows), W1 (P rows, where it is held), C1 (T), C2 (A).
+    /// What is linear in q, a row each: W0 (translation by translation, T A rows), W1 (P rows, where it is
+    /// held), C1 (T), C2 (A).
     pub linear: Mat<f64>,
     /// E of each pair (6.7), less geometric stiffness for spin (7.4).
     pub w2: Option<Mat<f64>>,

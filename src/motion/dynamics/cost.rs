@@ -7,11 +7,12 @@ use super::modal_matrix::{ModalMass, ModalMatrix};
 
 impl EquationsOfMotion {
     /// Multiplications of one evaluation: [`Evaluation::set`](super::Evaluation::set) and
-    /// [`Evaluation::accelerations`](super::Evaluation::accelerations), which is what one call of an explicit integrator takes, here or in
-    /// the momenta of a motion.
+    /// [`Evaluation::accelerations`](super::Evaluation::accelerations), which is what one call of an explicit
+    /// integrator takes, here or in the momenta of a motion.
     ///
-    /// Counted from the arrays that are there, as they lie in memory: rows that fill up a panel are multiplied too. With nf modes, r rigid
-    /// motions, a axes and p pairs of axes to turn about, and t axes to move along:
+    /// Counted from the arrays that are there, as they lie in memory: rows that fill up a panel are
+    /// multiplied too. With nf modes, r rigid motions, a axes and p pairs of axes to turn about, and t axes
+    /// to move along:
     ///
     /// | what | multiplications |
     /// |---|---|
@@ -22,7 +23,8 @@ impl EquationsOfMotion {
     /// | elimination of the modes | (r (r + 1) / 2 + 2 r) nf, and r + 2 solutions with a triangle of m_ff that is no identity |
     /// | K_ff and D | 2 nf each, or nf (nf + 1) where they are full |
     ///
-    /// Not counted are some hundreds with 3-vectors and 6 x 6 matrices, whatever nf is, and the forces of the surroundings.
+    /// Not counted are some hundreds with 3-vectors and 6 x 6 matrices, whatever nf is, and the forces of the
+    /// surroundings.
     pub fn multiplications(&self) -> usize {
         let (nf, r, a, t) = (self.nf, self.rigid.len(), self.axes.len(), self.translations());
         let panels = |panels: &Option<Panels>| panels.as_ref().map_or(0, |panels| panels.padded_rows() * nf);

@@ -13,8 +13,8 @@ use nalgebra::{Matrix3, Vector3};
 /// How far m_ff of mass-normalised modes may be from the identity by rounding.
 const MASS_ROUNDING: f64 = 1e-12;
 
-/// How large the entries of K_ff and D beside the diagonal may be by rounding, relative to sqrt(a_ii a_jj): products with K of
-/// modes of very different stiffness.
+/// How large the entries of K_ff and D beside the diagonal may be by rounding, relative to sqrt(a_ii a_jj):
+/// products with K of modes of very different stiffness.
 const STIFFNESS_ROUNDING: f64 = 1e-10;
 
 /// Entries of a symmetric 3x3 matrix, in the order of all arrays of such here.
@@ -27,21 +27,23 @@ pub(super) const C1: usize = 15;
 pub(super) const C2: usize = 18;
 pub(super) const LINEAR: usize = 21;
 
-/// The equations of motion of one flexible body in constant invariants (theory section 6, which is section 3 for solids).
+/// The equations of motion of one flexible body in constant invariants (theory section 6, which is section 3
+/// for solids).
 ///
 /// ```text
 /// Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd) = (F, tau, Q),    nu = (V, omega, qd)
 /// ```
 ///
-/// V is the velocity of the origin of the body frame, omega the angular velocity of the frame, both in body axes; F, tau (about the
-/// origin) and Q are the generalised forces that do the power F'V + tau'omega + Q'qd. With 6 + nf entries in this order, of a plane body
-/// 3 + nf: V_x, V_y, omega_z, qd. Units are those of the body: length/time, 1/time and, q being the amplitudes of mass-normalised
-/// modes, mass^(1/2) length/time.
+/// V is the velocity of the origin of the body frame, omega the angular velocity of the frame, both in body
+/// axes; F, tau (about the origin) and Q are the generalised forces that do the power F'V + tau'omega + Q'qd.
+/// With 6 + nf entries in this order, of a plane body 3 + nf: V_x, V_y, omega_z, qd. Units are those of the
+/// body: length/time, 1/time and, q being the amplitudes of mass-normalised modes, mass^(1/2) length/time.
 ///
-/// [`Evaluation`](super::Evaluation) computes with them. The equations hold for the mass matrices of solids and for general ones.
-/// Geometric stiffness of the body (theory 7.3) for spin, acceleration and angular acceleration is part of the kinetic energy: it
-/// belongs to motion of second order in q that adds q'K^a_k q / 2 to the first moment, q'K^alpha_k to row k of C(q), and takes
-/// q'K^omega(omega) q / 2 from T (theory 7.4).
+/// [`Evaluation`](super::Evaluation) computes with them. The equations hold for the mass matrices of solids
+/// and for general ones. Geometric stiffness of the body (theory 7.3) for spin, acceleration and angular
+/// acceleration is part of the kinetic energy: it belongs to motion of second order in q that adds q'K^a_k q
+/// / 2 to the first moment, q'K^alpha_k to row k of C(q), and takes q'K^omega(omega) q / 2 from T (theory
+/// 7.4).
 ///
 /// ```
 /// # fn check(body: &flexbody::FlexBody) {
@@ -70,7 +72,8 @@ pub struct EquationsOfMotion {
     pub(super) linear: Vec<f64>,
     /// The same matrix, laid out for products.
     pub(super) linear_panels: Panels,
-    /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`, less geometric stiffness for spin: T sees no more of W2.
+    /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`, less geometric stiffness for spin: T sees no more of
+    /// W2.
     pub(super) w2: Option<Panels>,
     /// W3_a' for each of `axes`, with geometric stiffness for angular acceleration.
     pub(super) w3: Option<Panels>,
@@ -87,8 +90,9 @@ pub struct EquationsOfMotion {
 impl EquationsOfMotion {
     /// The equations of `body` with those of the given terms that it holds.
     ///
-    /// Taken as they are meant: m_ff that is the identity to 1e-12 (with arrays of 32-bit floats to their rounding) is the identity; K_ff and D whose entries beside the diagonal are
-    /// below 1e-10 of sqrt(a_ii a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
+    /// Taken as they are meant: m_ff that is the identity to 1e-12 (with arrays of 32-bit floats to their
+    /// rounding) is the identity; K_ff and D whose entries beside the diagonal are below 1e-10 of sqrt(a_ii
+    /// a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
     pub fn new(body: &FlexBody, terms: Terms) -> Self {
         let parts = EquationParts::new(body, terms);
         let (invariants, nf) = (parts.invariants, parts.nf);
@@ -198,7 +202,8 @@ impl EquationsOfMotion {
     }
 }
 
-/// What the constants of the equations are made of: the body, the terms that it holds and that are wanted, and the axes of its motion.
+/// What the constants of the equations are made of: the body, the terms that it holds and that are wanted,
+/// and the axes of its motion.
 struct EquationParts<'b> {
     body: &'b FlexBody,
     invariants: &'b Invariants,

@@ -8,11 +8,12 @@ use pulp::Arch;
 
 const _: () = assert!(LINEAR <= WIDTH, "what is linear in q is one panel");
 
-/// The equations of motion at one state, and the memory to evaluate them: nothing is allocated after [`Evaluation::new`].
+/// The equations of motion at one state, and the memory to evaluate them: nothing is allocated after
+/// [`Evaluation::new`].
 ///
-/// [`Evaluation::set`] takes the state; everything else refers to the last one. Before the first it is rest, undeformed.
-/// Vectors with 6 + nf entries (of a plane body 3 + nf) are in the order of [`EquationsOfMotion`], in body axes about the origin of
-/// the body frame; matrices are row-major.
+/// [`Evaluation::set`] takes the state; everything else refers to the last one. Before the first it is rest,
+/// undeformed. Vectors with 6 + nf entries (of a plane body 3 + nf) are in the order of
+/// [`EquationsOfMotion`], in body axes about the origin of the body frame; matrices are row-major.
 #[derive(Debug, Clone)]
 pub struct Evaluation<'a> {
     pub(super) equations: &'a EquationsOfMotion,
@@ -282,23 +283,26 @@ impl<'a> Evaluation<'a> {
         self.equations
     }
 
-    /// s(q) = c + C1 q + q'K^a q / 2, first moment of the deformed body, with its geometric stiffness K^a for acceleration. Unit:
-    /// mass length.
+    /// s(q) = c + C1 q + q'K^a q / 2, first moment of the deformed body, with its geometric stiffness K^a for
+    /// acceleration. Unit: mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
         self.first_moment
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q, less q'K^omega q, inertia of the deformed body about the origin. Unit: mass length^2.
+    /// I(q) = I0 + W1 Q + Q'W2 Q, less q'K^omega q, inertia of the deformed body about the origin. Unit: mass
+    /// length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         self.inertia
     }
 
-    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q with what geometric stiffness adds to c.
+    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q with what geometric
+    /// stiffness adds to c.
     pub fn linear_momentum(&self) -> Vector3<f64> {
         self.momentum
     }
 
-    /// Angular momentum about the origin of the body frame, h = (-c~ + W0 Q)'V + I(q) omega + C(q) qd, body axes.
+    /// Angular momentum about the origin of the body frame, h = (-c~ + W0 Q)'V + I(q) omega + C(q) qd, body
+    /// axes.
     pub fn angular_momentum(&self) -> Vector3<f64> {
         self.angular_momentum
     }
@@ -380,7 +384,8 @@ impl<'a> Evaluation<'a> {
         &self.velocity_forces
     }
 
-    /// The forces that have to be applied for the accelerations nu': Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd).
+    /// The forces that have to be applied for the accelerations nu': Mc(q) nu' + h_nu + (0, 0, K_ff q + D
+    /// qd).
     ///
     /// # Panics
     /// When a length is not 6 + nf (of a plane body 3 + nf).

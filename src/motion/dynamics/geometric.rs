@@ -4,8 +4,8 @@ use crate::body::flex_body::FlexBody;
 use crate::model::LoadKind;
 use faer::Mat;
 
-/// Entries (component, i, j) of the geometric stiffness for a kind of load, zero for components that are not given; `None` where
-/// none is.
+/// Entries (component, i, j) of the geometric stiffness for a kind of load, zero for components that are not
+/// given; `None` where none is.
 pub(crate) fn geometric_stiffness<'b>(
     body: &'b FlexBody,
     kind: &LoadKind,

@@ -26,14 +26,17 @@ struct ModeDerivatives {
 }
 
 impl Evaluation<'_> {
-    /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd), at constant accelerations nu'.
+    /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd), at constant
+    /// accelerations nu'.
     ///
-    /// * `acceleration`: nu' (n = 6 + nf, of a plane body 3 + nf); zero for the derivatives of h_nu and the elastic forces alone.
+    /// * `acceleration`: nu' (n = 6 + nf, of a plane body 3 + nf); zero for the derivatives of h_nu and the
+    ///   elastic forces alone.
     /// * `by_q`: df/dq (n x nf), row-major.
     /// * `by_nu`: df/dnu (n x n), row-major.
     ///
-    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = dN/dq_j = (W0)_j and I_j = dI/dq_j = (W1)_j + 2 (E q)_j, where E
-    /// is the part of W2 that the kinetic energy sees (theory 6.4), transposes as N^T and rates as dN, dI:
+    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = dN/dq_j = (W0)_j and I_j = dI/dq_j
+    /// = (W1)_j + 2 (E q)_j, where E is the part of W2 that the kinetic energy sees (theory 6.4), transposes
+    /// as N^T and rates as dN, dI:
     ///
     /// ```text
     /// dF/dq_j      = N_j alpha + omega x N_j omega
@@ -226,7 +229,8 @@ impl Evaluation<'_> {
         (inertia, rate)
     }
 
-    /// Derivatives of the modal forces by q and qd; `linear` is the acceleration of the origin, V' + omega x V.
+    /// Derivatives of the modal forces by q and qd; `linear` is the acceleration of the origin, V' + omega x
+    /// V.
     fn modal_block(
         &self,
         linear: &Vector3<f64>,

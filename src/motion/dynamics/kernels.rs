@@ -1,6 +1,7 @@
 //! Products of constant matrices with vectors, and dot products, in vector registers.
 //!
-//! Nothing is contracted and every sum has an order that depends on sizes only: the same bits on every machine.
+//! Nothing is contracted and every sum has an order that depends on sizes only: the same bits on every
+//! machine.
 
 use faer::Mat;
 
@@ -10,8 +11,8 @@ pub(super) const WIDTH: usize = 32;
 /// Lanes of a dot product.
 const LANES: usize = 8;
 
-/// A matrix (rows x n, n > 0) cut to panels of [`WIDTH`] rows, the last filled up with zeros. A product streams the memory once and
-/// keeps the sums of a panel in registers.
+/// A matrix (rows x n, n > 0) cut to panels of [`WIDTH`] rows, the last filled up with zeros. A product
+/// streams the memory once and keeps the sums of a panel in registers.
 #[derive(Debug, Clone)]
 pub(super) struct Panels {
     columns: usize,

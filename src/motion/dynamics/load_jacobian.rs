@@ -12,15 +12,17 @@ pub enum LoadAxes {
     Body,
 }
 
-/// Derivatives of the generalised forces of loads, which add up here; n = 6 + nf rows, of a plane body 3 + nf.
+/// Derivatives of the generalised forces of loads, which add up here; n = 6 + nf rows, of a plane body 3 +
+/// nf.
 ///
-/// They belong to the right-hand side: [`Evaluation::jacobian`](super::Evaluation::jacobian) has those of the left. Constant loads do not
-/// depend on the place R of the body.
+/// They belong to the right-hand side: [`Evaluation::jacobian`](super::Evaluation::jacobian) has those of the
+/// left. Constant loads do not depend on the place R of the body.
 #[derive(Debug)]
 pub struct LoadJacobian<'m> {
     /// By q (n x nf), row-major.
     pub by_q: &'m mut [f64],
-    /// By a small rotation phi in body axes, A becoming A (I + phi~): n x 3, of a plane body n x 1, row-major.
+    /// By a small rotation phi in body axes, A becoming A (I + phi~): n x 3, of a plane body n x 1,
+    /// row-major.
     pub by_turn: &'m mut [f64],
 }
 
@@ -45,7 +47,8 @@ impl LoadJacobian<'_> {
         &mut self.by_q[(body.rigid.len() + i) * body.nf..][..body.nf]
     }
 
-    /// Adds a force, a torque about the origin and modal forces to the column of axis number `at` of `by_turn`.
+    /// Adds a force, a torque about the origin and modal forces to the column of axis number `at` of
+    /// `by_turn`.
     pub(super) fn add_by_turn(
         &mut self,
         body: &EquationsOfMotion,

@@ -1,5 +1,6 @@
-//! The equations of motion of one flexible body: reduced, from its invariants (theory sections 3, 4 and 6), and of all its nodes.
-//! Forces, momenta, energies, accelerations and Jacobians, without an allocation per evaluation; and its motion as a system to integrate.
+//! The equations of motion of one flexible body: reduced, from its invariants (theory sections 3, 4 and 6),
+//! and of all its nodes. Forces, momenta, energies, accelerations and Jacobians, without an allocation per
+//! evaluation; and its motion as a system to integrate.
 
 mod accelerations;
 mod constants;

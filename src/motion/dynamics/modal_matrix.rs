@@ -14,7 +14,8 @@ pub(super) enum ModalMatrix {
 }
 
 impl ModalMatrix {
-    /// The symmetric part of `a`, as a diagonal where no other entry is larger than `rounding` times sqrt(|a_ii a_jj|).
+    /// The symmetric part of `a`, as a diagonal where no other entry is larger than `rounding` times
+    /// sqrt(|a_ii a_jj|).
     pub(super) fn new(a: MatRef<'_, f64>, rounding: f64) -> Self {
         let n = a.nrows();
         let size: Vec<f64> = (0..n).map(|i| a[(i, i)].abs().sqrt()).collect();

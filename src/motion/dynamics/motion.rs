@@ -6,7 +6,8 @@ use super::{
 use crate::numerics::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3};
 
-/// Deformations below this part of the size of the body count as this much, so that a body at rest has a scale.
+/// Deformations below this part of the size of the body count as this much, so that a body at rest has a
+/// scale.
 const LEAST_DEFORMATION: f64 = 1e-6;
 
 /// The scale of vibration is at least this part of that of the whole internal motion.
@@ -14,11 +15,12 @@ const LEAST_VIBRATION: f64 = 1e-3;
 
 /// Forces on a body from outside, and motion that is prescribed.
 pub trait Surroundings {
-    /// Adds the generalised forces (F, tau, Q) in body axes at the state of `evaluation` ([`EquationsOfMotion`]).
+    /// Adds the generalised forces (F, tau, Q) in body axes at the state of `evaluation`
+    /// ([`EquationsOfMotion`]).
     fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]);
 
-    /// Rigid motion that is prescribed of a frame with these axes: velocities (V, omega) along them, and the rates of their components.
-    /// Nothing unless said.
+    /// Rigid motion that is prescribed of a frame with these axes: velocities (V, omega) along them, and the
+    /// rates of their components. Nothing unless said.
     fn prescribed(&self, _time: f64, _axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         (Prescribed::NOTHING, Prescribed::NOTHING)
     }
@@ -40,13 +42,15 @@ impl Surroundings for EmptySpace {
 /// P' = A F     L' = A tau + D x A F     pi' = dT/dq - K_ff q - D qd + Q
 /// ```
 ///
-/// in world axes, with the angular momentum L about a point G that starts at the origin R of the frame and flies with P / m. P and L of a
-/// free body are constant entries of y, so that every method keeps the momenta to rounding, whatever the mass matrix and the
-/// frame; it is (6.3) of the theory with the rotation and the flight of the frame taken out. For a free body whose frame is at its centre of
-/// mass D vanishes, and what is left is a Hamiltonian system on quaternions with a constant structure, which Gauss collocation keeps
+/// in world axes, with the angular momentum L about a point G that starts at the origin R of the frame and
+/// flies with P / m. P and L of a free body are constant entries of y, so that every method keeps the momenta
+/// to rounding, whatever the mass matrix and the frame; it is (6.3) of the theory with the rotation and the
+/// flight of the frame taken out. For a free body whose frame is at its centre of mass D vanishes, and what
+/// is left is a Hamiltonian system on quaternions with a constant structure, which Gauss collocation keeps
 /// (McLachlan, Modin, Verdier, Collective symplectic integrators, Nonlinearity 27, 2014).
 ///
-/// W, j and k collect work and impulses for [`Snapshot::balance`]. A plane body uses the entries of its plane.
+/// W, j and k collect work and impulses for [`Snapshot::balance`]. A plane body uses the entries of its
+/// plane.
 pub struct Motion<'a> {
     evaluation: Evaluation<'a>,
     surroundings: &'a dyn Surroundings,
@@ -197,8 +201,8 @@ impl<'a> Motion<'a> {
         (self.size.mass, self.size.radius)
     }
 
-    /// Elastic energy of a deformation that is 1e-9 of the radius of gyration in the softest mode: far below what is integrated, far above
-    /// rounding.
+    /// Elastic energy of a deformation that is 1e-9 of the radius of gyration in the softest mode: far below
+    /// what is integrated, far above rounding.
     pub fn least_energy(&self) -> f64 {
         const PART: f64 = 1e-9;
         0.5 * self.size.mass * (PART * self.size.radius * self.size.first_rate).powi(2)
@@ -228,7 +232,8 @@ impl<'a> Motion<'a> {
         })
     }
 
-    /// nu' at a state, in the order of [`EquationsOfMotion`]: V' and omega' are the rates of the components in body axes.
+    /// nu' at a state, in the order of [`EquationsOfMotion`]: V' and omega' are the rates of the components
+    /// in body axes.
     ///
     /// # Errors
     /// As [`Motion::evaluate`].
@@ -268,7 +273,8 @@ impl<'a> Motion<'a> {
         Ok((place, rates))
     }
 
-    /// Generalised forces to `self.forces`, those included that the prescribed motion takes, which are returned.
+    /// Generalised forces to `self.forces`, those included that the prescribed motion takes, which are
+    /// returned.
     fn apply(
         &mut self,
         time: f64,
@@ -338,9 +344,10 @@ impl System for Motion<'_> {
         Ok(())
     }
 
-    /// Positions are measured against the radius of gyration r, attitude against 1, momenta and modes in the energy norm: against the
-    /// rotational energy and that of the vibration, the latter at least 1e-3 of the former in amplitude, and both at least those of a
-    /// deformation of 1e-6 r at the first frequency. Work and impulses follow and are not controlled.
+    /// Positions are measured against the radius of gyration r, attitude against 1, momenta and modes in the
+    /// energy norm: against the rotational energy and that of the vibration, the latter at least 1e-3 of the
+    /// former in amplitude, and both at least those of a deformation of 1e-6 r at the first frequency. Work
+    /// and impulses follow and are not controlled.
     fn scales(&self, state: &[f64], scales: &mut [f64]) {
         let (layout, size) = (self.layout(), &self.size);
         let body_angular = attitude(state).axes().tr_mul(&vector(state, layout.angular()));

@@ -1,10 +1,12 @@
-//! The same equations in rates of coordinates: velocities along world axes, and any parameters of the rotation.
+//! The same equations in rates of coordinates: velocities along world axes, and any parameters of the
+//! rotation.
 
 use super::kernels::add_scaled;
 use super::{EquationsOfMotion, Evaluation};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Parameters theta (R of them) of the rotation A from body axes to world axes, with omega = G(theta) theta' in body axes.
+/// Parameters theta (R of them) of the rotation A from body axes to world axes, with omega = G(theta) theta'
+/// in body axes.
 ///
 /// With these, coordinates x = (R, theta, q) have velocities x' = (R', theta', qd), R' along world axes, and
 ///
@@ -48,7 +50,8 @@ impl Orientation<3> for AngularVelocity {
 
 /// Euler parameters p = (p0, p1, p2, p3) with p'p = 1, p0 the cosine of half the angle.
 ///
-/// G = 2 \[-e, p0 I - e~\] with e = (p1, p2, p3); G G' = 4 I and G'I G has rank 3: p'p'' = -p''p' is part of the system.
+/// G = 2 \[-e, p0 I - e~\] with e = (p1, p2, p3); G G' = 4 I and G'I G has rank 3: p'p'' = -p''p' is part of
+/// the system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EulerParameters(pub [f64; 4]);
 
@@ -59,7 +62,8 @@ impl EulerParameters {
         Self(self.0.map(|p| p / length))
     }
 
-    /// Those of the rotation with these axes as columns, from the largest of the four (Shepperd, J. Guidance and Control 1, 1978).
+    /// Those of the rotation with these axes as columns, from the largest of the four (Shepperd, J. Guidance
+    /// and Control 1, 1978).
     pub fn of_axes(axes: &Matrix3<f64>) -> Self {
         let a = |i: usize, j: usize| axes[(i, j)];
         let trace = axes.trace();
@@ -131,12 +135,13 @@ impl Orientation<4> for EulerParameters {
 
 /// The rotation vector v: turn by the angle |v| about v.
 ///
-/// A = I + sin f / f v~ + (1 - cos f) / f^2 v~^2 and G = I - (1 - cos f) / f^2 v~ + (f - sin f) / f^3 v~^2 with f = |v|. G is singular at
-/// f = 2 pi.
+/// A = I + sin f / f v~ + (1 - cos f) / f^2 v~^2 and G = I - (1 - cos f) / f^2 v~ + (f - sin f) / f^3 v~^2
+/// with f = |v|. G is singular at f = 2 pi.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationVector(pub Vector3<f64>);
 
-/// Angles below which the series of [`RotationVector`] are summed: their first terms left out are below rounding.
+/// Angles below which the series of [`RotationVector`] are summed: their first terms left out are below
+/// rounding.
 const SMALL: f64 = 1.0;
 
 /// Terms of these series: the next is below 1e-20 of the first.
@@ -153,7 +158,8 @@ impl RotationVector {
         let square = self.0.norm_squared();
         let f = square.sqrt();
         if f < SMALL {
-            // sum_k (-1)^k f^2k / (2k + shift)! and its derivative over f, sum_k (-1)^k 2k f^(2k-2) / (2k + shift)!.
+            // sum_k (-1)^k f^2k / (2k + shift)! and its derivative over f, sum_k (-1)^k 2k f^(2k-2) / (2k +
+            // shift)!.
             let series = |shift: u32| {
                 let mut coefficient = f64::from((1..=shift).product::<u32>()).recip();
                 let (mut power, mut sum, mut slope) = (1.0, coefficient, 0.0);
@@ -317,7 +323,8 @@ impl Evaluation<'_> {
         }
     }
 
-    /// H'(Mc dH/dt x' + h_nu): the velocity forces that belong to [`Evaluation::mass_matrix_of`], without elastic and damping forces.
+    /// H'(Mc dH/dt x' + h_nu): the velocity forces that belong to [`Evaluation::mass_matrix_of`], without
+    /// elastic and damping forces.
     ///
     /// * `rate`: theta', that of the state.
     /// * `forces`: 3 + R + nf, of a plane body 2 + R + nf.

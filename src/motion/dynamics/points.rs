@@ -9,7 +9,8 @@ use crate::model::LoadKind;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
-/// A vector that is linear in q, and where the body has geometric stiffness for the load that does work on it quadratic (theory 7.5).
+/// A vector that is linear in q, and where the body has geometric stiffness for the load that does work on it
+/// quadratic (theory 7.5).
 #[derive(Debug, Clone)]
 struct PointMotion {
     nf: usize,
@@ -87,8 +88,9 @@ impl PointMotion {
 
 /// A point of a flexible body and what the modes do there: a node, or the reference point of an interface.
 ///
-/// All vectors are in body axes; forces and torques along other axes are the caller's to turn. Forces are consistent: the generalised
-/// forces do the power of the force on the velocity of the point and of the torque on its angular velocity, whatever the deformation.
+/// All vectors are in body axes; forces and torques along other axes are the caller's to turn. Forces are
+/// consistent: the generalised forces do the power of the force on the velocity of the point and of the
+/// torque on its angular velocity, whatever the deformation.
 #[derive(Debug, Clone)]
 pub struct BodyPoint {
     position: Vector3<f64>,
@@ -97,7 +99,8 @@ pub struct BodyPoint {
 }
 
 impl BodyPoint {
-    /// Node `node` of `body`, by its index; users of the library ask the body (`FlexBody::node_point`). It has an orientation where the node has rotations.
+    /// Node `node` of `body`, by its index; users of the library ask the body (`FlexBody::node_point`). It
+    /// has an orientation where the node has rotations.
     ///
     /// # Panics
     /// When the index is not below the number of nodes.
@@ -114,9 +117,9 @@ impl BodyPoint {
         }
     }
 
-    /// The reference point of `interface` of `body`: the motion of its nodes on average (theory 5.3). It has an orientation where the nodes
-    /// determine one. Geometric stiffness for forces and moments at the interface is there where `terms` have it. `None` for an
-    /// interface without a reference point.
+    /// The reference point of `interface` of `body`: the motion of its nodes on average (theory 5.3). It has
+    /// an orientation where the nodes determine one. Geometric stiffness for forces and moments at the
+    /// interface is there where `terms` have it. `None` for an interface without a reference point.
     #[doc(hidden)] // As above.
     pub fn interface(body: &FlexBody, interface: &Interface, terms: Terms) -> Option<Self> {
         let (modes, nf) = (body.modes(), body.n_modes());
@@ -160,8 +163,8 @@ impl BodyPoint {
         evaluation.velocity + turned + self.translation.rate(&evaluation.q, &evaluation.qd)
     }
 
-    /// Axes of the point in columns: the rotation by the vector theta(q) = Psi_r q, the identity without deformation. `None` where it has
-    /// no orientation.
+    /// Axes of the point in columns: the rotation by the vector theta(q) = Psi_r q, the identity without
+    /// deformation. `None` where it has no orientation.
     pub fn axes(&self, evaluation: &Evaluation<'_>) -> Option<Matrix3<f64>> {
         self.turn(evaluation).map(|turn| turn.axes())
     }
@@ -173,15 +176,17 @@ impl BodyPoint {
         Some(evaluation.omega + self.turn(evaluation)?.map().tr_mul(&rate))
     }
 
-    /// What the velocity v of the point changes in the world without accelerations: with J nu = v its acceleration is J nu' and this,
-    /// omega x v + omega x dr/dt + (d2r/dq dq) qd qd. For constraints between bodies.
+    /// What the velocity v of the point changes in the world without accelerations: with J nu = v its
+    /// acceleration is J nu' and this, omega x v + omega x dr/dt + (d2r/dq dq) qd qd. For constraints between
+    /// bodies.
     pub fn velocity_drift(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
         let rate = self.translation.rate(&evaluation.q, &evaluation.qd);
         evaluation.omega.cross(&(self.velocity(evaluation) + rate)) + self.translation.bend(&evaluation.qd)
     }
 
-    /// Acceleration J nu' + drift of the point for the accelerations nu' in the order of [`EquationsOfMotion`](super::EquationsOfMotion), relative to
-    /// the world and along body axes (\[RD\] (10.9)):
+    /// Acceleration J nu' + drift of the point for the accelerations nu' in the order of
+    /// [`EquationsOfMotion`](super::EquationsOfMotion), relative to the world and along body axes (\[RD\]
+    /// (10.9)):
     ///
     /// ```text
     /// a = V' + omega' x r + dr/dq qdd + omega x (V + omega x r + 2 dr/dq qd) + (d2r/dq dq) qd qd
@@ -196,7 +201,8 @@ impl BodyPoint {
         linear + turned + bent + self.velocity_drift(evaluation)
     }
 
-    /// The same of the angular velocity: d(omega_p)/dt without accelerations. `None` where the point has no orientation.
+    /// The same of the angular velocity: d(omega_p)/dt without accelerations. `None` where the point has no
+    /// orientation.
     pub fn angular_drift(&self, evaluation: &Evaluation<'_>) -> Option<Vector3<f64>> {
         let rotation = self.rotation.as_ref()?;
         let (turn, rate) = (self.turn(evaluation)?, rotation.rate(&evaluation.q, &evaluation.qd));

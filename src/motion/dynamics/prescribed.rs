@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// The mass matrix at a state is not positive definite: terms were dropped and the deformation is too large for what is left, or
-/// the invariants are not those of a body.
+/// The mass matrix at a state is not positive definite: terms were dropped and the deformation is too large
+/// for what is left, or the invariants are not those of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotPositiveDefinite;
 
@@ -15,8 +15,8 @@ impl std::fmt::Display for NotPositiveDefinite {
 
 impl std::error::Error for NotPositiveDefinite {}
 
-/// Rigid motion that is given instead of following from forces, in body axes: velocities of the frame or, where accelerations are asked
-/// for, their rates of change. What is `None` is free.
+/// Rigid motion that is given instead of following from forces, in body axes: velocities of the frame or,
+/// where accelerations are asked for, their rates of change. What is `None` is free.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Prescribed {
     /// V or V'.

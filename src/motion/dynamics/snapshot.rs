@@ -104,7 +104,8 @@ impl Snapshot<'_> {
         }
     }
 
-    /// Force and torque about the origin that the prescribed motion takes, body axes; zero where nothing is prescribed.
+    /// Force and torque about the origin that the prescribed motion takes, body axes; zero where nothing is
+    /// prescribed.
     pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
         self.reaction
     }

@@ -4,9 +4,10 @@ use crate::body::flex_body::Groups;
 
 /// Terms by group of the kinetic energy (theory section 7).
 ///
-/// A group is there or not in every place where it acts: mass matrix, inertia forces, momenta and energy. What is left are the equations
-/// of motion of the truncated kinetic energy, which keep that energy and both momenta whatever is dropped. m, c, I0, C1, C2, W0 and
-/// m_ff are always there. Without W2, W3 and geometric stiffness an evaluation costs a multiple of nf, not of nf^2.
+/// A group is there or not in every place where it acts: mass matrix, inertia forces, momenta and energy.
+/// What is left are the equations of motion of the truncated kinetic energy, which keep that energy and both
+/// momenta whatever is dropped. m, c, I0, C1, C2, W0 and m_ff are always there. Without W2, W3 and geometric
+/// stiffness an evaluation costs a multiple of nf, not of nf^2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Terms {
     /// W1: inertia linear in q, and the constant centrifugal load of the modes.
@@ -15,8 +16,8 @@ pub struct Terms {
     pub w2: bool,
     /// W3: coupling of rotation and modes through q, and the Coriolis force among modes.
     pub w3: bool,
-    /// Geometric stiffness for the motion of the frame and for forces at interfaces (theory 7.4), of a body that has it. That for
-    /// spin is free of cost where W2 is kept.
+    /// Geometric stiffness for the motion of the frame and for forces at interfaces (theory 7.4), of a body
+    /// that has it. That for spin is free of cost where W2 is kept.
     pub geometric_stiffness: bool,
 }
 

@@ -5,7 +5,8 @@
 pub enum Axes {
     /// Fixed in space.
     World,
-    /// Those of the model, turning with the body. Of a body that came without a model these are those of its file.
+    /// Those of the model, turning with the body. Of a body that came without a model these are those of its
+    /// file.
     #[default]
     Model,
     /// Those of the body frame of the flex-body file, turning with the body.

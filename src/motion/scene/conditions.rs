@@ -1,4 +1,5 @@
-//! What the reference conditions of a body carry: the forces that keep its frame where the conditions say that it is.
+//! What the reference conditions of a body carry: the forces that keep its frame where the conditions say
+//! that it is.
 
 use super::stage::{UNCOUPLED, is_uncoupled};
 use crate::body::flex_body::FlexBody;
@@ -6,17 +7,19 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 /// The reaction of mean axes (Tisserand), the reference conditions of free-surface modes.
 ///
-/// Displacements u of the nodes count from a frame that conditions C u = 0 tie to the body, with multipliers lambda in the equations of all
-/// nodes (theory 6.10). What C'lambda carries has no force and the torque about the origin of the frame
+/// Displacements u of the nodes count from a frame that conditions C u = 0 tie to the body, with multipliers
+/// lambda in the equations of all nodes (theory 6.10). What C'lambda carries has no force and the torque
+/// about the origin of the frame
 ///
 /// ```text
 /// sum_i u_i x (K u + D u')_i = Q'W3 m_ff^-1 (K_ff q + D_ff qd)
 /// ```
 ///
-/// (theory 6.12): the moment that linear elastic forces and those of the damping have about the deformed body. It does no work and
-/// acts on no mode; it says how far elasticity that is linear in a floating frame is from one that turns with the material, of second order in q.
-/// The right side is the left one where the modes are eigenvectors (K Psi = M Psi Lambda); of other shapes it has that part of the
-/// elastic forces which the modes hold.
+/// (theory 6.12): the moment that linear elastic forces and those of the damping have about the deformed
+/// body. It does no work and acts on no mode; it says how far elasticity that is linear in a floating frame
+/// is from one that turns with the material, of second order in q. The right side is the left one where the
+/// modes are eigenvectors (K Psi = M Psi Lambda); of other shapes it has that part of the elastic forces
+/// which the modes hold.
 #[derive(Debug, Clone)]
 pub(super) struct MeanAxes {
     /// The blocks of W3 that belong to axes about which the body turns.
@@ -27,8 +30,8 @@ pub(super) struct MeanAxes {
 }
 
 impl MeanAxes {
-    /// Of `body`, or `None` where its frame is no mean frame (C1 and C2 do not vanish, as where something carries the body) or it does not
-    /// hold W3.
+    /// Of `body`, or `None` where its frame is no mean frame (C1 and C2 do not vanish, as where something
+    /// carries the body) or it does not hold W3.
     pub fn new(body: &FlexBody) -> Option<Self> {
         let (invariants, nf) = (body.invariants(), body.n_modes());
         let w3 = invariants.w3()?;

@@ -31,7 +31,8 @@ pub struct Scene {
     pub source: Option<SourceFile>,
     /// The files that its histories were read from.
     pub series: Vec<SeriesFile>,
-    /// Whether its vectors are along the axes of a body in its [`Stage`](super::Stage), and its start is that of this body's frame.
+    /// Whether its vectors are along the axes of a body in its [`Stage`](super::Stage), and its start is that
+    /// of this body's frame.
     pub resolved: bool,
     /// Which load case it is of a scene that has several.
     pub case: Option<LoadCase>,
@@ -123,7 +124,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Steps that an integration may take unless the scene says otherwise: some minutes to an hour, with the number of modes.
+    /// Steps that an integration may take unless the scene says otherwise: some minutes to an hour, with the
+    /// number of modes.
     pub const MOST_STEPS: u64 = 20_000_000;
 }
 
@@ -146,8 +148,8 @@ pub enum Scheme {
 
 /// The state at time zero.
 ///
-/// A point that has the coordinates x in the model is at `origin` + A x in the world, A being the rotation by `rotation`: world axes start
-/// along those of the model unless that turns them.
+/// A point that has the coordinates x in the model is at `origin` + A x in the world, A being the rotation by
+/// `rotation`: world axes start along those of the model unless that turns them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Initial {
     /// Where the origin of the model is, world axes.
@@ -162,7 +164,8 @@ pub struct Initial {
     pub axes: Axes,
     /// Modes that are not at rest and undeformed.
     pub modes: Vec<ModeStart>,
-    /// Whether the deformation starts at rest in equilibrium with what acts at time zero, instead of with a shock.
+    /// Whether the deformation starts at rest in equilibrium with what acts at time zero, instead of with a
+    /// shock.
     pub settled: bool,
 }
 
@@ -229,25 +232,26 @@ impl Load {
 pub struct Spin {
     /// Angular velocity.
     pub velocity: VectorHistory,
-    /// Its axes. Those of the world are, of a direction that does not change, the axes of the world at time zero, with which it turns; of
-    /// columns, axes that are fixed in space.
+    /// Its axes. Those of the world are, of a direction that does not change, the axes of the world at time
+    /// zero, with which it turns; of columns, axes that are fixed in space.
     pub axes: Axes,
-    /// The attitude at time zero of the model, or where `axes` are those of the body of its frame, instead of that of [`Initial`].
+    /// The attitude at time zero of the model, or where `axes` are those of the body of its frame, instead of
+    /// that of [`Initial`].
     pub start: Option<RotationVector>,
     /// Whether the centre of mass of the undeformed body is held where it is.
     pub hold: bool,
 }
 
 impl Spin {
-    /// Angular velocity and acceleration at a time along axes of the model that have the `attitude`, of a scene that is on its
-    /// [`Stage`](super::Stage).
+    /// Angular velocity and acceleration at a time along axes of the model that have the `attitude`, of a
+    /// scene that is on its [`Stage`](super::Stage).
     pub fn at(&self, time: f64, attitude: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         turning(&self.velocity, self.axes, time, attitude)
     }
 }
 
-/// Angular velocity and acceleration along axes of the model that have the `attitude`. Turned with the body, the rate of an angular velocity is the
-/// same vector as seen from the world: omega x omega = 0.
+/// Angular velocity and acceleration along axes of the model that have the `attitude`. Turned with the body,
+/// the rate of an angular velocity is the same vector as seen from the world: omega x omega = 0.
 fn turning(
     velocity: &VectorHistory,
     axes: Axes,
@@ -261,7 +265,8 @@ fn turning(
     }
 }
 
-/// An interface, or a node with rotations, whose motion is prescribed; the rest of the body hangs from it. Without motion it is held.
+/// An interface, or a node with rotations, whose motion is prescribed; the rest of the body hangs from it.
+/// Without motion it is held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
     /// The interface or node that carries the body.
@@ -292,7 +297,8 @@ impl CarriedSpin {
     }
 }
 
-/// Motion of what carries a body, axis of rotation and all, along axes of the world, given by one of its derivatives. It starts at zero.
+/// Motion of what carries a body, axis of rotation and all, along axes of the world, given by one of its
+/// derivatives. It starts at zero.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
     /// The way, of two continuous derivatives.

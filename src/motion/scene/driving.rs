@@ -28,7 +28,8 @@ impl<'a> CarriedMotion<'a> {
         Some(Self { carried, arm })
     }
 
-    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along the axes A of the frame.
+    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along
+    /// the axes A of the frame.
     fn at(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         let nothing = (Vector3::zeros(), Vector3::zeros());
         let (omega, alpha) = self.carried.spin.as_ref().map_or(nothing, |spin| spin.at(time, axes));
@@ -50,7 +51,8 @@ impl<'a> Driving<'a> {
         Self { spin: scene.spin.as_ref(), carried: CarriedMotion::new(frame, scene) }
     }
 
-    /// Velocities at a time and their rates, along the axes of the frame, which has the `axes` in the world then.
+    /// Velocities at a time and their rates, along the axes of the frame, which has the `axes` in the world
+    /// then.
     pub fn at(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         if let Some(carried) = &self.carried {
             return carried.at(time, axes);

@@ -9,13 +9,15 @@ use std::f64::consts::TAU;
 /// Steps of the conserving method per shortest period, unless said.
 const STEPS_PER_PERIOD: f64 = 20.0;
 
-/// Explicit steps per oscillation of a load or a spin, and steps of a given length: with fewer an oscillation could pass between them.
+/// Explicit steps per oscillation of a load or a spin, and steps of a given length: with fewer an oscillation
+/// could pass between them.
 const STEPS_PER_OSCILLATION: f64 = 2.0;
 
 /// Longest explicit step that is stable, as the angle that the fastest mode turns in it.
 const STABLE: f64 = 6.0;
 
-/// Frequency of the fastest history of a scene that lasts `duration`, in oscillations per time; zero without any that oscillates.
+/// Frequency of the fastest history of a scene that lasts `duration`, in oscillations per time; zero without
+/// any that oscillates.
 pub(crate) fn fastest_history(scene: &Scene, duration: f64) -> f64 {
     scene.acting().chain(scene.driving()).map(|history| history.frequency_until(duration)).fold(0.0, f64::max)
 }

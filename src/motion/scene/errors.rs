@@ -15,7 +15,8 @@ const NO_TORQUE: f64 = 1e-10;
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
 pub(crate) const LEAST_REACTION: f64 = 1e-3;
 
-/// Errors of the second half of a run over those of the first, beyond the growth of the motion, from which on they are said to grow.
+/// Errors of the second half of a run over those of the first, beyond the growth of the motion, from which on
+/// they are said to grow.
 const GROWING: f64 = 1.8;
 
 /// Errors below this part of their tolerance do not matter yet, though they grow.
@@ -29,14 +30,15 @@ type Reaction = (Vector3<f64>, Vector3<f64>);
 pub struct OutputErrors {
     /// Angle between the frames, radians.
     pub attitude: f64,
-    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of any of them or to the least
-    /// that counts ([`Resolution`](super::Resolution)). Without watched points: of the nodes that move most in some mode along some axis.
+    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of
+    /// any of them or to the least that counts ([`Resolution`](super::Resolution)). Without watched points:
+    /// of the nodes that move most in some mode along some axis.
     pub deflection: Option<f64>,
-    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that counts instead of the
-    /// largest where that is less.
+    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that
+    /// counts instead of the largest where that is less.
     pub stress: Option<f64>,
-    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or torque, or to a thousandth of
-    /// w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2.
+    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or
+    /// torque, or to a thousandth of w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2.
     pub reaction: Option<f64>,
 }
 
@@ -100,9 +102,10 @@ impl ErrorHistory {
         }
     }
 
-    /// How much more the errors grow from the first half of the run to the second than `motion`, that of the reference, does: about 1 for
-    /// errors that stay in step with the motion, 2 and more where phases run apart. `None` where they do not grow so much that it is worth a
-    /// word ([`GROWING`]), or where those of the second half do not matter yet ([`MATTERS`]).
+    /// How much more the errors grow from the first half of the run to the second than `motion`, that of the
+    /// reference, does: about 1 for errors that stay in step with the motion, 2 and more where phases run
+    /// apart. `None` where they do not grow so much that it is worth a word ([`GROWING`]), or where those of
+    /// the second half do not matter yet ([`MATTERS`]).
     pub fn growth(&self, motion: &Trace, tolerance: &Tolerance) -> Option<f64> {
         let growth = |(first, second): (f64, f64), allowed: f64| {
             (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
@@ -139,8 +142,8 @@ pub struct Apart {
 }
 
 impl ErrorHistory {
-    /// The errors of `candidate`, whose deformation is `apart` from that of `reference`. What the nodes have to say counts where no points
-    /// are watched.
+    /// The errors of `candidate`, whose deformation is `apart` from that of `reference`. What the nodes have
+    /// to say counts where no points are watched.
     ///
     /// # Panics
     /// When the motions were not looked at in the same places.
@@ -166,8 +169,8 @@ fn relative(values: Vec<f64>, scale: f64) -> Option<Vec<f64>> {
     (scale > 0.0).then(|| values.into_iter().map(|value| value / scale).collect())
 }
 
-/// Differences of deflections along the motion, and the largest deflection of the reference: of the watched points, without any of the nodes
-/// that `apart` looked at.
+/// Differences of deflections along the motion, and the largest deflection of the reference: of the watched
+/// points, without any of the nodes that `apart` looked at.
 fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>, f64) {
     if reference.deflections.is_empty() {
         return (apart.deflection.clone(), apart.largest_deflection);
@@ -284,7 +287,8 @@ impl<'r> Measure<'r> {
     }
 }
 
-/// Modes of a candidate, seen from those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K Psi_r
+/// Modes of a candidate, seen from those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K
+/// Psi_r
 ///
 /// ```text
 /// V(Psi_c q_c - Psi_r q_r) = d'L_r d / 2 + q_c'(L_c - G L_r^-1 G') q_c / 2,    d = L_r^-1 G' q_c - q_r
@@ -301,8 +305,8 @@ pub struct OtherModes<'c> {
 }
 
 impl<'c> OtherModes<'c> {
-    /// The modes of `candidate` seen from those of `reference`, with `shared` = G (nc x nr); `None` where the bodies are not of one model, or
-    /// the stiffness of the reference is not positive definite.
+    /// The modes of `candidate` seen from those of `reference`, with `shared` = G (nc x nr); `None` where the
+    /// bodies are not of one model, or the stiffness of the reference is not positive definite.
     pub fn new(candidate: &'c FlexBody, reference: &FlexBody, shared: MatRef<'_, f64>) -> Option<Self> {
         let (nc, nr) = (candidate.n_modes(), reference.n_modes());
         // The centre of mass of a lumped mass is another point: deflections do not depend on it.

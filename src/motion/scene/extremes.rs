@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 /// Differences of energies up to so many roundings of the largest total energy are rounding.
 const ROUNDINGS: f64 = 16.0;
 
-/// The largest of everything over a continuous motion: at the steps of the integration, between them, and between the places where they are
-/// looked at. It does not depend on which instants are written.
+/// The largest of everything over a continuous motion: at the steps of the integration, between them, and
+/// between the places where they are looked at. It does not depend on which instants are written.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Extremes {
     /// Deflection of any node, relative to the largest extent of the body, and when it is largest.
@@ -41,7 +41,8 @@ pub struct Drift {
     pub energy: f64,
     /// Of linear momentum less impulse, relative to the largest of both and of sqrt(2 m E).
     pub linear: f64,
-    /// Of angular momentum less angular impulse, relative to the largest of both and of r sqrt(2 m E), r being the radius of gyration.
+    /// Of angular momentum less angular impulse, relative to the largest of both and of r sqrt(2 m E), r
+    /// being the radius of gyration.
     pub angular: f64,
 }
 
@@ -134,8 +135,8 @@ impl<'b> Survey<'b> {
 /// How many deformations are kept whose nodes are all looked at in the end.
 const KEPT: usize = 16;
 
-/// The deformations at which the nodes that the modes move most are deflected most. Another node may be deflected more then, or at another of
-/// these times.
+/// The deformations at which the nodes that the modes move most are deflected most. Another node may be
+/// deflected more then, or at another of these times.
 #[derive(Debug, Clone, Default)]
 struct Bulges {
     /// Time, deflection and modal coordinates, the largest deflection first.
@@ -167,8 +168,8 @@ impl Bulges {
         }
     }
 
-    /// The largest deflection of any node relative to the extent of `body`. What the peak of the nodes that the modes move most has beyond what
-    /// was seen of them holds for the others.
+    /// The largest deflection of any node relative to the extent of `body`. What the peak of the nodes that
+    /// the modes move most has beyond what was seen of them holds for the others.
     fn largest(mut self, body: &FlexBody, peak: f64) -> Peak {
         self.keep_last();
         let seen = self.kept.first().map_or(0.0, |kept| kept.1);

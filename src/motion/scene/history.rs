@@ -25,8 +25,8 @@ pub enum History {
         /// Phase in radians.
         phase: f64,
     },
-    /// Smoothly from one value to another: with x from 0 to 1 within the duration, from + (to - from) (x - sin(2 pi x) / (2 pi)); two
-    /// continuous derivatives.
+    /// Smoothly from one value to another: with x from 0 to 1 within the duration, from + (to - from) (x -
+    /// sin(2 pi x) / (2 pi)); two continuous derivatives.
     Ramp {
         /// Value before.
         from: f64,

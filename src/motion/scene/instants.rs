@@ -8,7 +8,8 @@ use crate::motion::dynamics::Motion;
 use crate::numerics::integration::{Failure, Sight};
 use nalgebra::Vector3;
 
-/// State, accelerations and loads of a body at an instant. Vectors are along the axes of the frame of the [`Stage`], about its origin.
+/// State, accelerations and loads of a body at an instant. Vectors are along the axes of the frame of the
+/// [`Stage`], about its origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// When.
@@ -25,7 +26,8 @@ pub struct Instant {
     pub qdd: Vec<f64>,
     /// The acceleration of gravity.
     pub gravity: Vector3<f64>,
-    /// Force and torque of every load of the scene; the torque as it works on the rotation vector of its point.
+    /// Force and torque of every load of the scene; the torque as it works on the rotation vector of its
+    /// point.
     pub loads: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 

@@ -6,7 +6,8 @@ use crate::base::error::Result;
 use crate::model::FeModel;
 use crate::motion::dynamics::NodalPoint;
 
-/// `point` among the nodes of `model`; `None` where the model has no such node, or no such interface with a reference point.
+/// `point` among the nodes of `model`; `None` where the model has no such node, or no such interface with a
+/// reference point.
 ///
 /// # Errors
 /// [`InterfaceNode`](Code::InterfaceNode).

@@ -5,9 +5,10 @@ const UNEVEN: f64 = 8.0;
 
 /// The largest value of a function f >= 0 of time that is seen at ascending instants, and where it lies.
 ///
-/// Between instants f^2 is taken for the parabola through a largest value and its neighbours: sizes of vectors have smooth squares. With twenty
-/// instants in the period of a vibration a peak is found to within 9e-4 of it, with sixty to within 1.2e-5. Six and a half, 0.06 off, are what there is of
-/// a mode whose vibration an explicit step can only just follow; error control does not let such a mode move much.
+/// Between instants f^2 is taken for the parabola through a largest value and its neighbours: sizes of
+/// vectors have smooth squares. With twenty instants in the period of a vibration a peak is found to within
+/// 9e-4 of it, with sixty to within 1.2e-5. Six and a half, 0.06 off, are what there is of a mode whose
+/// vibration an explicit step can only just follow; error control does not let such a mode move much.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Peak {
     /// The largest value.

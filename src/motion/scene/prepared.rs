@@ -17,11 +17,12 @@ use crate::numerics::linalg::larger;
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::borrow::Cow;
 
-/// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by much, or it would not be stable.
+/// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by
+/// much, or it would not be stable.
 pub(super) const PARTS: usize = 6;
 
-/// Steps towards the static deformation at the start, each of which leaves a part (spin / first frequency)^2 of the way, and what is near
-/// enough.
+/// Steps towards the static deformation at the start, each of which leaves a part (spin / first frequency)^2
+/// of the way, and what is near enough.
 const MOST_SETTLING: usize = 200;
 const SETTLED: f64 = 1e-13;
 
@@ -90,7 +91,8 @@ impl<'a> Prepared<'a> {
         Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
     }
 
-    /// Shows a place of the motion, between those that are written, to `survey`. Answers the reaction there where something is prescribed.
+    /// Shows a place of the motion, between those that are written, to `survey`. Answers the reaction there
+    /// where something is prescribed.
     ///
     /// # Errors
     /// Where the body has no motion at this state.
@@ -119,7 +121,8 @@ impl<'a> Prepared<'a> {
     /// Integrates over `instants` and shows the motion, at so many parts of every explicit step.
     ///
     /// # Errors
-    /// FB540 when the integration cannot go on, FB550 when it takes more steps than it may, FB601 when `show` has no memory left.
+    /// FB540 when the integration cannot go on, FB550 when it takes more steps than it may, FB601 when `show`
+    /// has no memory left.
     pub fn integrate<E: From<Failure> + Into<Stop>>(
         &self,
         instants: &[f64],
@@ -183,7 +186,8 @@ fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configurat
     }
 }
 
-/// Gives `start` the deformation q that stays as it is under what acts at time zero: q'' = 0 with q' = 0, by q += K_ff^-1 m_ff q''.
+/// Gives `start` the deformation q that stays as it is under what acts at time zero: q'' = 0 with q' = 0, by
+/// q += K_ff^-1 m_ff q''.
 ///
 /// # Errors
 /// FB540 where there is none: the spin takes the stiffness of some motion.

@@ -40,7 +40,8 @@ const TOLERANCE: f64 = 1e-9;
 /// Tolerances that rounding leaves a meaning.
 const TOLERANCES: Range<f64> = 1e-14..0.1;
 
-/// A scene without cases, named `stem` where it has no name. `None` only with something in `found`, as everything here.
+/// A scene without cases, named `stem` where it has no name. `None` only with something in `found`, as
+/// everything here.
 pub(super) fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
     let required = read_requirements::TABLES.map(|(name, _)| name);
     walk.known_keys(top, "the scene", &[TOP, &required].concat());

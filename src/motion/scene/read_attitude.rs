@@ -21,8 +21,8 @@ const LENGTH: f64 = 0.01;
 /// Largest angle between two rows, radians: beyond it the way from one to the other is a guess.
 const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_2;
 
-/// Largest angle, radians, that the interpolated angular velocity may lead away from the attitudes in the file: the tolerance of the
-/// attitude that scenes have unless they say otherwise.
+/// Largest angle, radians, that the interpolated angular velocity may lead away from the attitudes in the
+/// file: the tolerance of the attitude that scenes have unless they say otherwise.
 const LARGEST_LOSS: f64 = 1e-3;
 
 /// How something turns.
@@ -136,9 +136,10 @@ impl Attitudes {
 
     /// The angular velocity that follows the attitudes, along their axes, and the attitude at time zero.
     ///
-    /// With the cubic spline s through the Euler parameters, which leaves unit length a little between the rows, p = s / |s| turns with
-    /// omega = G(p) p' = G(s) s' / |s|^2, since G(s) s = 0. At the rows s' has one order more than elsewhere; the cubic spline through omega there has
-    /// a continuous second derivative.
+    /// With the cubic spline s through the Euler parameters, which leaves unit length a little between the
+    /// rows, p = s / |s| turns with omega = G(p) p' = G(s) s' / |s|^2, since G(s) s = 0. At the rows s' has
+    /// one order more than elsewhere; the cubic spline through omega there has a continuous second
+    /// derivative.
     fn followed(&self, read: &FromFile, end: Option<f64>) -> Result<(Samples<3>, RotationVector)> {
         let splined = Samples::new(read.times.clone(), &self.parameters, Interpolation::Cubic, false);
         let omega = |time: f64| {
@@ -152,8 +153,9 @@ impl Attitudes {
         Ok((velocity, start.into()))
     }
 
-    /// Refuses rows that are so far apart that the angular velocity through them leads elsewhere until `end`: it is integrated from row to row by the
-    /// method of Magnus of order four, Omega = h (w_1 + w_2) / 2 + sqrt(3) h^2 / 12 w_1 x w_2 at the two Gauss points, along axes that turn.
+    /// Refuses rows that are so far apart that the angular velocity through them leads elsewhere until `end`:
+    /// it is integrated from row to row by the method of Magnus of order four, Omega = h (w_1 + w_2) / 2 +
+    /// sqrt(3) h^2 / 12 w_1 x w_2 at the two Gauss points, along axes that turn.
     fn refuse_loss(&self, read: &FromFile, velocity: &Samples<3>, end: f64) -> Result<()> {
         let axes = |row: usize| EulerParameters(self.parameters[row].into()).axes();
         let mut own = axes(0);

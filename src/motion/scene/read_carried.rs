@@ -57,7 +57,8 @@ fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<us
 /// Makes a drive of a history.
 type Driven = fn(VectorHistory) -> Drive;
 
-/// The derivatives that a translation can be given by: the key of a history along a direction, that of three columns, and what it makes.
+/// The derivatives that a translation can be given by: the key of a history along a direction, that of three
+/// columns, and what it makes.
 const DERIVATIVES: [(&str, &str, Driven); 3] = [
     ("displacement", "displacement_from", Drive::Displacement),
     ("velocity", "velocity_from", Drive::Velocity),

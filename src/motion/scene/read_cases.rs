@@ -1,4 +1,5 @@
-//! Reads the load cases of a scene file: what stands outside `[[case]]` is common, a case adds to it or takes its place.
+//! Reads the load cases of a scene file: what stands outside `[[case]]` is common, a case adds to it or takes
+//! its place.
 
 use super::read::{TOP, scene};
 use super::{LoadCase, Scene, read_requirements};
@@ -10,7 +11,8 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::DeValue;
 
-/// Tables of settings that are independent of each other: a case replaces their keys one by one. Every other table is replaced as a whole.
+/// Tables of settings that are independent of each other: a case replaces their keys one by one. Every other
+/// table is replaced as a whole.
 const BY_KEY: &[&str] = &["run", "initial", "motion", "attachment", "limits", "tolerance"];
 
 /// Lists whose items a case adds to those of the scene.
@@ -22,8 +24,9 @@ const ONLY_COMMON: &[&str] = &["case", "cost"];
 /// Reads the load cases of a scene file, in its order; of a file without `[[case]]` that is one scene.
 ///
 /// # Errors
-/// FB101, FB106 when it or a file of its histories cannot be read; FB211 for syntax, unknown, missing or mistyped keys and values that cannot
-/// be; FB213 for what contradicts itself; FB215 to FB217 for what is wrong in files of histories. All of them, in the order of lines.
+/// FB101, FB106 when it or a file of its histories cannot be read; FB211 for syntax, unknown, missing or
+/// mistyped keys and values that cannot be; FB213 for what contradicts itself; FB215 to FB217 for what is
+/// wrong in files of histories. All of them, in the order of lines.
 pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<Scene>> {
     let path = path.as_ref();
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -148,8 +151,9 @@ pub(super) fn known_keys() -> Vec<&'static str> {
     TOP.iter().chain(&required).copied().filter(|key| !ONLY_COMMON.contains(key)).collect()
 }
 
-/// The scene that a case is: what is `common`, with the tables of [`BY_KEY`] key by key and the lists of [`ADDED`] item by item joined by those
-/// of the case, and everything else of the case instead of what is common.
+/// The scene that a case is: what is `common`, with the tables of [`BY_KEY`] key by key and the lists of
+/// [`ADDED`] item by item joined by those of the case, and everything else of the case instead of what is
+/// common.
 fn merged<'t>(common: &Table<'t>, case: &Table<'t>) -> Table<'t> {
     let mut merged = common.clone();
     merged.remove("case");

@@ -23,10 +23,11 @@ pub struct Recording {
     pub balances: Vec<Balance>,
     /// The frame that the numbers refer to, and what the body is exposed to.
     pub setting: Setting,
-    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes; none without.
+    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes;
+    /// none without.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
-    /// Torque about the origin of the frame, axes of the model, that the reference conditions carry; their force is zero. None where the frame
-    /// is not a mean one: `reactions` are then all that there are.
+    /// Torque about the origin of the frame, axes of the model, that the reference conditions carry; their
+    /// force is zero. None where the frame is not a mean one: `reactions` are then all that there are.
     pub conditions: Option<Vec<Vector3<f64>>>,
     /// Paths of the watched points.
     pub paths: Vec<Path>,
@@ -38,12 +39,14 @@ pub struct Recording {
 
 /// What a recording is about: its frame, and what the body is exposed to.
 ///
-/// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model and turn with the body.
+/// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model
+/// and turn with the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
     /// Name of the interface or node that carries the body.
     pub carrier: Option<String>,
-    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the reference point of what carries it.
+    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the reference
+    /// point of what carries it.
     pub origin: Vector3<f64>,
     /// Gravity at the start, axes of the model.
     pub gravity: Option<Vector3<f64>>,
@@ -74,7 +77,8 @@ impl Setting {
     }
 }
 
-/// The least deformation that counts: errors are relative to the largest of the motion, or to this where that is less.
+/// The least deformation that counts: errors are relative to the largest of the motion, or to this where that
+/// is less.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resolution {
     /// Deflection.
@@ -84,7 +88,8 @@ pub struct Resolution {
 }
 
 impl Resolution {
-    /// Part of the largest extent of a body that its least deflection is unless said: 10 micrometres per metre.
+    /// Part of the largest extent of a body that its least deflection is unless said: 10 micrometres per
+    /// metre.
     const LEAST: f64 = 1e-5;
 
     /// For `body`; `least`: the deflection, where it is given.
@@ -109,7 +114,8 @@ pub struct Path {
     pub deflection: Vec<Vector3<f64>>,
     /// Velocity at every instant, world axes: that of the place.
     pub velocity: Vec<Vector3<f64>>,
-    /// Acceleration at every instant, world axes: that of the place. Where a load or motion jumps, that after it.
+    /// Acceleration at every instant, world axes: that of the place. Where a load or motion jumps, that after
+    /// it.
     pub acceleration: Vec<Vector3<f64>>,
 }
 

@@ -1,4 +1,5 @@
-//! What a scene demands of a body, and what it says about motion that nobody simulates. All of it is optional.
+//! What a scene demands of a body, and what it says about motion that nobody simulates. All of it is
+//! optional.
 
 use super::Axes;
 use nalgebra::{Matrix3, Vector3};
@@ -106,12 +107,13 @@ pub struct Tolerance {
     pub attitude: f64,
     /// Deflection of watched points, relative to the largest of any of them.
     pub deflection: f64,
-    /// Root of the elastic energy of the error relative to the largest of the motion: stresses, as far as a body without stress
-    /// recovery knows them.
+    /// Root of the elastic energy of the error relative to the largest of the motion: stresses, as far as a
+    /// body without stress recovery knows them.
     pub stress: f64,
     /// Force and torque that a prescribed spin takes, relative to their largest.
     pub reaction: f64,
-    /// Least deflection that counts ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent of the body.
+    /// Least deflection that counts ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent of the
+    /// body.
     pub least_deflection: Option<f64>,
 }
 

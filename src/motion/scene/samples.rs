@@ -4,8 +4,8 @@ use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Parts that a cubic piece is cut into where its largest value is bounded: the bound is then above the largest value by less than 1/64 of
-/// what it would be of the whole piece.
+/// Parts that a cubic piece is cut into where its largest value is bounded: the bound is then above the
+/// largest value by less than 1/64 of what it would be of the whole piece.
 const PARTS: usize = 8;
 
 /// Changes of a rate that together are below this part of the largest value are rounding, and no oscillation.
@@ -16,8 +16,8 @@ const STEADY: f64 = 1e-9;
 pub enum Interpolation {
     /// Straight lines: a kink at every row.
     Linear,
-    /// The cubic spline with two continuous derivatives, whose third is continuous at the second and the last but one row too (not-a-knot).
-    /// Of three rows the parabola, of two the line.
+    /// The cubic spline with two continuous derivatives, whose third is continuous at the second and the last
+    /// but one row too (not-a-knot). Of three rows the parabola, of two the line.
     Cubic,
 }
 
@@ -53,8 +53,8 @@ pub struct Sample<const N: usize> {
     pub second: SVector<f64, N>,
 }
 
-/// Bounds of a function from time zero to a time, in the Euclidean norm of its components. They hold for certain, and are above what they
-/// bound by a small part of what the function does between two rows.
+/// Bounds of a function from time zero to a time, in the Euclidean norm of its components. They hold for
+/// certain, and are above what they bound by a small part of what the function does between two rows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sizes {
     /// The value at time zero.
@@ -152,7 +152,8 @@ impl<const N: usize> Samples<N> {
         self.0.integrals[piece] + self.0.pieces[piece].integral(since)
     }
 
-    /// Times at which it is not smooth: the rows of straight lines, and the ends where it stays what it is outside.
+    /// Times at which it is not smooth: the rows of straight lines, and the ends where it stays what it is
+    /// outside.
     pub fn breaks(&self) -> Vec<f64> {
         let Pieces { times, interpolation, held, .. } = &*self.0;
         let last = times.len() - 1;
@@ -169,15 +170,16 @@ impl<const N: usize> Samples<N> {
         self.0.interpolation == Interpolation::Cubic
     }
 
-    /// The shortest time between two rows where the function is smooth there; none of straight lines, whose rows are breaks.
+    /// The shortest time between two rows where the function is smooth there; none of straight lines, whose
+    /// rows are breaks.
     pub fn smooth_spacing(&self) -> Option<f64> {
         let spacings = self.0.times.windows(2).map(|ends| ends[1] - ends[0]);
         self.is_smooth().then(|| spacings.fold(f64::INFINITY, f64::min))
     }
 
-    /// Oscillations per time of its fastest part, about: the largest second derivative over the largest deviation of the rate from its mean
-    /// from time zero to `end`, over 2 pi. A sine has its frequency, a pulse some 1.6 over its width. Zero of straight lines, whose kinks say
-    /// where they change.
+    /// Oscillations per time of its fastest part, about: the largest second derivative over the largest
+    /// deviation of the rate from its mean from time zero to `end`, over 2 pi. A sine has its frequency, a
+    /// pulse some 1.6 over its width. Zero of straight lines, whose kinks say where they change.
     pub fn frequency_until(&self, end: f64) -> f64 {
         let may_oscillate = self.is_smooth() && end > 0.0 && end.is_finite();
         if !may_oscillate {
@@ -291,8 +293,9 @@ impl<const N: usize> Piece<N> {
         (a + (b / 2.0 + (c / 3.0 + d * (t / 4.0)) * t) * t) * t
     }
 
-    /// Raises `sizes` to what the piece does between two times. A polynomial lies within the convex hull of its control points, and
-    /// the integral of |f| over a length h is at most the root of h times that of |f|^2, which Gauss and Simpson give exactly.
+    /// Raises `sizes` to what the piece does between two times. A polynomial lies within the convex hull of
+    /// its control points, and the integral of |f| over a length h is at most the root of h times that of
+    /// |f|^2, which Gauss and Simpson give exactly.
     fn bound(&self, from: f64, to: f64, sizes: &mut Sizes) {
         let (a, b, h) = (self.at(from), self.at(to), to - from);
         let inner = [a.value + a.rate * (h / 3.0), b.value - b.rate * (h / 3.0)];
@@ -312,8 +315,9 @@ impl<const N: usize> Piece<N> {
     }
 }
 
-/// Slopes at the rows of the cubic spline with two continuous derivatives and the conditions not-a-knot at its ends (de Boor, A Practical
-/// Guide to Splines, chapter IV): tridiagonal equations whose elimination needs no pivoting.
+/// Slopes at the rows of the cubic spline with two continuous derivatives and the conditions not-a-knot at
+/// its ends (de Boor, A Practical Guide to Splines, chapter IV): tridiagonal equations whose elimination
+/// needs no pivoting.
 fn slopes<const N: usize>(times: &[f64], values: &[SVector<f64, N>]) -> Vec<SVector<f64, N>> {
     let last = times.len() - 1;
     let h: Vec<f64> = times.windows(2).map(|ends| ends[1] - ends[0]).collect();
@@ -423,7 +427,8 @@ mod tests {
         }
     }
 
-    /// Two derivatives do not jump at rows, values outside are held or not, and integrals are those of the values.
+    /// Two derivatives do not jump at rows, values outside are held or not, and integrals are those of the
+    /// values.
     #[test]
     fn a_spline_is_smooth_and_stays_where_it_is_told() {
         let times = uneven(12);
@@ -451,7 +456,8 @@ mod tests {
         assert_eq!(lines.at(times[3]).value, values[3]);
     }
 
-    /// Sampled densely, no function does more than its bounds say, and the bounds are close where the rows are.
+    /// Sampled densely, no function does more than its bounds say, and the bounds are close where the rows
+    /// are.
     #[test]
     fn bounds_hold_and_are_close() {
         for (count, close, interpolation) in [

@@ -31,8 +31,8 @@ const WATCHED: usize = 12;
 /// * `watch`: hears which part of the duration is done.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body; FB550, before any work, when the run takes more steps than it may, and FB601, when the
-/// recording does not fit the memory; FB540 when the integration cannot go on.
+/// FB212 where the scene does not fit the body; FB550, before any work, when the run takes more steps than it
+/// may, and FB601, when the recording does not fit the memory; FB540 when the integration cannot go on.
 pub fn simulate(
     body: &FlexBody,
     scene: &Scene,

@@ -1,7 +1,9 @@
-//! A scene and its body in one frame: axes of the model, origin at the centre of mass or at what carries the body.
+//! A scene and its body in one frame: axes of the model, origin at the centre of mass or at what carries the
+//! body.
 //!
-//! A flex-body file has its frame where the conversion put it, along principal axes as a rule. What a scene means does not depend on that:
-//! everything is computed in this frame, and vectors of the results are along its axes, which are those of the model.
+//! A flex-body file has its frame where the conversion put it, along principal axes as a rule. What a scene
+//! means does not depend on that: everything is computed in this frame, and vectors of the results are along
+//! its axes, which are those of the model.
 
 use super::{Axes, Load, Point, Range, Scene, VectorHistory};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -32,10 +34,12 @@ pub struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// Brings `body` and `scene` together; a scene that was resolved already, and the body that it was resolved for, stay.
+    /// Brings `body` and `scene` together; a scene that was resolved already, and the body that it was
+    /// resolved for, stay.
     ///
     /// # Errors
-    /// FB212 and FB214 where the body has not what the scene carries it by; FB213 for a prescribed motion beyond what the scene allows.
+    /// FB212 and FB214 where the body has not what the scene carries it by; FB213 for a prescribed motion
+    /// beyond what the scene allows.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         if scene.resolved {
             return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
@@ -82,7 +86,8 @@ fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
     Ok(Cow::Owned(body.in_model_axes(shift)?))
 }
 
-/// The scene with its vectors along the axes of the model; `axes` are those of the body in the model, `origin` is that of its frame.
+/// The scene with its vectors along the axes of the model; `axes` are those of the body in the model,
+/// `origin` is that of its frame.
 fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene {
     let mut scene = scene.clone();
     start_with_the_motion(&mut scene, axes);
@@ -134,7 +139,8 @@ fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene 
     scene
 }
 
-/// The attitude at time zero is that of the prescribed motion, where that has one; `axes` are those of the body in the model.
+/// The attitude at time zero is that of the prescribed motion, where that has one; `axes` are those of the
+/// body in the model.
 fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
     let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
     let spin = scene.spin.as_mut().map(|spin| (&mut spin.start, spin.axes));
@@ -146,7 +152,8 @@ fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
     };
 }
 
-/// Refuses a start or a prescribed rotation beyond what [motion] allows; `axes` are those of the body in the model.
+/// Refuses a start or a prescribed rotation beyond what [motion] allows; `axes` are those of the body in the
+/// model.
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
     let mut found = Vec::new();
@@ -167,7 +174,8 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
                 |range: &Option<Range>, length: f64, components: fn(&VectorHistory, f64) -> Vector3<f64>| {
                     let any_direction = matches!(range, Some(Range::Any(_)));
                     match (history.direction(), kind) {
-                        // Which components a rotation about axes of the world has in the body is known when it has run.
+                        // Which components a rotation about axes of the world has in the body is known when
+                        // it has run.
                         (None, Axes::World) => {
                             range.is_some_and(|range| length > range.length() * (1.0 + ROUNDING))
                         }

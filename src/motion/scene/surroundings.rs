@@ -19,8 +19,8 @@ impl<'a> SceneForces<'a> {
     /// Resolves the names of `scene`; and the points that it watches.
     ///
     /// # Errors
-    /// FB212 for nodes, interfaces and modes that the body has not, for torques where it has no orientation, and for
-    /// vectors that leave the plane of a plane body. All of them.
+    /// FB212 for nodes, interfaces and modes that the body has not, for torques where it has no orientation,
+    /// and for vectors that leave the plane of a plane body. All of them.
     pub fn new(body: &FlexBody, scene: &'a Scene) -> Result<(Self, Vec<BodyPoint>)> {
         let mut found = Vec::new();
         let mut wrong = |message: String| found.push(Diagnostic::new(Code::SceneBody, message));
@@ -64,7 +64,8 @@ pub(crate) fn points_of(body: &FlexBody, scene: &Scene) -> Result<(Vec<BodyPoint
     Ok((forces.loads.into_iter().map(|(point, _)| point).collect(), watched))
 }
 
-/// A node or the reference point of an interface of `body`, with geometric stiffness where `terms` have it; or why there is no such point.
+/// A node or the reference point of an interface of `body`, with geometric stiffness where `terms` have it;
+/// or why there is no such point.
 pub(crate) fn body_point(
     body: &FlexBody,
     terms: Terms,

@@ -12,9 +12,9 @@ use crate::motion::dynamics::{Configuration, EulerParameters, Motion};
 use crate::numerics::integration::{Failure, Sight, Work};
 use nalgebra::Vector3;
 
-/// The continuous motion of a body: at the ends of the steps of its integration, at both sides of every break, and at places within the
-/// steps that are so close that a parabola through three of them finds every extreme. Which instants a scene writes has no part in it.
-/// Numbers are in the units of the body.
+/// The continuous motion of a body: at the ends of the steps of its integration, at both sides of every
+/// break, and at places within the steps that are so close that a parabola through three of them finds every
+/// extreme. Which instants a scene writes has no part in it. Numbers are in the units of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
     /// How it was integrated; with the step that was taken.
@@ -27,7 +27,8 @@ pub struct Trace {
     pub q: Vec<Vec<f64>>,
     /// Elastic energy.
     pub elastic: Vec<f64>,
-    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes; none without.
+    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes;
+    /// none without.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
     /// Deflections of every watched point from the undeformed body, axes of the model.
     pub deflections: Vec<Vec<Vector3<f64>>>,
@@ -97,7 +98,8 @@ pub fn trace(
     Ok((tracer.finish(finished, extremes), found))
 }
 
-/// The motion of `body` in `scene` where another motion was looked at, to be compared with it. Of the extremes there are none.
+/// The motion of `body` in `scene` where another motion was looked at, to be compared with it. Of the
+/// extremes there are none.
 ///
 /// * `times`: ascending, from 0 to the end of the scene.
 /// * `memory`: bytes that there are for the motion; `None` where it is not known.

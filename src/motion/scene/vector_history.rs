@@ -105,7 +105,8 @@ impl VectorHistory {
         longest.try_normalize(0.0)
     }
 
-    /// Directions that all of its values are combinations of: its own, or those of the components that are not always zero.
+    /// Directions that all of its values are combinations of: its own, or those of the components that are
+    /// not always zero.
     pub fn directions(&self) -> Vec<Vector3<f64>> {
         match self {
             Self::Along { direction, .. } => vec![*direction],
@@ -167,7 +168,8 @@ impl VectorHistory {
         }
     }
 
-    /// Shortest time in which it can do anything between two of its breaks, where that is less than what lies between the breaks.
+    /// Shortest time in which it can do anything between two of its breaks, where that is less than what lies
+    /// between the breaks.
     pub fn spacing(&self) -> Option<f64> {
         match self {
             Self::Along { factor: History::Samples(samples), .. } => samples.smooth_spacing(),

@@ -1,11 +1,11 @@
 //! Guaranteed lower and upper bounds of every eigenvalue, about the exact K and M as they are stored (theory
 //! section 8, "Certified").
 //!
-//! With A = K + tau M = L L', omega = lambda + tau are the eigenvalues of the pencil (A, M), and mu = 1 / omega those
-//! of S = L^-1 M L^-T: M may be singular. The Lehmann-Goerisch method turns a count of the eigenvalues on the other
-//! side of a shift s into bounds of those on this side, whose distance from the truth is quadratic in the residuals
-//! (Kato-Temple for one mode, a block for repeated ones). Everything that enters is evaluated in double-double
-//! arithmetic, with a bound of its own rounding.
+//! With A = K + tau M = L L', omega = lambda + tau are the eigenvalues of the pencil (A, M), and mu = 1 /
+//! omega those of S = L^-1 M L^-T: M may be singular. The Lehmann-Goerisch method turns a count of the
+//! eigenvalues on the other side of a shift s into bounds of those on this side, whose distance from the
+//! truth is quadratic in the residuals (Kato-Temple for one mode, a block for repeated ones). Everything that
+//! enters is evaluated in double-double arithmetic, with a bound of its own rounding.
 
 use super::canonical::clusters;
 use super::completeness::count_below;
@@ -25,24 +25,26 @@ const U: f64 = f64::EPSILON / 2.0;
 /// Room for the rounding of the bounds themselves where they are evaluated in f64.
 const ROOM: f64 = 1.0 + 1e-6;
 
-/// Shift between rigid and flexible modes relative to the first eigenvalue: rigid modes whose rounding comes near are
-/// refused before.
+/// Shift between rigid and flexible modes relative to the first eigenvalue: rigid modes whose rounding comes
+/// near are refused before.
 const PART_BELOW: f64 = 0.5;
 
-/// tau relative to the first eigenvalue: the larger it is the better conditioned is K + tau M, and the wider are the
-/// bounds.
+/// tau relative to the first eigenvalue: the larger it is the better conditioned is K + tau M, and the wider
+/// are the bounds.
 const SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 
 /// Counts the eigenvalues below the modes and encloses those between the two shifts.
 ///
-/// * `vectors` (N x m, m > 0): nearly M-orthonormal approximate modes, one for every flexible eigenvalue below `high`.
+/// * `vectors` (N x m, m > 0): nearly M-orthonormal approximate modes, one for every flexible eigenvalue
+///   below `high`.
 /// * `eigenvalues`: their approximate eigenvalues, ascending.
 /// * `high`: shift above them, below which a count found m eigenvalues and the rigid ones.
 /// * `gap`: as in [`clusters`].
 ///
 /// # Errors
 /// [`EigenFailure::CountDiffers`] when there are others than the rigid modes below half the first eigenvalue,
-/// [`EigenFailure::NotCertified`] when K + tau M cannot be proved positive definite in f64 or the counts are wrong.
+/// [`EigenFailure::NotCertified`] when K + tau M cannot be proved positive definite in f64 or the counts are
+/// wrong.
 pub(super) fn enclose(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
@@ -94,8 +96,8 @@ pub(super) fn enclose(
     Ok(EigenvalueBounds { lower, upper, shape_error, shift_below: low, pivots_below })
 }
 
-/// Cholesky factor of A - alpha D with A = K + tau M and D its diagonal. That it exists proves A >= margin D, with all
-/// rounding counted.
+/// Cholesky factor of A - alpha D with A = K + tau M and D its diagonal. That it exists proves A >= margin D,
+/// with all rounding counted.
 struct ProvedFactor<'a> {
     pencil: Pencil<'a>,
     factor: Cholesky<'a>,
@@ -112,10 +114,10 @@ struct ProvedFactor<'a> {
 impl<'a> ProvedFactor<'a> {
     /// `None` when A is not positive definite, or not by more than rounding.
     ///
-    /// If the Cholesky factorisation of a matrix with the diagonal d runs to its end, its factor is that of a matrix
-    /// whose entries differ by at most gamma sqrt(d_i d_j) with gamma = (k + 2) u and k entries in the row of L
-    /// (S. M. Rump, *Verification of positive definiteness*, BIT 46, 2006). Relative to D that is at most u times the
-    /// entries of L.
+    /// If the Cholesky factorisation of a matrix with the diagonal d runs to its end, its factor is that of a
+    /// matrix whose entries differ by at most gamma sqrt(d_i d_j) with gamma = (k + 2) u and k entries in the
+    /// row of L (S. M. Rump, *Verification of positive definiteness*, BIT 46, 2006). Relative to D that is at
+    /// most u times the entries of L.
     fn new(analysis: &'a Analysis, pencil: &Pencil<'a>, tau: f64, counters: &mut Counters) -> Option<Self> {
         let (k, m, block) = (pencil.stiffness(), pencil.mass(), pencil.block());
         let n = pencil.n();
@@ -264,12 +266,12 @@ impl Trial {
         trial
     }
 
-    /// Lehmann-Goerisch bounds of omega, ascending: lower ones for a shift s above, upper ones for a shift below. `None`
-    /// for all or for one when the trial vectors are not good enough.
+    /// Lehmann-Goerisch bounds of omega, ascending: lower ones for a shift s above, upper ones for a shift
+    /// below. `None` for all or for one when the trial vectors are not good enough.
     ///
-    /// For G_A = X'AX, G_M = X'MX and T >= X'M A^-1 M X, the eigenvalues kappa of
-    /// (G_A - s G_M) v = kappa (G_A - 2 s G_M + s^2 T) v give the bounds s - s / (1 - kappa). With R = A X - M X Omega,
-    /// Omega T Omega = G_M Omega + Omega G_M - G_A + R'A^-1 R, and R'A^-1 R <= m diag(|r_j|^2).
+    /// For G_A = X'AX, G_M = X'MX and T >= X'M A^-1 M X, the eigenvalues kappa of (G_A - s G_M) v = kappa
+    /// (G_A - 2 s G_M + s^2 T) v give the bounds s - s / (1 - kappa). With R = A X - M X Omega, Omega T Omega
+    /// = G_M Omega + Omega G_M - G_A + R'A^-1 R, and R'A^-1 R <= m diag(|r_j|^2).
     fn lehmann(&self, s: DoubleDouble, side: Side) -> Option<Vec<Option<DoubleDouble>>> {
         let count = self.omega.len();
         let sign = if side == Side::Above { -1.0 } else { 1.0 };

@@ -1,16 +1,17 @@
-//! A canonical basis inside repeated eigenvalues and canonical signs, so that the same body gives the same modes
-//! whatever path computed them.
+//! A canonical basis inside repeated eigenvalues and canonical signs, so that the same body gives the same
+//! modes whatever path computed them.
 
 use crate::numerics::linalg::combine;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
 use std::ops::Range;
 
-/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form together.
+/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form
+/// together.
 pub(super) const CLUSTER_GAP: f64 = 1e-9;
 
-/// Components within this part of the largest count as equally large; the first of them in row order is taken, so
-/// that rounding does not choose between symmetric nodes.
+/// Components within this part of the largest count as equally large; the first of them in row order is
+/// taken, so that rounding does not choose between symmetric nodes.
 const EQUAL: f64 = 1e-6;
 
 /// Index ranges of eigenvalues (ascending) whose neighbours differ by at most `gap` relative to their size.
@@ -28,8 +29,8 @@ pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
     ranges
 }
 
-/// Number of eigenvalues up to the end of the cluster that the last of the first `wanted` belongs to, clusters as [`clusters`]
-/// forms them of the `count` eigenvalues lambda(0), lambda(1), ...
+/// Number of eigenvalues up to the end of the cluster that the last of the first `wanted` belongs to,
+/// clusters as [`clusters`] forms them of the `count` eigenvalues lambda(0), lambda(1), ...
 pub(super) fn cluster_end(wanted: usize, count: usize, gap: f64, lambda: impl Fn(usize) -> f64) -> usize {
     let near = |i: usize| {
         let (below, above) = (lambda(i - 1), lambda(i));
@@ -41,8 +42,9 @@ pub(super) fn cluster_end(wanted: usize, count: usize, gap: f64, lambda: impl Fn
 
 /// Rotates the columns of each cluster into echelon form and fixes all signs.
 ///
-/// Within a cluster, the row with the largest norm is found and the columns are rotated so that only the first has
-/// a component there; then the same for the rest. Every column's component of largest magnitude is made positive.
+/// Within a cluster, the row with the largest norm is found and the columns are rotated so that only the
+/// first has a component there; then the same for the rest. Every column's component of largest magnitude is
+/// made positive.
 pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
     for cluster in clusters {
         let mut block = shapes.rb_mut().subcols_mut(cluster.start, cluster.len());
@@ -75,7 +77,8 @@ fn dominant_row(block: MatRef<'_, f64>) -> usize {
     squares.iter().position(|&s| s >= largest * (1.0 - EQUAL)).unwrap_or(0)
 }
 
-/// Applies the Householder reflection of the columns that leaves only the first one with a component in `row`.
+/// Applies the Householder reflection of the columns that leaves only the first one with a component in
+/// `row`.
 fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
     let k = block.ncols();
     let target: Vec<f64> = (0..k).map(|j| block[(row, j)]).collect();
@@ -83,7 +86,8 @@ fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
     if norm == 0.0 {
         return;
     }
-    // u = target + sign * norm * e1: H = I - 2 u u' / u'u maps target onto the first axis without cancellation.
+    // u = target + sign * norm * e1: H = I - 2 u u' / u'u maps target onto the first axis without
+    // cancellation.
     let mut u = target;
     u[0] += if u[0] < 0.0 { -norm } else { norm };
     let square = u.iter().map(|v| v * v).sum::<f64>();

@@ -1,5 +1,5 @@
-//! The proof that no mode is missed: by Sylvester's law the number of negative pivots of K - sigma M is the number of
-//! eigenvalues below sigma (M positive semidefinite).
+//! The proof that no mode is missed: by Sylvester's law the number of negative pivots of K - sigma M is the
+//! number of eigenvalues below sigma (M positive semidefinite).
 
 use super::counters::Counters;
 use super::failure::EigenFailure;
@@ -27,7 +27,8 @@ pub struct Completeness {
     pub shift: f64,
     /// Negative pivots of K - sigma M: rigid and flexible modes below sigma.
     pub negative_pivots: Option<usize>,
-    /// Flexible modes below sigma that were computed; those after the wanted ones complete a repeated eigenvalue.
+    /// Flexible modes below sigma that were computed; those after the wanted ones complete a repeated
+    /// eigenvalue.
     pub modes_below: usize,
     /// Why there is no proof; empty when there is one.
     pub remark: String,

@@ -1,6 +1,7 @@
 //! The work of a search in counts.
 
-/// Work done, independent of the machine: snapshotted in tests, so that a slower algorithm fails without timing.
+/// Work done, independent of the machine: snapshotted in tests, so that a slower algorithm fails without
+/// timing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
     /// Numeric factorisations (Cholesky and inertia counts).

@@ -12,7 +12,8 @@ use faer::{Mat, MatMut, Par};
 /// Scaled eigenvalues of Ms below this are zero: files with 10 digits leave less.
 const NULL: f64 = 1e-10;
 
-/// Number of finite eigenvalues of the pencil, rigid ones included: block * rank(Ms). `None`: Ms is indefinite.
+/// Number of finite eigenvalues of the pencil, rigid ones included: block * rank(Ms). `None`: Ms is
+/// indefinite.
 pub(super) fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
     let ms = dense(pencil.mass());
     let n = ms.nrows();
@@ -94,7 +95,8 @@ impl Spectrum {
     }
 }
 
-/// The largest ratio K_ii / M_ii: a Rayleigh quotient, hence a lower bound of the largest eigenvalue and close to it.
+/// The largest ratio K_ii / M_ii: a Rayleigh quotient, hence a lower bound of the largest eigenvalue and
+/// close to it.
 pub(super) fn highest_estimate(pencil: &Pencil<'_>) -> f64 {
     let k = pencil.stiffness().diagonal();
     let m = pencil.mass().diagonal();

@@ -43,8 +43,8 @@ pub(super) enum Attempt<R> {
     ShiftTooLarge(f64),
 }
 
-/// Searches with a factor in the precision of `T`, the first time from `start`, until the shift suits the modes. Returns the
-/// result and the shift.
+/// Searches with a factor in the precision of `T`, the first time from `start`, until the shift suits the
+/// modes. Returns the result and the shift.
 pub(super) fn with_suited_shift<T: Real, R>(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,

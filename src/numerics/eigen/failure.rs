@@ -12,8 +12,8 @@ pub enum EigenFailure {
         /// Modes asked for.
         wanted: usize,
     },
-    /// What a search with a single-precision factor came to, where double precision was not allowed or does not fit: often it
-    /// says nothing about the model.
+    /// What a search with a single-precision factor came to, where double precision was not allowed or does
+    /// not fit: often it says nothing about the model.
     SinglePrecision(Box<EigenFailure>),
     /// K + tau M is not positive definite: K or M is indefinite.
     NotPositiveDefinite {

@@ -7,18 +7,20 @@ use crate::numerics::linalg::{Solve, combine, gram, subtract_combination};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
-/// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not see: the rest is
-/// rounding of the product.
+/// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not
+/// see: the rest is rounding of the product.
 const UNSEEN: f64 = 1e-13;
 
-/// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is rounding.
+/// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is
+/// rounding.
 const VANISHED: f64 = 1e-13;
 
 /// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
-    /// Grows with the basis inside memory reserved for `capacity` columns: what is not reached is never touched.
+    /// Grows with the basis inside memory reserved for `capacity` columns: what is not reached is never
+    /// touched.
     v: Mat<f64>,
     capacity: usize,
     m: usize,
@@ -91,7 +93,8 @@ impl<'a> Krylov<'a> {
         self.t.as_ref().submatrix(0, 0, self.projected(), self.projected())
     }
 
-    /// Norms |B s_last| of the columns of S (projected x k): the M-norms of the Ritz residuals of the operator.
+    /// Norms |B s_last| of the columns of S (projected x k): the M-norms of the Ritz residuals of the
+    /// operator.
     pub(super) fn residual_norms(&self, s: MatRef<'_, f64>) -> Vec<f64> {
         let last = self.coupling.ncols();
         let tail = s.subrows(self.projected() - last, last);
@@ -99,9 +102,10 @@ impl<'a> Krylov<'a> {
         (0..s.ncols()).map(|j| r.col(j).norm_l2()).collect()
     }
 
-    /// OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected x k) with
-    /// values theta: one inverse iteration on them that needs no solve, because OP V = V T + V_fresh B E' holds already.
-    /// It damps what is left of higher modes, and removes what a singular M does not see of the basis.
+    /// OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected
+    /// x k) with values theta: one inverse iteration on them that needs no solve, because OP V = V T +
+    /// V_fresh B E' holds already. It damps what is left of higher modes, and removes what a singular M does
+    /// not see of the basis.
     pub(super) fn inverse_iterated(&self, s: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
         let (size, last) = (self.projected(), self.coupling.ncols());
         let residual = combine(self.coupling.as_ref(), s.subrows(size - last, last));
@@ -124,8 +128,8 @@ impl<'a> Krylov<'a> {
         self.push(block);
     }
 
-    /// Appends a deterministic random block of `width` columns, filtered by one application of the operator, which
-    /// removes what a singular M does not see.
+    /// Appends a deterministic random block of `width` columns, filtered by one application of the operator,
+    /// which removes what a singular M does not see.
     pub(super) fn append_random(&mut self, width: usize, counters: &mut Counters) {
         let n = self.problem.pencil.n();
         let seed = self.random;
@@ -181,7 +185,8 @@ impl<'a> Krylov<'a> {
         self.reach = 0;
     }
 
-    /// Ritz vectors V S (S: projected x k) with the newest block F behind them, and C of OP V S = V S Theta + F C.
+    /// Ritz vectors V S (S: projected x k) with the newest block F behind them, and C of OP V S = V S Theta +
+    /// F C.
     pub(super) fn state(&self, s: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
         let (size, k, last) = (self.projected(), s.ncols(), self.coupling.ncols());
         let coefficients = Mat::from_fn(self.m, k + self.fresh, |i, j| match (i < size, j < k) {
@@ -220,9 +225,10 @@ impl<'a> Krylov<'a> {
         self.m_fresh = block.mw;
     }
 
-    /// Two passes of: block Gram-Schmidt against the rigid modes and the basis, then column by column inside the block.
-    /// The first leaves out the columns before `reach`, where the operator leaves nothing but rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the first ends
-    /// orthogonal to rounding; only what is rounding altogether is dropped.
+    /// Two passes of: block Gram-Schmidt against the rigid modes and the basis, then column by column inside
+    /// the block. The first leaves out the columns before `reach`, where the operator leaves nothing but
+    /// rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the
+    /// first ends orthogonal to rounding; only what is rounding altogether is dropped.
     fn orthonormalise(&self, mut w: Mat<f64>, reach: usize, counters: &mut Counters) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
@@ -263,8 +269,9 @@ fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
     gram(w.as_ref().subcols(i, 1), mw.as_ref().subcols(j, 1))[(0, 0)]
 }
 
-/// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`] of
-/// their norm before are dropped, and those whose square does not exceed `unseen`. Returns T (new x old) with W_old = W_new T.
+/// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`]
+/// of their norm before are dropped, and those whose square does not exceed `unseen`. Returns T (new x old)
+/// with W_old = W_new T.
 fn gram_schmidt(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,

@@ -1,8 +1,8 @@
 //! Shift-invert block Lanczos with thick restart: the lowest flexible modes of a large pencil.
 //!
-//! The operator (K + tau M)^-1 M has the eigenvalues theta = 1 / (lambda + tau) and is self-adjoint in the M inner
-//! product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) keeps repeated
-//! eigenvalues complete up to what the later inertia count proves.
+//! The operator (K + tau M)^-1 M has the eigenvalues theta = 1 / (lambda + tau) and is self-adjoint in the M
+//! inner product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) keeps
+//! repeated eigenvalues complete up to what the later inertia count proves.
 
 use super::canonical::cluster_end;
 use super::counters::Counters;
@@ -18,9 +18,9 @@ use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Solve, SymmetricEigen, symmetric_eigen};
 use faer::Mat;
 
-/// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
-/// 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8. 4 is also one more than
-/// the copies of an eigenvalue that an isotropic cube has.
+/// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138
+/// with 6, 88 to 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8.
+/// 4 is also one more than the copies of an eigenvalue that an isotropic cube has.
 pub(super) const BLOCK: usize = 4;
 
 /// Restarts without which every model met so far converged, times ten.
@@ -35,8 +35,8 @@ const SAVED_AFTER: usize = 5;
 /// A first flexible eigenvalue below this part of the shift asks for a smaller shift: iterations grow.
 const SMALLEST_PART: f64 = 0.02;
 
-/// The shift stays above this part of the last eigenvalue wanted, however soft the first modes are: the last ones
-/// would lose as many digits. The refinement separates a few much softer modes.
+/// The shift stays above this part of the last eigenvalue wanted, however soft the first modes are: the last
+/// ones would lose as many digits. The refinement separates a few much softer modes.
 const DIGITS_PART: f64 = 1e-3;
 
 /// How a search ended.
@@ -62,8 +62,8 @@ pub(super) enum Search {
 /// Block steps after which the shift is judged: the lowest Ritz value is then near the first eigenvalue.
 const STEPS_TO_JUDGE: usize = 6;
 
-/// Judges the shift by the Ritz values so far, upper bounds of the eigenvalues: the shift to use instead when it is far
-/// too large for them; an error when there is no strain energy at all.
+/// Judges the shift by the Ritz values so far, upper bounds of the eigenvalues: the shift to use instead when
+/// it is far too large for them; an error when there is no strain energy at all.
 fn better_shift(
     problem: &EigenProblem<'_>,
     krylov: &Krylov<'_>,
@@ -142,8 +142,8 @@ pub(super) struct Goal {
     pub attempt: u64,
 }
 
-/// The lowest flexible modes: the basis is expanded and its Ritz pairs are tested until they are good enough to be handed over; a
-/// full basis is restarted from the best of them.
+/// The lowest flexible modes: the basis is expanded and its Ritz pairs are tested until they are good enough
+/// to be handed over; a full basis is restarted from the best of them.
 pub(super) fn lowest_modes(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
@@ -227,8 +227,8 @@ impl Ritz {
         self.norms[i] <= tolerance * self.theta[i]
     }
 
-    /// K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with M-norms for the
-    /// Euclidean ones.
+    /// K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with
+    /// M-norms for the Euclidean ones.
     fn estimate(&self, i: usize) -> f64 {
         let theta = self.theta[i];
         0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta).max(SMALLEST_PART))
@@ -265,7 +265,8 @@ impl<'a> Iteration<'a> {
         let mut krylov = Krylov::new(problem, factor, capacity);
         krylov.choose_random(1000 * goal.attempt);
         match start {
-            // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for any part of them.
+            // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for
+            // any part of them.
             Some(start) => {
                 let room = capacity.saturating_sub(start.coupling.nrows() + block);
                 let taken = start.eigenvalues.len().min(room);
@@ -320,8 +321,8 @@ impl<'a> Iteration<'a> {
         self.krylov.room() < self.goal.block
     }
 
-    /// Whether the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100 vectors or so not after
-    /// every step.
+    /// Whether the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100
+    /// vectors or so not after every step.
     fn is_test_due(&mut self) -> bool {
         let size = self.krylov.projected();
         let small = size < self.goal.wanted + 1 || size < self.tested + self.tested / 25;
@@ -364,7 +365,8 @@ impl<'a> Iteration<'a> {
         }
         let many = self.saved + SAVED_AFTER.max(self.goal.wanted / 4);
         if converged > 0 && !self.goal.rough && (converged >= many || ritz.all_there()) {
-            // All Ritz vectors: with a third of those that are no modes yet, 60 modes after 20 take 36 columns more.
+            // All Ritz vectors: with a third of those that are no modes yet, 60 modes after 20 take 36
+            // columns more.
             self.problem
                 .resume
                 .save(|| snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged)));
@@ -372,7 +374,8 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Hands the modes over when they are there and keep what was asked for; else more is asked of the estimates.
+    /// Hands the modes over when they are there and keep what was asked for; else more is asked of the
+    /// estimates.
     fn hand_over(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<Search>, EigenFailure> {
         if !ritz.all_there() {
             return Ok(None);
@@ -400,7 +403,8 @@ impl<'a> Iteration<'a> {
         Ok(None)
     }
 
-    /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better start anew.
+    /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better
+    /// start anew.
     ///
     /// # Errors
     /// [`EigenFailure::NotConverged`] when there is nothing left to search in, or after too many restarts.

@@ -1,4 +1,5 @@
-//! Rounding floors: how small a residual or an eigenvalue can be told from zero with the digits that are there.
+//! Rounding floors: how small a residual or an eigenvalue can be told from zero with the digits that are
+//! there.
 
 use crate::numerics::linalg::{SymmetricMatrix, sum_terms};
 use faer::{ColRef, Mat, MatRef};
@@ -6,8 +7,9 @@ use faer::{ColRef, Mat, MatRef};
 /// Unit roundoff of f64.
 const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
-/// For each column x of X: the standard deviation of x'Kx when every entry of K carries an independent relative
-/// error of `relative`: relative * sqrt(sum_ij (K_ij x_i x_j)^2), times sqrt(2) for the equal errors of symmetric pairs.
+/// For each column x of X: the standard deviation of x'Kx when every entry of K carries an independent
+/// relative error of `relative`: relative * sqrt(sum_ij (K_ij x_i x_j)^2), times sqrt(2) for the equal errors
+/// of symmetric pairs.
 pub fn energy_noise(k: &SymmetricMatrix, x: MatRef<'_, f64>, relative: f64) -> Vec<f64> {
     let relative = relative.max(ROUNDOFF);
     let terms = row_sums(k, x, |term| term * term);

@@ -24,7 +24,8 @@ pub struct Plan {
     pub proof_too_large: Option<(u64, u64)>,
 }
 
-/// Operations per second that estimates of time assume: what one processor does of the mixed work of a search.
+/// Operations per second that estimates of time assume: what one processor does of the mixed work of a
+/// search.
 const PACE: f64 = 4e9;
 
 /// Columns of the Krylov basis. Measured: five for each wanted mode.
@@ -32,15 +33,15 @@ fn basis_columns(wanted: usize) -> usize {
     (5 * wanted + 16).min(2 * wanted + 128)
 }
 
-/// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products, corrections, and
-/// the copy of the basis that a checkpoint is written from.
+/// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products,
+/// corrections, and the copy of the basis that a checkpoint is written from.
 fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
     let basis = basis_columns(wanted);
     let searched = basis + 4 * wanted + 24;
     let columns = match precision {
         Precision::Double => searched,
-        // A span of twice its first size, 1.5 for each wanted mode, and the corrections, all with both products; one more
-        // while they are combined.
+        // A span of twice its first size, 1.5 for each wanted mode, and the corrections, all with both
+        // products; one more while they are combined.
         Precision::Single => (searched + 2 * wanted).max(15 * wanted + 128),
     };
     let saved = if problem.resume.save.is_some() { basis } else { 0 };
@@ -59,8 +60,8 @@ fn made_of_them(n: usize, wanted: usize) -> u64 {
     8 * (80 * wanted * wanted + 3 * n * wanted)
 }
 
-/// About how long a search takes: solutions with the factor, orthogonalisation against the basis, restarts, and the products of
-/// all pairs of modes; on the dense path two decompositions.
+/// About how long a search takes: solutions with the factor, orthogonalisation against the basis, restarts,
+/// and the products of all pairs of modes; on the dense path two decompositions.
 fn seconds(n: usize, wanted: usize, factor: u64, dense: bool) -> f64 {
     let (rows, modes) = (n as f64, wanted as f64);
     let search = if dense {
@@ -98,7 +99,8 @@ impl Plan {
     /// Decides for `wanted` modes, which the dense path looks for or an iterative search.
     ///
     /// # Errors
-    /// [`EigenFailure::Memory`] when nothing fits; [`EigenFailure::TooLong`] when it would take longer than the settings allow.
+    /// [`EigenFailure::Memory`] when nothing fits; [`EigenFailure::TooLong`] when it would take longer than
+    /// the settings allow.
     pub(super) fn new(
         problem: &EigenProblem<'_>,
         settings: &EigenSettings,
@@ -178,9 +180,10 @@ impl std::fmt::Display for Plan {
     }
 }
 
-/// What a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given back and not yet
-/// taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its own, and buffers of the dense
-/// products (measured on models of 4 000 to 20 000 degrees of freedom: 42 to 52 MB on one thread, 50 to 90 MB on two).
+/// What a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given
+/// back and not yet taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its
+/// own, and buffers of the dense products (measured on models of 4 000 to 20 000 degrees of freedom: 42 to 52
+/// MB on one thread, 50 to 90 MB on two).
 fn resident(bytes: u64) -> u64 {
     bytes + bytes / 8 + 24_000_000 + 24_000_000 * rayon::current_num_threads() as u64
 }

@@ -1,4 +1,5 @@
-//! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals.
+//! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes,
+//! residuals.
 
 use super::counters::Counters;
 use super::failure::EigenFailure;
@@ -15,8 +16,9 @@ pub(super) struct Refined {
     pub floors: Vec<f64>,
 }
 
-/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the basis. With
-/// `correct`, one step of iterative refinement follows, which brings the residual of the solve to its rounding floor.
+/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the
+/// basis. With `correct`, one step of iterative refinement follows, which brings the residual of the solve to
+/// its rounding floor.
 fn inverse_iteration(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
@@ -47,8 +49,8 @@ fn inverse_iteration(
 /// Squared M-norm, relative to that of the columns, below which a direction of their span is only rounding.
 const DEPENDENT: f64 = 1e-8;
 
-/// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz vectors
-/// in ascending order of lambda. Directions in which X is dependent are left out.
+/// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz
+/// vectors in ascending order of lambda. Directions in which X is dependent are left out.
 pub(super) fn rayleigh_ritz(
     problem: &EigenProblem<'_>,
     mut x: Mat<f64>,
@@ -71,8 +73,8 @@ pub(super) fn rayleigh_ritz(
     Ok((values, combine(x.as_ref(), coefficients.as_ref())))
 }
 
-/// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram matrices
-/// with M and with K. Directions in which the basis is dependent are left out.
+/// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
+/// matrices with M and with K. Directions in which the basis is dependent are left out.
 pub(super) fn small_ritz(gm: Mat<f64>, gk: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
     // A column that nothing is left of spans nothing.
     let scale: Vec<f64> =
@@ -97,9 +99,9 @@ pub(super) fn small_ritz(gm: Mat<f64>, gk: Mat<f64>) -> Result<(Vec<f64>, Mat<f6
     Ok((ritz.values, coefficients))
 }
 
-/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be helped:
-/// rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as well as the node positions
-/// are known.
+/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be
+/// helped: rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as well as the
+/// node positions are known.
 pub(super) fn residuals(
     problem: &EigenProblem<'_>,
     eigenvalues: &[f64],
@@ -128,8 +130,8 @@ pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f6
     k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
 }
 
-/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros, NaN for one
-/// that is no number.
+/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros, NaN for
+/// one that is no number.
 pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
     let scale = residual_scale(k_psi, m_psi, lambda);
     if scale == 0.0 { 0.0 } else { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale }
@@ -151,19 +153,21 @@ impl Refined {
         Ok(Self { eigenvalues, vectors, residuals, floors })
     }
 
-    /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is higher.
+    /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is
+    /// higher.
     fn excess_of(&self, i: usize, tolerance: f64) -> f64 {
         self.residuals[i] / tolerance.max(self.floors[i])
     }
 
-    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors; NaN when one is no number.
+    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors; NaN when
+    /// one is no number.
     pub(super) fn excess(&self, tolerance: f64) -> f64 {
         largest((0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)))
     }
 }
 
-/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor, by at most three
-/// inverse iterations of those that do not.
+/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor, by at
+/// most three inverse iterations of those that do not.
 pub(super) fn refine(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,

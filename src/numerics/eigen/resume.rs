@@ -2,8 +2,9 @@
 
 use faer::Mat;
 
-/// A search as it stands: (K + tau M)^-1 M V = V Theta + F C with theta = 1 / (lambda + tau). It does not depend on how
-/// the factor was made, and a search for more modes, or for the same ones more accurately, goes on from it.
+/// A search as it stands: (K + tau M)^-1 M V = V Theta + F C with theta = 1 / (lambda + tau). It does not
+/// depend on how the factor was made, and a search for more modes, or for the same ones more accurately, goes
+/// on from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot {
     /// tau.
@@ -21,8 +22,8 @@ pub struct Snapshot {
 /// Takes a snapshot whenever modes have converged.
 pub type Save<'a> = &'a (dyn Fn(&Snapshot) + Sync);
 
-/// Where a search starts, and who keeps how far it came. Neither changes what a result promises: residuals and
-/// completeness are those of the outcome, whatever the start was.
+/// Where a search starts, and who keeps how far it came. Neither changes what a result promises: residuals
+/// and completeness are those of the outcome, whatever the start was.
 #[derive(Clone, Copy, Default)]
 pub struct Resume<'a> {
     /// An earlier search on the same pencil; one that does not fit the pencil is left aside.

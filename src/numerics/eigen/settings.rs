@@ -16,8 +16,8 @@ pub enum Accuracy {
     Fast,
     /// K-residual 1e-9 or the rounding floor of the matrices; completeness proved.
     Standard,
-    /// K-residual 1e-12 or the rounding floor; completeness proved from both sides; guaranteed bounds of every eigenvalue
-    /// and, in a conversion, of the invariants.
+    /// K-residual 1e-12 or the rounding floor; completeness proved from both sides; guaranteed bounds of
+    /// every eigenvalue and, in a conversion, of the invariants.
     Certified,
 }
 
@@ -63,11 +63,13 @@ pub struct EigenSettings {
     pub method: Method,
     /// Precision of the factor.
     pub factor: FactorChoice,
-    /// Multiplications and additions of a factorisation above which [`FactorChoice::Auto`] tries single precision for its speed.
+    /// Multiplications and additions of a factorisation above which [`FactorChoice::Auto`] tries single
+    /// precision for its speed.
     pub single_pays: f64,
     /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
     pub memory: Option<u64>,
-    /// Seconds that the search may take by its estimate, without the factorisation; `None`: as many as it needs.
+    /// Seconds that the search may take by its estimate, without the factorisation; `None`: as many as it
+    /// needs.
     pub longest: Option<f64>,
 }
 
@@ -97,7 +99,8 @@ impl Default for EigenSettings {
 pub enum Precision {
     /// f64.
     Double,
-    /// f32, with all residuals and projections in f64: half the memory, and half the time where factorisation dominates.
+    /// f32, with all residuals and projections in f64: half the memory, and half the time where factorisation
+    /// dominates.
     Single,
 }
 
@@ -114,13 +117,15 @@ impl Precision {
 /// What the user says about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FactorChoice {
-    /// Single where double does not fit the memory, or where it is faster; back to double where conditioning defeats it.
+    /// Single where double does not fit the memory, or where it is faster; back to double where conditioning
+    /// defeats it.
     Auto,
     /// This one.
     Always(Precision),
 }
 
-/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the estimate).
+/// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the
+/// estimate).
 pub(super) fn keeps(residual: f64, floor: f64, tolerance: f64) -> bool {
     residual <= tolerance.max(30.0 * floor)
 }

@@ -1,10 +1,11 @@
-//! Modes with a single-precision factor: Lanczos on the operator that it makes, then corrections against the true K
-//! and M in double precision until the true residuals keep the tolerance (a block Davidson method: Davidson, J. Comput.
-//! Phys. 17 (1975) 87, with the factor as preconditioner).
+//! Modes with a single-precision factor: Lanczos on the operator that it makes, then corrections against the
+//! true K and M in double precision until the true residuals keep the tolerance (a block Davidson method:
+//! Davidson, J. Comput. Phys. 17 (1975) 87, with the factor as preconditioner).
 //!
-//! The factor T of K + tau M is good to about 1e-7 times its condition, so that Lanczos finds the modes to 1e-2 or
-//! 1e-4. A correction T r of the residual r = K x - lambda M x, with Rayleigh-Ritz on all that is there, gains as many
-//! digits again for one solved column, where refining every solve of Lanczos would cost several.
+//! The factor T of K + tau M is good to about 1e-7 times its condition, so that Lanczos finds the modes to
+//! 1e-2 or 1e-4. A correction T r of the residual r = K x - lambda M x, with Rayleigh-Ritz on all that is
+//! there, gains as many digits again for one solved column, where refining every solve of Lanczos would cost
+//! several.
 
 use super::canonical::cluster_end;
 use super::counters::Counters;
@@ -21,13 +22,15 @@ use crate::numerics::linalg::{
 };
 use faer::{Mat, MatRef};
 
-/// Columns per step of Lanczos: as many as the solves take together, since with single precision four cost the same.
+/// Columns per step of Lanczos: as many as the solves take together, since with single precision four cost
+/// the same.
 const BLOCK: usize = 8;
 
 /// Ritz residual at which Lanczos hands over: more steps find no modes that the factor's error does not hide.
 const HANDED_OVER: f64 = 1e-4;
 
-/// Residual of the first mode beyond the wanted ones: its eigenvalue, good to the square, bounds the gap of the count.
+/// Residual of the first mode beyond the wanted ones: its eigenvalue, good to the square, bounds the gap of
+/// the count.
 const BEYOND: f64 = 1e-3;
 
 /// Corrections before single precision is given up.
@@ -36,7 +39,8 @@ const MAX_ROUNDS: usize = 30;
 /// Rounds in a row that gain less than a factor of two before it is given up.
 const PATIENCE: usize = 6;
 
-/// The lowest modes, eigenvalues beyond them, and the shift; or the reason why single precision does not find them.
+/// The lowest modes, eigenvalues beyond them, and the shift; or the reason why single precision does not find
+/// them.
 pub(super) fn search(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
@@ -87,7 +91,8 @@ impl Span {
         }
     }
 
-    /// Replaces the vectors by combinations of them and of others, `coefficients` first of its own, then of the others.
+    /// Replaces the vectors by combinations of them and of others, `coefficients` first of its own, then of
+    /// the others.
     fn combine_with(&mut self, other: &Self, coefficients: MatRef<'_, f64>) {
         let (own, others) = coefficients.split_at_row(self.x.ncols());
         for (mine, theirs) in [(&mut self.x, &other.x), (&mut self.kx, &other.kx), (&mut self.mx, &other.mx)]
@@ -99,7 +104,8 @@ impl Span {
     }
 }
 
-/// A span of vectors that is corrected until its lowest Ritz pairs keep the tolerance, and the end of their cluster is seen.
+/// A span of vectors that is corrected until its lowest Ritz pairs keep the tolerance, and the end of their
+/// cluster is seen.
 struct Correction<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
@@ -110,7 +116,8 @@ struct Correction<'a> {
     /// Ritz vectors, and their values, ascending.
     span: Span,
     lambda: Vec<f64>,
-    /// The span keeps earlier corrections until it has twice this size: with them the last modes take half the columns.
+    /// The span keeps earlier corrections until it has twice this size: with them the last modes take half
+    /// the columns.
     base: usize,
     /// Modes wanted, to the end of the cluster of the last one.
     wanted: usize,

@@ -22,7 +22,8 @@ pub struct EigenvalueBounds {
 }
 
 impl EigenvalueBounds {
-    /// Moves eigenvalues that lie outside of their bounds onto them: the bounds know more digits than a projection in f64.
+    /// Moves eigenvalues that lie outside of their bounds onto them: the bounds know more digits than a
+    /// projection in f64.
     pub(super) fn clamp(&self, eigenvalues: &mut [f64]) {
         for ((lambda, lower), upper) in eigenvalues.iter_mut().zip(&self.lower).zip(&self.upper) {
             *lambda = lambda.clamp(*lower, *upper);
@@ -47,7 +48,8 @@ pub struct EigenSolution {
     pub plan: Option<Plan>,
     /// Bounds of the eigenvalues, at [`Accuracy::Certified`].
     pub bounds: Option<EigenvalueBounds>,
-    /// Eigenvalues that were computed beyond the last mode given, at least loosely (for cluster and gap decisions).
+    /// Eigenvalues that were computed beyond the last mode given, at least loosely (for cluster and gap
+    /// decisions).
     pub next_eigenvalue: Option<f64>,
     /// Number of flexible modes with a finite eigenvalue, where it is known (dense path).
     pub finite_modes: Option<usize>,
@@ -58,7 +60,8 @@ pub struct EigenSolution {
 }
 
 impl EigenSolution {
-    /// How many of the modes, wherever they come from, are eigenvectors to the K-residual of `accuracy` or to rounding.
+    /// How many of the modes, wherever they come from, are eigenvectors to the K-residual of `accuracy` or to
+    /// rounding.
     pub fn eigenvectors(&self, accuracy: Accuracy) -> usize {
         let pairs = self.residuals.iter().zip(&self.rounding_floors);
         pairs.filter(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()

@@ -30,11 +30,12 @@ const DENSE_AT_MOST: usize = 9000;
 /// Part of all modes beyond which the dense path does less work than a Krylov basis of twice that size.
 const DENSE_PART: f64 = 0.2;
 
-/// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one: a digit.
+/// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one:
+/// a digit.
 const FAR: f64 = 0.1;
 
-/// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies mixes their
-/// residuals, up to the root of m times the largest.
+/// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies
+/// mixes their residuals, up to the root of m times the largest.
 const SEARCHED: f64 = 0.4;
 
 /// Computes the wanted flexible modes.
@@ -122,8 +123,8 @@ fn is_dense(problem: &EigenProblem<'_>, settings: &EigenSettings, wanted: usize)
     }
 }
 
-/// The proof that no mode is missing; where one is, it is searched for once more, from other directions and for as many modes as
-/// there are.
+/// The proof that no mode is missing; where one is, it is searched for once more, from other directions and
+/// for as many modes as there are.
 fn complete(
     sparse: &mut Sparse<'_>,
     mut search: Search,
@@ -188,8 +189,8 @@ fn search_densely(
     let end =
         |spectrum: &dense::Spectrum| cluster_end(wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
     let mut last = end(&spectrum);
-    // Far above the wanted modes a shift crowds them together, which costs the digits by which they differ. Once it is known
-    // where they are, another is placed between them, if that matrix can be factored.
+    // Far above the wanted modes a shift crowds them together, which costs the digits by which they differ.
+    // Once it is known where they are, another is placed between them, if that matrix can be factored.
     let highest = if last > 0 { spectrum.eigenvalue(last - 1) } else { mean };
     let among = dense::shift(problem.first_estimate.min(highest), highest);
     if among < FAR * mean
@@ -223,7 +224,8 @@ struct Sparse<'a> {
 }
 
 impl Sparse<'_> {
-    /// Searches with the factor of the plan; from single precision back to double where it fails, if that fits.
+    /// Searches with the factor of the plan; from single precision back to double where it fails, if that
+    /// fits.
     fn search(
         &mut self,
         wanted: usize,

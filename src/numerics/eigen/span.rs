@@ -1,5 +1,5 @@
-//! Modes of a given subspace: Rayleigh-Ritz, canonical form, residuals as they are, and the count for those that turn
-//! out to be eigenvectors. Nothing is factored unless that count is made.
+//! Modes of a given subspace: Rayleigh-Ritz, canonical form, residuals as they are, and the count for those
+//! that turn out to be eigenvectors. Nothing is factored unless that count is made.
 
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
@@ -16,19 +16,20 @@ use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, is_positive_semidefinite};
 use faer::Mat;
 
-/// Distance of the count's shift from the last eigenvector, relative to its eigenvalue: the second is tried where the
-/// first counts too many, which may lie beyond the modes that were given.
+/// Distance of the count's shift from the last eigenvector, relative to its eigenvalue: the second is tried
+/// where the first counts too many, which may lie beyond the modes that were given.
 const ABOVE: [f64; 2] = [1e-3, 1e-5];
 
-/// The modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors, M-orthogonal to the
-/// rigid modes, ascending.
+/// The modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors,
+/// M-orthogonal to the rigid modes, ascending.
 ///
-/// They are eigenvectors only as far as their residuals say. Where the lowest of them keep the K-residual of the
-/// accuracy, an inertia count says whether modes are missing below the last such; accuracy `fast` leaves it out.
+/// They are eigenvectors only as far as their residuals say. Where the lowest of them keep the K-residual of
+/// the accuracy, an inertia count says whether modes are missing below the last such; accuracy `fast` leaves
+/// it out.
 ///
 /// # Errors
-/// [`EigenFailure`]: dependent columns, an indefinite matrix, a mechanism; at [`Accuracy::Certified`] also where a mode is no
-/// eigenvector or one is missing.
+/// [`EigenFailure`]: dependent columns, an indefinite matrix, a mechanism; at [`Accuracy::Certified`] also
+/// where a mode is no eigenvector or one is missing.
 pub fn modes_of_span(
     problem: &EigenProblem<'_>,
     basis: Mat<f64>,

@@ -12,13 +12,14 @@ const ORTHONORMAL: f64 = 1e-9;
 /// Largest relative difference of lambda and the Rayleigh quotient of a converged mode.
 const SAME_EIGENVALUE: f64 = 1e-6;
 
-/// The start of a search, where there is one that fits the problem. A repeated search (`attempt` > 0) has none: it must
-/// not start from the directions that led to a wrong count.
+/// The start of a search, where there is one that fits the problem. A repeated search (`attempt` > 0) has
+/// none: it must not start from the directions that led to a wrong count.
 pub(super) fn fitting_start<'a>(problem: &EigenProblem<'a>, attempt: u64) -> Option<&'a Snapshot> {
     problem.resume.start.filter(|snapshot| attempt == 0 && fits(problem, snapshot))
 }
 
-/// The shift that an iterative search begins with: that of its start, or a part of the upper bound of the first eigenvalue.
+/// The shift that an iterative search begins with: that of its start, or a part of the upper bound of the
+/// first eigenvalue.
 pub(super) fn first_shift(problem: &EigenProblem<'_>, start: Option<&Snapshot>) -> f64 {
     start.map_or(0.3 * problem.first_estimate, |start| start.shift)
 }

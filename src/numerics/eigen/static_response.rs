@@ -1,5 +1,5 @@
-//! Static responses of the free body: x = K^+ f on the M-orthogonal complement of given modes, by conjugate gradients
-//! that the factor of K + tau M preconditions.
+//! Static responses of the free body: x = K^+ f on the M-orthogonal complement of given modes, by conjugate
+//! gradients that the factor of K + tau M preconditions.
 
 use super::counters::Counters;
 use super::factorise::factorise;
@@ -12,7 +12,8 @@ use crate::numerics::linalg::{
 };
 use faer::{Mat, MatRef};
 
-/// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of six in each.
+/// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of
+/// six in each.
 const ITERATIONS: usize = 40;
 
 /// How accurate responses are to be.
@@ -33,10 +34,12 @@ impl ResponseAccuracy {
     pub const ROUGH: Self = Self { cycles: 1, reached: 1e-5, accepted: 1e-2 };
 }
 
-/// For each load (column of `loads`, N x m) the part of K^+ f that `modes` do not have: with P = \[R, Psi\] of rigid modes and
-/// eigenvectors (`modes` M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are thereby self-equilibrated (inertia relief).
+/// For each load (column of `loads`, N x m) the part of K^+ f that `modes` do not have: with P = \[R, Psi\]
+/// of rigid modes and eigenvectors (`modes` M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are
+/// thereby self-equilibrated (inertia relief).
 ///
-/// `first` is the first flexible eigenvalue, the scale of the shift. Without rigid modes and `modes` (a body that is held) x = K^-1 f.
+/// `first` is the first flexible eigenvalue, the scale of the shift. Without rigid modes and `modes` (a body
+/// that is held) x = K^-1 f.
 ///
 /// # Errors
 /// Failures of the factorisation; [`EigenFailure::Inaccurate`] with the residual of a response.
@@ -53,7 +56,8 @@ pub fn static_responses(
     with_responses(problem, modes, first, precision, accuracy, counters, respond)
 }
 
-/// The responses of a body that is held, K^-1 f, and with the same factor those to further loads that these responses tell.
+/// The responses of a body that is held, K^-1 f, and with the same factor those to further loads that these
+/// responses tell.
 ///
 /// # Errors
 /// As [`static_responses`].

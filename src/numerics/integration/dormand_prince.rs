@@ -1,5 +1,6 @@
-//! Coefficients of the method of Dormand and Prince of order 8 with estimates of order 5 and 3 and interpolation of order 7
-//! (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, second edition, II.5 and II.6; DOP853).
+//! Coefficients of the method of Dormand and Prince of order 8 with estimates of order 5 and 3 and
+//! interpolation of order 7 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, second
+//! edition, II.5 and II.6; DOP853).
 
 /// Stages of a step; one more is the rate at its end, three more interpolate.
 pub(super) const STAGES: usize = 12;

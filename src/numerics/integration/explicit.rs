@@ -13,12 +13,12 @@ const GROW: f64 = 6.0;
 /// Steps below this part of the time do not move it.
 const SMALLEST: f64 = 16.0 * f64::EPSILON;
 
-/// The method of Dormand and Prince of order 8 with control of the step, DOP853 of Hairer, Norsett and Wanner (Solving Ordinary
-/// Differential Equations I, II.5 and II.10), and their interpolation of order 7.
+/// The method of Dormand and Prince of order 8 with control of the step, DOP853 of Hairer, Norsett and Wanner
+/// (Solving Ordinary Differential Equations I, II.5 and II.10), and their interpolation of order 7.
 ///
-/// A step is taken when the root mean square over the entries of error / scale is at most the tolerance, the error being
-/// h e5^2 / sqrt(e5^2 + 0.01 e3^2) of the embedded solutions of order 5 and 3. Undamped oscillations are stable up to about
-/// h omega = 6, which the control finds by itself.
+/// A step is taken when the root mean square over the entries of error / scale is at most the tolerance, the
+/// error being h e5^2 / sqrt(e5^2 + 0.01 e3^2) of the embedded solutions of order 5 and 3. Undamped
+/// oscillations are stable up to about h omega = 6, which the control finds by itself.
 #[derive(Debug, Clone)]
 pub struct Explicit {
     tolerance: f64,
@@ -40,7 +40,8 @@ pub struct Explicit {
 }
 
 impl Explicit {
-    /// Steps of at most `longest` for `dimension` entries whose error is kept below `tolerance` times the scales of the system.
+    /// Steps of at most `longest` for `dimension` entries whose error is kept below `tolerance` times the
+    /// scales of the system.
     ///
     /// # Panics
     /// When the tolerance or the longest step is not positive.

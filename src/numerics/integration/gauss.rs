@@ -11,15 +11,16 @@ const MOST_CORRECTIONS: usize = 100;
 /// Corrections below this part of the scales have reached rounding when they no longer shrink.
 const NEAR_ROUNDING: f64 = 1e-9;
 
-/// What is left of the stages, in scales: so far below rounding that it does not add up over millions of steps.
+/// What is left of the stages, in scales: so far below rounding that it does not add up over millions of
+/// steps.
 const SOLVED: f64 = 1e-20;
 
-/// Collocation at Gauss points (Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3): order 2 (the implicit midpoint rule), 4
-/// or 6 with steps of one length.
+/// Collocation at Gauss points (Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3): order 2
+/// (the implicit midpoint rule), 4 or 6 with steps of one length.
 ///
-/// The methods are symmetric, symplectic and keep quadratic invariants, and stable for every step. Stages are solved down to rounding,
-/// by iterations that treat the [`Oscillator`]s of the system exactly; increments are summed with compensation, so that rounding
-/// does not drift over millions of steps.
+/// The methods are symmetric, symplectic and keep quadratic invariants, and stable for every step. Stages are
+/// solved down to rounding, by iterations that treat the [`Oscillator`]s of the system exactly; increments
+/// are summed with compensation, so that rounding does not drift over millions of steps.
 #[derive(Debug, Clone)]
 pub struct Gauss {
     tableau: Box<Tableau>,
@@ -110,12 +111,14 @@ impl Gauss {
         }
     }
 
-    /// The same with stages that are solved until what is left of them is below `solved` in scales, instead of down to rounding.
+    /// The same with stages that are solved until what is left of them is below `solved` in scales, instead
+    /// of down to rounding.
     pub fn solved_to(self, solved: f64) -> Self {
         Self { solved, ..self }
     }
 
-    /// The same with every step of an integration divided into so many: at the ends of the steps before they meet again.
+    /// The same with every step of an integration divided into so many: at the ends of the steps before they
+    /// meet again.
     pub fn refined(self, refinement: u32) -> Self {
         Self { refinement: refinement.max(1), ..self }
     }
@@ -139,7 +142,8 @@ impl Gauss {
     /// Takes a step of `h` from `time`. It goes on from the last one unless [`Gauss::restart`] was called.
     ///
     /// # Errors
-    /// [`Failure::NotConverged`] where the step is too long for what the oscillators leave to the iteration, or what the system says.
+    /// [`Failure::NotConverged`] where the step is too long for what the oscillators leave to the iteration,
+    /// or what the system says.
     ///
     /// # Panics
     /// When the state has another number of entries.
@@ -209,7 +213,8 @@ impl Gauss {
         let a = nalgebra::DMatrix::from_fn(n, n, |i, j| h * self.tableau.weights[i][j]);
         let matrix =
             nalgebra::DMatrix::identity(n, n) + &a * oscillator.damping + &a * (&a * oscillator.stiffness);
-        // The eigenvalues of A lie in the right half plane: regular for every damped oscillator; else it is left to the iteration.
+        // The eigenvalues of A lie in the right half plane: regular for every damped oscillator; else it is
+        // left to the iteration.
         let inverse = matrix.try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
         std::array::from_fn(|i| std::array::from_fn(|j| if i < n && j < n { inverse[(i, j)] } else { 0.0 }))
     }

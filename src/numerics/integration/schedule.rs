@@ -52,9 +52,9 @@ pub enum Sight {
     Within,
 }
 
-/// Integrates from the first to the last of `instants` and shows the state at every one to `observe`, which may end the integration
-/// by returning an error. The steps do not depend on the instants between: within a step the explicit method interpolates, and the
-/// method of Gauss takes a shorter step aside.
+/// Integrates from the first to the last of `instants` and shows the state at every one to `observe`, which
+/// may end the integration by returning an error. The steps do not depend on the instants between: within a
+/// step the explicit method interpolates, and the method of Gauss takes a shorter step aside.
 ///
 /// * `state`: y at the first instant; afterwards, y at the last.
 /// * `instants`: ascending.
@@ -79,9 +79,9 @@ pub fn integrate<E: From<Failure>>(
     })
 }
 
-/// As [`integrate`], and shows besides the instants the state at the start, at the end of every step, at both sides of every break and, of
-/// the explicit method, at `parts` - 1 places within every step that divide it evenly. Times never descend; an instant at one of these
-/// places is shown twice.
+/// As [`integrate`], and shows besides the instants the state at the start, at the end of every step, at both
+/// sides of every break and, of the explicit method, at `parts` - 1 places within every step that divide it
+/// evenly. Times never descend; an instant at one of these places is shown twice.
 ///
 /// # Errors
 /// As [`integrate`].
@@ -194,7 +194,8 @@ fn explicit_piece<E: From<Failure>>(
     Ok(())
 }
 
-/// Integrates over a stretch in equal steps of the method of Gauss; an instant within a step is reached by a shorter step aside.
+/// Integrates over a stretch in equal steps of the method of Gauss; an instant within a step is reached by a
+/// shorter step aside.
 fn gauss_piece<E: From<Failure>>(
     method: &mut Gauss,
     longest: f64,

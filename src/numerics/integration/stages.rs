@@ -5,8 +5,9 @@ use nalgebra::{Complex, DMatrix};
 /// Stages of the method of the highest order here.
 pub const STAGES: usize = 3;
 
-/// An eigenvalue mu of the matrix A of the method, with its part of every stage: sum over all of them of right_i mu left_j = A_ij. Of a pair of
-/// conjugate ones only that above the real axis is told, and its part counts with twice its real part.
+/// An eigenvalue mu of the matrix A of the method, with its part of every stage: sum over all of them of
+/// right_i mu left_j = A_ij. Of a pair of conjugate ones only that above the real axis is told, and its part
+/// counts with twice its real part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageMode {
     /// mu: to the right of the imaginary axis, mu^2 too.

@@ -10,25 +10,27 @@ pub trait System {
     /// f(t, y).
     ///
     /// # Errors
-    /// [`Failure::Rates`] where the equations have no solution at this state; an integrator with error control then tries a shorter
-    /// step.
+    /// [`Failure::Rates`] where the equations have no solution at this state; an integrator with error
+    /// control then tries a shorter step.
     fn rates(&mut self, time: f64, state: &[f64], rates: &mut [f64]) -> Result<(), Failure>;
 
-    /// What an error of each entry is measured against at this state: all positive, in the units of the entry. A tolerance is the largest
-    /// root mean square of error / scale that a step may add.
+    /// What an error of each entry is measured against at this state: all positive, in the units of the
+    /// entry. A tolerance is the largest root mean square of error / scale that a step may add.
     fn scales(&self, state: &[f64], scales: &mut [f64]);
 
-    /// The stiff part of the system that implicit steps solve without iterating; none unless the system knows one.
+    /// The stiff part of the system that implicit steps solve without iterating; none unless the system knows
+    /// one.
     fn oscillators(&self) -> &[Oscillator] {
         &[]
     }
 
-    /// Sees what the stages of an implicit step of length h lack, `lacks`, through a stiff linear part J of the system that is solved as a
-    /// whole: replaces it by (I - h A kron J)^-1 `lacks`, with the matrix A of the method given by its eigenvalues. Nothing unless the system
-    /// has such a part.
+    /// Sees what the stages of an implicit step of length h lack, `lacks`, through a stiff linear part J of
+    /// the system that is solved as a whole: replaces it by (I - h A kron J)^-1 `lacks`, with the matrix A of
+    /// the method given by its eigenvalues. Nothing unless the system has such a part.
     ///
-    /// Returns the root mean square of the corrections over the stages in a norm of the system's own, relative to the motion, where its scales,
-    /// entry by entry, would count as much what is stiff as what is soft and is known less closely; else `None`.
+    /// Returns the root mean square of the corrections over the stages in a norm of the system's own,
+    /// relative to the motion, where its scales, entry by entry, would count as much what is stiff as what is
+    /// soft and is known less closely; else `None`.
     ///
     /// # Errors
     /// Where that cannot be solved.
@@ -46,7 +48,8 @@ pub trait System {
     fn settle(&self, _state: &mut [f64]) {}
 }
 
-/// A pair of entries with x' = p + ... and p' = -stiffness x - damping p + ..., where the rest varies slowly or little.
+/// A pair of entries with x' = p + ... and p' = -stiffness x - damping p + ..., where the rest varies slowly
+/// or little.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Oscillator {
     /// Index of x.

@@ -1,10 +1,10 @@
-//! Elimination order and structure of the factor: supernodes on the graph with one vertex per node of the model, found
-//! once for every shift. Positions are places in the elimination order, counted in vertices.
+//! Elimination order and structure of the factor: supernodes on the graph with one vertex per node of the
+//! model, found once for every shift. Positions are places in the elimination order, counted in vertices.
 //!
-//! The structure of column j is that of the matrix below the diagonal, united with those of its children in the
-//! elimination tree without j (Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134). Columns of equal structure form
-//! supernodes; small ones are amalgamated with their parents, where few explicit zeros buy larger dense blocks
-//! (Ashcraft and Grimes, ACM TOMS 15 (1989) 291, with the thresholds of CHOLMOD).
+//! The structure of column j is that of the matrix below the diagonal, united with those of its children in
+//! the elimination tree without j (Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134). Columns of equal structure
+//! form supernodes; small ones are amalgamated with their parents, where few explicit zeros buy larger dense
+//! blocks (Ashcraft and Grimes, ACM TOMS 15 (1989) 291, with the thresholds of CHOLMOD).
 
 use std::ops::Range;
 

@@ -1,10 +1,10 @@
 //! Double-double arithmetic: a number as the unevaluated sum of two, with 106 bits.
 //!
-//! Own code and not the crate `twofloat`: the same sums there take six times as long, because its products call the
-//! fused multiply-add as a function and its sums do not vectorise. Algorithms and error bounds: M. Joldes,
-//! J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building blocks of double-word arithmetic*,
-//! ACM Trans. Math. Softw. 44 (2017). With u = 2^-53, relative errors are at most 3 u^2 for a sum, 4 u^2 for a
-//! product, 15 u^2 for a quotient, as long as nothing over- or underflows.
+//! Own code and not the crate `twofloat`: the same sums there take six times as long, because its products
+//! call the fused multiply-add as a function and its sums do not vectorise. Algorithms and error bounds: M.
+//! Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building blocks of
+//! double-word arithmetic*, ACM Trans. Math. Softw. 44 (2017). With u = 2^-53, relative errors are at most 3
+//! u^2 for a sum, 4 u^2 for a product, 15 u^2 for a quotient, as long as nothing over- or underflows.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -162,7 +162,8 @@ pub fn accumulate_pair<const W: usize>(
     }
 }
 
-/// Runs `work` compiled for the instructions that this processor has. The bits are the same on every processor.
+/// Runs `work` compiled for the instructions that this processor has. The bits are the same on every
+/// processor.
 pub fn with_fma<R>(work: impl FnOnce() -> R) -> R {
     struct Work<F>(F);
     impl<R, F: FnOnce() -> R> pulp::NullaryFnOnce for Work<F> {

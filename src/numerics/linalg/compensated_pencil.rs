@@ -8,12 +8,13 @@ const SWEEPS: usize = 30;
 /// Off-diagonal entries below this part of the diagonal are zero.
 const ZERO: f64 = 1e-33;
 
-/// Eigenvalues kappa of P x = kappa Q x, ascending, for P and Q symmetric positive definite and scaled so that their
-/// diagonals dominate. Rows of full matrices. `None` when they are not positive definite or not finite.
+/// Eigenvalues kappa of P x = kappa Q x, ascending, for P and Q symmetric positive definite and scaled so
+/// that their diagonals dominate. Rows of full matrices. `None` when they are not positive definite or not
+/// finite.
 ///
-/// Cholesky of Q, then Jacobi on L^-1 P L^-T. For such matrices both are accurate relative to every single eigenvalue
-/// (J. Demmel, K. Veselic, *Jacobi's method is more accurate than QR*, SIAM J. Matrix Anal. Appl. 13, 1992): the
-/// relative error is a small multiple of the order of the pencil times 2^-106.
+/// Cholesky of Q, then Jacobi on L^-1 P L^-T. For such matrices both are accurate relative to every single
+/// eigenvalue (J. Demmel, K. Veselic, *Jacobi's method is more accurate than QR*, SIAM J. Matrix Anal. Appl.
+/// 13, 1992): the relative error is a small multiple of the order of the pencil times 2^-106.
 pub fn small_pencil_eigenvalues(
     mut p: Vec<Vec<DoubleDouble>>,
     q: &[Vec<DoubleDouble>],

@@ -26,9 +26,9 @@ pub struct SymmetricEigen {
 /// Eigenvalues and eigenvectors of the symmetric matrix whose lower triangle is that of `a`; `None` when the
 /// iteration does not converge or the matrix has non-finite entries.
 ///
-/// faer's divide and conquer (0.24.4) returns eigenvectors that are wrong by up to 1e-3 on matrices with clustered or
-/// strongly graded spectra, which is what a Krylov basis makes: every decomposition is verified, and the QR
-/// iteration takes over where it fails.
+/// faer's divide and conquer (0.24.4) returns eigenvectors that are wrong by up to 1e-3 on matrices with
+/// clustered or strongly graded spectra, which is what a Krylov basis makes: every decomposition is verified,
+/// and the QR iteration takes over where it fails.
 pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
     let n = a.nrows();
     if n == 0 {
@@ -65,8 +65,8 @@ fn decompose(a: &Mat<f64>, params: SelfAdjointEvdParams) -> Option<SymmetricEige
     Some(SymmetricEigen { values: values.iter().copied().collect(), vectors })
 }
 
-/// Lower Cholesky factor of the dense symmetric matrix whose lower triangle is that of `a`; `None` when it is not
-/// positive definite.
+/// Lower Cholesky factor of the dense symmetric matrix whose lower triangle is that of `a`; `None` when it is
+/// not positive definite.
 pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     let params = <LltParams as Auto<f64>>::auto().into();
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, params));
@@ -116,7 +116,8 @@ pub fn solve_upper(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
 mod tests {
     use super::*;
 
-    /// Spectra over 14 decades in triples: the divide and conquer of faer 0.24.4 loses ten digits on such matrices.
+    /// Spectra over 14 decades in triples: the divide and conquer of faer 0.24.4 loses ten digits on such
+    /// matrices.
     #[test]
     fn graded_and_clustered_spectra_keep_their_backward_error() {
         for n in [5, 130, 210] {

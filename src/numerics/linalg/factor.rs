@@ -1,5 +1,5 @@
-//! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu, SIAM
-//! Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
+//! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu,
+//! SIAM Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
 
 use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
@@ -79,8 +79,8 @@ impl Analysis {
         self.tree.places(s).iter().flat_map(rows).collect()
     }
 
-    /// K - sigma M, scaled to a diagonal of about one by powers of two: exact, and within the range of single precision
-    /// in any units.
+    /// K - sigma M, scaled to a diagonal of about one by powers of two: exact, and within the range of single
+    /// precision in any units.
     pub(super) fn scaled<'a>(&'a self, pencil: &'a Pencil<'a>, sigma: f64) -> Scaled<'a> {
         let diagonals = pencil.stiffness().diagonal().into_iter().zip(pencil.mass_diagonal());
         let scale = diagonals.map(|(k, m)| {
@@ -212,8 +212,9 @@ impl<'a, T: Real> Cholesky<'a, T> {
     }
 }
 
-/// Substitution over the tree, up and down, for the columns of `x`, of which there are at most `K`, with the scale of each row.
-/// `forward` eliminates the leading rows of the front of a supernode, `backward` finds them from those below.
+/// Substitution over the tree, up and down, for the columns of `x`, of which there are at most `K`, with the
+/// scale of each row. `forward` eliminates the leading rows of the front of a supernode, `backward` finds
+/// them from those below.
 pub(super) fn substitute<T: Real, const K: usize>(
     analysis: &Analysis,
     scale: &[f64],
@@ -302,10 +303,11 @@ impl<T: Real> Solve for Cholesky<'_, T> {
     }
 }
 
-/// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has
-/// been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Most are far from
-/// semidefinite: where it succeeds in single precision with a diagonal that is 1e-3 less, that settles it in half the time.
-/// Uses the node order of `analysis`, whose pencil has `block` rows per node.
+/// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the
+/// diagonal has been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a
+/// matrix). Most are far from semidefinite: where it succeeds in single precision with a diagonal that is
+/// 1e-3 less, that settles it in half the time. Uses the node order of `analysis`, whose pencil has `block`
+/// rows per node.
 pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
     let Some(graph) = node_graph(&Pencil::new(mass, mass, 1)) else { return false };
     let analysis = Analysis::with_tree(AssemblyTree::new(&graph, analysis.tree.order(), 1), 1);

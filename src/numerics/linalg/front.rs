@@ -1,6 +1,6 @@
-//! Dense fronts: trapezoids cut into panels of columns, each panel row-major, and the kernels that eliminate the
-//! leading columns of a front. Work is cut into fixed pieces of rows, so that the bits do not depend on the number
-//! of threads.
+//! Dense fronts: trapezoids cut into panels of columns, each panel row-major, and the kernels that eliminate
+//! the leading columns of a front. Work is cut into fixed pieces of rows, so that the bits do not depend on
+//! the number of threads.
 
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
@@ -10,7 +10,8 @@ use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
 use std::ops::{AddAssign, Mul, Neg};
 
-/// Columns of a panel: large enough for products at full speed, small enough for its triangles to cost little.
+/// Columns of a panel: large enough for products at full speed, small enough for its triangles to cost
+/// little.
 pub(super) const PANEL: usize = 128;
 
 /// Rows of a piece of parallel work.
@@ -59,8 +60,9 @@ impl Real for f32 {
     }
 }
 
-/// Columns 0..width of the lower triangle of a symmetric matrix with `height` rows. Panel p holds the columns from
-/// p [`PANEL`] and the rows from there down, row by row; above the diagonal of its leading square stands nothing of use.
+/// Columns 0..width of the lower triangle of a symmetric matrix with `height` rows. Panel p holds the columns
+/// from p [`PANEL`] and the rows from there down, row by row; above the diagonal of its leading square stands
+/// nothing of use.
 #[derive(Debug, Default)]
 pub struct Trapezoid<T> {
     height: usize,
@@ -105,7 +107,8 @@ impl<T: Real> Trapezoid<T> {
     }
 }
 
-/// Adds `source`, whose rows and columns are `places` of the front with columns `pivots` and Schur complement `rest`.
+/// Adds `source`, whose rows and columns are `places` of the front with columns `pivots` and Schur complement
+/// `rest`.
 pub(super) fn extend_add<T: Real>(
     pivots: &mut Trapezoid<T>,
     rest: &mut Trapezoid<T>,
@@ -163,7 +166,8 @@ fn runs(places: &[usize], pivots: usize) -> Vec<Run> {
     runs
 }
 
-/// Runs `work(index, piece)` on pieces of [`ROWS`] rows of a row-major block, at the same time when that pays.
+/// Runs `work(index, piece)` on pieces of [`ROWS`] rows of a row-major block, at the same time when that
+/// pays.
 pub(super) fn by_rows<T: Real>(
     block: &mut [T],
     width: usize,
@@ -197,8 +201,8 @@ fn subtract<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
     matmul(c, Accum::Add, a, b.transpose(), T::of(-1.0), Par::Seq);
 }
 
-/// Subtracts from one panel (rows from its own first column on) the product of the eliminated panels `left` with
-/// `right`: A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B.
+/// Subtracts from one panel (rows from its own first column on) the product of the eliminated panels `left`
+/// with `right`: A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B.
 pub(super) fn subtract_eliminated<T: Real>(
     target: &mut [T],
     width: usize,
@@ -235,8 +239,8 @@ pub(super) fn divide_rows<T: Real>(below: &mut [T], l: MatRef<'_, T>, unit: bool
     });
 }
 
-/// Cholesky of the columns `pivots` of a front; their contribution is subtracted from `rest`. `None` when a pivot is
-/// not positive.
+/// Cholesky of the columns `pivots` of a front; their contribution is subtracted from `rest`. `None` when a
+/// pivot is not positive.
 pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<T>) -> Option<()> {
     let mut memory = dyn_stack::MemBuffer::new(llt::factor::cholesky_in_place_scratch::<T>(
         PANEL.min(pivots.width),

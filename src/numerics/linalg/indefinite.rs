@@ -1,4 +1,5 @@
-//! K - sigma M = L B L' with pivoting inside the panels of each front, kept to solve with: the dynamic stiffness at a frequency.
+//! K - sigma M = L B L' with pivoting inside the panels of each front, kept to solve with: the dynamic
+//! stiffness at a frequency.
 
 use super::factor::{Analysis, COLUMNS, substitute};
 use super::front::PANEL;
@@ -20,7 +21,8 @@ pub struct Indefinite<'a> {
 }
 
 impl<'a> Indefinite<'a> {
-    /// Factors K - sigma M. Whether the factor is any good its [`Inertia`] tells: no zero pivot, and a small backward error.
+    /// Factors K - sigma M. Whether the factor is any good its [`Inertia`] tells: no zero pivot, and a small
+    /// backward error.
     pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, sigma);
@@ -64,7 +66,8 @@ fn subtract<const K: usize>(to: &mut [f64; K], factor: f64, from: &[f64; K]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
 }
 
-/// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows below.
+/// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows
+/// below.
 fn forward<const K: usize>((columns, blocks): &(Trapezoid<f64>, Vec<Blocks>), values: &mut [[f64; K]]) {
     for (p, block) in blocks.iter().enumerate() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
@@ -120,7 +123,8 @@ mod tests {
     use crate::numerics::linalg::{CscMatrix, SymmetricMatrix, symmetric_eigen};
     use faer::Mat;
 
-    /// A chain of `n` masses with springs of changing stiffness along it and, every seventh, one to a mass far away.
+    /// A chain of `n` masses with springs of changing stiffness along it and, every seventh, one to a mass
+    /// far away.
     fn chain(n: usize) -> [SymmetricMatrix; 2] {
         let (mut k, mut m) = (Vec::new(), Vec::new());
         let mut spring = |i: usize, j: usize, c: f64| {
@@ -139,7 +143,8 @@ mod tests {
         [k, m].map(|t| SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(n, n, &t)))
     }
 
-    /// Solutions fulfil their equations between, below and above all eigenvalues, with one and several panels in a front.
+    /// Solutions fulfil their equations between, below and above all eigenvalues, with one and several panels
+    /// in a front.
     #[test]
     fn solutions_fulfil_their_equations() {
         for (n, block) in [(1, 1), (9, 3), (90, 1), (300, 2)] {

@@ -1,4 +1,5 @@
-//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front; who only counts does not keep the factor.
+//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front; who only counts does not
+//! keep the factor.
 
 use super::Pencil;
 use super::factor::{Analysis, Scaled};
@@ -11,8 +12,8 @@ use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
 use std::convert::Infallible;
 
-/// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma when M
-/// is positive semidefinite (Sylvester).
+/// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma
+/// when M is positive semidefinite (Sylvester).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
     /// Eigenvalues below zero: modes below sigma.
@@ -20,8 +21,8 @@ pub struct Inertia {
     /// Zero pivots.
     pub zero: usize,
     /// Backward error of the factorisation relative to the scaled matrix: the unit roundoff times the largest
-    /// diagonal entry of |L| |B| |L|', which bounds all others (Higham, Accuracy and Stability, section 11.1). A large
-    /// one means that element growth spoilt the factor and with it the count.
+    /// diagonal entry of |L| |B| |L|', which bounds all others (Higham, Accuracy and Stability, section
+    /// 11.1). A large one means that element growth spoilt the factor and with it the count.
     pub backward_error: f64,
 }
 
@@ -49,7 +50,8 @@ impl Eliminated {
     }
 }
 
-/// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and eliminates its columns.
+/// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and
+/// eliminates its columns.
 pub(super) fn eliminate_front(
     analysis: &Analysis,
     matrix: &Scaled<'_>,

@@ -1,5 +1,5 @@
-//! The largest of numbers that are checked afterwards. `f64::max` and `norm_max` of faer leave a NaN out, and a check of what
-//! they give would pass; here a NaN stays.
+//! The largest of numbers that are checked afterwards. `f64::max` and `norm_max` of faer leave a NaN out, and
+//! a check of what they give would pass; here a NaN stays.
 
 use faer::MatRef;
 

@@ -1,6 +1,6 @@
-//! L D L' of a sparse positive semidefinite matrix, or of a complex sum of some, row by row (Davis, ACM TOMS 31 (2005) 587): where one vector
-//! is solved for again and again, by one thread and without an allocation. Large models and blocks of vectors have
-//! [`Cholesky`](super::Cholesky).
+//! L D L' of a sparse positive semidefinite matrix, or of a complex sum of some, row by row (Davis, ACM TOMS
+//! 31 (2005) 587): where one vector is solved for again and again, by one thread and without an allocation.
+//! Large models and blocks of vectors have [`Cholesky`](super::Cholesky).
 
 use super::matrix_sum::{MatrixSum, Scalar};
 use super::ordering::{nested_dissection, node_graph};
@@ -23,10 +23,11 @@ pub struct SparseLdl<T = f64> {
 }
 
 impl SparseLdl {
-    /// Factors a positive semidefinite matrix. A pivot up to `floor` times the diagonal entry of its row counts as zero, and is replaced
-    /// by that entry (by one in an empty row).
+    /// Factors a positive semidefinite matrix. A pivot up to `floor` times the diagonal entry of its row
+    /// counts as zero, and is replaced by that entry (by one in an empty row).
     ///
-    /// `None` when a pivot lies below minus that: the matrix is indefinite; also when it is too large for the ordering.
+    /// `None` when a pivot lies below minus that: the matrix is indefinite; also when it is too large for the
+    /// ordering.
     pub fn new(a: &SymmetricMatrix, floor: f64) -> Option<Self> {
         let sum = MatrixSum::new(vec![(1.0, a, 1)]);
         let mut rows = RowByRow::new(&sum, Structure::new(&sum, &Pencil::new(a, a, 1))?);
@@ -49,11 +50,13 @@ impl SparseLdl {
 }
 
 impl<T: Scalar> SparseLdl<T> {
-    /// Factors a sum of semidefinite matrices whose factors lie in one quadrant of the complex plane, as those of M + z D + z^2 K do for z^2
-    /// to the right of the imaginary axis: no pivot is needed to keep it stable (Higham, Math. Comp. 67 (1998) 1591). In the order that suits
-    /// `pencil`, whose matrices are among them.
+    /// Factors a sum of semidefinite matrices whose factors lie in one quadrant of the complex plane, as
+    /// those of M + z D + z^2 K do for z^2 to the right of the imaginary axis: no pivot is needed to keep it
+    /// stable (Higham, Math. Comp. 67 (1998) 1591). In the order that suits `pencil`, whose matrices are
+    /// among them.
     ///
-    /// `None` when a pivot vanishes to rounding: the sum is singular; also when it is too large for the ordering.
+    /// `None` when a pivot vanishes to rounding: the sum is singular; also when it is too large for the
+    /// ordering.
     pub fn of_sum(sum: &MatrixSum<'_, T>, pencil: &Pencil<'_>) -> Option<Self> {
         let mut rows = RowByRow::new(sum, Structure::new(sum, pencil)?);
         for k in 0..sum.n() {
@@ -79,9 +82,9 @@ impl<T: Scalar> SparseLdl<T> {
         self.values.len()
     }
 
-    /// Rows whose pivot was zero, ascending: as many as the matrix has null vectors. The solution for e_j, j one of them, is a null
-    /// vector; together they span the null space. Right-hand sides in the range of A have the solution of A x = b that is zero in
-    /// these rows.
+    /// Rows whose pivot was zero, ascending: as many as the matrix has null vectors. The solution for e_j, j
+    /// one of them, is a null vector; together they span the null space. Right-hand sides in the range of A
+    /// have the solution of A x = b that is zero in these rows.
     pub fn null_rows(&self) -> &[usize] {
         &self.null_rows
     }

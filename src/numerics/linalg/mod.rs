@@ -1,5 +1,5 @@
-//! Sparse and dense kernels: symmetric matrices, block products, ordering, factorisation, M-orthogonalisation.
-//! The only room that names the linear-algebra crates' sparse solvers.
+//! Sparse and dense kernels: symmetric matrices, block products, ordering, factorisation,
+//! M-orthogonalisation. The only room that names the linear-algebra crates' sparse solvers.
 
 mod assembly_tree;
 mod compensated;

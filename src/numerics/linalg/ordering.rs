@@ -1,7 +1,7 @@
 //! Fill-reducing ordering and connectivity of the node graph.
 //!
-//! Nested dissection by METIS on the graph with one vertex per node: the same fill as on the graph of degrees of
-//! freedom in half the time, and a quarter of the factorisation work of minimum degree on compact solids.
+//! Nested dissection by METIS on the graph with one vertex per node: the same fill as on the graph of degrees
+//! of freedom in half the time, and a quarter of the factorisation work of minimum degree on compact solids.
 
 use super::assembly_tree::Graph;
 use super::{Pencil, SymmetricMatrix};
@@ -39,8 +39,8 @@ fn neighbours(pencil: &Pencil<'_>, vertex: u32, mut take: impl FnMut(u32)) {
     }
 }
 
-/// Graph of the nodes of a pencil: two are neighbours where K or M couples them. `None` when it is too large for the
-/// 32-bit numbers of the ordering library.
+/// Graph of the nodes of a pencil: two are neighbours where K or M couples them. `None` when it is too large
+/// for the 32-bit numbers of the ordering library.
 ///
 /// # Panics
 /// When a node has not one, two or three rows.
@@ -76,8 +76,8 @@ pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
     Some(Graph { pointers, neighbours: lists })
 }
 
-/// Elimination order of the vertices of a graph: entry i is eliminated as the i-th. `None` when the ordering library
-/// fails (it runs out of memory). The graph is only borrowed mutably because the library asks for it.
+/// Elimination order of the vertices of a graph: entry i is eliminated as the i-th. `None` when the ordering
+/// library fails (it runs out of memory). The graph is only borrowed mutably because the library asks for it.
 pub(super) fn nested_dissection(graph: &mut Graph) -> Option<Vec<u32>> {
     let vertices = graph.len();
     if graph.neighbours.is_empty() || vertices < 3 {
@@ -110,8 +110,8 @@ fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
     (status == metis_sys::rstatus_et_METIS_OK).then_some(order)
 }
 
-/// Connected component of every block of rows, numbered from 0 in the order of their first block. Any entry of any of
-/// the matrices, all of one size, connects.
+/// Connected component of every block of rows, numbered from 0 in the order of their first block. Any entry
+/// of any of the matrices, all of one size, connects.
 ///
 /// # Panics
 /// When there is no matrix.

@@ -49,7 +49,8 @@ fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] for other sums of the same terms.
+/// y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] for other sums of the
+/// same terms.
 ///
 /// # Panics
 /// When the shapes disagree.
@@ -138,7 +139,8 @@ fn rows_times<const B: usize, const W: usize>(
     mut y: [&mut [f64]; W],
     f: impl Fn(f64) -> f64,
 ) {
-    // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the inner loop.
+    // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the
+    // inner loop.
     let mut tile = [[[0.0f64; W]; B]; TILE];
     let rows = y[0].len() / B;
     for start in (0..rows).step_by(TILE) {

@@ -48,8 +48,8 @@ impl CscMatrix {
         Self { n_rows, n_cols, col_ptr, row_idx, values }
     }
 
-    /// Builds a matrix from (row, column, value) triplets: duplicates are summed in the order given, zeros are
-    /// dropped, sums that cancel among them.
+    /// Builds a matrix from (row, column, value) triplets: duplicates are summed in the order given, zeros
+    /// are dropped, sums that cancel among them.
     ///
     /// # Panics
     /// When an index is out of range.
@@ -187,8 +187,8 @@ impl CscMatrix {
                 == Some(0)
     }
 
-    /// Number of entries below the diagonal less that above it in some columns; `None` when an entry below has no equal
-    /// one at the mirrored place.
+    /// Number of entries below the diagonal less that above it in some columns; `None` when an entry below
+    /// has no equal one at the mirrored place.
     fn lower_surplus(&self, columns: Range<usize>) -> Option<i64> {
         let mut surplus = 0;
         // Ascending columns j meet the mirrored entries (j, i) of column i in ascending order.
@@ -346,7 +346,8 @@ impl SymmetricMatrix {
         Self(matrix)
     }
 
-    /// The matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` when one is not stored.
+    /// The matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` when one is not
+    /// stored.
     pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut matrix = self.clone();
         for i in 0..self.n() {
@@ -356,7 +357,8 @@ impl SymmetricMatrix {
         Some(matrix)
     }
 
-    /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every other.
+    /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every
+    /// other.
     pub(super) fn with_raised_diagonal(&self, factor: f64) -> Self {
         if self.diagonal().iter().all(|&d| d > 0.0)
             && let Some(raised) = self.with_diagonal(|_, d| d * factor)

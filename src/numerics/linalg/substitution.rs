@@ -1,6 +1,6 @@
-//! Substitution with the panels of a front for a few right-hand sides at a time: bound by the speed at which memory
-//! delivers the factor. Panels and right-hand sides are row-major; four rows of the panel are taken together, read once
-//! from end to end. Large panels are cut into fixed pieces of rows.
+//! Substitution with the panels of a front for a few right-hand sides at a time: bound by the speed at which
+//! memory delivers the factor. Panels and right-hand sides are row-major; four rows of the panel are taken
+//! together, read once from end to end. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL, Real, Trapezoid};
 use faer::traits::ComplexField;
@@ -15,8 +15,8 @@ const ROWS: usize = 512;
 /// Numbers of a panel below which cutting it is not worth the tasks.
 const WORTH_TASKS: usize = 300_000;
 
-/// Forward substitution with the columns of a Cholesky factor: `front` holds a row of `K` right-hand sides for every
-/// row of the front; the leading rows become the solution, the others what is left for the parent.
+/// Forward substitution with the columns of a Cholesky factor: `front` holds a row of `K` right-hand sides
+/// for every row of the front; the leading rows become the solution, the others what is left for the parent.
 pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
     let arch = Arch::new();
     for (p, panel) in l.panels.iter().enumerate() {
@@ -62,8 +62,8 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
     }
 }
 
-/// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its columns to the
-/// other (x).
+/// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its
+/// columns to the other (x).
 enum Step<'a, T, const K: usize> {
     /// x <- L^-1 x for the leading square of a panel.
     SolveLower(&'a [T], &'a mut [[T; K]]),
@@ -75,16 +75,17 @@ enum Step<'a, T, const K: usize> {
     SolveTransposed(&'a [T], &'a mut [[T; K]]),
 }
 
-// Everything below is inlined into one function per instruction set. A row of right-hand sides is a few vectors that
-// stay in registers, and every number of L is spread over a vector of its own: left to itself, the compiler runs
-// its vectors along the rows of L and pays for it in shuffles.
+// Everything below is inlined into one function per instruction set. A row of right-hand sides is a few
+// vectors that stay in registers, and every number of L is spread over a vector of its own: left to itself,
+// the compiler runs its vectors along the rows of L and pays for it in shuffles.
 
 impl<T: Real, const K: usize> WithSimd for Step<'_, T, K> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // Rows of L taken together: enough sums to hide the latency of a multiplication, few enough for the registers.
+        // Rows of L taken together: enough sums to hide the latency of a multiplication, few enough for the
+        // registers.
         match size_of::<[T; K]>() / size_of::<T::SimdVec<S>>() {
             1 => Kernels::<T, S, 1>(T::simd_ctx(simd)).run::<8, K>(self),
             2 => Kernels::<T, S, 2>(T::simd_ctx(simd)).run::<4, K>(self),
@@ -98,8 +99,8 @@ impl<T: Real, const K: usize> WithSimd for Step<'_, T, K> {
 /// Columns of L between two calls of [`fetch`].
 const STEP: usize = 8;
 
-/// Asks for the lines of the `R` [`STEP`] numbers of L from `from` on. Several rows read side by side are no stream that
-/// the hardware foresees; these requests, one row group ahead and in the order of memory, are.
+/// Asks for the lines of the `R` [`STEP`] numbers of L from `from` on. Several rows read side by side are no
+/// stream that the hardware foresees; these requests, one row group ahead and in the order of memory, are.
 #[inline(always)]
 fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
     for at in (from..from + R * STEP).step_by(64 / size_of::<T>()) {
@@ -107,13 +108,13 @@ fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
     }
 }
 
-/// Asks the processor to bring the line at `address` into its cache; any address will do. (Reading ahead instead, in safe
-/// code, leaves solves with 4 columns at 0.63 of the speed.)
+/// Asks the processor to bring the line at `address` into its cache; any address will do. (Reading ahead
+/// instead, in safe code, leaves solves with 4 columns at 0.63 of the speed.)
 #[inline(always)]
 #[allow(unsafe_code)]
 fn prefetch<T>(address: *const T) {
-    // SAFETY: a hint, of the instructions that every x86-64 has: nothing is read, and an address that nothing may be read
-    // from is ignored.
+    // SAFETY: a hint, of the instructions that every x86-64 has: nothing is read, and an address that nothing
+    // may be read from is ignored.
     #[cfg(target_arch = "x86_64")]
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -1,5 +1,5 @@
-//! Products of tall, skinny blocks (n x m, n large) with fixed partitions: partial results of fixed row chunks
-//! are added in a fixed order, so that the bits do not depend on the number of threads.
+//! Products of tall, skinny blocks (n x m, n large) with fixed partitions: partial results of fixed row
+//! chunks are added in a fixed order, so that the bits do not depend on the number of threads.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};

@@ -1,6 +1,6 @@
 //! Parallel walks over the assembly tree: upward (factorisation, forward substitution) and downward (back
-//! substitution). Heavy subtrees run at the same time; what is done at a supernode, and the order in which its
-//! children's results reach it, do not depend on the number of threads.
+//! substitution). Heavy subtrees run at the same time; what is done at a supernode, and the order in which
+//! its children's results reach it, do not depend on the number of threads.
 
 use super::assembly_tree::AssemblyTree;
 use rayon::prelude::*;
@@ -72,14 +72,14 @@ impl Walk {
         Self { trees: Segment { supernodes: 0..tree.len(), branches: top } }
     }
 
-    /// Most memory that an upward walk holds at a time, in the units of `needs`, with so many branches in work at the same
-    /// time: those that need most beyond what they leave.
+    /// Most memory that an upward walk holds at a time, in the units of `needs`, with so many branches in
+    /// work at the same time: those that need most beyond what they leave.
     pub fn peak(&self, tree: &AssemblyTree, threads: usize, needs: &dyn Fn(usize) -> Needs) -> usize {
         peak(tree, &self.trees, threads.max(1), needs).0
     }
 
-    /// Calls `visit(supernode, slot, results of its children)` for every supernode, children first. Results of roots
-    /// are dropped.
+    /// Calls `visit(supernode, slot, results of its children)` for every supernode, children first. Results
+    /// of roots are dropped.
     ///
     /// # Errors
     /// The first one in elimination order among those met.
@@ -92,8 +92,8 @@ impl Walk {
         up(tree, &self.trees, slots, visit).map(|_| ())
     }
 
-    /// Calls `visit(supernode, slot, message of its parent)` for every supernode, parents first; it returns the
-    /// messages to its children, in their order. Roots get `None`.
+    /// Calls `visit(supernode, slot, message of its parent)` for every supernode, parents first; it returns
+    /// the messages to its children, in their order. Roots get `None`.
     pub fn down<S: Send, D: Send>(
         &self,
         tree: &AssemblyTree,

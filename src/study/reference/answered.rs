@@ -8,13 +8,15 @@ use faer::{Mat, MatRef};
 /// Part of the trace of E'K E below which a direction is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The amplitudes z(t) of the static responses E (N x k) in the motion that they make under the forces whose static amplitudes are c(t):
+/// The amplitudes z(t) of the static responses E (N x k) in the motion that they make under the forces whose
+/// static amplitudes are c(t):
 ///
 /// E'M E z'' + E'K E z = E'K E c(t),
 ///
-/// with c(t) along straight lines between the instants, without damping, and solved exactly: in its own modes, of frequency w, each amplitude is
-/// s(t) plus an oscillation, which every kink of s adds to. Where c changes slowly beside w that is s itself; where it changes as fast, or begins
-/// with a shock, the static response would be too small.
+/// with c(t) along straight lines between the instants, without damping, and solved exactly: in its own
+/// modes, of frequency w, each amplitude is s(t) plus an oscillation, which every kink of s adds to. Where c
+/// changes slowly beside w that is s itself; where it changes as fast, or begins with a shock, the static
+/// response would be too small.
 ///
 /// * `stiffness`, `mass`: E'K E and E'M E (k x k); `amplitudes`: c (k x m), at `times`.
 /// * `settled`: whether it starts in equilibrium, z = c and z' = 0; else at z = z' = 0.
@@ -43,7 +45,8 @@ pub(super) fn answered(
     Some(combine(combine(directions.as_ref(), own.vectors.as_ref()).as_ref(), motion.as_ref()))
 }
 
-/// Writes into row `j` of `motion` what an oscillator of circular frequency `rate` makes of the static amplitudes in row `j` of `s`.
+/// Writes into row `j` of `motion` what an oscillator of circular frequency `rate` makes of the static
+/// amplitudes in row `j` of `s`.
 fn oscillate(rate: f64, s: MatRef<'_, f64>, j: usize, times: &[f64], settled: bool, motion: &mut Mat<f64>) {
     let slope = |i: usize| (s[(j, i + 1)] - s[(j, i)]) / (times[i + 1] - times[i]);
     // Distance from the static amplitude, and its rate.
@@ -64,7 +67,8 @@ fn oscillate(rate: f64, s: MatRef<'_, f64>, j: usize, times: &[f64], settled: bo
 mod tests {
     use super::*;
 
-    /// Two oscillators that share no coordinate, of circular frequencies 2 and 50, pushed along a ramp and by a step.
+    /// Two oscillators that share no coordinate, of circular frequencies 2 and 50, pushed along a ramp and by
+    /// a step.
     #[test]
     fn oscillators_follow_ramps_and_steps() {
         let (stiffness, mass) =

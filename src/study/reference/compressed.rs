@@ -17,8 +17,9 @@ pub(super) struct Compressed {
 }
 
 impl Compressed {
-    /// The first principal directions of `forces` where each row counts by one over the diagonal of K: about the energy that a force does
-    /// work with at that row alone. Nothing where the forces are zero, or beyond the range of numbers.
+    /// The first principal directions of `forces` where each row counts by one over the diagonal of K: about
+    /// the energy that a force does work with at that row alone. Nothing where the forces are zero, or beyond
+    /// the range of numbers.
     pub fn new(model: &FeModel, forces: &Mat<f64>) -> Option<Self> {
         let diagonal = model.stiffness().diagonal();
         let weights: Vec<f64> =
@@ -34,8 +35,8 @@ impl Compressed {
     }
 }
 
-/// Eigenvectors (m x k) of a Gram matrix and the roots of their eigenvalues, descending, up to the part `left_out` of their sum and at most
-/// `most`. `None` where there is nothing.
+/// Eigenvectors (m x k) of a Gram matrix and the roots of their eigenvalues, descending, up to the part
+/// `left_out` of their sum and at most `most`. `None` where there is nothing.
 pub(super) fn principal(gram: Mat<f64>, left_out: f64, most: usize) -> Option<(Mat<f64>, Vec<f64>)> {
     let eigen = symmetric_eigen(gram.as_ref())?;
     let sum: f64 = eigen.values.iter().map(|v| v.max(0.0)).sum();

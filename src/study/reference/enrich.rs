@@ -9,8 +9,8 @@ use crate::motion::scene::Scene;
 use crate::numerics::linalg::side_by_side;
 use faer::Mat;
 
-/// What a body still lacks, relative to the one before it, for its modes to be worth their cost: the first responses may leave most of what has
-/// inertia to those of the next round.
+/// What a body still lacks, relative to the one before it, for its modes to be worth their cost: the first
+/// responses may leave most of what has inertia to those of the next round.
 const WORTH: f64 = 0.9;
 
 /// How often a body is enriched at the most.
@@ -37,13 +37,15 @@ impl<B> Enriched<B> {
 pub struct EnrichedForCases<B> {
     /// What the body was last made as.
     pub made: B,
-    /// For each case what every body on the way lacked, the last one that of `made`; empty where nothing can be said.
+    /// For each case what every body on the way lacked, the last one that of `made`; empty where nothing can
+    /// be said.
     pub rounds: Vec<Vec<ReferenceError>>,
 }
 
-/// Makes a body of `model` with `make`, which gets nodal forces (N x k) whose static responses the body shall have beside its modes, none at
-/// first. As long as the body lacks more than [`PART_OF_REFERENCE`] of the tolerances of `scene` in its own motion, the forces that its motion
-/// leaves unbalanced at the nodes join these, while that pays. `grows`: whether `make` can follow.
+/// Makes a body of `model` with `make`, which gets nodal forces (N x k) whose static responses the body shall
+/// have beside its modes, none at first. As long as the body lacks more than [`PART_OF_REFERENCE`] of the
+/// tolerances of `scene` in its own motion, the forces that its motion leaves unbalanced at the nodes join
+/// these, while that pays. `grows`: whether `make` can follow.
 ///
 /// # Errors
 /// Those of `make` and of [`trace`](crate::motion::scene::trace).
@@ -62,8 +64,8 @@ pub fn enrich<B>(
     Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
 }
 
-/// The same for the load cases `scenes`: what joins the body is what it lacks in any of them, while that pays in one of them. A case in which
-/// it no longer pays asks for nothing more.
+/// The same for the load cases `scenes`: what joins the body is what it lacks in any of them, while that pays
+/// in one of them. A case in which it no longer pays asks for nothing more.
 ///
 /// # Errors
 /// As [`enrich`].
@@ -118,7 +120,8 @@ struct Asking {
 }
 
 impl Asking {
-    /// Whether the last body, which has what this case asked for, lacks less than the one before it by as much as pays.
+    /// Whether the last body, which has what this case asked for, lacks less than the one before it by as
+    /// much as pays.
     fn was_paid(&self, now: Option<&Estimate>) -> bool {
         match (self.rounds.last(), now) {
             (Some(before), Some(now)) if self.asked => !Self::in_vain(before, &now.error),

@@ -22,7 +22,8 @@ const MOST_LACKING: f64 = 0.5;
 /// Instants that the motion is looked at.
 const INSTANTS: usize = 120;
 
-/// The elastic energy of what the body lacks, after so many responses of the motion joined it, is below this part of what is allowed.
+/// The elastic energy of what the body lacks, after so many responses of the motion joined it, is below this
+/// part of what is allowed.
 const PART_OF_RESPONSES: f64 = 0.1;
 
 /// Responses that may join the body at once.
@@ -33,8 +34,9 @@ const MOST_RESPONSES: usize = 12;
 pub struct ReferenceError {
     /// Number of modes of the body.
     pub modes: usize,
-    /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the equations of all nodes leave unbalanced
-    /// along its motion. Nothing is estimated of attitude and reaction.
+    /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the
+    /// equations of all nodes leave unbalanced along its motion. Nothing is estimated of attitude and
+    /// reaction.
     pub errors: OutputErrors,
     /// The larger of both over its tolerance.
     pub worst: f64,
@@ -73,13 +75,15 @@ impl ReferenceError {
 /// An estimate, and what would improve the body.
 pub(super) struct Estimate {
     pub error: ReferenceError,
-    /// Nodal forces (N x k) whose static responses the body lacks most, so many as it takes to come within what is allowed.
+    /// Nodal forces (N x k) whose static responses the body lacks most, so many as it takes to come within
+    /// what is allowed.
     pub missing: Mat<f64>,
 }
 
 impl Estimate {
-    /// Estimates what `body`, made of `model`, lacks in `scene`. `allowed` is the part of the tolerances that it may lack. `None` where nothing
-    /// can be said: for a scene without a duration, and a body that is carried.
+    /// Estimates what `body`, made of `model`, lacks in `scene`. `allowed` is the part of the tolerances that
+    /// it may lack. `None` where nothing can be said: for a scene without a duration, and a body that is
+    /// carried.
     ///
     /// # Errors
     /// Those of [`trace`] and [`free_static_responses`].
@@ -212,7 +216,8 @@ impl Missed {
         }
     }
 
-    /// The fewest forces B y (N x p) whose responses leave, at every instant, no more than `enough` of the root of the elastic energy.
+    /// The fewest forces B y (N x p) whose responses leave, at every instant, no more than `enough` of the
+    /// root of the elastic energy.
     fn dominant(&self, enough: f64) -> Mat<f64> {
         let none = || Mat::zeros(self.forces.basis.nrows(), 0);
         let Some((turned, roots)) = principal(self.energy.clone(), 0.0, usize::MAX) else { return none() };

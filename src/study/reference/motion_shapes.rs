@@ -11,8 +11,9 @@ use crate::numerics::linalg::{combine, gram, larger};
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 
-/// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth trying: what a reduced body makes of its
-/// own motion may be better or worse than the best that its shapes allow.
+/// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth
+/// trying: what a reduced body makes of its own motion may be better or worse than the best that its shapes
+/// allow.
 const PARTS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 
 /// Shapes at the most.
@@ -21,16 +22,19 @@ const MOST: usize = 120;
 /// The part of the sum of energies that no shape is made for.
 const LEFT_OUT: f64 = 1e-16;
 
-/// Principal directions of a motion in elastic energy (proper orthogonal decomposition): with K_ff = L L' and y = L' q of the instants of the
-/// motion, the eigenvectors u of the mean of y y' give the shapes Psi L'^-1 u. Of all sets of as many shapes the first r leave out the least of the
-/// elastic energy, on average over the motion.
+/// Principal directions of a motion in elastic energy (proper orthogonal decomposition): with K_ff = L L' and
+/// y = L' q of the instants of the motion, the eigenvectors u of the mean of y y' give the shapes Psi L'^-1
+/// u. Of all sets of as many shapes the first r leave out the least of the elastic energy, on average over
+/// the motion.
 #[derive(Debug, Clone)]
 pub struct MotionShapes {
     /// N x k, rows and axes of the model.
     shapes: Mat<f64>,
-    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of the motion, for r = 0 to k.
+    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of the
+    /// motion, for r = 0 to k.
     left: Vec<f64>,
-    /// The damping that the scene gives the modes of the motion; `None` where the model says it, or there is none.
+    /// The damping that the scene gives the modes of the motion; `None` where the model says it, or there is
+    /// none.
     damping: Option<GivenDamping>,
 }
 
@@ -44,7 +48,8 @@ struct GivenDamping {
 }
 
 impl MotionShapes {
-    /// Of the `motion` of `body`, made of `model`, in `scene`. `None` where the body has other rows than the model, or nothing deforms.
+    /// Of the `motion` of `body`, made of `model`, in `scene`. `None` where the body has other rows than the
+    /// model, or nothing deforms.
     ///
     /// # Errors
     /// Those of [`Stage::new`].
@@ -77,8 +82,9 @@ impl MotionShapes {
         Ok(Some(Self { shapes: combine(vectors.as_ref(), combinations.as_ref()), left, damping }))
     }
 
-    /// `made` of some of the shapes, with the damping that the scene gives the modes whose motion they are, D = C'D_r C with C = K_r^-1 Psi_r'K Psi:
-    /// the same ratio for its own modes, each of which is made of several of those, would be another damping.
+    /// `made` of some of the shapes, with the damping that the scene gives the modes whose motion they are, D
+    /// = C'D_r C with C = K_r^-1 Psi_r'K Psi: the same ratio for its own modes, each of which is made of
+    /// several of those, would be another damping.
     ///
     /// # Errors
     /// Those of [`FlexBody::new`].
@@ -126,7 +132,8 @@ fn mean_of_products(weighted: &[DVector<f64>], time: &[f64]) -> Mat<f64> {
     Mat::from_fn(n, n, |i, j| sum[(i, j)])
 }
 
-/// What the first r of the `directions` leave out of the motion at the most, relative to the largest of it, for every r.
+/// What the first r of the `directions` leave out of the motion at the most, relative to the largest of it,
+/// for every r.
 fn left_out(weighted: &[DVector<f64>], directions: &DMatrix<f64>) -> Vec<f64> {
     let mut largest = 0.0;
     let mut left = vec![0.0f64; directions.ncols() + 1];

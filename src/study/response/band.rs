@@ -6,15 +6,16 @@ const WIDE: f64 = 20.0;
 /// Half the width of a resonance, relative, where damping makes it no wider.
 const NARROWEST: f64 = 1e-3;
 
-/// How far from the natural frequency, relative, the peak of a damped resonance is looked for at least: at the frequency itself the dynamic
-/// stiffness without damping is singular.
+/// How far from the natural frequency, relative, the peak of a damped resonance is looked for at least: at
+/// the frequency itself the dynamic stiffness without damping is singular.
 const BESIDE: f64 = 1e-6;
 
-/// Resonances with more damping than this have a peak that is looked at; others are sampled on both sides of their pole.
+/// Resonances with more damping than this have a peak that is looked at; others are sampled on both sides of
+/// their pole.
 const DAMPED: f64 = 1e-5;
 
-/// How near to a natural frequency, relative, no response is evaluated: without damping it has no finite value there, and with damping the
-/// matrix without it cannot be solved with.
+/// How near to a natural frequency, relative, no response is evaluated: without damping it has no finite
+/// value there, and with damping the matrix without it cannot be solved with.
 const POLE: f64 = 1e-4;
 const DAMPED_POLE: f64 = 3e-7;
 
@@ -75,8 +76,8 @@ impl Band {
         if self.low > 0.0 && self.high / self.low >= WIDE { Spacing::Logarithmic } else { Spacing::Linear }
     }
 
-    /// `count` frequencies of even spacing up to the end of the band; at zero a free body has no response, so a band from there begins one
-    /// step above it.
+    /// `count` frequencies of even spacing up to the end of the band; at zero a free body has no response, so
+    /// a band from there begins one step above it.
     fn even(&self, count: usize) -> impl Iterator<Item = f64> + '_ {
         let steps = if self.low > 0.0 { count.max(2) - 1 } else { count.max(1) };
         let first = usize::from(self.low == 0.0);
@@ -90,8 +91,8 @@ impl Band {
         })
     }
 
-    /// About `points` frequencies, ascending, at about `solves` of which (none where that is zero) the equations of all nodes are solved: half
-    /// of these at the resonances, the rest spread evenly.
+    /// About `points` frequencies, ascending, at about `solves` of which (none where that is zero) the
+    /// equations of all nodes are solved: half of these at the resonances, the rest spread evenly.
     pub(super) fn frequencies(
         &self,
         points: usize,

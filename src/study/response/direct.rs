@@ -12,7 +12,8 @@ use nalgebra::{Complex, DMatrix};
 /// A factor with a larger backward error is no preconditioner.
 const GROWTH_LIMIT: f64 = 1e-4;
 
-/// Refinements of a solution at the most, and its last change, relative, at which it is good, and at which it still is one.
+/// Refinements of a solution at the most, and its last change, relative, at which it is good, and at which it
+/// still is one.
 const REFINEMENTS: usize = 4;
 const GOOD: f64 = 1e-11;
 const ACCEPTED: f64 = 1e-6;
@@ -48,7 +49,8 @@ pub(super) struct DirectSolution {
 type Parts = Mat<f64>;
 
 impl<'m> DirectSolver<'m> {
-    /// Prepares `solves` solutions. `damping` are the products M Psi and the matrix of the modes, D = M Psi C (M Psi)'.
+    /// Prepares `solves` solutions. `damping` are the products M Psi and the matrix of the modes, D = M Psi C
+    /// (M Psi)'.
     ///
     /// # Errors
     /// [`MemoryShort`](Code::MemoryShort) and [`WorkLong`](Code::WorkLong), before the work.

@@ -1,4 +1,5 @@
-//! The response with what the equations of all nodes leave unbalanced added to the modes: the estimate of what the modes lack (theory section 8).
+//! The response with what the equations of all nodes leave unbalanced added to the modes: the estimate of
+//! what the modes lack (theory section 8).
 
 use super::modal_sum::ModalSum;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -18,7 +19,8 @@ const EIGENVECTOR: f64 = 1e-6;
 /// Part of a load that must be left beside rigid motions and modes.
 const LEFT: f64 = 1e-10;
 
-/// Part of the elastic energy, relative to the largest, that a direction of the static responses must have to count.
+/// Part of the elastic energy, relative to the largest, that a direction of the static responses must have to
+/// count.
 const INDEPENDENT: f64 = 1e-9;
 
 /// A body seen from the rows of its model.
@@ -36,11 +38,13 @@ pub(super) struct NodalModes<'m> {
 }
 
 impl NodalModes<'_> {
-    /// The transfer function in the span of the modes and the static responses E = K^+ \[(1 - M Phi Phi' - M Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\]
-    /// to what they leave unbalanced, with the damping C of the modes: D = M Psi C (M Psi)'. `None` where nothing is left.
+    /// The transfer function in the span of the modes and the static responses E = K^+
+    /// \[(1 - M Phi Phi' - M Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\] to what they leave unbalanced,
+    /// with the damping C of the modes: D = M Psi C (M Psi)'. `None` where nothing is left.
     ///
     /// # Errors
-    /// Those of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) where the span has no basis.
+    /// Those of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) where the span
+    /// has no basis.
     pub fn enriched(&self, body: &FlexBody, damping: Option<&Mat<f64>>) -> Result<Option<ModalSum>> {
         let Some(static_responses) = self.static_responses(body)? else { return Ok(None) };
         let stiff = normalised(&self.vectors, &self.elastic);
@@ -131,7 +135,8 @@ fn columns(a: &Mat<f64>, kept: &[usize]) -> Mat<f64> {
     Mat::from_fn(a.nrows(), kept.len(), |i, j| a[(i, kept[j])])
 }
 
-/// Columns x / sqrt(x'p) for columns x of `vectors` and p of `products`, without those where that is not positive.
+/// Columns x / sqrt(x'p) for columns x of `vectors` and p of `products`, without those where that is not
+/// positive.
 fn normalised(vectors: &Mat<f64>, products: &Mat<f64>) -> Mat<f64> {
     let square = |j: usize| (0..vectors.nrows()).map(|i| vectors[(i, j)] * products[(i, j)]).sum::<f64>();
     let sizes: Vec<(usize, f64)> =
@@ -139,7 +144,8 @@ fn normalised(vectors: &Mat<f64>, products: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(vectors.nrows(), sizes.len(), |i, at| vectors[(i, sizes[at].0)] / sizes[at].1)
 }
 
-/// An orthonormal basis of what `vectors` span in the inner product whose products with them are `products`; `None` where that is nothing.
+/// An orthonormal basis of what `vectors` span in the inner product whose products with them are `products`;
+/// `None` where that is nothing.
 fn orthonormal(vectors: &Mat<f64>, products: &Mat<f64>) -> Option<Mat<f64>> {
     let square = gram(vectors.as_ref(), products.as_ref());
     let symmetric =

@@ -39,13 +39,15 @@ pub struct PairErrors {
     pub decibels: Option<At>,
     /// The largest of both: measured where that was done, estimated elsewhere.
     pub worst: Option<At>,
-    /// Up to this frequency no error, measured or else estimated, is above the tolerance; `None` where the first one is.
+    /// Up to this frequency no error, measured or else estimated, is above the tolerance; `None` where the
+    /// first one is.
     pub accurate_to: Option<f64>,
     /// How good the estimate was.
     pub effectivity: Option<Effectivity>,
 }
 
-/// One frequency: the reduced response between two places, the enriched one, and that of all nodes where it is known.
+/// One frequency: the reduced response between two places, the enriched one, and that of all nodes where it
+/// is known.
 pub(super) struct Compared<'a> {
     pub hertz: f64,
     pub reduced: &'a DMatrix<Complex<f64>>,

@@ -1,5 +1,5 @@
-//! Frequency response of a free body: the displacement that a harmonic force causes, of the reduced body and of all nodes of the model that it
-//! was made of, and how far the two are apart. No files.
+//! Frequency response of a free body: the displacement that a harmonic force causes, of the reduced body and
+//! of all nodes of the model that it was made of, and how far the two are apart. No files.
 
 mod band;
 mod direct;

@@ -3,7 +3,8 @@
 use faer::Mat;
 use nalgebra::{Complex, DMatrix};
 
-/// H(w) = -G / w^2 + C' (diag(k) - w^2 diag(m) + i w D)^-1 B: the receptances of a free body in coordinates of diagonal stiffness and mass.
+/// H(w) = -G / w^2 + C' (diag(k) - w^2 diag(m) + i w D)^-1 B: the receptances of a free body in coordinates
+/// of diagonal stiffness and mass.
 pub(super) struct ModalSum {
     /// k (n).
     pub stiffness: Vec<f64>,
@@ -20,7 +21,8 @@ pub(super) struct ModalSum {
 }
 
 impl ModalSum {
-    /// H (outputs x inputs) at w > 0, in radians per time. Numbers that are not finite at the resonance of a coordinate without damping.
+    /// H (outputs x inputs) at w > 0, in radians per time. Numbers that are not finite at the resonance of a
+    /// coordinate without damping.
     pub fn at(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let amplitudes = self.amplitudes(omega);
         let (outputs, inputs) = (self.outputs.ncols(), self.inputs.ncols());
@@ -69,7 +71,8 @@ fn is_diagonal(a: &Mat<f64>) -> bool {
 mod tests {
     use super::*;
 
-    /// Two masses m joined by a spring k and a damper c: H_11 - H_12 = 1 / (2 k - w^2 m + 2 i w c), H_11 + H_12 = -1 / (w^2 m).
+    /// Two masses m joined by a spring k and a damper c: H_11 - H_12 = 1 / (2 k - w^2 m + 2 i w c), H_11 +
+    /// H_12 = -1 / (w^2 m).
     #[test]
     fn two_masses_have_their_closed_form() {
         let (m, k, c) = (2.0, 50.0, 0.3);

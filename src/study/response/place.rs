@@ -63,7 +63,8 @@ pub struct Place {
     pub directions: Vec<Direction>,
 }
 
-/// A point of a body: where it is, and its displacements and rotations in the modes (3 x nf), the latter where something determines them.
+/// A point of a body: where it is, and its displacements and rotations in the modes (3 x nf), the latter
+/// where something determines them.
 struct PointMotion {
     position: Vector3<f64>,
     translation: Mat<f64>,
@@ -84,7 +85,8 @@ impl Place {
         Self { point, directions: Vec::new() }
     }
 
-    /// `17`, `big_end`, `big_end:z`, `17:x,rz`: a node by its number or an interface by its name, and which directions count there.
+    /// `17`, `big_end`, `big_end:z`, `17:x,rz`: a node by its number or an interface by its name, and which
+    /// directions count there.
     pub fn parse(text: &str) -> Self {
         let named = |name: &str| Direction::ALL.into_iter().find(|direction| direction.name() == name);
         let point = |text: &str| text.parse().map_or_else(|_| Point::Interface(text.to_owned()), Point::Node);
@@ -112,7 +114,8 @@ impl Place {
         }
     }
 
-    /// Refuses what `body`, whose axes are those of the model and whose origin is the centre of mass, does not have.
+    /// Refuses what `body`, whose axes are those of the model and whose origin is the centre of mass, does
+    /// not have.
     ///
     /// # Errors
     /// [`PlaceUnknown`](Code::PlaceUnknown).
@@ -177,7 +180,8 @@ impl Place {
         }
     }
 
-    /// Nodal forces of a unit force or torque along each direction (N x k), which also read the displacements.
+    /// Nodal forces of a unit force or torque along each direction (N x k), which also read the
+    /// displacements.
     ///
     /// # Errors
     /// [`PlaceUnknown`](Code::PlaceUnknown), and [`InterfaceNode`](Code::InterfaceNode).

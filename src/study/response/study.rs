@@ -20,7 +20,8 @@ use nalgebra::{DMatrix, Matrix6, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Modal masses of a body differ from one by less than this in the model that it was made of, for arrays of 32 bits too.
+/// Modal masses of a body differ from one by less than this in the model that it was made of, for arrays of
+/// 32 bits too.
 const MODAL_MASS: f64 = 1e-4;
 
 /// What is asked for.
@@ -98,7 +99,8 @@ pub struct Pair {
     pub errors: Option<PairErrors>,
 }
 
-/// A transfer function: displacement per force, rotation per force, and so on, in the units of the body and radians.
+/// A transfer function: displacement per force, rotation per force, and so on, in the units of the body and
+/// radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Function {
     /// Direction of the force or torque.
@@ -131,13 +133,14 @@ impl Response {
     }
 }
 
-/// The receptances of `body` from places to places over a band: displacements and rotations for unit forces and torques, along the axes of the
-/// model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the body was made of also those of all its nodes, at some of the frequencies, with
-/// the damping that the body has: D = M Psi C Psi'M.
+/// The receptances of `body` from places to places over a band: displacements and rotations for unit forces
+/// and torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the
+/// body was made of also those of all its nodes, at some of the frequencies, with the damping that the body
+/// has: D = M Psi C Psi'M.
 ///
 /// # Errors
-/// [`PlaceUnknown`](Code::PlaceUnknown) for a place that the body does not have; [`BodyIncomparable`](Code::BodyIncomparable) for a body of another
-/// model; failures of the solutions.
+/// [`PlaceUnknown`](Code::PlaceUnknown) for a place that the body does not have;
+/// [`BodyIncomparable`](Code::BodyIncomparable) for a body of another model; failures of the solutions.
 pub fn respond(
     model: Option<&FeModel>,
     body: &FlexBody,
@@ -193,8 +196,8 @@ fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {
     Resonance { hertz: units.frequency_of(square), ratio }
 }
 
-/// The response of a body in a frame along the axes of the model about its centre of mass: rigid motion of the undeformed body and the modes, which
-/// no rigid motion couples to at rest.
+/// The response of a body in a frame along the axes of the model about its centre of mass: rigid motion of
+/// the undeformed body and the modes, which no rigid motion couples to at rest.
 fn reduced_sum(body: &FlexBody, from: &[PlaceRows], to: &[PlaceRows], damping: Option<Mat<f64>>) -> ModalSum {
     let joined = |rows: &[PlaceRows], part: fn(&PlaceRows) -> &Mat<f64>| {
         side_by_side(&rows.iter().map(|place| part(place).as_ref()).collect::<Vec<_>>())
@@ -215,7 +218,8 @@ fn reduced_sum(body: &FlexBody, from: &[PlaceRows], to: &[PlaceRows], damping: O
     }
 }
 
-/// Accelerations of the undeformed body for unit forces and torques about its centre of mass; in the plane, those in the plane.
+/// Accelerations of the undeformed body for unit forces and torques about its centre of mass; in the plane,
+/// those in the plane.
 fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
     let (mass, inertia) = (body.invariants().mass(), body.invariants().inertia());
     let mut compliance = Matrix6::zeros();
@@ -234,7 +238,8 @@ fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
 /// What the model knows.
 struct Known<'m> {
     nodal: NodalModes<'m>,
-    /// The estimate: the response with static responses beside the modes; `None` where the modes leave nothing to respond to.
+    /// The estimate: the response with static responses beside the modes; `None` where the modes leave
+    /// nothing to respond to.
     enriched: Option<ModalSum>,
     damping: Option<Mat<f64>>,
     /// Memory and time that solutions may take.
@@ -335,8 +340,8 @@ impl Curves {
         Self { frequencies, reduced: own, enriched, full, flops: 0.0 }
     }
 
-    /// Has the equations of all nodes solved also where the estimate of a block is largest and where it first is above the tolerance, at up to
-    /// `most` frequencies: what is said of them shall be measured.
+    /// Has the equations of all nodes solved also where the estimate of a block is largest and where it first
+    /// is above the tolerance, at up to `most` frequencies: what is said of them shall be measured.
     fn look_closer(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
         let mut found = Vec::new();
         for errors in blocks.iter().filter_map(|(_, _, block)| self.errors(block, tolerance)) {
@@ -355,7 +360,8 @@ impl Curves {
         }
     }
 
-    /// Solves the equations of all nodes. Frequencies where the solution has too few digits, at a natural frequency, are left out.
+    /// Solves the equations of all nodes. Frequencies where the solution has too few digits, at a natural
+    /// frequency, are left out.
     fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, watch: Watch<'_>) -> Result<()> {
         watch(Event::Phase("equations of all nodes"));
         let solver = known.direct_solver(self.frequencies.iter().filter(|f| f.solved).count())?;

@@ -3,7 +3,8 @@
 use crate::motion::scene::{Load, Point, Scene};
 use std::f64::consts::TAU;
 
-/// The loads of a scene whose static responses belong into a basis, so that no more modes are needed than the motion excites.
+/// The loads of a scene whose static responses belong into a basis, so that no more modes are needed than the
+/// motion excites.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WantedResponses {
     /// Centrifugal loads: the body turns.
@@ -34,7 +35,8 @@ impl WantedResponses {
     }
 }
 
-/// Free modes are wanted up to so many times the highest frequency of interest; what is above answers statically.
+/// Free modes are wanted up to so many times the highest frequency of interest; what is above answers
+/// statically.
 pub const BEYOND_BAND: f64 = 2.0;
 
 /// lambda up to which free modes are wanted: by the highest band of `scenes`, where one of them has a band.

@@ -1,4 +1,5 @@
-//! Guaranteed bounds of what dropped terms change of the motion of a body whose rotation is given (theory section 7).
+//! Guaranteed bounds of what dropped terms change of the motion of a body whose rotation is given (theory
+//! section 7).
 //!
 //! With the angular velocity w(t) of the frame given, the modes move by linear equations,
 //!
@@ -6,9 +7,10 @@
 //! q'' + D q' + 2 G(w) q' + (Lambda - E(w, w) + G(w')) q = Q(t) + W1'w w / 2,    G skew, E symmetric, 0 <= E <= |w|^2
 //! ```
 //!
-//! and the error of a model without some of the terms obeys the same equations with these terms of its own motion as load. The energy
-//! H = (|q'|^2 + q'(Lambda - E) q) / 2 bounds the response to a load F twice: sqrt(2 H) grows by no more than |F|; and against the static
-//! response, by no more than the total variation of that. Damping only helps, and is not counted on.
+//! and the error of a model without some of the terms obeys the same equations with these terms of its own
+//! motion as load. The energy H = (|q'|^2 + q'(Lambda - E) q) / 2 bounds the response to a load F twice:
+//! sqrt(2 H) grows by no more than |F|; and against the static response, by no more than the total variation
+//! of that. Damping only helps, and is not counted on.
 
 use super::norms::Norms;
 use super::variation::{Rotation, Variation};
@@ -146,8 +148,8 @@ impl Operator {
         Some(Self { margin, growth, softening, coupling, first, turned, rotation: *rotation, settled })
     }
 
-    /// sqrt(2 H) of the response to a load, from rest without deformation; or from its static response, about which it then moves by what is
-    /// not more, but of which an impulse says nothing.
+    /// sqrt(2 H) of the response to a load, from rest without deformation; or from its static response, about
+    /// which it then moves by what is not more, but of which an impulse says nothing.
     fn response(&self, load: &LoadSizes) -> f64 {
         let (m, r) = (self.margin, &self.rotation);
         let impulse = product(self.growth, load.impulse);
@@ -167,7 +169,8 @@ impl Driven {
         ModalLoad { force: norms.centrifugal, energy: norms.centrifugal_energy, factor: rate.times(&rate) }
     }
 
-    /// Bounds of the motion of the body with the groups that are kept. `None` where the spin takes all stiffness of some motion.
+    /// Bounds of the motion of the body with the groups that are kept. `None` where the spin takes all
+    /// stiffness of some motion.
     pub fn amplitude(&self, kept: Groups, norms: &Norms) -> Option<Amplitude> {
         let operator = Operator::new(kept, norms, self)?;
         let mut loads = self.loads.clone();
@@ -243,8 +246,8 @@ impl Driven {
         loads
     }
 
-    /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads. `None` where the spin may take
-    /// all stiffness of some motion.
+    /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads.
+    /// `None` where the spin may take all stiffness of some motion.
     pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<ErrorBound> {
         let operator = Operator::new(Groups::ALL, norms, self)?;
         let r = &self.rotation;
@@ -274,8 +277,8 @@ impl Driven {
         TorqueDefect { torque, stiff: product(norms.turning * norms.last, q) }
     }
 
-    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads: what it lacks, and what the whole
-    /// body makes of the `error` of a motion within `own`.
+    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads: what it
+    /// lacks, and what the whole body makes of the `error` of a motion within `own`.
     pub fn torque_error(
         &self,
         norms: &Norms,
@@ -289,7 +292,8 @@ impl Driven {
         let (q, v) = (own.coordinate + dq, own.rate + dv);
         let linear = norms.inertia * (dv * w + dq * turn);
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
-        // q'W3 e'' with e'' of the equations of motion, whose part Lambda e meets W3'q in the norm of stiffness.
+        // q'W3 e'' with e'' of the equations of motion, whose part Lambda e meets W3'q in the norm of
+        // stiffness.
         let stiff = product(defect.stiff + product(norms.turning * norms.last, dq), error.energy);
         let rest = product(product(norms.turning, q), error.acceleration_without_stiffness);
         let coupled =

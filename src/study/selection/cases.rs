@@ -16,18 +16,20 @@ pub(super) const PART_OF_BOUNDS: f64 = 0.5;
 /// How far the run may stay behind the rotation that the scene allows for its measurements to count.
 pub(super) const SLACK_OF_RANGE: f64 = 1.01;
 
-/// Sets of groups that a body may be left with, cheapest first. A body that is carried keeps all: dropped groups are those of
-/// its own modes, and what the interface takes from these needs them.
+/// Sets of groups that a body may be left with, cheapest first. A body that is carried keeps all: dropped
+/// groups are those of its own modes, and what the interface takes from these needs them.
 pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = Groups> {
     sets().filter(move |set| !carried || *set == Groups::ALL)
 }
 
-/// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size of K_ff, W3 two times three.
+/// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size
+/// of K_ff, W3 two times three.
 pub(super) fn sets() -> impl Iterator<Item = Groups> {
     (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
 }
 
-/// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays behind that.
+/// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays
+/// behind that.
 pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     let (loads, _) = points_of(body, scene)?;
     let allowed = Situation::new(body, scene, &loads);
@@ -87,7 +89,8 @@ impl<'c> Case<'c> {
         Ok(Self { body, scene, situation, loads, watched, memory })
     }
 
-    /// Sizes of the terms at tier 0 and, where they are wanted and the body holds all groups, at tier 1. Nothing without bounds.
+    /// Sizes of the terms at tier 0 and, where they are wanted and the body holds all groups, at tier 1.
+    /// Nothing without bounds.
     fn norms(&self, tier_1: bool) -> Vec<Norms> {
         let Ok(driven) = &self.situation.driven else { return Vec::new() };
         let (invariants, eigenvalues) = (self.body.invariants(), &self.body.modes().eigenvalue);
@@ -103,8 +106,8 @@ impl<'c> Case<'c> {
     }
 }
 
-/// Trials by bounds, up to the first set of groups that passes. Where the rotation is that of a run, the models that cost a multiple of nf
-/// only are run; others are as dear as a measurement.
+/// Trials by bounds, up to the first set of groups that passes. Where the rotation is that of a run, the
+/// models that cost a multiple of nf only are run; others are as dear as a measurement.
 pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     // Norms of the actual terms are eigenproblems of the size of the basis: once for every case.
     let norms: Vec<Vec<Norms>> = cases.iter().map(|case| case.norms(tier_1)).collect();
@@ -145,8 +148,8 @@ pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
     trials.max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in")
 }
 
-/// The trial of a model in all load cases: that of the case in which its errors take the largest part of what is left of the tolerances there.
-/// Of a scene alone it is its own.
+/// The trial of a model in all load cases: that of the case in which its errors take the largest part of what
+/// is left of the tolerances there. Of a scene alone it is its own.
 pub(super) fn together(trials: Vec<Trial>) -> Trial {
     let part = |trial: &Trial| (!trial.passed(), trial.worst / trial.budget);
     let larger = |a: &Trial, b: &Trial| {

@@ -17,7 +17,8 @@ pub(super) struct Deciding<'s> {
     demands: &'s [Demand<'s>],
     pub choice: Choice,
     pub trials: Vec<Trial>,
-    /// Of each load case the largest rotation of its runs and that which it allows, where the runs stay behind that.
+    /// Of each load case the largest rotation of its runs and that which it allows, where the runs stay
+    /// behind that.
     pub short_of: Vec<Option<(f64, f64)>>,
     /// The chosen model in each load case, measured.
     pub chosen_by_case: Vec<Trial>,

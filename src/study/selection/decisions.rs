@@ -11,7 +11,8 @@ use crate::body::flex_body::{Group, Groups, TermDecision};
 pub struct Ground {
     /// The output whose error is largest beside its tolerance: attitude, deflection, stress or reaction.
     pub output: &'static str,
-    /// Its error without the group: of the attitude in radians, else relative. A bound, or measured over a run (`tier` 2).
+    /// Its error without the group: of the attitude in radians, else relative. A bound, or measured over a
+    /// run (`tier` 2).
     pub error: f64,
     /// The tolerance of the scene.
     pub tolerance: f64,
@@ -23,7 +24,8 @@ pub struct Ground {
     pub case: Option<usize>,
 }
 
-/// What decisions are made from: what every load case demands, what was chosen, and what was tried on the way.
+/// What decisions are made from: what every load case demands, what was chosen, and what was tried on the
+/// way.
 pub(super) struct Deliberation<'d> {
     pub demands: &'d [Demand<'d>],
     pub choice: &'d Choice,
@@ -74,7 +76,8 @@ impl Deliberation<'_> {
         without().rfind(|trial| self.is_of_all(trial)).or(without().rfind(|trial| !trial.passed()))
     }
 
-    /// The first trial of what is kept that passed; where bounds of each load case decided, the largest of those without `group`.
+    /// The first trial of what is kept that passed; where bounds of each load case decided, the largest of
+    /// those without `group`.
     fn first_that_passed(&self, group: Group) -> Option<&Trial> {
         let kept = self.choice.groups;
         let passed = || self.trials.iter().filter(|trial| trial.passed());

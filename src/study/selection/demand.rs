@@ -11,8 +11,8 @@ use crate::motion::scene::{Scene, Stage, Tolerance, damped, points_of};
 use crate::study::reference::ReferenceError;
 use std::borrow::Cow;
 
-/// A body and a scene on their stage, and the scenes that a model is tried in: this one, and where it allows faster rotation than its run
-/// has, the one that turns as fast.
+/// A body and a scene on their stage, and the scenes that a model is tried in: this one, and where it allows
+/// faster rotation than its run has, the one that turns as fast.
 pub(super) struct OnStage<'s> {
     pub body: Cow<'s, FlexBody>,
     pub scene: Cow<'s, Scene>,
@@ -33,7 +33,8 @@ impl<'s> OnStage<'s> {
     }
 }
 
-/// What a scene demands: the motion that it means, the groups that bounds leave, and what is left of its tolerances.
+/// What a scene demands: the motion that it means, the groups that bounds leave, and what is left of its
+/// tolerances.
 pub(super) struct Demand<'c> {
     /// Name of the load case; `None` of a scene alone.
     pub name: Option<&'c str>,
@@ -95,7 +96,8 @@ impl<'c> Demand<'c> {
         if self.by_bounds.is_none() {
             return left;
         }
-        // What is measured is relative to a motion that may be larger than that of the whole body by as much as bounds allow.
+        // What is measured is relative to a motion that may be larger than that of the whole body by as much
+        // as bounds allow.
         let Tolerance { deflection, stress, reaction, .. } = *self.tolerance();
         (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
     }

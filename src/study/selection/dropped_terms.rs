@@ -10,7 +10,8 @@ use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::Vector3;
 
-/// A motion without some terms, and what these would add at its instants: from norms of the terms at tier 0, at tier 1 from the terms.
+/// A motion without some terms, and what these would add at its instants: from norms of the terms at tier 0,
+/// at tier 1 from the terms.
 pub(super) struct DroppedTerms {
     pub amplitude: Amplitude,
     /// What the balance of modal forces lacks.
@@ -57,8 +58,8 @@ impl DroppedTerms {
     }
 }
 
-/// The response of every mode alone to the `forces` that the dropped terms are at the instants; and what the terms that couple the modes make of
-/// that, which is left to bounds.
+/// The response of every mode alone to the `forces` that the dropped terms are at the instants; and what the
+/// terms that couple the modes make of that, which is left to bounds.
 fn first_order(
     body: &FlexBody,
     scene: &Scene,
@@ -106,7 +107,8 @@ fn instants<'r>(scene: &Scene, run: &'r Recording) -> Vec<Instant<'r>> {
     (0..run.time.len()).map(instant).collect()
 }
 
-/// q'' at an instant: of the polynomial through q and q' there and beside, of degree five, at the ends of degree three.
+/// q'' at an instant: of the polynomial through q and q' there and beside, of degree five, at the ends of
+/// degree three.
 fn acceleration(run: &Recording, i: usize) -> Vec<f64> {
     let last = run.time.len() - 1;
     let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
@@ -231,7 +233,8 @@ impl TermNorms<'_> {
             + self.turning * (q * a + w * q * v)
     }
 
-    /// How far Lambda^(-1/2) times the load moves between two instants: products change by the change of one factor times the other.
+    /// How far Lambda^(-1/2) times the load moves between two instants: products change by the change of one
+    /// factor times the other.
     fn moved(&self, earlier: &Scalars<'_>, now: &Scalars<'_>) -> f64 {
         let (norms, root) = (self.norms, self.root);
         let (state, old) = (now.instant, earlier.instant);
@@ -253,7 +256,8 @@ impl TermNorms<'_> {
     }
 }
 
-/// The dropped terms themselves: what the balance of forces of the whole body has beyond that of the kept groups; its modal forces at every instant.
+/// The dropped terms themselves: what the balance of forces of the whole body has beyond that of the kept
+/// groups; its modal forces at every instant.
 fn by_terms(
     body: &FlexBody,
     instants: &[Instant<'_>],

@@ -14,7 +14,8 @@ pub(super) struct ModalState {
     pub qd: Vec<f64>,
 }
 
-/// Sizes of the response e of the uncoupled modes, e'' + D e' + Lambda e = F, to the load F that the dropped terms are.
+/// Sizes of the response e of the uncoupled modes, e'' + D e' + Lambda e = F, to the load F that the dropped
+/// terms are.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct FirstOrder {
     /// |Lambda^(1/2) e|.
@@ -25,8 +26,8 @@ pub(super) struct FirstOrder {
     rate: f64,
     /// |e'' + Lambda e|.
     without_stiffness: f64,
-    /// Loads that e leaves out: those of the terms that couple the modes, along e, and what F has beside straight lines from instant to
-    /// instant.
+    /// Loads that e leaves out: those of the terms that couple the modes, along e, and what F has beside
+    /// straight lines from instant to instant.
     pub rest: LoadSizes,
 }
 
@@ -52,8 +53,8 @@ impl FirstOrder {
     }
 }
 
-/// The modes of a body as oscillators x'' + d x' + lambda x = f, each of which moves from one of even instants to the next, under a load that is
-/// straight between them, without error.
+/// The modes of a body as oscillators x'' + d x' + lambda x = f, each of which moves from one of even
+/// instants to the next, under a load that is straight between them, without error.
 pub(super) struct Oscillators {
     /// Time between two instants.
     step: f64,
@@ -93,7 +94,8 @@ impl Oscillators {
         &self.root
     }
 
-    /// The response at every instant to the loads there, from rest without deformation or, `settled`, from the static response; its sizes.
+    /// The response at every instant to the loads there, from rest without deformation or, `settled`, from
+    /// the static response; its sizes.
     pub fn respond(&self, loads: &[Vec<f64>], settled: bool) -> (Vec<ModalState>, FirstOrder) {
         let modes = self.root.len();
         let mut now = ModalState { q: vec![0.0; modes], qd: vec![0.0; modes] };

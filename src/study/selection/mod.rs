@@ -1,4 +1,5 @@
-//! What a body needs in a scene: sizes of the terms, guaranteed bounds of what dropping them does, measured errors, and the decision.
+//! What a body needs in a scene: sizes of the terms, guaranteed bounds of what dropping them does, measured
+//! errors, and the decision.
 
 mod basis;
 mod bounds;

@@ -1,13 +1,14 @@
-//! Sizes of the terms of the equations of motion, before and after the invariants are known (theory section 7).
+//! Sizes of the terms of the equations of motion, before and after the invariants are known (theory section
+//! 7).
 
 use crate::body::invariants::{Invariants, relative_norm};
 use crate::numerics::linalg::symmetric_eigen;
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// Bounds of the terms for mass-normalised free-surface modes about the centre of mass, per unit of angular velocity and of q. Tier 0 knows
-/// I0 and the eigenvalues and follows from the Cauchy-Schwarz inequality in the inner product of M; tier 1 has the norms of
-/// the actual W1, W2, W3.
+/// Bounds of the terms for mass-normalised free-surface modes about the centre of mass, per unit of angular
+/// velocity and of q. Tier 0 knows I0 and the eigenvalues and follows from the Cauchy-Schwarz inequality in
+/// the inner product of M; tier 1 has the norms of the actual W1, W2, W3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Norms {
     /// 0 or 1.
@@ -33,7 +34,8 @@ pub struct Norms {
 }
 
 impl Norms {
-    /// What I0 (body axes, about the centre of mass) and the eigenvalues say, for rotation about `axis` or, without one, about any.
+    /// What I0 (body axes, about the centre of mass) and the eigenvalues say, for rotation about `axis` or,
+    /// without one, about any.
     pub fn of_rigid(inertia: &Matrix3<f64>, eigenvalues: &[f64], axis: Option<&Vector3<f64>>) -> Self {
         let largest = inertia.symmetric_eigenvalues().max();
         let along = axis.map_or(largest, |e| e.dot(&(inertia * e))).max(0.0).sqrt();
@@ -52,8 +54,8 @@ impl Norms {
         }
     }
 
-    /// What the invariants say; `None` where a group is not held or K_ff is not positive definite. Never more than
-    /// [`Norms::of_rigid`].
+    /// What the invariants say; `None` where a group is not held or K_ff is not positive definite. Never more
+    /// than [`Norms::of_rigid`].
     pub fn of_invariants(
         invariants: &Invariants,
         eigenvalues: &[f64],
@@ -120,7 +122,8 @@ fn spectral_norm(a: &Mat<f64>) -> Option<f64> {
 
 /// W1'w w / 2, the constant centrifugal load on the modes, as a function of w.
 struct CentrifugalLoad {
-    /// nf x 6: of w_x^2, w_y^2, w_z^2, sqrt(2) w_y w_z, sqrt(2) w_x w_z, sqrt(2) w_x w_y, whose root of the sum of squares is |w|^2.
+    /// nf x 6: of w_x^2, w_y^2, w_z^2, sqrt(2) w_y w_z, sqrt(2) w_x w_z, sqrt(2) w_x w_y, whose root of the
+    /// sum of squares is |w|^2.
     rows: DMatrix<f64>,
 }
 

@@ -6,20 +6,21 @@ use crate::motion::dynamics::BodyPoint;
 use crate::motion::scene::{Point, Scene};
 use nalgebra::Vector3;
 
-/// What modes lack of the static response to a load, relative, in the norm of K: sqrt(1 - sum_kept (f_p^2 / lambda_p) / sum_all).
+/// What modes lack of the static response to a load, relative, in the norm of K: sqrt(1 - sum_kept (f_p^2 /
+/// lambda_p) / sum_all).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Participation {
     /// The load.
     pub load: String,
     /// What the selected modes lack of the response of all modes of the body.
     pub selected: f64,
-    /// What the modes of the body lack of the response of all nodes, with its residual vectors and without; where it was recorded when
-    /// the body was made.
+    /// What the modes of the body lack of the response of all nodes, with its residual vectors and without;
+    /// where it was recorded when the body was made.
     pub body: Option<(f64, f64)>,
 }
 
-/// For the loads of `scene` at `points` in their first direction, or where that changes along every axis that they have, and for steady spin about its axis. Loads that deform nothing are left
-/// out.
+/// For the loads of `scene` at `points` in their first direction, or where that changes along every axis that
+/// they have, and for steady spin about its axis. Loads that deform nothing are left out.
 pub fn participations(
     body: &FlexBody,
     scene: &Scene,

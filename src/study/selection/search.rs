@@ -6,7 +6,8 @@ use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Groups};
 use crate::motion::scene::{Measure, Scene, Tolerance, Trace};
 
-/// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are kept.
+/// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are
+/// kept.
 const PART_OF_TERMS: f64 = 0.5;
 
 /// Terms and modes that are chosen so far.
@@ -41,7 +42,8 @@ fn by_weight(weights: &[f64]) -> Vec<usize> {
     ranked
 }
 
-/// Modes of `body` by what they do in its `motion` in `scene`, most first: the order in which [`select`](super::select) keeps them.
+/// Modes of `body` by what they do in its `motion` in `scene`, most first: the order in which
+/// [`select`](super::select) keeps them.
 ///
 /// # Errors
 /// FB212 where the scene does not fit the body.
@@ -67,7 +69,8 @@ pub(super) struct TriedCase<'s> {
 pub(super) struct Search<'s> {
     /// One at least.
     pub cases: &'s [TriedCase<'s>],
-    /// Groups that have to stay: a run that turns slower than its scene allows shows of no term that it may be dropped.
+    /// Groups that have to stay: a run that turns slower than its scene allows shows of no term that it may
+    /// be dropped.
     pub fixed: Groups,
     /// Whether something carries the body in a case: all groups stay then.
     pub carried: bool,
@@ -94,7 +97,8 @@ impl Search<'_> {
         self.cheapest(PART_OF_TERMS, choice, trials)
     }
 
-    /// Cheaper groups with the modes that are kept, where these take less of the tolerances than was left to them.
+    /// Cheaper groups with the modes that are kept, where these take less of the tolerances than was left to
+    /// them.
     pub fn fewer_terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
         self.cheapest(1.0, choice, trials)
     }
@@ -163,8 +167,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The most accurate model of at most `most` multiplications: for every set of groups as many modes as that allows.
-    /// False where every model takes more.
+    /// The most accurate model of at most `most` multiplications: for every set of groups as many modes as
+    /// that allows. False where every model takes more.
     pub fn within_cost(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<bool> {
         let ranked = self.ranked(choice);
         let mut best: Option<(f64, Groups, Vec<usize>)> = None;

@@ -24,7 +24,8 @@ pub struct Selection {
     pub body: String,
     /// Numbers that the decision follows from.
     pub inputs: Vec<Input>,
-    /// Largest errors that are allowed, of several load cases the least in any; in the order attitude, deflection, stress, reaction.
+    /// Largest errors that are allowed, of several load cases the least in any; in the order attitude,
+    /// deflection, stress, reaction.
     pub tolerance: [f64; 4],
     /// Sizes of all terms.
     pub significances: Vec<Significance>,
@@ -56,8 +57,9 @@ pub struct Selection {
     pub guideline: &'static str,
     /// The cost that the scene allows, where that decides.
     pub most_multiplications: Option<usize>,
-    /// What the body, and those before it that were enriched, lack of the model, the last one the body itself; empty where only a file is at
-    /// hand, or nothing can be estimated. Of several load cases: in that where the body lacks most.
+    /// What the body, and those before it that were enriched, lack of the model, the last one the body
+    /// itself; empty where only a file is at hand, or nothing can be estimated. Of several load cases: in
+    /// that where the body lacks most.
     pub lacks: Vec<ReferenceError>,
     /// What belongs to each load case; empty of a scene without.
     pub cases: Vec<CaseSelection>,
@@ -66,8 +68,8 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured, against a body that lacks no more than
-    /// half of them itself.
+    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured,
+    /// against a body that lacks no more than half of them itself.
     pub fn holds(&self) -> bool {
         let is_reference = self.lacks.last().is_none_or(ReferenceError::is_reference);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
@@ -77,8 +79,8 @@ impl Selection {
     }
 }
 
-/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in these load cases, one or more, need not hold.
-/// `body` needs to hold none.
+/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in these load
+/// cases, one or more, need not hold. `body` needs to hold none.
 ///
 /// # Errors
 /// FB212 where a scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
@@ -102,10 +104,11 @@ pub fn rule_out(body: &FlexBody, scenes: &[Scene], memory: Option<u64>) -> Resul
 
 /// The terms and modes of `body` that `scene` needs.
 ///
-/// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 where these leave half of the tolerances, else by
-/// the error of a motion that is integrated (tier 2), if the scene says how long it lasts. Where the scene allows faster rotation than
-/// its run has, everything holds for the run and for the run with the rotation scaled to that. Modes are ranked by what
-/// they do in the motion, and the fewest are kept whose motion, with the kept groups, is within the tolerances.
+/// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 where these leave half of
+/// the tolerances, else by the error of a motion that is integrated (tier 2), if the scene says how long it
+/// lasts. Where the scene allows faster rotation than its run has, everything holds for the run and for the
+/// run with the rotation scaled to that. Modes are ranked by what they do in the motion, and the fewest are
+/// kept whose motion, with the kept groups, is within the tolerances.
 ///
 /// # Errors
 /// FB212 where the scene does not fit the body; those of [`simulate`](crate::motion::scene::simulate).
@@ -113,7 +116,8 @@ pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<
     select_from(body, &[], scene, memory, watch)
 }
 
-/// The same where it is known what `body`, and those before it, lack of the model in this scene: what is left of the tolerances.
+/// The same where it is known what `body`, and those before it, lack of the model in this scene: what is left
+/// of the tolerances.
 ///
 /// # Errors
 /// As [`select`].
@@ -127,8 +131,9 @@ pub fn select_from(
     select_for_cases(body, &[lacks.to_vec()], std::slice::from_ref(scene), memory, watch)
 }
 
-/// The same for the load cases `scenes`: the terms and modes with which every one of them is within its own tolerances. A group that bounds
-/// rule out in some cases is measured in the others; modes are ranked by the most that they do beside the tolerances of any case.
+/// The same for the load cases `scenes`: the terms and modes with which every one of them is within its own
+/// tolerances. A group that bounds rule out in some cases is measured in the others; modes are ranked by the
+/// most that they do beside the tolerances of any case.
 ///
 /// * `lacks`: for each case as in [`select_from`]; nothing is known of cases that it does not reach.
 ///

@@ -1,5 +1,5 @@
-//! Significance of every term of the equations of motion for a body and a scene: unit-free (\[WP19\] eq. 28 and 36 to 40, as corrected in the
-//! theory, section 11), and with the invariants of the body.
+//! Significance of every term of the equations of motion for a body and a scene: unit-free (\[WP19\] eq. 28
+//! and 36 to 40, as corrected in the theory, section 11), and with the invariants of the body.
 
 use super::norms::Norms;
 use super::situation::Situation;
@@ -80,7 +80,8 @@ const TERMS: [Term; 8] = [
     ),
 ];
 
-/// Terms of [`TERMS`] that the norms of the invariants say nothing of: the Coriolis torque has components across the axis.
+/// Terms of [`TERMS`] that the norms of the invariants say nothing of: the Coriolis torque has components
+/// across the axis.
 const WITHOUT_NORM: usize = TERMS.len() - 1;
 
 /// Sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
@@ -113,11 +114,11 @@ pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance
     cases.reduce(larger).unwrap_or_default()
 }
 
-/// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation or the body axis where they
-/// are largest.
+/// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation
+/// or the body axis where they are largest.
 ///
-/// With eta = |q| / sqrt(e'I0 e), Omega_1 the first circular frequency of the body (of the assembly for Coriolis forces), w and alpha
-/// the largest angular velocity and acceleration.
+/// With eta = |q| / sqrt(e'I0 e), Omega_1 the first circular frequency of the body (of the assembly for
+/// Coriolis forces), w and alpha the largest angular velocity and acceleration.
 pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
     let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
     let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);

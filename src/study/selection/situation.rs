@@ -1,4 +1,5 @@
-//! What a scene means for a body: how fast it turns, how far its modes go, what loads them, and where each of these numbers comes from.
+//! What a scene means for a body: how fast it turns, how far its modes go, what loads them, and where each of
+//! these numbers comes from.
 
 use super::bounds::{Driven, ModalLoad, Start, TurnedTorques};
 use super::rows::PointRows;
@@ -10,13 +11,15 @@ use crate::motion::scene::{AttachmentKind, Axes, Load, Range, Scene, VectorHisto
 use nalgebra::{DMatrix, Matrix3};
 use std::f64::consts::TAU;
 
-/// Deflection, relative to the largest extent, where linear elasticity ends: the bound of amplitudes unless a scene has one.
+/// Deflection, relative to the largest extent, where linear elasticity ends: the bound of amplitudes unless a
+/// scene has one.
 const LINEAR_RANGE: f64 = 0.1;
 
 /// Periods of the first mode that a scene lasts unless it says how long.
 const PERIODS: f64 = 100.0;
 
-/// How far C1 and C2 may be from zero for modes to be free-surface modes about the centre of mass, relative to their bounds.
+/// How far C1 and C2 may be from zero for modes to be free-surface modes about the centre of mass, relative
+/// to their bounds.
 const ROUNDING: f64 = 1e-8;
 
 /// A number that decisions follow from.
@@ -122,7 +125,8 @@ fn turning(
 ) -> (Input, Input) {
     let motion = &scene.requirements.motion;
     let [spin, acceleration] = turning_of_run(body, scene, inertia, duration, points);
-    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what it is.
+    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what
+    // it is.
     let larger = |range: &Option<Range>, (value, source): Sourced, key: &str| match range {
         Some(range) if !scene.prescribes() || range.length() > value => {
             (range.length(), format!("[motion] {key}"))
@@ -189,8 +193,9 @@ fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyP
     scene.loads.iter().zip(points).map(torque).sum()
 }
 
-/// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more than what a load of the
-/// size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p (\[WP19\] 5.2).
+/// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more
+/// than what a load of the size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p
+/// (\[WP19\] 5.2).
 fn amplitudes(body: &FlexBody, scene: &Scene) -> Vec<f64> {
     let limits = &scene.requirements.limits;
     let deflection = limits.deflection.unwrap_or(LINEAR_RANGE * body.extent());
@@ -238,7 +243,8 @@ fn given_rotation(
     match (spin_of_run, scene.requirements.attachment.kind) {
         (Some(spin), _) => {
             let rate = Variation::of_vector(&spin.velocity, duration);
-            // Seen from the body, the acceleration of a rotation about axes of the world turns with omega besides.
+            // Seen from the body, the acceleration of a rotation about axes of the world turns with omega
+            // besides.
             let turned = if spin.axes == Axes::World { rate.largest * rate.total } else { 0.0 };
             Ok(Rotation {
                 axis: spin.velocity.direction().and_then(|direction| direction.try_normalize(0.0)),
@@ -321,8 +327,9 @@ fn energy_norm(rows: &DMatrix<f64>, root: &[f64]) -> f64 {
     PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / root[j]))
 }
 
-/// How the deformation changes the modal forces of torques: a torque t works on the rotation vector theta = Theta q of its point as G(theta)'t, where
-/// G = integral_0^1 exp(s theta~) ds, which changes by no more than half of what theta changes by.
+/// How the deformation changes the modal forces of torques: a torque t works on the rotation vector theta =
+/// Theta q of its point as G(theta)'t, where G = integral_0^1 exp(s theta~) ds, which changes by no more than
+/// half of what theta changes by.
 fn turned_torques(
     body: &FlexBody,
     scene: &Scene,

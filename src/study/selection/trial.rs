@@ -26,7 +26,8 @@ const MOST_NUMBERS: f64 = 4e6;
 /// Part of the tolerance of the stress from which a mode takes part in a motion.
 const TAKES_PART: f64 = 0.01;
 
-/// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a spin is looked for.
+/// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a
+/// spin is looked for.
 const LEAST_INSTANTS: usize = 500;
 
 /// A model with fewer terms or modes and the error that it makes.
@@ -48,7 +49,8 @@ pub struct Trial {
     pub worst: f64,
     /// Why there are no errors; empty where there are.
     pub remark: String,
-    /// Of several load cases the one (from 0) that the errors are of: where they take the largest part of what is left of the tolerances.
+    /// Of several load cases the one (from 0) that the errors are of: where they take the largest part of
+    /// what is left of the tolerances.
     pub case: Option<usize>,
     /// Largest error over its tolerance in each load case, where it was tried in several.
     pub by_case: Vec<f64>,
@@ -88,8 +90,9 @@ impl TrialRuns<'_> {
         trace(self.body, &scene, self.memory, |_| ())
     }
 
-    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the loads and the spin; or, where these would
-    /// be too many, the fastest mode that takes part. `None` where that are too many still.
+    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the
+    /// loads and the spin; or, where these would be too many, the fastest mode that takes part. `None` where
+    /// that are too many still.
     ///
     /// # Errors
     /// As [`simulate`].
@@ -110,8 +113,8 @@ impl TrialRuns<'_> {
         Ok(is_followed.then_some(motion))
     }
 
-    /// The largest circular frequency of the modes that take part in a motion: whose root of the elastic energy, relative to the largest, is
-    /// above a part of the tolerance.
+    /// The largest circular frequency of the modes that take part in a motion: whose root of the elastic
+    /// energy, relative to the largest, is above a part of the tolerance.
     fn liveliest(&self, motion: &Recording) -> f64 {
         let roots: Vec<f64> = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
         let energies = || roots.iter().zip(&motion.extremes.amplitudes).map(|(root, q)| root * q.abs());
@@ -120,8 +123,8 @@ impl TrialRuns<'_> {
         lively.map(|(root, _)| *root).fold(0.0, f64::max)
     }
 
-    /// Largest circular frequency of anything in the motion of the body, of its modes up to `highest`. What a spin does between two of its breaks is
-    /// one half of a period.
+    /// Largest circular frequency of anything in the motion of the body, of its modes up to `highest`. What a
+    /// spin does between two of its breaks is one half of a period.
     fn fastest(&self, highest: f64) -> f64 {
         let duration = self.situation.duration.value;
         let roots = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt());
@@ -138,7 +141,8 @@ impl TrialRuns<'_> {
         tones.chain(rows).chain(pieces).fold(modes, f64::max) + self.situation.spin.value
     }
 
-    /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure` holds; and how its errors grow.
+    /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure`
+    /// holds; and how its errors grow.
     ///
     /// # Errors
     /// Those of [`simulate`] other than FB540 and FB550, which the trial notes.
@@ -185,8 +189,9 @@ impl TrialRuns<'_> {
         Ok((trial, history.ok()))
     }
 
-    /// The trial by bounds of a model with the groups `kept`. With its motion `run`, the load that the dropped terms are to its error is taken
-    /// along that, at its instants; without, at the largest motion that loads and rotation allow.
+    /// The trial by bounds of a model with the groups `kept`. With its motion `run`, the load that the
+    /// dropped terms are to its error is taken along that, at its instants; without, at the largest motion
+    /// that loads and rotation allow.
     pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: Groups, budget: f64) -> Trial {
         let mut trial = Trial {
             kept,
@@ -255,7 +260,8 @@ impl TrialRuns<'_> {
         self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>()
     }
 
-    /// Errors relative to what is certain of the whole motion, or to the least that counts; `torque` is the bound of the error of that.
+    /// Errors relative to what is certain of the whole motion, or to the least that counts; `torque` is the
+    /// bound of the error of that.
     fn relative_errors(
         &self,
         driven: &Driven,
@@ -348,7 +354,8 @@ impl TrialRuns<'_> {
 pub struct ModeShare {
     /// Largest |q|.
     pub amplitude: f64,
-    /// Largest deflection of a watched point (without any: of a node) by this mode alone, relative to the largest of all together.
+    /// Largest deflection of a watched point (without any: of a node) by this mode alone, relative to the
+    /// largest of all together.
     pub deflection: f64,
     /// Root of its largest elastic energy, relative to the largest of all together.
     pub stress: f64,

@@ -6,7 +6,8 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::motion::scene::{Axes, History, Measure, VectorHistory};
 use std::f64::consts::TAU;
 
-/// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths of its resonance.
+/// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths
+/// of its resonance.
 const NEAR: f64 = 0.1;
 
 /// The warning that the errors of the selected model grow faster than its motion, by this factor.

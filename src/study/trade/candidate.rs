@@ -39,8 +39,9 @@ impl Kind {
 /// What was lumped of the mass, and by which scheme: the two ways of multibody programs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LumpedMass {
-    /// Modes and modal mass are those of the consistent mass; the rigid body and all couplings are summed over nodal masses. This is made
-    /// of a modal neutral file, which holds modes, generalised masses and nodal masses.
+    /// Modes and modal mass are those of the consistent mass; the rigid body and all couplings are summed
+    /// over nodal masses. This is made of a modal neutral file, which holds modes, generalised masses and
+    /// nodal masses.
     Couplings(String),
     /// The whole mass was lumped before the modes were computed: an FE model with a lumped mass matrix.
     Whole(String),
@@ -129,12 +130,13 @@ impl Candidate {
 /// Groups that a ladder of modes is tried with, the cheapest first.
 const SETS: [Groups; 3] = [Groups::NONE, Groups { w1: true, ..Groups::NONE }, Groups::ALL];
 
-/// Errors over their tolerances of a set of groups with all modes: beyond the first it is hopeless, and below the second dearer sets cannot
-/// be told from it.
+/// Errors over their tolerances of a set of groups with all modes: beyond the first it is hopeless, and below
+/// the second dearer sets cannot be told from it.
 const HOPELESS: f64 = 10.0;
 const PERFECT: f64 = 0.01;
 
-/// The candidates that have all modes of a source, the first of which is the reference. Bodies that are `carried` keep all groups.
+/// The candidates that have all modes of a source, the first of which is the reference. Bodies that are
+/// `carried` keep all groups.
 pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {
@@ -158,8 +160,8 @@ pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candida
     held(all, sources, carried)
 }
 
-/// The candidates that have some modes of the reference, the lowest and the `liveliest`, with the sets of groups that are worth it:
-/// `worst_of` answers the largest error over its tolerance of a set with all modes.
+/// The candidates that have some modes of the reference, the lowest and the `liveliest`, with the sets of
+/// groups that are worth it: `worst_of` answers the largest error over its tolerance of a set with all modes.
 pub(super) fn ladder(
     sources: &[Source],
     liveliest: &[usize],

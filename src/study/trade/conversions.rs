@@ -18,7 +18,8 @@ use std::time::Instant;
 pub struct Conversions {
     /// The reference first.
     pub sources: Vec<Source>,
-    /// What the reference, and bodies before it that were enriched, lack of the model in the scene; the last one is the reference.
+    /// What the reference, and bodies before it that were enriched, lack of the model in the scene; the last
+    /// one is the reference.
     pub lacks: Vec<ReferenceError>,
     /// What was said about the reference.
     pub diagnostics: Vec<Diagnostic>,
@@ -26,9 +27,10 @@ pub struct Conversions {
 
 /// Every conversion of a study in `scene`.
 ///
-/// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what [`enrich`] finds lacking. Beside it stand
-/// `modes`, their half and their quarter with residual vectors and without, `modes` at the other levels of accuracy, bodies of the shapes that
-/// the motion of the reference is made of, and what the settings of the reference make of the model with its whole mass lumped. Each is timed.
+/// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what [`enrich`]
+/// finds lacking. Beside it stand `modes`, their half and their quarter with residual vectors and without,
+/// `modes` at the other levels of accuracy, bodies of the shapes that the motion of the reference is made of,
+/// and what the settings of the reference make of the model with its whole mass lumped. Each is timed.
 ///
 /// # Errors
 /// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
@@ -79,8 +81,8 @@ pub fn conversions(
 
 const OF_THE_MODEL: &str = "bodies that were made of the model";
 
-/// Schemes that lump the whole mass of `model`; none where it is lumped already, or where rows without a place carry mass that belongs to
-/// no node.
+/// Schemes that lump the whole mass of `model`; none where it is lumped already, or where rows without a
+/// place carry mass that belongs to no node.
 fn lumpings(model: &FeModel) -> Vec<Lumping> {
     match model.has_diagonal_mass() || model.rows().vectors() > 0 {
         true => Vec::new(),
@@ -187,7 +189,8 @@ impl<'m> Making<'m> {
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
 
-    /// Bodies of the [`MotionShapes`] of `reference` in `scene`; each takes the time of the reference and its motion besides.
+    /// Bodies of the [`MotionShapes`] of `reference` in `scene`; each takes the time of the reference and its
+    /// motion besides.
     fn make_of_motion(&self, reference: &Source, scene: &Scene) -> Result<Vec<Source>> {
         if scene.run.duration.is_none() {
             return Ok(Vec::new());

@@ -23,7 +23,8 @@ impl Recommendation {
         }
     }
 
-    /// Of `rows`, whose errors may be `most` times their tolerances, with the multiplications that the scene allows instead.
+    /// Of `rows`, whose errors may be `most` times their tolerances, with the multiplications that the scene
+    /// allows instead.
     pub(super) fn new(rows: &[Row], most: f64, allowed: Option<usize>) -> Self {
         let points = points(rows);
         match allowed {
@@ -41,9 +42,10 @@ impl Recommendation {
     }
 }
 
-/// Rows (from 0) that no other is cheaper than and as accurate as, ascending in cost: the Pareto front of multiplications per evaluation
-/// and the largest ratio of error to tolerance. Multiplications stand for the time of an evaluation, which is their number but for what
-/// clocks add: the front does not depend on the machine and its load.
+/// Rows (from 0) that no other is cheaper than and as accurate as, ascending in cost: the Pareto front of
+/// multiplications per evaluation and the largest ratio of error to tolerance. Multiplications stand for the
+/// time of an evaluation, which is their number but for what clocks add: the front does not depend on the
+/// machine and its load.
 pub fn front(rows: &[Row]) -> Vec<usize> {
     let mut best = f64::INFINITY;
     let better = |point: &(usize, f64, usize)| {
@@ -56,8 +58,8 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
     points(rows).into_iter().filter(better).map(|point| point.2).collect()
 }
 
-/// (multiplications, worst ratio, row) of what was measured, ascending. A lumped mass is there to be compared with: it costs what the
-/// consistent one does.
+/// (multiplications, worst ratio, row) of what was measured, ascending. A lumped mass is there to be compared
+/// with: it costs what the consistent one does.
 fn points(rows: &[Row]) -> Vec<(usize, f64, usize)> {
     let point = |(at, row): (usize, &Row)| {
         let measured = row.outcome.as_ref().ok().filter(|_| row.candidate.lumped.is_none())?;

@@ -41,7 +41,8 @@ impl Source {
         Self { lumped_by: Some(scheme.to_owned()), ..self }
     }
 
-    /// The same as a candidate beside the body `reference` of the same model; `None` when one of them is not of `model`.
+    /// The same as a candidate beside the body `reference` of the same model; `None` when one of them is not
+    /// of `model`.
     pub fn beside(mut self, reference: &FlexBody, model: &FeModel) -> Option<Self> {
         let (own, others) = (self.body.vectors_of(model)?, reference.vectors_of(model)?);
         let mut product = Mat::zeros(others.nrows(), others.ncols());
@@ -88,8 +89,8 @@ impl Source {
         self.lumped_by.as_deref()
     }
 
-    /// The body with its own modal mass and everything else summed over the nodal masses of a scheme; itself where there is none of that
-    /// name.
+    /// The body with its own modal mass and everything else summed over the nodal masses of a scheme; itself
+    /// where there is none of that name.
     pub(super) fn with_lumped_couplings(&self, scheme: &str) -> Result<FlexBody> {
         let mut parts = self.body.clone().into_parts();
         if let Some(lumped) = self.lumped.iter().find(|lumped| lumped.scheme == scheme) {
@@ -99,10 +100,11 @@ impl Source {
         FlexBody::new(parts)
     }
 
-    /// `scene` for a candidate with the `modes` of this body, a motion that starts as `start` of the reference does.
+    /// `scene` for a candidate with the `modes` of this body, a motion that starts as `start` of the
+    /// reference does.
     ///
-    /// Modes of the start are those of the reference; other modes take the part of its deformation that is nearest to it in elastic
-    /// energy, q = L^-1 G q_r.
+    /// Modes of the start are those of the reference; other modes take the part of its deformation that is
+    /// nearest to it in elastic energy, q = L^-1 G q_r.
     pub(in crate::study) fn scene(
         &self,
         scene: &Scene,
@@ -127,7 +129,8 @@ impl Source {
         own
     }
 
-    /// Errors of the motion of a candidate with the `modes` of this body; `None` where its modes cannot be compared.
+    /// Errors of the motion of a candidate with the `modes` of this body; `None` where its modes cannot be
+    /// compared.
     pub(in crate::study) fn errors(
         &self,
         measure: &Measure<'_>,

@@ -76,16 +76,18 @@ pub struct Trade {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Measures every candidate of `sources` in `scene`. The first source is the reference; others are [`Source::beside`] it.
+/// Measures every candidate of `sources` in `scene`. The first source is the reference; others are
+/// [`Source::beside`] it.
 ///
-/// Errors are those of the model: all candidates are integrated with the method and the step of the reference. They are found on all
-/// threads; the times of those that somebody may take afterwards, one after the other. Everything but the times is the same at any number of threads.
+/// Errors are those of the model: all candidates are integrated with the method and the step of the
+/// reference. They are found on all threads; the times of those that somebody may take afterwards, one after
+/// the other. Everything but the times is the same at any number of threads.
 ///
 /// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
 ///
 /// # Errors
-/// Those of [`trace`] and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the
-/// temporary folder.
+/// Those of [`trace`] and [`NodalReference::new`] for the reference; FB601 when memory is short; those of
+/// writing a file to the temporary folder.
 pub fn trade(
     sources: &[Source],
     scene: &Scene,
@@ -167,7 +169,8 @@ struct Job<'j> {
 }
 
 impl Job<'_> {
-    /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one after the other.
+    /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one
+    /// after the other.
     fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<Row>> {
         let carried = self.scene.carried.is_some();
         let whole = whole_candidates(self.sources, carried);
@@ -188,7 +191,8 @@ impl Job<'_> {
         Ok(rows)
     }
 
-    /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that is not, as a selection does.
+    /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that
+    /// is not, as a selection does.
     fn refine(&self, liveliest: &[usize], rows: &mut Vec<Row>) -> Result<()> {
         if self.scene.requirements.multiplications.is_some() {
             return Ok(());

@@ -15,7 +15,8 @@ const BATCHES: usize = 15;
 /// Integrations that take this long together are not repeated: the clock is sharper than that.
 const LONG: Duration = Duration::from_secs(2);
 
-/// Seconds that one evaluation of the equations of `body` with `terms` takes: state, forces of inertia and accelerations.
+/// Seconds that one evaluation of the equations of `body` with `terms` takes: state, forces of inertia and
+/// accelerations.
 pub(super) fn evaluation(body: &FlexBody, terms: Terms) -> std::result::Result<f64, NotPositiveDefinite> {
     let equations = EquationsOfMotion::new(body, terms);
     let mut evaluation = Evaluation::new(&equations);

@@ -1,4 +1,5 @@
-//! Finite element bodies: exact counts around every bound, and the way from the model through the file to `check`.
+//! Finite element bodies: exact counts around every bound, and the way from the model through the file to
+//! `check`.
 
 use super::exact::count_below;
 use crate::support::elements::{Kind, MassRule, Material};

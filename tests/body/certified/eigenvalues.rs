@@ -1,5 +1,5 @@
-//! Every eigenvalue lies between its bounds, by exact counts; the bounds are tight; the counts on both sides are those
-//! of the rigid modes and of all modes.
+//! Every eigenvalue lies between its bounds, by exact counts; the bounds are tight; the counts on both sides
+//! are those of the rigid modes and of all modes.
 
 use super::exact::count_below;
 use faer::Mat;
@@ -86,7 +86,8 @@ impl Body {
         let mut widest = 0.0f64;
         for (j, &lambda) in found.eigenvalues.iter().enumerate() {
             assert!(lower[j] <= lambda && lambda <= upper[j], "{j}: {} {lambda} {}", lower[j], upper[j]);
-            // Eigenvalues below the bounds, the rigid one included. `next_up`: an eigenvalue on the bound itself.
+            // Eigenvalues below the bounds, the rigid one included. `next_up`: an eigenvalue on the bound
+            // itself.
             let below = count_below(&self.k, &self.m, lower[j].next_down());
             let up_to = count_below(&self.k, &self.m, upper[j].next_up());
             assert!(
@@ -129,7 +130,8 @@ fn free_chains_have_the_eigenvalues_of_their_closed_form() {
 
 #[test]
 fn a_long_chain_keeps_its_digits_by_the_iterative_path() {
-    // 700 masses: beyond the dense path. lambda_1 / lambda_max = 5e-6, so plain products would keep ten digits.
+    // 700 masses: beyond the dense path. lambda_1 / lambda_max = 5e-6, so plain products would keep ten
+    // digits.
     let n = 700;
     let found = chain(n).solve(Wanted::Lowest(6), Method::Lanczos).expect("a sound body");
     let bounds = found.bounds.as_ref().expect("certified");
@@ -148,7 +150,8 @@ fn a_long_chain_keeps_its_digits_by_the_iterative_path() {
 
 #[test]
 fn repeated_eigenvalues_are_enclosed_as_a_block() {
-    // Five equal arms of two bars from one hub: every antisymmetric pair of arms vibrates alike, four times each.
+    // Five equal arms of two bars from one hub: every antisymmetric pair of arms vibrates alike, four times
+    // each.
     let mut body = Body::empty(11);
     for arm in 0..5 {
         body.add((0, 1 + 2 * arm), 3.0, 0.75, true);
@@ -160,7 +163,8 @@ fn repeated_eigenvalues_are_enclosed_as_a_block() {
     assert_eq!(fourfold, 2, "{:?}", found.eigenvalues);
     for j in 0..10 {
         assert!((bounds.upper[j] - bounds.lower[j]) / bounds.upper[j] < 1e-13);
-        // Sturm counts of the exact matrix: it repeats its eigenvalues exactly or splits them by rounding of the entries.
+        // Sturm counts of the exact matrix: it repeats its eigenvalues exactly or splits them by rounding of
+        // the entries.
         assert!(count_below(&body.k, &body.m, bounds.lower[j].next_down()) <= j + 1);
         assert!(count_below(&body.k, &body.m, bounds.upper[j].next_up()) >= j + 2);
     }
@@ -236,7 +240,8 @@ proptest! {
     fn random_bodies_are_enclosed(body in bodies(), wanted in 1usize..12, lanczos in any::<bool>()) {
         let method = if lanczos { Method::Lanczos } else { Method::Dense };
         let found = body.solve(Wanted::Lowest(wanted), method);
-        // The highest modes of wild contrasts may not reach the residual of 1e-12; few of the bodies are like that.
+        // The highest modes of wild contrasts may not reach the residual of 1e-12; few of the bodies are like
+        // that.
         prop_assume!(!matches!(found, Err(EigenFailure::NotConverged { .. })));
         let found = found.expect("a sound body");
         let width = body.assert_enclosed(&found);

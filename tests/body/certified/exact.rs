@@ -8,8 +8,8 @@ pub fn exact(value: f64) -> BigRational {
     BigRational::from_float(value).expect("finite")
 }
 
-/// Eigenvalues of the pencil (K, M) below `sigma`: negative eigenvalues of K - sigma M, by exact elimination with
-/// pivots of one or two rows (Sylvester's law of inertia).
+/// Eigenvalues of the pencil (K, M) below `sigma`: negative eigenvalues of K - sigma M, by exact elimination
+/// with pivots of one or two rows (Sylvester's law of inertia).
 pub fn count_below(k: &[Vec<f64>], m: &[Vec<f64>], sigma: f64) -> usize {
     let n = k.len();
     let sigma = exact(sigma);

@@ -1,4 +1,5 @@
-//! Invariants of certified bodies against exact rational sums: every entry has the digits that it is said to have.
+//! Invariants of certified bodies against exact rational sums: every entry has the digits that it is said to
+//! have.
 
 use super::exact::exact;
 use crate::support::random::Random;
@@ -180,8 +181,8 @@ fn every_invariant_has_its_guaranteed_digits_and_not_many_more() {
 
 #[test]
 fn plain_sums_lose_what_compensated_ones_keep() {
-    // Heavy masses of either sign between the first and the last node, which move alike: the large terms of every sum
-    // cancel, with light ones between them.
+    // Heavy masses of either sign between the first and the last node, which move alike: the large terms of
+    // every sum cancel, with light ones between them.
     let mut case = Case::new(7, 0.0, 0.0);
     let last = N - 1;
     for (i, j, sign) in [(0, 0, 1.0), (last, last, 1.0), (0, last, -1.0), (last, 0, -1.0)] {

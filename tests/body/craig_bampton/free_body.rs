@@ -1,5 +1,5 @@
-//! A Craig-Bampton body in its own terms: what is proved of its fixed-interface modes, how near its frequencies are to those of the free body, and
-//! static condensation.
+//! A Craig-Bampton body in its own terms: what is proved of its fixed-interface modes, how near its
+//! frequencies are to those of the free body, and static condensation.
 
 use super::*;
 use flexbody::body::flex_body::FixedInterface;
@@ -12,8 +12,9 @@ fn record(body: &FlexBody) -> &FixedInterface {
     body.certificate().fixed_interface.as_ref().expect("a Craig-Bampton body")
 }
 
-/// lower <= lambda <= estimate <= theta for every mode, and the estimate has found nearly all of theta - lambda far below the cut; the
-/// smallest part that it found there, and the largest ratio of the bound to the truth.
+/// lower <= lambda <= estimate <= theta for every mode, and the estimate has found nearly all of theta -
+/// lambda far below the cut; the smallest part that it found there, and the largest ratio of the bound to the
+/// truth.
 fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) -> [f64; 2] {
     let theta = &basis.solution.eigenvalues;
     let fixed = basis.fixed_interface.as_ref().expect("recorded");
@@ -81,7 +82,8 @@ fn the_frequencies_of_fixtures_are_told_as_well_as_free_modes_know_them() {
     }
 }
 
-/// K and M of static condensation are those of the constraint modes from definitions, and the inertia of the rigid body is exact.
+/// K and M of static condensation are those of the constraint modes from definitions, and the inertia of the
+/// rigid body is exact.
 #[test]
 fn without_fixed_interface_modes_the_body_is_statically_condensed() {
     for raw in models() {

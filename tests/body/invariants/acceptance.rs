@@ -1,5 +1,6 @@
 //! THE acceptance test: generalised inertia forces from the invariants are the forces that M times the nodal
-//! accelerations sum to, for random motions of bodies with random and smooth shapes, in any basis and any frame.
+//! accelerations sum to, for random motions of bodies with random and smooth shapes, in any basis and any
+//! frame.
 
 use super::bodies::{Body, orthonormalised, random_matrix, smooth_shapes};
 use crate::support::equations::Coriolis;

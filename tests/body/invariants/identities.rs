@@ -128,7 +128,8 @@ fn each_identity_fails_for_a_body_that_breaks_it() {
         ("w3_skew", |b| b.primary_mut().s[1][2][(2, 2)] += 1e-9),
         ("w3_bounded", |b| b.primary_mut().s[1][2][(0, 1)] += 1.5),
         ("scalar_gram_psd", |b| {
-            // Each bound holds, together they do not: x and psi_1 are parallel, 1 and psi_1 are not orthogonal.
+            // Each bound holds, together they do not: x and psi_1 are parallel, 1 and psi_1 are not
+            // orthogonal.
             b.primary_mut().ibar[0][0][0] = 0.9 * b.second_moment()[(0, 0)].sqrt();
             b.primary_mut().c1[(0, 0)] = 0.9 * b.mass().sqrt();
         }),

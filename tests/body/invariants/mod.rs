@@ -1,5 +1,5 @@
-//! Properties of the invariants: closed forms, an independent evaluation, the nodal equations of motion, covariance,
-//! frames, lumped comparators, error norms, identities.
+//! Properties of the invariants: closed forms, an independent evaluation, the nodal equations of motion,
+//! covariance, frames, lumped comparators, error norms, identities.
 
 mod acceptance;
 mod alignment;

@@ -48,8 +48,9 @@ fn assert_norms(what: &str, body: &Invariants, reference: &serde_json::Value) {
     let [w1, w2, w3] = [&derived.w1, &derived.w2, &derived.w3].map(|group| group.as_ref().expect("held"));
     let inertia = Mat::from_fn(3, 3, |k, l| derived.inertia[(k, l)]);
     let rotation = body.second_moment().trace().sqrt();
-    // Modes have a residual of 1e-9 and relative gaps of 3 % and more: mode errors of 3e-8. Norms that do not vanish
-    // change by their square, and by what the reference rounds; norms that vanish by symmetry change by the errors.
+    // Modes have a residual of 1e-9 and relative gaps of 3 % and more: mode errors of 3e-8. Norms that do not
+    // vanish change by their square, and by what the reference rounds; norms that vanish by symmetry change
+    // by the errors.
     for (name, norm, scale, limit) in [
         ("I0", inertia.norm_l2(), inertia.norm_l2(), 1e-11),
         ("W1", w1.norm_l2(), w1.norm_l2(), 1e-9),

@@ -27,7 +27,8 @@ struct Contents {
 
 const ABOUT: [&str; 3] = ["symbol", "units", "description"];
 
-/// What the flex-body file of the body holds, read by HDF5 alone, and the arrays in it that have 32-bit floats.
+/// What the flex-body file of the body holds, read by HDF5 alone, and the arrays in it that have 32-bit
+/// floats.
 fn of_hdf5(body: &FlexBody) -> (Contents, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("body.flex.h5");

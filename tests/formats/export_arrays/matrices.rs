@@ -178,7 +178,8 @@ fn names_of_frames_are_kept() {
     assert!(table.contains("\n\"Lager außen\",") && table.contains("\n\"日本 \"\"x\"\"\","), "{table}");
 }
 
-/// Boundary nodes, then six coordinates for each internal node: those that are no modes have stiffness but no mass.
+/// Boundary nodes, then six coordinates for each internal node: those that are no modes have stiffness but no
+/// mass.
 #[test]
 fn chrono_has_the_same_matrices_filled_up_to_whole_nodes() {
     let mut filled = 0;

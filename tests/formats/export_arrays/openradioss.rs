@@ -1,4 +1,5 @@
-//! `openradioss`: the data file of /FXBODY, read as `hm_read_fxb.F` does, its energies and forces put together as the engine does.
+//! `openradioss`: the data file of /FXBODY, read as `hm_read_fxb.F` does, its energies and forces put
+//! together as the engine does.
 
 use super::readers::Deck;
 use crate::support::exported::{bodies, exported, file};
@@ -84,8 +85,8 @@ impl Fxb {
         (0..9).map(|i| &self.coupled_stiffness[i] * rotation[(i % 3, i / 3)]).sum()
     }
 
-    /// Rates of the rigid modes for the velocity of the origin and a spin, both in space: those of the ends of the axes, of their origin,
-    /// and the spin where there are modes for it.
+    /// Rates of the rigid modes for the velocity of the origin and a spin, both in space: those of the ends
+    /// of the axes, of their origin, and the spin where there are modes for it.
     fn rates(&self, rotation: &Matrix3<f64>, velocity: &Vector3<f64>, spin: &Vector3<f64>) -> DVector<f64> {
         let ends = (0..3).map(|axis| velocity + spin.cross(&rotation.column(axis)));
         let sets: Vec<Vector3<f64>> = ends.chain([*velocity, *spin]).collect();
@@ -168,7 +169,8 @@ fn the_kinetic_energy_of_any_motion_of_the_undeformed_body_is_that_of_the_body()
                 + coupling
                 + 0.5 * omega.dot(&(invariants.inertia() * omega))
                 + modes;
-            // The four points are as far from the body as its axes are long: what they add up to is larger than the energy.
+            // The four points are as far from the body as its axes are long: what they add up to is larger
+            // than the energy.
             let (rates_size, qd_size) = (rates.abs(), qd.abs());
             let parts = rates_size.dot(&(fxb.rigid_mass.abs() * &rates_size))
                 + rates_size.dot(&(fxb.mass_at(&rotation).abs() * &qd_size))
@@ -210,7 +212,8 @@ fn nodes_move_with_the_body_and_its_modes() {
     }
 }
 
-/// Each by itself, whatever its size: half a unit of the eleventh digit, or of the tenth where exponents have three.
+/// Each by itself, whatever its size: half a unit of the eleventh digit, or of the tenth where exponents have
+/// three.
 #[test]
 fn every_number_is_rounded_to_its_own_digits() {
     let wild = (0..30).map(|seed| {
@@ -247,7 +250,8 @@ fn every_number_is_rounded_to_its_own_digits() {
     assert!((1..20).contains(&refused), "{refused} of 30");
 }
 
-/// A spinning body pulls its modes by -[w1 I, w2 I, w3 I] W1'/2 w: the accelerations of the ends of the axes make that of the file.
+/// A spinning body pulls its modes by -[w1 I, w2 I, w3 I] W1'/2 w: the accelerations of the ends of the axes
+/// make that of the file.
 #[test]
 fn the_centrifugal_load_of_the_modes_is_that_of_w1() {
     let mut random = Random(3);
@@ -304,7 +308,8 @@ fn stiffness_damping_and_frequency_are_those_of_the_body_and_rigid_motion_strain
     assert_eq!(damped, 2, "the bodies with Rayleigh damping");
 }
 
-/// The oracle that knows no invariants: products of nodal fields with M and K of the model, in model axes at rest.
+/// The oracle that knows no invariants: products of nodal fields with M and K of the model, in model axes at
+/// rest.
 #[test]
 fn products_are_those_of_the_finite_element_matrices() {
     for name in ["cube_hex8", "connecting_rod", "satellite"] {

@@ -49,7 +49,8 @@ impl<'a> Deck<'a> {
     }
 }
 
-/// Input of Fortran's F editing: a decimal point, and an exponent that is a signed integer, with or without a letter.
+/// Input of Fortran's F editing: a decimal point, and an exponent that is a signed integer, with or without a
+/// letter.
 fn fortran(field: &str) -> f64 {
     assert!(field.contains('.'), "`{field}`");
     let after = field.find('.').expect("just found");

@@ -37,7 +37,8 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
-/// A block with every node moved at random: no two elements are alike. Mid-edge nodes of tetrahedra stay in place.
+/// A block with every node moved at random: no two elements are alike. Mid-edge nodes of tetrahedra stay in
+/// place.
 fn distorted(kind: Kind) -> Mesh {
     let mut random = Random(7);
     let corner = random.vector::<3>();
@@ -146,7 +147,8 @@ fn linear_tetrahedra_have_the_textbook_mass() {
 
 #[test]
 fn quadratic_tetrahedra_have_the_textbook_mass() {
-    // rho V / 420 times: corners 6, 1; corner to its edge -4, to another edge -6; edges 32, touching 16, opposite 8.
+    // rho V / 420 times: corners 6, 1; corner to its edge -4, to another edge -6; edges 32, touching 16,
+    // opposite 8.
     let nodes = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let edges = crate::support::elements::TET_EDGES;
     let mut all = nodes.to_vec();

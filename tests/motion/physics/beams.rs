@@ -7,7 +7,8 @@ use std::f64::consts::{PI, TAU};
 
 const STEEL: Material = Material::STEEL;
 
-/// Steel without lateral contraction: rods and beams follow the one-dimensional theories exactly or nearly so.
+/// Steel without lateral contraction: rods and beams follow the one-dimensional theories exactly or nearly
+/// so.
 const NO_CONTRACTION: Material = Material { poisson: 0.0, ..STEEL };
 
 /// Roots beta L of cos(b) cosh(b) = 1: bending of a free-free beam.
@@ -85,8 +86,8 @@ fn thick_beam_follows_timoshenko() {
 
 #[test]
 fn rod_vibrates_along_its_axis_as_the_discrete_closed_form_says() {
-    // Without lateral contraction u(x) is an exact solution in linear elements of length d: consistent mass gives
-    // lambda = 6 E / (rho d^2) (1 - cos k d) / (2 + cos k d), k = n pi / L, at any refinement.
+    // Without lateral contraction u(x) is an exact solution in linear elements of length d: consistent mass
+    // gives lambda = 6 E / (rho d^2) (1 - cos k d) / (2 + cos k d), k = n pi / L, at any refinement.
     for cells in [4, 8, 16] {
         let length = 2.0;
         let mesh = Mesh::block(Kind::Hex8, [cells, 1, 1], [length, 0.3, 0.2]);

@@ -32,9 +32,9 @@ fn error_of(body: &Assembly, field: impl Fn([f64; 3]) -> [f64; 3], exact: f64) -
     found.eigenvalues()[mode] / exact - 1.0
 }
 
-/// Lame's equivoluminal mode of a square prism of side 1 and height 1/3 in cells of side 1/n:
-/// u = (cos a sin b, -sin a cos b, 0), a = pi x, b = pi y. No traction on any face and no change of volume, so
-/// lambda = 2 pi^2 mu / rho exactly, at any Poisson's ratio and height.
+/// Lame's equivoluminal mode of a square prism of side 1 and height 1/3 in cells of side 1/n: u = (cos a sin
+/// b, -sin a cos b, 0), a = pi x, b = pi y. No traction on any face and no change of volume, so lambda = 2
+/// pi^2 mu / rho exactly, at any Poisson's ratio and height.
 fn lame_error(kind: Kind, n: i32) -> f64 {
     let body = Mesh::block(kind, [n, n, n / 3], [1.0, 1.0, 1.0 / 3.0]).assemble(&STEEL, MassRule::Consistent);
     let (_, mu) = STEEL.lame();
@@ -72,8 +72,8 @@ fn quadratic_hexahedra_converge_with_order_four() {
 
 #[test]
 fn quadratic_tetrahedra_converge_with_order_four() {
-    // The split of hexahedra into tetrahedra has no mirror symmetry: free faces add a term of order five, so the
-    // observed order approaches four linearly in the mesh width.
+    // The split of hexahedra into tetrahedra has no mirror symmetry: free faces add a term of order five, so
+    // the observed order approaches four linearly in the mesh width.
     for errors in
         [[8, 16, 32].map(|n| rod_error(Kind::Tet10, n)), [3, 6, 12].map(|n| lame_error(Kind::Tet10, n))]
     {

@@ -35,8 +35,8 @@ fn eigenvalue_difference(a: &Body, b: &Body, scale: f64) -> f64 {
     pairs.map(|(a, b)| (b / (a * scale) - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// Differences of the invariants about the centre of mass in model axes, relative to their Cauchy-Schwarz bounds,
-/// when the nodes of `b` are those of `a` at x_b = R x_a + d. Signs of modes are free.
+/// Differences of the invariants about the centre of mass in model axes, relative to their Cauchy-Schwarz
+/// bounds, when the nodes of `b` are those of `a` at x_b = R x_a + d. Signs of modes are free.
 fn moved_differences(a: &Body, b: &Body, turn: &Matrix3<f64>) -> Vec<(String, f64)> {
     let (condensed_a, condensed_b) = (a.condensed(BodyFrame::Com), b.condensed(BodyFrame::Com));
     let turned = condensed_a.invariants.rotated(&turn.transpose());
@@ -147,8 +147,8 @@ fn invariants_in_units(a: &Invariants, length: f64, mass: f64, time: f64) -> Inv
 
 #[test]
 fn units_change_nothing_but_the_numbers() {
-    // mm-t-s, micrometre-kg-s and micrometre-pg-us (MEMS), km-kt-ms, ft-slug-s, a resonator of 50 micrometres in SI
-    // units, and powers of four: exact in binary, so every bit must come back.
+    // mm-t-s, micrometre-kg-s and micrometre-pg-us (MEMS), km-kt-ms, ft-slug-s, a resonator of 50 micrometres
+    // in SI units, and powers of four: exact in binary, so every bit must come back.
     for (length, mass, time) in [
         (1e3, 1e-3, 1.0),
         (1e6, 1.0, 1.0),

@@ -1,5 +1,5 @@
-//! Misprints of the literature (theory section 11), shown on a tumbling body: the correct equations keep what nature
-//! keeps, the printed ones do not.
+//! Misprints of the literature (theory section 11), shown on a tumbling body: the correct equations keep what
+//! nature keeps, the printed ones do not.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::equations::{Coriolis, ReducedBody, State};
@@ -95,8 +95,8 @@ fn misprinted_coriolis_terms_lose_angular_momentum_and_hide_from_the_energy() {
 
 #[test]
 fn euler_parameters_carry_a_factor_of_four() {
-    // [WP19] (29) to (33) and (41) to (45) lose it on one side: with w = G pd and |p| = 1, G G' is four times the
-    // identity, so the equations of omega come back from those of p as G (...) / 4.
+    // [WP19] (29) to (33) and (41) to (45) lose it on one side: with w = G pd and |p| = 1, G G' is four times
+    // the identity, so the equations of omega come back from those of p as G (...) / 4.
     let p = [0.5, -0.1, 0.7, 0.5];
     let [e0, e1, e2, e3] = p.map(|v| 2.0 * v);
     let g = nalgebra::Matrix3x4::new(-e1, e0, e3, -e2, -e2, -e3, e0, e1, -e3, e2, -e1, e0);

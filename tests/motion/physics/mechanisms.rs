@@ -1,4 +1,5 @@
-//! Two flexible bodies held together by joints: beside Exudyn, and in the limit of stiff bodies the rigid double pendulum.
+//! Two flexible bodies held together by joints: beside Exudyn, and in the limit of stiff bodies the rigid
+//! double pendulum.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::{body_of, fixture};

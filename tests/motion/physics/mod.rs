@@ -1,4 +1,5 @@
-//! Properties of bodies that mechanics dictates: closed forms, symmetry, convergence, covariance, conservation.
+//! Properties of bodies that mechanics dictates: closed forms, symmetry, convergence, covariance,
+//! conservation.
 
 mod assembler;
 mod beams;

@@ -1,4 +1,5 @@
-//! Test models as files: whatever part of the matrices is stored, in whatever order, the same model comes back.
+//! Test models as files: whatever part of the matrices is stored, in whatever order, the same model comes
+//! back.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{DofOrder, Numbering, Triangle, reordered, write_model};

@@ -1,5 +1,5 @@
-//! Bodies that use up the digits of double precision, and tables that carry few: what can be told is told, to the
-//! accuracy that is left.
+//! Bodies that use up the digits of double precision, and tables that carry few: what can be told is told, to
+//! the accuracy that is left.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh, grid};
@@ -41,8 +41,8 @@ fn assert_close(what: &str, found: &[f64], exact: &[f64], tolerance: f64) {
 
 #[test]
 fn node_tables_of_six_digits_are_enough() {
-    // FE programs print coordinates with six to eight digits. Rigid motion is then known to 1e-6 only; eigenvalues
-    // do not depend on it to first order.
+    // FE programs print coordinates with six to eight digits. Rigid motion is then known to 1e-6 only;
+    // eigenvalues do not depend on it to first order.
     let turn = Random(3).rotation();
     let mesh = Mesh::bracket(Kind::Hex8, 5, 2, 0.125).moved(&turn, [0.3, 0.7, -0.2]);
     let body = mesh.assemble(&STEEL, MassRule::Consistent);
@@ -69,8 +69,8 @@ fn joined(ratio: f64) -> Assembly {
 
 #[test]
 fn soft_joints_keep_six_low_modes_that_scale_with_their_stiffness() {
-    // In the limit two rigid blocks on a spring: the six lowest eigenvalues are proportional to its stiffness, the
-    // others those of the blocks.
+    // In the limit two rigid blocks on a spring: the six lowest eigenvalues are proportional to its
+    // stiffness, the others those of the blocks.
     let reference = dense_modes(&joined(1e-5)).eigenvalues;
     for ratio in [1e-5, 1e-6, 1e-7, 1e-8] {
         let exact: Vec<f64> =

@@ -1,5 +1,5 @@
-//! Bodies that other programs meshed and assembled, through the readers and the whole pipeline, against reference
-//! numbers of another solver and against the unreduced nodal equations.
+//! Bodies that other programs meshed and assembled, through the readers and the whole pipeline, against
+//! reference numbers of another solver and against the unreduced nodal equations.
 
 use crate::support::equations::Coriolis;
 use crate::support::mesh::entries;
@@ -123,9 +123,9 @@ fn groups(eigenvalues: &[f64]) -> Vec<usize> {
     eigenvalues.chunk_by(|a, b| b / a - 1.0 < 1e-9).map(<[f64]>::len).collect()
 }
 
-/// Mass properties and frequencies of the reference to the digits that the files carry, and a count of modes that is
-/// proved. Both sides read the same matrices; eigenvalues of thin bodies keep fewer digits than the matrices have, and
-/// the reference is as good as its residuals.
+/// Mass properties and frequencies of the reference to the digits that the files carry, and a count of modes
+/// that is proved. Both sides read the same matrices; eigenvalues of thin bodies keep fewer digits than the
+/// matrices have, and the reference is as good as its residuals.
 fn agrees_with_its_reference(case: &Case) {
     let (name, count) = (&case.name, case.eigenvalues.len());
     let body = proved(case.raw.clone(), count, Method::Auto);
@@ -156,8 +156,8 @@ fn agrees_with_its_reference(case: &Case) {
     }
 }
 
-/// THE acceptance test (theory section 10, last line): generalised inertia forces from the invariants of the body's
-/// own modes are the forces that M of the file times the accelerations of all nodes sum to.
+/// THE acceptance test (theory section 10, last line): generalised inertia forces from the invariants of the
+/// body's own modes are the forces that M of the file times the accelerations of all nodes sum to.
 fn obeys_the_nodal_equations(case: &Case) {
     let body = proved(case.raw.clone(), case.eigenvalues.len(), Method::Auto);
     let mass = labelled(&case.raw, &body);

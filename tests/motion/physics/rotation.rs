@@ -1,5 +1,5 @@
-//! Rotating bodies against closed forms: the unstable middle axis, the stretch of a spinning bar, the turning of the vibration
-//! of a spinning ring.
+//! Rotating bodies against closed forms: the unstable middle axis, the stretch of a spinning bar, the turning
+//! of the vibration of a spinning ring.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::flexible::body_of;
@@ -35,7 +35,8 @@ fn elliptic_k(k: f64) -> f64 {
     0.5 * PI / a
 }
 
-/// Half the period of a rigid top (Landau, Lifshitz, Mechanics, 37): the time between two flips about the middle axis.
+/// Half the period of a rigid top (Landau, Lifshitz, Mechanics, 37): the time between two flips about the
+/// middle axis.
 fn rigid_flip(moments: [f64; 3], omega: Vector3<f64>) -> f64 {
     let [a, b, c] = moments;
     let double_energy = a * omega.x * omega.x + b * omega.y * omega.y + c * omega.z * omega.z;
@@ -104,8 +105,8 @@ impl Surroundings for SpinUp {
     }
 }
 
-/// (E A u')' + rho A w^2 (x + u) = 0 with free ends: the stretch of half a bar of length 2 l, tan(k l)/k - l with k = w sqrt(rho/E).
-/// Without W2 the load does not grow with u: rho w^2 l^3 / 3E.
+/// (E A u')' + rho A w^2 (x + u) = 0 with free ends: the stretch of half a bar of length 2 l, tan(k l)/k - l
+/// with k = w sqrt(rho/E). Without W2 the load does not grow with u: rho w^2 l^3 / 3E.
 #[test]
 fn a_spinning_bar_stretches_as_far_as_the_closed_form_says() {
     // Without lateral contraction a bar of hexahedra is the bar of the formula.
@@ -141,9 +142,9 @@ fn a_spinning_bar_stretches_as_far_as_the_closed_form_says() {
     assert!((full / linear - 1.0) > 0.05, "the closed forms differ");
 }
 
-/// Bryan's effect: in-plane vibration with n waves of a thin ring that spins with W turns at g W against the ring's modes, in their plane
-/// of amplitudes, g = 2n / (n^2 + 1); the two frequencies of the pair are split by 2 g W (G. H. Bryan, On the beats in the vibrations of a
-/// revolving cylinder or bell, 1890).
+/// Bryan's effect: in-plane vibration with n waves of a thin ring that spins with W turns at g W against the
+/// ring's modes, in their plane of amplitudes, g = 2n / (n^2 + 1); the two frequencies of the pair are split
+/// by 2 g W (G. H. Bryan, On the beats in the vibrations of a revolving cylinder or bell, 1890).
 #[test]
 fn the_vibration_of_a_spinning_ring_turns_with_bryans_factor() {
     let mesh = Mesh::ring(Kind::Hex20, 24, 1.0, 0.03);

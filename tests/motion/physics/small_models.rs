@@ -1,5 +1,5 @@
-//! Bodies of one element and a few: all their modes, singular mass matrices, dense and sparse paths side by side, and
-//! bodies that are none.
+//! Bodies of one element and a few: all their modes, singular mass matrices, dense and sparse paths side by
+//! side, and bodies that are none.
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::{Assembly, Mesh, entries};

@@ -32,8 +32,9 @@ fn root(equation: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     low
 }
 
-/// omega a / c_T of the two lowest vibrations of a free elastic sphere, both five-fold (degree 2): Lamb, On the
-/// vibrations of an elastic sphere (1881); the spheroidal equation as in Eringen and Suhubi, Elastodynamics II.
+/// omega a / c_T of the two lowest vibrations of a free elastic sphere, both five-fold (degree 2): Lamb, On
+/// the vibrations of an elastic sphere (1881); the spheroidal equation as in Eringen and Suhubi,
+/// Elastodynamics II.
 fn lamb() -> (f64, f64) {
     let torsional = root(|x| bessel(2, x) - x * bessel(3, x), 2.0, 3.0);
     let speeds = ((1.0 - 2.0 * UNIT.poisson) / (2.0 - 2.0 * UNIT.poisson)).sqrt();
@@ -72,8 +73,8 @@ fn sphere_has_lambs_fivefold_modes_split_two_and_three_by_the_cubic_mesh() {
             meshes.each_ref().map(|omega| omega[range.clone()].iter().sum::<f64>() / 5.0 / exact - 1.0);
         let split = meshes.each_ref().map(|omega| omega[range.end - 1] / omega[range.start] - 1.0);
         assert!(error[2] > 0.0 && error[2] < 8e-3 && split[2] < 3e-3, "{error:?} {split:?}");
-        // Both fall with the square of the mesh width, which the cells at the cube's edges, flattened by the map to
-        // the sphere, delay.
+        // Both fall with the square of the mesh width, which the cells at the cube's edges, flattened by the
+        // map to the sphere, delay.
         let order = (error[1] / error[2]).log2();
         assert!((order - 2.0).abs() < 0.25, "{error:?}: order {order}");
         assert!((split[1] / split[2]).log2() > 1.4, "{split:?}");
@@ -98,8 +99,8 @@ fn cube_has_single_double_and_triple_modes_only() {
 
 #[test]
 fn disc_has_double_modes_for_odd_numbers_of_nodal_diameters() {
-    // A four-fold symmetric mesh keeps pairs with an odd number of nodal diameters exactly, and splits those with an
-    // even number less and less.
+    // A four-fold symmetric mesh keeps pairs with an odd number of nodal diameters exactly, and splits those
+    // with an even number less and less.
     let split = [1, 2, 4].map(|n| {
         let found = modes(&unit(&Mesh::cylinder(Kind::Hex20, n, 1, 1.0, 0.1)), 5);
         assert_eq!(multiplicities(found.eigenvalues()), [1, 1, 1, 2], "{n}: (2,0) twice, (0,1), (3,0)");

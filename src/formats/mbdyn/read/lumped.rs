@@ -1,4 +1,5 @@
-//! The invariants that MBDyn itself makes of lumped masses (record group 11), in Modal.cc: sums over the nodes.
+//! The invariants that MBDyn itself makes of lumped masses (record group 11), in Modal.cc: sums over the
+//! nodes.
 
 use super::records::Records;
 use crate::body::invariants::{Groups, Numbered};

@@ -1,5 +1,5 @@
-//! The record groups of a file, read as MBDyn does: of each group as many numbers as the header says. What stands after them MBDyn skips
-//! without a word; here it is told.
+//! The record groups of a file, read as MBDyn does: of each group as many numbers as the header says. What
+//! stands after them MBDyn skips without a word; here it is told.
 
 use super::words::{GROUP, Surplus, Words};
 use crate::base::error::Result;

@@ -138,7 +138,8 @@ impl<'t> Words<'t> {
         Surplus::of(line, self.take_line().unwrap_or(""))
     }
 
-    /// Takes the title of a mode: a comment, or a blank line where the numbers follow. Gives the line where it should be.
+    /// Takes the title of a mode: a comment, or a blank line where the numbers follow. Gives the line where
+    /// it should be.
     pub(crate) fn take_title(&mut self) -> std::result::Result<(), usize> {
         let first = self.at();
         while self.rest.trim().is_empty() && self.line < self.lines.len() {
@@ -185,7 +186,8 @@ impl Surplus {
     }
 }
 
-/// Bytes of the number that a word begins with: up to a sign that neither begins it nor follows the letter of an exponent.
+/// Bytes of the number that a word begins with: up to a sign that neither begins it nor follows the letter of
+/// an exponent.
 fn end_of_number(word: &str) -> usize {
     let bytes = word.as_bytes();
     let is_next = |&at: &usize| matches!(bytes[at], b'+' | b'-') && !matches!(bytes[at - 1], b'e' | b'E');

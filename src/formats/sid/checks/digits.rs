@@ -8,7 +8,8 @@ use crate::formats::sid::read::parse::Listed;
 /// Digits that a number may lack, relative to the largest of its array.
 const LOST: f64 = 1e-8;
 
-/// The constant (order 0) or linear (order 1) part of an array: half a unit of its last digit beside its largest number.
+/// The constant (order 0) or linear (order 1) part of an array: half a unit of its last digit beside its
+/// largest number.
 struct Part {
     array: &'static str,
     order: usize,

@@ -124,7 +124,8 @@ fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
     })
 }
 
-/// The undeformed axes of every frame. Those of the body have no other, so that a mirrored frame is one of another body.
+/// The undeformed axes of every frame. Those of the body have no other, so that a mirrored frame is one of
+/// another body.
 fn undeformed_axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
     let (mut total, mut what) = (Missed { by: 0.0, scale: 1.0, rounding: 0.0 }, String::new());
     for (frame, listed) in frames.iter().zip(&listed.frames) {

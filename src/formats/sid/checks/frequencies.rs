@@ -12,8 +12,8 @@ const FREQUENCY: f64 = 0.01;
 /// Entries of Ke beside the diagonal, relative to it, with which the diagonal still gives frequencies.
 const DIAGONAL: f64 = 1e-6;
 
-/// The frequency of a text such as `Eigen Mode 1 : 9.089 Hz` in the unit of the text, half a unit of its last digit, and whether it is in
-/// radians.
+/// The frequency of a text such as `Eigen Mode 1 : 9.089 Hz` in the unit of the text, half a unit of its last
+/// digit, and whether it is in radians.
 fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
     let words: Vec<&str> =
         text.split([' ', '\t', ':', '=', ',', ';']).filter(|word| !word.is_empty()).collect();
@@ -31,7 +31,8 @@ fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
     })
 }
 
-/// The text that is farthest off; `None` where no mode has a frequency in its text, or modes are coupled by Ke.
+/// The text that is farthest off; `None` where no mode has a frequency in its text, or modes are coupled by
+/// Ke.
 pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditCheck> {
     let (ke, me, nq) = (&arrays.ke.m0, &arrays.me.m0, arrays.nq);
     let coupled = (0..nq).any(|i| {

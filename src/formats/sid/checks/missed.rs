@@ -4,8 +4,8 @@ use crate::base::diagnostic::Code;
 use crate::formats::import::AuditCheck;
 use crate::numerics::linalg::larger;
 
-/// What identities may be missed by, relative to the Cauchy-Schwarz bounds of their arrays, beside the digits of the file: sums over the
-/// nodes of a large model in double precision.
+/// What identities may be missed by, relative to the Cauchy-Schwarz bounds of their arrays, beside the digits
+/// of the file: sums over the nodes of a large model in double precision.
 const ROUNDING: f64 = 1e-10;
 
 /// Roundings of the last digit that one identity may add up.
@@ -36,7 +36,8 @@ impl Missed {
     }
 }
 
-/// The largest magnitude of `entry` over all rows and columns. A NaN, from numbers beyond the range of double precision, passes nothing.
+/// The largest magnitude of `entry` over all rows and columns. A NaN, from numbers beyond the range of double
+/// precision, passes nothing.
 pub(super) fn largest_entry(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     places.map(|(i, j)| entry(i, j).abs()).fold(0.0, larger)

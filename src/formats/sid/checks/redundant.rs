@@ -16,7 +16,8 @@ use crate::numerics::linalg::larger;
 /// The checks of a file, and what they say of its Oe1.
 pub(crate) struct Found {
     pub(crate) checks: Vec<AuditCheck>,
-    /// Whether Oe1 holds more than Me does: geometric stiffness for spin, or inertia that does not belong to Me.
+    /// Whether Oe1 holds more than Me does: geometric stiffness for spin, or inertia that does not belong to
+    /// Me.
     pub(crate) spin_in_oe: bool,
 }
 
@@ -46,7 +47,8 @@ pub(crate) fn checks(
     Found { checks: all, spin_in_oe: centrifugal.spin_in_oe }
 }
 
-/// The arrays of the body, how they are to be read, and which of them are not there: identities of those are left out.
+/// The arrays of the body, how they are to be read, and which of them are not there: identities of those are
+/// left out.
 struct Identities<'a> {
     arrays: &'a Arrays,
     layout: &'a Layout,
@@ -289,7 +291,8 @@ impl Identities<'_> {
     }
 }
 
-/// The size of what an identity compares: the bound that the mass sets, or what stands in the file where that is larger.
+/// The size of what an identity compares: the bound that the mass sets, or what stands in the file where that
+/// is larger.
 fn scale(bound: f64, sizes: &[f64]) -> f64 {
     sizes.iter().fold(bound.max(0.0), |most, size| most.max(*size))
 }

@@ -109,7 +109,8 @@ impl Arrays {
         self.cr.linear(l, k, a) - self.cr.linear(k, l, a)
     }
 
-    /// Cauchy-Schwarz bounds of what is linear in one mode beside translation and beside rotation, and of what is quadratic.
+    /// Cauchy-Schwarz bounds of what is linear in one mode beside translation and beside rotation, and of
+    /// what is quadratic.
     pub(crate) fn bounds(&self) -> [f64; 3] {
         let modal = (0..self.nq).map(|k| self.me.m0[(k, k)].abs()).fold(0.0, f64::max);
         let rigid = 0.5 * self.j0().trace().abs();

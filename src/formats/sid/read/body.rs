@@ -61,8 +61,8 @@ impl Declared {
     }
 }
 
-/// The body of a file, and notes on how its arrays were taken. `spin_in_oe`: Oe1 holds more than Me, which is taken as geometric stiffness
-/// for spin.
+/// The body of a file, and notes on how its arrays were taken. `spin_in_oe`: Oe1 holds more than Me, which is
+/// taken as geometric stiffness for spin.
 pub(crate) fn body(
     listed: &Listed<'_>,
     arrays: &Arrays,

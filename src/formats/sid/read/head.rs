@@ -13,8 +13,8 @@ pub(crate) struct Head {
 }
 
 impl Head {
-    /// Reads up to `part` inclusive. The first line is `21 4 :No. nodes, No. modes:text` or, of FEMBeam, `3 nodes, 2 modes, text`; further
-    /// ones are text.
+    /// Reads up to `part` inclusive. The first line is `21 4 :No. nodes, No. modes:text` or, of FEMBeam,
+    /// `3 nodes, 2 modes, text`; further ones are text.
     pub(crate) fn read(lines: &mut Lines<'_>) -> Result<Self, Diagnostic> {
         let mut head: Option<Self> = None;
         loop {

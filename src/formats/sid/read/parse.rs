@@ -98,8 +98,8 @@ impl<'t> Listed<'t> {
         Ok(listed)
     }
 
-    /// Says what required object is missing, or that there are fewer numbers than a body of so many modes and frames can have: arrays are
-    /// made of the sizes that the file states, which nothing else bounds.
+    /// Says what required object is missing, or that there are fewer numbers than a body of so many modes and
+    /// frames can have: arrays are made of the sizes that the file states, which nothing else bounds.
     fn refuse_incomplete(&self) -> Result<(), String> {
         for at in [0, 1, 4, 9] {
             if self.objects[at].is_none() {
@@ -151,7 +151,8 @@ impl<'t> Listed<'t> {
         self.all_objects().map(|object| object.digits).fold(Digits::default(), Digits::most)
     }
 
-    /// Where `m1` has the mode: columns of one number tell, of three modes where there are three columns nothing does.
+    /// Where `m1` has the mode: columns of one number tell, of three modes where there are three columns
+    /// nothing does.
     fn find_mode_index(&mut self) {
         let admits = |modes: ModeIndex| self.all_objects().all(|object| object.admits(modes, self.nq));
         let last = match (admits(ModeIndex::Middle), admits(ModeIndex::Last)) {

@@ -258,8 +258,8 @@ impl Listing {
     }
 }
 
-/// What `structure` of an object must be that has none, by the entries that it lists: ccx2sid writes none. Objects that are symmetric by their
-/// meaning may list one triangle.
+/// What `structure` of an object must be that has none, by the entries that it lists: ccx2sid writes none.
+/// Objects that are symmetric by their meaning may list one triangle.
 fn inferred_structure(name: &str, m0: &[Entry], m1: &[Entry]) -> usize {
     const SYMMETRIC: [&str; 5] = ["j", "mmi", "me", "ke", "de"];
     let all = || m0.iter().chain(m1);

@@ -50,8 +50,8 @@ fn blocks(nrow: usize, nf: usize, order: Blocks, entry: impl Fn(usize, usize, us
 
 /// mdCM to De, in the order of the file.
 ///
-/// The elastic forces (7.3) of theory section 7 are in Ct(q) (a - g), Cr(q) alpha and Oe(q) of the spin products; with them the rows of
-/// translation and rotation get the same Ct(q), Cr(q) as (7.4) has.
+/// The elastic forces (7.3) of theory section 7 are in Ct(q) (a - g), Cr(q) alpha and Oe(q) of the spin
+/// products; with them the rows of translation and rotation get the same Ct(q), Cr(q) as (7.4) has.
 pub(crate) fn modal(body: &FlexBody, dialect: &Dialect) -> Vec<Taylor> {
     let terms = Terms::new(body);
     let Terms { numbered, nf, w1, .. } = &terms;

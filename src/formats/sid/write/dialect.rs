@@ -33,7 +33,8 @@ pub(crate) struct Dialect {
     pub(crate) mode_last: bool,
     /// Whether symmetric matrices list one triangle instead of both.
     pub(crate) triangle: bool,
-    /// Whether `new modal` has a sign of equality and a name after it: readers of these files split the line there.
+    /// Whether `new modal` has a sign of equality and a name after it: readers of these files split the line
+    /// there.
     pub(crate) named_modal: bool,
     /// Letter of exponents.
     pub(crate) exponent: char,
@@ -69,7 +70,8 @@ pub(crate) const DIALECTS: [Dialect; 4] = [
         gr: Blocks::Mode,
         ge: Blocks::Mode,
         mode_last: true,
-        // FEMBeam lists one triangle, but its reader mirrors none: of J it would lose the products of inertia above the diagonal.
+        // FEMBeam lists one triangle, but its reader mirrors none: of J it would lose the products of inertia
+        // above the diagonal.
         triangle: false,
         named_modal: false,
         exponent: 'E',

@@ -9,8 +9,8 @@ use crate::formats::export::losses::{general_w0, geometric_stiffness, internal_r
 use crate::formats::export::{ExportFormat, ExportOptions, Exported};
 use crate::model::{LoadKind, UnitLoad};
 
-/// SID_FEM text (Wallrapp, Standard Input Data of flexible members in multibody systems, 1993). The equations of SID have the inertia
-/// of a body to first order in q; the file has every number of the exact ones.
+/// SID_FEM text (Wallrapp, Standard Input Data of flexible members in multibody systems, 1993). The equations
+/// of SID have the inertia of a body to first order in q; the file has every number of the exact ones.
 pub struct Sid;
 
 impl ExportFormat for Sid {
@@ -78,7 +78,8 @@ fn file(body: &FlexBody, options: &ExportOptions, dialect: &Dialect) -> String {
     text.out
 }
 
-/// A name as one word without a sign of equality, which readers take for the end of a key; none of a body without a name.
+/// A name as one word without a sign of equality, which readers take for the end of a key; none of a body
+/// without a name.
 fn word(name: &str) -> String {
     let words = name.split(|c: char| c.is_whitespace() || c.is_control() || c == '=');
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")

@@ -3,11 +3,12 @@
 use super::{NodalError, NodalPoint};
 use crate::model::{DofLabel, FeModel};
 
-/// The conditions C u = 0 on the displacements, as many as rigid motions, that say where the frame of the deformed body is.
+/// The conditions C u = 0 on the displacements, as many as rigid motions, that say where the frame of the
+/// deformed body is.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ReferenceConditions {
-    /// R'M u = 0 with the rigid motions R (Tisserand): no deformation carries momentum to first order. What free-surface modes
-    /// fulfil.
+    /// R'M u = 0 with the rigid motions R (Tisserand): no deformation carries momentum to first order. What
+    /// free-surface modes fulfil.
     #[default]
     MeanAxes,
     /// These degrees of freedom are zero: the frame is fixed to nodes. Six, of a plane body three.

@@ -5,9 +5,9 @@ use crate::model::FeModel;
 use faer::Mat;
 use nalgebra::DMatrix;
 
-/// D = W G W' with W = M Psi (N x nf): the damping of the modes of a body, as forces on the nodes of its model. With
-/// G = m_ff^-1 D_ff m_ff^-1 and m_ff = Psi'M Psi, Psi'D Psi = D_ff: for mass-normalised modes D = sum_j 2 zeta_j omega_j (M psi_j)(M psi_j)'.
-/// What is orthogonal to the modes in M is not damped.
+/// D = W G W' with W = M Psi (N x nf): the damping of the modes of a body, as forces on the nodes of its
+/// model. With G = m_ff^-1 D_ff m_ff^-1 and m_ff = Psi'M Psi, Psi'D Psi = D_ff: for mass-normalised modes D =
+/// sum_j 2 zeta_j omega_j (M psi_j)(M psi_j)'. What is orthogonal to the modes in M is not damped.
 #[derive(Debug, Clone)]
 pub(super) struct ModalDamping {
     /// W.
@@ -24,7 +24,8 @@ pub(super) struct Amplitudes {
 }
 
 impl ModalDamping {
-    /// The damping of `body`; nothing where it has none. `None` when the body has other rows than `model`, or modes that depend on each other.
+    /// The damping of `body`; nothing where it has none. `None` when the body has other rows than `model`, or
+    /// modes that depend on each other.
     pub fn new(model: &FeModel, body: &FlexBody) -> Option<Option<Self>> {
         let vectors = body.vectors_of(model)?;
         let damping = body.damping();

@@ -29,7 +29,8 @@ impl Drive {
         Self { given, matrix: matrix(answer, conditions, given).lu(), reaction: Vector6::zeros() }
     }
 
-    /// Solves (6.16) for right-hand sides of the conditions and of the momenta or, where it is given, the motion.
+    /// Solves (6.16) for right-hand sides of the conditions and of the momenta or, where it is given, the
+    /// motion.
     pub fn solve(
         &self,
         conditions: &Vector6<f64>,

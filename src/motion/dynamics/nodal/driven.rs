@@ -25,8 +25,8 @@ impl NodalEquations<'_> {
 impl NodalEvaluation<'_> {
     /// Goes to a state, without loads, where `velocities` of the frame are given, V and omega in its axes.
     ///
-    /// w of the state counts up to C'mu, P as the momentum along what is free; L does not count. With E = C M^-1 C' and B'C' at the
-    /// displacements u,
+    /// w of the state counts up to C'mu, P as the momentum along what is free; L does not count. With E = C
+    /// M^-1 C' and B'C' at the displacements u,
     ///
     /// ```text
     /// E mu - C B (V, omega) = -C M^-1 w
@@ -63,8 +63,9 @@ impl NodalEvaluation<'_> {
         Ok(())
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), under the loads where `rates` of (V, omega) are given: those of the components in
-    /// the axes of the frame. [`NodalEvaluation::driving_force`] is then what they take.
+    /// V' and omega' in the axes of the frame, and u'' (N), under the loads where `rates` of (V, omega) are
+    /// given: those of the components in the axes of the frame. [`NodalEvaluation::driving_force`] is then
+    /// what they take.
     ///
     /// # Errors
     /// [`Failure::Rates`] as [`NodalEvaluation::set`].
@@ -112,7 +113,8 @@ impl NodalEvaluation<'_> {
         (to_frame * force, to_frame * torque)
     }
 
-    /// (p', h') less what turning makes of p and h, of the loads alone: what B'w' is of a body that nothing drives.
+    /// (p', h') less what turning makes of p and h, of the loads alone: what B'w' is of a body that nothing
+    /// drives.
     pub(super) fn wanted(&self) -> Vector6<f64> {
         let torque = self.torque
             - self.omega.cross(&self.h)

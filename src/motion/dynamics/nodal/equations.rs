@@ -12,8 +12,8 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 /// Part of the largest that the smallest singular value of C R may be.
 const INDEPENDENT: f64 = 1e-8;
 
-/// The equations of motion of all nodes in a floating frame (theory 6.9 to 6.13; \[ZG19\] eq. 67 to 98 for solids):
-/// nothing is reduced, K and M are the model's.
+/// The equations of motion of all nodes in a floating frame (theory 6.9 to 6.13; \[ZG19\] eq. 67 to 98 for
+/// solids): nothing is reduced, K and M are the model's.
 ///
 /// ```text
 /// vbar = R (V, omega) + omega x u + u',    w = M vbar,    (p, h) = B'w,    B = [Phi_t, B_x + B(u)],    C u = 0
@@ -21,13 +21,15 @@ const INDEPENDENT: f64 = 1e-8;
 /// p' + omega x p = F,    h' + omega x h + V x p = tau
 /// ```
 ///
-/// u (N) are the displacements of all rows of the model relative to the moving frame, in the rows and axes of the model; omega x
-/// turns displacements, not rotations of nodes. V, omega and what else belongs to the frame are in the axes of `frame`, as those of a
-/// [`FlexBody`](crate::body::flex_body::FlexBody) with the same frame. M is any symmetric positive semidefinite matrix: what it leaves without mass is
-/// condensed exactly.
+/// u (N) are the displacements of all rows of the model relative to the moving frame, in the rows and axes of
+/// the model; omega x turns displacements, not rotations of nodes. V, omega and what else belongs to the
+/// frame are in the axes of `frame`, as those of a [`FlexBody`](crate::body::flex_body::FlexBody) with the
+/// same frame. M is any symmetric positive semidefinite matrix: what it leaves without mass is condensed
+/// exactly.
 ///
-/// [`NodalEvaluation`](super::NodalEvaluation) computes with them, [`NodalMotion`](super::NodalMotion) integrates them. One evaluation costs a
-/// product with K, a solve with a factor of M made here, and a few dot products: some thousand rows are comfortable.
+/// [`NodalEvaluation`](super::NodalEvaluation) computes with them, [`NodalMotion`](super::NodalMotion)
+/// integrates them. One evaluation costs a product with K, a solve with a factor of M made here, and a few
+/// dot products: some thousand rows are comfortable.
 ///
 /// ```
 /// # fn check(model: &flexbody::model::FeModel, body: &flexbody::body::flex_body::FlexBody, start: &flexbody::motion::dynamics::Configuration)
@@ -72,7 +74,8 @@ pub struct NodalEquations<'m> {
     pub(super) modal_damping: Option<ModalDamping>,
 }
 
-/// R and M R: rigid motions of the frame at the rows of the model, zero for those that a plane body does not have.
+/// R and M R: rigid motions of the frame at the rows of the model, zero for those that a plane body does not
+/// have.
 fn rigid_motions(model: &FeModel, frame: &Frame, moving: &[usize]) -> (Motions, Motions) {
     let (pencil, n) = (model.pencil(), model.rows().len());
     let fields = model.rigid_fields(frame.origin.into(), 1.0);
@@ -91,12 +94,12 @@ fn rigid_motions(model: &FeModel, frame: &Frame, moving: &[usize]) -> (Motions, 
 impl<'m> NodalEquations<'m> {
     /// The equations of `model` in a frame that coincides with `frame` before deformation.
     ///
-    /// Factors M. Rows and null vectors without mass are condensed: u of the empty rows of M, and along any null vector z, follows from
-    /// z'(K u - f) = 0.
+    /// Factors M. Rows and null vectors without mass are condensed: u of the empty rows of M, and along any
+    /// null vector z, follows from z'(K u - f) = 0.
     ///
     /// # Errors
-    /// [`NodalError`]: conditions that do not fix the frame; K that does not hold what carries no mass; M that is indefinite or has more null
-    /// vectors than dense storage is worth; damping by ratios of modes.
+    /// [`NodalError`]: conditions that do not fix the frame; K that does not hold what carries no mass; M
+    /// that is indefinite or has more null vectors than dense storage is worth; damping by ratios of modes.
     pub fn new(
         model: &'m FeModel,
         frame: &Frame,
@@ -108,11 +111,13 @@ impl<'m> NodalEquations<'m> {
         Self::undamped_modes(model, frame, conditions)
     }
 
-    /// The equations of `model` in the frame of `body`, a body of it, with the damping of its modes where the model has no damping matrix of
-    /// its own: D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M, with which Psi'D Psi is the D_ff of the body.
+    /// The equations of `model` in the frame of `body`, a body of it, with the damping of its modes where the
+    /// model has no damping matrix of its own: D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M, with which Psi'D Psi is
+    /// the D_ff of the body.
     ///
     /// # Errors
-    /// As [`NodalEquations::new`]; [`NodalError::OtherBody`] when the body has other rows, or modes that depend on each other.
+    /// As [`NodalEquations::new`]; [`NodalError::OtherBody`] when the body has other rows, or modes that
+    /// depend on each other.
     pub fn of_body(
         model: &'m FeModel,
         body: &FlexBody,

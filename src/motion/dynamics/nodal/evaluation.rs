@@ -11,9 +11,11 @@ use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{LU, Matrix3, U6, Vector3, Vector6};
 
-/// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after [`NodalEvaluation::new`].
+/// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after
+/// [`NodalEvaluation::new`].
 ///
-/// [`NodalEvaluation::set`] takes the state and removes all loads; loads are added then; rates and accelerations are those under them.
+/// [`NodalEvaluation::set`] takes the state and removes all loads; loads are added then; rates and
+/// accelerations are those under them.
 #[derive(Debug, Clone)]
 pub struct NodalEvaluation<'e> {
     pub(super) equations: &'e NodalEquations<'e>,
@@ -93,8 +95,8 @@ impl<'e> NodalEvaluation<'e> {
 
     /// Goes to a state, without loads.
     ///
-    /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a whole. Then M vbar = w,
-    /// C B (V, omega) = C vbar and u' = vbar - B (V, omega).
+    /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a
+    /// whole. Then M vbar = w, C B (V, omega) = C vbar and u' = vbar - B (V, omega).
     ///
     /// # Errors
     /// [`Failure::Rates`] when the body is deformed so far that C B is singular.
@@ -181,7 +183,8 @@ impl<'e> NodalEvaluation<'e> {
 
     /// w' and lambda.
     ///
-    /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is known from the momenta.
+    /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is
+    /// known from the momenta.
     ///
     /// Where motion of the frame is given, w counts up to C'mu: lambda then leaves R'w' = 0.
     fn find_rates(&mut self) -> Result<(), Failure> {
@@ -226,13 +229,15 @@ impl<'e> NodalEvaluation<'e> {
         if let Some(damping) = &body.modal_damping {
             damping.add(-1.0, &self.ud, &mut self.first, &mut self.amplitudes);
         }
-        // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the others.
+        // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the
+        // others.
         body.massless.add_static(&self.first, &mut self.second, &mut self.room);
         multiply_vector(body.stiffness(), 1, &self.second, &mut self.w_rate);
         self.w_rate.iter_mut().zip(&self.first).for_each(|(rate, force)| *rate = force - *rate);
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components in these axes.
+    /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components
+    /// in these axes.
     ///
     /// # Errors
     /// [`Failure::Rates`] as [`NodalEvaluation::set`].
@@ -255,17 +260,17 @@ impl<'e> NodalEvaluation<'e> {
         Ok((to_frame * linear, to_frame * angular))
     }
 
-    /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame: what it takes to hold C u = 0.
-    /// Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the moment that linear elastic forces have about the deformed
-    /// body.
+    /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame:
+    /// what it takes to hold C u = 0. Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the
+    /// moment that linear elastic forces have about the deformed body.
     pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
         let (force, torque) = halves(&(self.equations.conditions_at(&self.u) * self.multipliers));
         let to_frame = self.equations.frame.axes.transpose();
         (to_frame * force, to_frame * torque)
     }
 
-    /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F and tau in the axes of the
-    /// frame, and f (N) in model axes, with lambda = 0; none on what has no mass.
+    /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F
+    /// and tau in the axes of the frame, and f (N) in model axes, with lambda = 0; none on what has no mass.
     ///
     /// # Panics
     /// When a length is not N.

@@ -40,7 +40,8 @@ impl NodalEvaluation<'_> {
         self.row_forces[d * i..d * (i + 1)].iter_mut().zip(&own).for_each(|(sum, value)| *sum += value);
     }
 
-    /// Adds a torque at node `i`, on the axes that its rotation vector theta turns: G(theta) t on its rotations (theory 6.8).
+    /// Adds a torque at node `i`, on the axes that its rotation vector theta turns: G(theta) t on its
+    /// rotations (theory 6.8).
     ///
     /// * `torque`: world axes; of a plane body what it has along z.
     ///
@@ -67,7 +68,8 @@ impl NodalEvaluation<'_> {
         }
     }
 
-    /// Adds forces of all rows (N) that turn with the frame, model axes: forces of displacements, moments of rotations.
+    /// Adds forces of all rows (N) that turn with the frame, model axes: forces of displacements, moments of
+    /// rotations.
     ///
     /// # Panics
     /// When there are not N.
@@ -81,7 +83,8 @@ impl NodalEvaluation<'_> {
 
     /// Adds a force at a point, whose moment is about where the point is displaced to.
     ///
-    /// * `force`: along `axes`, those of the world or of the frame; of a plane body what it has along z is left out.
+    /// * `force`: along `axes`, those of the world or of the frame; of a plane body what it has along z is
+    ///   left out.
     pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
         let mut own = self.along_model(force, axes);
         if self.equations.model.dimension() == 2 {
@@ -93,7 +96,8 @@ impl NodalEvaluation<'_> {
         self.add_weighted(&point.translation, &own);
     }
 
-    /// Adds a torque at a point, on the axes that its rotation vector theta turns: C_r'G(theta) t (theory 6.8).
+    /// Adds a torque at a point, on the axes that its rotation vector theta turns: C_r'G(theta) t (theory
+    /// 6.8).
     ///
     /// * `torque`: along `axes`, those of the world or of the frame; of a plane body what it has along z.
     pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>, axes: LoadAxes) {

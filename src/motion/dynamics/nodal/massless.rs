@@ -5,7 +5,8 @@ use crate::model::FeModel;
 use crate::numerics::linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Part of its diagonal entry up to which a pivot of M is zero. Consistent masses stay above 1e-4, null vectors leave 1e-15.
+/// Part of its diagonal entry up to which a pivot of M is zero. Consistent masses stay above 1e-4, null
+/// vectors leave 1e-15.
 pub(super) const NULL_PIVOT: f64 = 1e-9;
 
 /// Largest z'Mz of a null vector relative to that of the diagonal of M.
@@ -14,7 +15,8 @@ const NULL_MASS: f64 = 1e-10;
 /// Most numbers that null vectors may take (16 MB).
 const DENSE: usize = 2_000_000;
 
-/// The null space of M: Z = \[unit vectors of empty rows, others\], the others with K z = 0 in the empty rows.
+/// The null space of M: Z = \[unit vectors of empty rows, others\], the others with K z = 0 in the empty
+/// rows.
 #[derive(Debug, Clone)]
 pub(super) struct Massless {
     /// Empty rows of M.

@@ -1,5 +1,5 @@
-//! The unreduced equations of motion of a body in its floating frame, all nodes kept (theory 6.9 to 6.13): what every
-//! reduced equation is measured against.
+//! The unreduced equations of motion of a body in its floating frame, all nodes kept (theory 6.9 to 6.13):
+//! what every reduced equation is measured against.
 
 mod conditions;
 mod damping;

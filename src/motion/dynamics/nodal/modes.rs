@@ -8,7 +8,8 @@ use crate::numerics::linalg::{combine, gram};
 use faer::{Mat, MatRef};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// The modes of a body in the rows of its model: trajectories of the reduced and of the nodal equations compare.
+/// The modes of a body in the rows of its model: trajectories of the reduced and of the nodal equations
+/// compare.
 #[derive(Debug, Clone)]
 pub struct NodalModes {
     vectors: Mat<f64>,
@@ -18,8 +19,8 @@ pub struct NodalModes {
 }
 
 impl NodalModes {
-    /// The modes of `body`, which was made of the model of `equations`; `None` when it has other rows, another frame, or modes that
-    /// depend on each other.
+    /// The modes of `body`, which was made of the model of `equations`; `None` when it has other rows,
+    /// another frame, or modes that depend on each other.
     pub fn new(equations: &NodalEquations<'_>, body: &FlexBody) -> Option<Self> {
         let vectors = body.vectors_of(equations.model).filter(|_| *body.frame() == equations.frame)?;
         let weighted = equations.model.pencil().apply_mass(vectors.as_ref());

@@ -13,18 +13,20 @@ const NOTHING: f64 = 1e-9;
 
 /// y' = f(t, y) of all nodes, with y as [`NodalEquations::dimension`] says.
 ///
-/// The error of a step is measured in energy: with E the kinetic energy about the centre of mass (estimated with the diagonal of M)
-/// and the elastic energy, and n entries of y,
+/// The error of a step is measured in energy: with E the kinetic energy about the centre of mass (estimated
+/// with the diagonal of M) and the elastic energy, and n entries of y,
 ///
 /// ```text
 /// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    G, D: length / sqrt(n)    e: 1 / sqrt(n)
 /// ```
 ///
-/// so that the mean square of error over scale is the energy of the error relative to E, with the diagonals of K and M in place of the
-/// matrices: strict for soft modes, whose u has less energy than that. A body at rest has in place of E what deforms it by 1e-9 of its
-/// size; one that is driven the energy of its spin besides.
+/// so that the mean square of error over scale is the energy of the error relative to E, with the diagonals
+/// of K and M in place of the matrices: strict for soft modes, whose u has less energy than that. A body at
+/// rest has in place of E what deforms it by 1e-9 of its size; one that is driven the energy of its spin
+/// besides.
 ///
-/// Implicit steps solve what is stiff, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of M + z D + z^2 K.
+/// Implicit steps solve what is stiff, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of M + z D +
+/// z^2 K.
 pub struct NodalMotion<'e, L> {
     pub(super) evaluation: NodalEvaluation<'e>,
     loads: L,
@@ -34,7 +36,8 @@ pub struct NodalMotion<'e, L> {
     mass: Vec<f64>,
 }
 
-/// Velocities of the frame that are given at a time, and their rates, where the frame has these axes in the world.
+/// Velocities of the frame that are given at a time, and their rates, where the frame has these axes in the
+/// world.
 type Drive<'e> = dyn Fn(f64, &Matrix3<f64>) -> (Prescribed, Prescribed) + 'e;
 
 impl<'e> NodalMotion<'e, fn(f64, &mut NodalEvaluation<'e>)> {
@@ -61,8 +64,9 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         }
     }
 
-    /// The same where motion of the frame is given: `drive` tells its velocities at a time, V and omega in the axes of the frame, and their
-    /// rates, from these axes in the world. What is given at one time is given at all.
+    /// The same where motion of the frame is given: `drive` tells its velocities at a time, V and omega in
+    /// the axes of the frame, and their rates, from these axes in the world. What is given at one time is
+    /// given at all.
     pub fn driven(self, drive: impl Fn(f64, &Matrix3<f64>) -> (Prescribed, Prescribed) + 'e) -> Self {
         Self { drive: Some(Box::new(drive)), ..self }
     }
@@ -85,8 +89,8 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         Ok(&mut self.evaluation)
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), at a state; the evaluation then has what drives the frame
-    /// ([`NodalEvaluation::driving_force`]).
+    /// V' and omega' in the axes of the frame, and u'' (N), at a state; the evaluation then has what drives
+    /// the frame ([`NodalEvaluation::driving_force`]).
     ///
     /// # Errors
     /// [`Failure::Rates`] as [`NodalEvaluation::set`].
@@ -159,7 +163,8 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
         w.iter_mut().zip(&self.mass).for_each(|(scale, m)| *scale = (share * m).sqrt());
     }
 
-    /// The energy of the corrections of u and w, relative to E of the step; those of the frame in their scales.
+    /// The energy of the corrections of u and w, relative to E of the step; those of the frame in their
+    /// scales.
     fn correct_stages(
         &mut self,
         h: f64,

@@ -9,9 +9,10 @@ use nalgebra::Vector3;
 /// Rows of the model with their weights in the three components of a vector.
 pub(super) type Weights = Vec<(usize, [f64; 3])>;
 
-/// A node, or the reference point of an interface: C_t and C_r, which take the displacement and the rotation vector of the point from the
-/// displacements u of all rows, in model axes. The forces b and torques t that do work on these are the nodal forces C_t'b + C_r't:
-/// [`BodyPoint`](crate::motion::dynamics::BodyPoint) without modes, for Psi_t = C_t Psi and Psi_r = C_r Psi.
+/// A node, or the reference point of an interface: C_t and C_r, which take the displacement and the rotation
+/// vector of the point from the displacements u of all rows, in model axes. The forces b and torques t that
+/// do work on these are the nodal forces C_t'b + C_r't: [`BodyPoint`](crate::motion::dynamics::BodyPoint)
+/// without modes, for Psi_t = C_t Psi and Psi_r = C_r Psi.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalPoint {
     /// Place in the undeformed model.
@@ -38,8 +39,8 @@ impl NodalPoint {
         }
     }
 
-    /// The reference point of the interface `name`: the rigid motion that fits that of its nodes best, as of every coupling
-    /// (theory (5.3)). `None` for an interface that does not exist or has no reference point.
+    /// The reference point of the interface `name`: the rigid motion that fits that of its nodes best, as of
+    /// every coupling (theory (5.3)). `None` for an interface that does not exist or has no reference point.
     ///
     /// # Errors
     /// FB150 when the model has no interfaces at all.

@@ -12,15 +12,15 @@ const MOST_CORRECTIONS: usize = 100;
 const CLOSE: f64 = 1e-14;
 
 impl NodalEquations<'_> {
-    /// The configuration with the same places and velocities of all nodes, whose displacements fulfil C u = 0: how a state with mean
-    /// axes, as modes have it, becomes one with held degrees of freedom.
+    /// The configuration with the same places and velocities of all nodes, whose displacements fulfil C u =
+    /// 0: how a state with mean axes, as modes have it, becomes one with held degrees of freedom.
     ///
-    /// The frame moves by d and turns by S, u becomes S'(x + u - d) - x. Models of displacements only: what K and M say of nodal
-    /// rotations and of rows without a place holds for small ones.
+    /// The frame moves by d and turns by S, u becomes S'(x + u - d) - x. Models of displacements only: what K
+    /// and M say of nodal rotations and of rows without a place holds for small ones.
     ///
     /// # Errors
-    /// [`NodalError::FrameTied`] when the model has other rows, [`NodalError::ConditionsViolated`] when no frame was found: the deformation is too
-    /// large.
+    /// [`NodalError::FrameTied`] when the model has other rows, [`NodalError::ConditionsViolated`] when no
+    /// frame was found: the deformation is too large.
     ///
     /// # Panics
     /// When a length is not N.

@@ -11,7 +11,8 @@ const SETTLED: f64 = 1e-12;
 /// Steps below this part that no longer shrink are rounding of K u.
 const NEAR_ROUNDING: f64 = 1e-6;
 
-/// The shift of K, relative to the square of the first circular frequency: steps leave a tenth of the way to go, or less.
+/// The shift of K, relative to the square of the first circular frequency: steps leave a tenth of the way to
+/// go, or less.
 const SHIFT: f64 = 0.1;
 
 impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
@@ -21,7 +22,8 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     /// * `softest`: square of the first circular frequency.
     ///
     /// # Errors
-    /// [`Failure::Rates`] where there is none: the spin takes the stiffness of some motion, or K is not positive semidefinite.
+    /// [`Failure::Rates`] where there is none: the spin takes the stiffness of some motion, or K is not
+    /// positive semidefinite.
     pub fn settled(
         &mut self,
         time: f64,

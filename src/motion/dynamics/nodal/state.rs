@@ -15,7 +15,8 @@ pub(super) const LINEAR: usize = 10;
 pub(super) const ANGULAR: usize = 13;
 pub(super) const DISPLACEMENTS: usize = 16;
 
-/// A state in the velocities that a reader thinks in: [`Configuration`](crate::motion::dynamics::Configuration) with nodal displacements.
+/// A state in the velocities that a reader thinks in:
+/// [`Configuration`](crate::motion::dynamics::Configuration) with nodal displacements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalConfiguration {
     /// Origin of the body frame, world axes.
@@ -33,17 +34,18 @@ pub struct NodalConfiguration {
 }
 
 impl NodalEquations<'_> {
-    /// Number of entries of a state y = (G, D, e, P, L, u, w): 16 + 2 N. The frame has its origin at R = G + D and the Euler parameters e;
-    /// P is the linear momentum, L the angular momentum about G, which starts at R and flies with P / m; all in world axes. P and L
-    /// of a free body are constant entries, which every method keeps to rounding.
+    /// Number of entries of a state y = (G, D, e, P, L, u, w): 16 + 2 N. The frame has its origin at R = G +
+    /// D and the Euler parameters e; P is the linear momentum, L the angular momentum about G, which starts
+    /// at R and flies with P / m; all in world axes. P and L of a free body are constant entries, which every
+    /// method keeps to rounding.
     pub fn dimension(&self) -> usize {
         DISPLACEMENTS + 2 * self.n_rows()
     }
 
     /// The state y of a configuration.
     ///
-    /// What carries no mass is set to where the rest takes it. Rigid motion in u' is taken as that of the body: the velocities that a
-    /// state has leave C u' = 0.
+    /// What carries no mass is set to where the rest takes it. Rigid motion in u' is taken as that of the
+    /// body: the velocities that a state has leave C u' = 0.
     ///
     /// # Errors
     /// [`NodalError::ConditionsViolated`] when C u is not zero to rounding.

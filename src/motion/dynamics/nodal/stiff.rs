@@ -12,15 +12,17 @@ const SINGULAR: Failure = Failure::Rates {
     reason: "mass, damping and stiffness of the nodes cannot be factored for implicit steps",
 };
 
-/// u' = P M^-1 w, w' = -K u - D u' with P = I - R (C R)^-1 C: what is linear and fast in the nodal equations, solved in the eigenvalues mu of an
-/// implicit method with the step h. What the stages lack, (a, b) in (u, w), is corrected by
+/// u' = P M^-1 w, w' = -K u - D u' with P = I - R (C R)^-1 C: what is linear and fast in the nodal equations,
+/// solved in the eigenvalues mu of an implicit method with the step h. What the stages lack, (a, b) in (u,
+/// w), is corrected by
 ///
 /// ```text
 /// (M + z D + z^2 K) x = z b + M a + z D a,    z = h mu,    u: P x,    w: M (x - a) / z
 /// ```
 ///
-/// where K R = 0 and D R = 0, D being the damping of the model; that of modes is left to the iteration. This is what is linear with mean axes;
-/// other conditions leave a constraint in M^-1 w that is left to the iteration too, which then asks for steps below the shortest period.
+/// where K R = 0 and D R = 0, D being the damping of the model; that of modes is left to the iteration. This
+/// is what is linear with mean axes; other conditions leave a constraint in M^-1 w that is left to the
+/// iteration too, which then asks for steps below the shortest period.
 #[derive(Debug)]
 pub(super) struct Stiff<'m> {
     equations: &'m NodalEquations<'m>,
@@ -57,14 +59,16 @@ impl<'m> Stiff<'m> {
         }
     }
 
-    /// Corrections in place of what the stages lack; their energy, u'K u / 2 + w'M^-1 w / 2, on an average over the stages, at the most.
+    /// Corrections in place of what the stages lack; their energy, u'K u / 2 + w'M^-1 w / 2, on an average
+    /// over the stages, at the most.
     pub fn correct(&mut self, h: f64, modes: &[StageMode], lacks: &mut [Vec<f64>]) -> Result<f64, Failure> {
         let n = self.equations.n_rows();
         if self.step != h || self.factors.len() != modes.len() {
             self.prepare(h, modes, lacks.len())?;
         }
         self.corrected.iter_mut().for_each(|stage| stage.fill(0.0));
-        // Square roots of the energies of the stages: those of the parts, of which a pair counts twice, add up at the most.
+        // Square roots of the energies of the stages: those of the parts, of which a pair counts twice, add
+        // up at the most.
         let mut roots = [0.0; STAGES];
         for (at, mode) in modes.iter().enumerate() {
             self.gather(mode, lacks);

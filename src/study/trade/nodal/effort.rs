@@ -25,7 +25,8 @@ const ITERATIONS: f64 = 5.0;
 /// Real solves that a complex one takes as long as.
 const COMPLEX: f64 = 3.0;
 
-/// Explicit integrations of so many seconds are taken however cheap implicit ones are: nothing is left to be said of their steps.
+/// Explicit integrations of so many seconds are taken however cheap implicit ones are: nothing is left to be
+/// said of their steps.
 const COMFORTABLE: f64 = 30.0;
 
 /// The fastest motion that counts turns by this angle in the first implicit steps that are tried.
@@ -34,7 +35,8 @@ const FIRST_ANGLE: f64 = 1.5;
 /// Order of implicit steps that the scene does not ask for.
 pub(super) const ORDER: usize = 6;
 
-/// Times that implicit steps are halved at the least, to see what they were worth: relative to the first ones, 1 + 2.
+/// Times that implicit steps are halved at the least, to see what they were worth: relative to the first
+/// ones, 1 + 2.
 const RUNS: f64 = 3.0;
 
 /// Numbers of a model that work depends on.
@@ -104,7 +106,8 @@ impl Effort {
         steps * one + self.pieces * (1.0 + COMPLEX) * self.factorisation
     }
 
-    /// How to integrate what a scene asks for by `scheme`, with circular frequencies up to `liveliest` that count; and the seconds that it takes.
+    /// How to integrate what a scene asks for by `scheme`, with circular frequencies up to `liveliest` that
+    /// count; and the seconds that it takes.
     pub fn plan(&self, scene: &Scene, scheme: Scheme, liveliest: f64) -> (Way, f64) {
         match scheme {
             // Implicit steps solve what is stiff of a body with mean axes.
@@ -141,7 +144,8 @@ impl Effort {
         Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into())
     }
 
-    /// Refuses what does not fit the memory: the displacements of all rows at `instants` of `runs` motions, and the factors of implicit steps.
+    /// Refuses what does not fit the memory: the displacements of all rows at `instants` of `runs` motions,
+    /// and the factors of implicit steps.
     ///
     /// # Errors
     /// FB601.
@@ -170,7 +174,8 @@ pub(super) fn fastest_mode(body: &FlexBody) -> f64 {
     body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt()
 }
 
-/// An estimate of the largest circular frequency: sqrt(3 max K_ii / M_ii), an element of three dimensions with consistent mass.
+/// An estimate of the largest circular frequency: sqrt(3 max K_ii / M_ii), an element of three dimensions
+/// with consistent mass.
 fn fastest(model: &FeModel) -> f64 {
     let mass = model.pencil().mass_diagonal();
     let ratios = model.stiffness().diagonal().into_iter().zip(mass).filter(|(_, m)| *m > 0.0);

@@ -10,7 +10,8 @@ use crate::body::flex_body::{FlexBody, LoadKind};
 use crate::model::FeModel;
 use crate::motion::scene::{ErrorHistory, Scene, Scheme, Trace, nodal_point};
 
-/// Tolerance of the explicit integration unless the scene has one: errors of reduced models that are smaller are not told.
+/// Tolerance of the explicit integration unless the scene has one: errors of reduced models that are smaller
+/// are not told.
 const TOLERANCE: f64 = 1e-8;
 
 /// Part of the tolerances of the scene that steps which are halved may be worth before they are halved again.
@@ -37,8 +38,9 @@ pub struct NodalIntegration {
     pub scheme: Scheme,
     /// Steps taken.
     pub steps: u64,
-    /// What steps of twice the length make of the motion, over the tolerances of the scene: an upper estimate of the error of the integration.
-    /// `None` where the scene gives the step, as of all candidates, or the tolerance.
+    /// What steps of twice the length make of the motion, over the tolerances of the scene: an upper estimate
+    /// of the error of the integration. `None` where the scene gives the step, as of all candidates, or the
+    /// tolerance.
     pub error: Option<f64>,
 }
 
@@ -52,7 +54,8 @@ pub struct NodalReference<'m> {
 }
 
 impl<'m> NodalReference<'m> {
-    /// Refuses, before any work, what the nodal equations do not have, and more work than is allowed for the motion of `body`.
+    /// Refuses, before any work, what the nodal equations do not have, and more work than is allowed for the
+    /// motion of `body`.
     ///
     /// # Errors
     /// FB801 for geometric stiffness; FB212 for places that the model does not have; FB604.
@@ -77,13 +80,16 @@ impl<'m> NodalReference<'m> {
         effort.refuse_long(seconds, longest)
     }
 
-    /// Integrates the unreduced equations of `model` in `scene` from where `motion`, that of a body of the model, starts.
+    /// Integrates the unreduced equations of `model` in `scene` from where `motion`, that of a body of the
+    /// model, starts.
     ///
-    /// A scene with a method of implicit steps gets these steps. One with error control gets them from the explicit method, or where that takes
-    /// long in implicit steps that are halved until they no longer change what is measured.
+    /// A scene with a method of implicit steps gets these steps. One with error control gets them from the
+    /// explicit method, or where that takes long in implicit steps that are halved until they no longer
+    /// change what is measured.
     ///
     /// # Errors
-    /// Those of [`NodalReference::refuse`], FB801 for models without nodal equations, FB601; FB540 when the integration cannot go on.
+    /// Those of [`NodalReference::refuse`], FB801 for models without nodal equations, FB601; FB540 when the
+    /// integration cannot go on.
     pub fn new(
         model: &'m FeModel,
         body: &FlexBody,
@@ -153,7 +159,8 @@ impl<'m> NodalReference<'m> {
         Some(Diagnostic::new(Code::ReferenceLacks, message).with_help(help))
     }
 
-    /// Errors of the motion of `body`, which was looked at where this one was; `None` when it is no body of the model.
+    /// Errors of the motion of `body`, which was looked at where this one was; `None` when it is no body of
+    /// the model.
     ///
     /// # Panics
     /// When it was looked at elsewhere.
@@ -174,8 +181,8 @@ struct Halving<'h, 'm> {
 }
 
 impl Halving<'_, '_> {
-    /// The motion with the shortest steps, looked at where the first ones of length `step` end, and what twice their length changes of it over the
-    /// tolerances of the scene.
+    /// The motion with the shortest steps, looked at where the first ones of length `step` end, and what
+    /// twice their length changes of it over the tolerances of the scene.
     fn run(&self, step: f64, told: &mut dyn FnMut(f64)) -> Result<(Seen, f64)> {
         let tolerance = &self.staged.scene.requirements.tolerance;
         let mut coarse = self.staged.implicit(ORDER, step, 1, self.end, told)?;
@@ -197,8 +204,8 @@ impl Halving<'_, '_> {
     }
 }
 
-/// The largest circular frequency of the modes whose root of the elastic energy, relative to the largest, is above the tolerance of the stress:
-/// others need no steps of their own to begin with.
+/// The largest circular frequency of the modes whose root of the elastic energy, relative to the largest, is
+/// above the tolerance of the stress: others need no steps of their own to begin with.
 fn liveliest(body: &FlexBody, scene: &Scene, motion: &Trace) -> f64 {
     let roots = body.modes().eigenvalue.iter().zip(&motion.extremes.amplitudes);
     let roots: Vec<f64> = roots.map(|(lambda, amplitude)| lambda.sqrt() * amplitude.abs()).collect();

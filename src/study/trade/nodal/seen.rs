@@ -23,7 +23,8 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Nothing yet of a motion of `rows` rows that goes as that of a body, `motion`, which was integrated in another way.
+    /// Nothing yet of a motion of `rows` rows that goes as that of a body, `motion`, which was integrated in
+    /// another way.
     pub fn new(rows: usize, motion: &Trace) -> Self {
         let trace = Trace {
             scheme: motion.scheme,
@@ -95,7 +96,8 @@ impl Seen {
         Peak::of(&self.trace.time, lengths).value
     }
 
-    /// Errors of `candidate` with the displacements `of` (N x count) from an instant on, relative to this motion.
+    /// Errors of `candidate` with the displacements `of` (N x count) from an instant on, relative to this
+    /// motion.
     pub fn errors(
         &self,
         model: &FeModel,

@@ -11,7 +11,8 @@ use crate::motion::dynamics::{
 use crate::motion::scene::{Axes, Driving, Load, Scene, Scheme, Trace, damped, nodal_point};
 use crate::numerics::integration::{Explicit, Failure, Gauss, Method, Sight, integrate_closely};
 
-/// What is left of the stages of implicit steps, in the scales of the motion: far below the errors of bodies that are told, far above rounding.
+/// What is left of the stages of implicit steps, in the scales of the motion: far below the errors of bodies
+/// that are told, far above rounding.
 const SOLVED: f64 = 1e-11;
 
 /// The equations of all nodes in a scene, with the damping of the modes of a body.
@@ -40,7 +41,8 @@ fn stopped(scene: &Scene, failure: Failure) -> Error {
 }
 
 impl<'a> Staged<'a> {
-    /// `model` in `scene`, both in the frame of `body`, a body of the model whose motion starts as `motion` does.
+    /// `model` in `scene`, both in the frame of `body`, a body of the model whose motion starts as `motion`
+    /// does.
     pub fn new(model: &'a FeModel, body: &FlexBody, scene: &'a Scene, motion: &'a Trace) -> Result<Self> {
         let conditions = match &scene.carried {
             Some(carried) => ReferenceConditions::AtRest(nodal_point(model, &carried.by)?),
@@ -108,8 +110,8 @@ impl<'a> Staged<'a> {
         self.integrate(method, scheme, instants, watch, |sight| sight == Sight::Instant)
     }
 
-    /// Integrates to `end` with the collocation of an `order` in steps of at most `step`, each divided into `refinement`, and sees the motion at
-    /// the ends of the undivided steps and at both sides of every break.
+    /// Integrates to `end` with the collocation of an `order` in steps of at most `step`, each divided into
+    /// `refinement`, and sees the motion at the ends of the undivided steps and at both sides of every break.
     pub fn implicit(
         &self,
         order: usize,
