@@ -20,8 +20,8 @@ use std::f64::consts::TAU;
 /// Instants per shortest period at which bounds look at a motion.
 const INSTANTS_PER_PERIOD: f64 = 20.0;
 
-/// Numbers of a motion, instants times modes, that are looked at along a run.
-const MOST_NUMBERS: f64 = 4e6;
+/// Instants at which they look at it at the most.
+const MOST_INSTANTS: f64 = 6e4;
 
 /// Part of the tolerance of the stress from which a mode takes part in a motion.
 const TAKES_PART: f64 = 0.01;
@@ -100,10 +100,9 @@ impl TrialRuns<'_> {
         let mut scene = self.scene.clone();
         let duration = self.situation.duration.value;
         let wanted = |rate: f64| (duration * rate / TAU * INSTANTS_PER_PERIOD).ceil();
-        let most = MOST_NUMBERS / self.body.n_modes() as f64;
-        let followed = wanted(self.fastest(f64::INFINITY)).min(most);
+        let followed = wanted(self.fastest(f64::INFINITY)).min(MOST_INSTANTS);
         // What no mode has a part in has to be followed in any case.
-        if followed.is_nan() || wanted(self.fastest(0.0)) > most {
+        if followed.is_nan() || wanted(self.fastest(0.0)) > MOST_INSTANTS {
             return Ok(None);
         }
         scene.run.outputs = (followed as usize).max(LEAST_INSTANTS);
