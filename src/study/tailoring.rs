@@ -99,9 +99,16 @@ impl Tailoring {
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<EnrichedForCases<Conversion>> {
         let EnrichedForCases { made: mut reference, rounds } = whole;
+        let own = rounds.first().and_then(|rounds| rounds.last());
+        if own.is_some_and(|own| !own.is_reference()) {
+            let message =
+                "the body whose motion shapes would be made of lacks more than half of the tolerances itself";
+            reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
+            return Ok(EnrichedForCases { made: reference, rounds });
+        }
         let (motion, _) = trace(&reference.body, scene, self.settings.modes.memory, |_| ())?;
         let measure = Measure::new(&reference.body, &motion);
-        let lacks = rounds.first().and_then(|rounds| rounds.last()).map_or(0.0, |own| own.worst);
+        let lacks = own.map_or(0.0, |own| own.worst);
         let shapes = MotionShapes::new(model, &reference.body, scene, &motion)?;
         let counts =
             shapes.as_ref().map_or(Vec::new(), |shapes| shapes.counts(&scene.requirements.tolerance));
@@ -269,13 +276,21 @@ pub fn convert_for_cases(
 
 /// Refuses what a basis that is made of a motion cannot serve.
 fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
-    if tailoring.of_motion && scenes.len() > 1 {
+    if !tailoring.of_motion {
+        return Ok(());
+    }
+    if scenes.len() > 1 {
         let message = "--basis scene: shapes are made of one motion, and the scene has several load cases";
         return Err(Diagnostic::new(Code::SceneCase, message).into());
     }
-    if tailoring.of_motion && scenes.iter().any(|scene| !scene.initial.modes.is_empty()) {
-        let message = "--basis scene: the scene starts modes by their number, which a body made of its motion does not have";
-        return Err(Diagnostic::new(Code::Usage, message).into());
-    }
-    Ok(())
+    let message = if scenes.iter().any(|scene| !scene.initial.modes.is_empty()) {
+        "--basis scene: the scene starts modes by their number, which a body made of its motion does not have"
+    } else if scenes.iter().any(|scene| scene.carried.is_some()) {
+        "--basis scene: shapes are made of the motion of a free body, and something carries this one"
+    } else if scenes.iter().any(|scene| scene.run.duration.is_none()) {
+        "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration"
+    } else {
+        return Ok(());
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
 }
