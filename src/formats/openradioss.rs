@@ -2,9 +2,9 @@
 //! DMIG file (`ini_fxbody.F`).
 //!
 //! Twelve rigid modes move a node at x (body axes) by the velocities of four points in space: the ends of the
-//! body axes, p_I, and their origin p_0. Rigid mode 3 (I - 1) + J: x_I e_J, rigid mode 9 + J: (1 - x_1 - x_2
-//! - x_3) e_J. The columns of the rotation matrix are p_I - p_0. Where nodes have rotations, three more turn
-//! all nodes about the axes in space. Local modes turn with the body.
+//! body axes, p_I, and their origin p_0. Rigid mode 3 (I - 1) + J: x_I e_J, rigid mode 9 + J:
+//! (1 - x_1 - x_2 - x_3) e_J. The columns of the rotation matrix are p_I - p_0. Where nodes have
+//! rotations, three more turn all nodes about the axes in space. Local modes turn with the body.
 //!
 //! With s_I = x_I, s_0 = 1 - sum x_I and E_ab = e_a e_b', the products are those of J, c, m, Ibar and C1:
 //! s_I' Ms s_K = J_IK, s_0' Ms s_I = c_I - sum_K J_IK, s_I' Ms Psi_k = `Ibar_Ik`, s_0' Ms Psi_k = C1_k -

@@ -449,9 +449,9 @@ fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolu
     }
 }
 
-/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi + (R
-/// - Psi Q) Q^+ with their coordinates Q = C'R: K annihilates them only as well as its digits allow, and a
-/// slender body magnifies that. The coordinates of the shapes stay what they are.
+/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi +
+/// (R - Psi Q) Q^+ with their coordinates Q = C'R: K annihilates them only as well as its digits allow, and
+/// a slender body magnifies that. The coordinates of the shapes stay what they are.
 fn restore_rigid_motion(
     joints: &[CoupledInterface],
     rigid: MatRef<'_, f64>,

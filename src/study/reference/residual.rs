@@ -34,9 +34,10 @@ impl<'m> NodalView<'m> {
         Some(Self { model, vectors, weighted, rigid, axes: body.frame().axes, loads })
     }
 
-    /// r = f - K u - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with w = M (R (V, omega)
-    /// + omega x u + u') and u = Psi q (theory 6.9 to 6.13), a column for every instant, without what it does
-    /// to the modes: that is zero, but for damping and geometric stiffness, which nodes do not have.
+    /// r = f - K u - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with
+    /// w = M (R (V, omega) + omega x u + u') and u = Psi q (theory 6.9 to 6.13), a column for every
+    /// instant, without what it does to the modes: that is zero, but for damping and geometric stiffness,
+    /// which nodes do not have.
     pub fn residual(&self, motion: &[Instant]) -> Mat<f64> {
         let mut residual = Mat::zeros(self.vectors.nrows(), motion.len());
         for first in (0..motion.len()).step_by(BLOCK) {
