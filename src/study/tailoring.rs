@@ -9,11 +9,11 @@ use crate::body::convert::{Condensation, Conversion, ConvertSettings, ModalModel
 use crate::body::flex_body::FlexBody;
 use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
-use crate::motion::scene::{Measure, OutputErrors, Scene, trace, trace_at};
+use crate::motion::scene::{Measure, OtherModes, OutputErrors, Scene, trace, trace_at};
 use crate::numerics::eigen::{Accuracy, Resume, Wanted};
+use crate::numerics::linalg::gram;
 use crate::study::reference::{Enriched, EnrichedForCases, MotionShapes, ReferenceError, enrich_for_cases};
 use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
-use crate::study::trade::Source;
 use faer::Mat;
 
 /// Settings of a conversion for a scene.
@@ -183,15 +183,14 @@ fn errors_beside(
     model: &FeModel,
     scene: &Scene,
 ) -> Result<Option<OutputErrors>> {
-    let Some(source) = Source::new("shapes of the motion", body.clone(), None)?.beside(measure.body(), model)
-    else {
-        return Ok(None);
-    };
-    let modes: Vec<usize> = (0..body.n_modes()).collect();
-    let mut scene = source.scene(scene, body, &modes, &measure.trace().start);
+    let vectors = body.vectors_of(model).zip(measure.body().vectors_of(model));
+    let Some((own, others)) = vectors else { return Ok(None) };
+    let shared = gram(own.as_ref(), model.pencil().apply_stiffness(others.as_ref()).as_ref());
+    let Some(modes) = OtherModes::new(body, measure.body(), shared.as_ref()) else { return Ok(None) };
+    let mut scene = scene.clone();
     scene.run.scheme = measure.trace().scheme;
     let motion = trace_at(body, &scene, &measure.trace().time, None)?;
-    Ok(source.errors(measure, body, &modes, &motion).map(|errors| errors.largest()))
+    Ok(Some(measure.of_other(&motion, &modes).largest()))
 }
 
 /// Loads whose static responses join the modes where nobody names others: those `stated` with the model;

@@ -105,7 +105,7 @@ impl Source {
     ///
     /// Modes of the start are those of the reference; other modes take the part of its deformation that is
     /// nearest to it in elastic energy, q = L^-1 G q_r.
-    pub(in crate::study) fn scene(
+    pub(super) fn scene(
         &self,
         scene: &Scene,
         body: &FlexBody,
@@ -131,7 +131,7 @@ impl Source {
 
     /// Errors of the motion of a candidate with the `modes` of this body; `None` where its modes cannot be
     /// compared.
-    pub(in crate::study) fn errors(
+    pub(super) fn errors(
         &self,
         measure: &Measure<'_>,
         body: &FlexBody,
