@@ -11,7 +11,6 @@ use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
 use crate::motion::scene::{Measure, OtherModes, OutputErrors, Scene, trace, trace_at};
 use crate::numerics::eigen::{Accuracy, Resume, Wanted};
-use crate::numerics::linalg::gram;
 use crate::study::reference::{Enriched, EnrichedForCases, MotionShapes, ReferenceError, enrich_for_cases};
 use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
 use faer::Mat;
@@ -183,10 +182,9 @@ fn errors_beside(
     model: &FeModel,
     scene: &Scene,
 ) -> Result<Option<OutputErrors>> {
-    let vectors = body.vectors_of(model).zip(measure.body().vectors_of(model));
-    let Some((own, others)) = vectors else { return Ok(None) };
-    let shared = gram(own.as_ref(), model.pencil().apply_stiffness(others.as_ref()).as_ref());
-    let Some(modes) = OtherModes::new(body, measure.body(), shared.as_ref()) else { return Ok(None) };
+    let shared = body.stiffness_beside(measure.body(), model);
+    let modes = shared.and_then(|shared| OtherModes::new(body, measure.body(), shared.as_ref()));
+    let Some(modes) = modes else { return Ok(None) };
     let mut scene = scene.clone();
     scene.run.scheme = measure.trace().scheme;
     let motion = trace_at(body, &scene, &measure.trace().time, None)?;

@@ -2,6 +2,7 @@
 
 use super::FlexBody;
 use crate::model::FeModel;
+use crate::numerics::linalg::gram;
 use faer::Mat;
 
 impl FlexBody {
@@ -29,6 +30,13 @@ impl FlexBody {
                     .map_or(0.0, |internal| internal.shape[(split + row - massless, j)]),
             }
         }))
+    }
+
+    /// Psi'K Psi_r (nf x nr) with the modes Psi_r of another body of the same model: how each sees the
+    /// deformations of the other. `None` as [`FlexBody::vectors_of`].
+    pub(crate) fn stiffness_beside(&self, other: &Self, model: &FeModel) -> Option<Mat<f64>> {
+        let (own, others) = (self.vectors_of(model)?, other.vectors_of(model)?);
+        Some(gram(own.as_ref(), model.pencil().apply_stiffness(others.as_ref()).as_ref()))
     }
 
     /// Displacements of the modes in body axes, three per node and then per vector without a place; `None` as

@@ -7,9 +7,8 @@ use crate::body::flex_body::FlexBody;
 use crate::body::invariants::symmetric_part;
 use crate::model::FeModel;
 use crate::motion::scene::{Scene, Stage, Tolerance, Trace, damped};
-use crate::numerics::linalg::{combine, gram, larger};
+use crate::numerics::linalg::{combine, dense_cholesky, gram, larger, solve_lower, solve_upper};
 use faer::Mat;
-use nalgebra::{DMatrix, DVector};
 
 /// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth
 /// trying: what a reduced body makes of its own motion may be better or worse than the best that its shapes
@@ -57,25 +56,22 @@ impl MotionShapes {
         let stage = Stage::new(body, scene)?;
         let undamped = stage.body.modes().damping_ratio.iter().all(|ratio| *ratio == 0.0);
         let body = &*damped(&stage.body, &stage.scene)?;
-        let vectors = body.vectors_of(model);
-        let factor = body.invariants().symmetric_stiffness().cholesky();
-        let (Some(vectors), Some(factor)) = (vectors, factor) else { return Ok(None) };
-        let lower = factor.l();
-        let weighted: Vec<DVector<f64>> =
-            motion.q.iter().map(|q| lower.tr_mul(&DVector::from_column_slice(q))).collect();
+        let stiffness = symmetric_part(body.invariants().modal_stiffness());
+        let (Some(vectors), Some(lower)) = (body.vectors_of(model), dense_cholesky(stiffness)) else {
+            return Ok(None);
+        };
+        let instants = Mat::from_fn(body.n_modes(), motion.q.len(), |j, i| motion.q[i][j]);
+        let weighted = gram(lower.as_ref(), instants.as_ref());
         let Some((directions, _)) = principal(mean_of_products(&weighted, &motion.time), LEFT_OUT, MOST)
         else {
             return Ok(None);
         };
-        let directions = DMatrix::from_fn(directions.nrows(), directions.ncols(), |i, j| directions[(i, j)]);
         let left = left_out(&weighted, &directions);
-        let Some(combinations) = lower.tr_solve_lower_triangular(&directions) else { return Ok(None) };
-        let combinations =
-            Mat::from_fn(combinations.nrows(), combinations.ncols(), |i, j| combinations[(i, j)]);
+        let combinations = solve_upper(&lower, &directions);
         let given = undamped && body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0);
         let damping = given.then(|| {
-            let inverse = factor.inverse();
-            let inverse = Mat::from_fn(inverse.nrows(), inverse.ncols(), |i, j| inverse[(i, j)]);
+            let identity = Mat::identity(body.n_modes(), body.n_modes());
+            let inverse = solve_upper(&lower, &solve_lower(&lower, &identity));
             let weighted = model.pencil().apply_stiffness(vectors.as_ref());
             GivenDamping { matrix: body.damping(), dual: combine(weighted.as_ref(), inverse.as_ref()) }
         });
@@ -120,31 +116,29 @@ impl MotionShapes {
     }
 }
 
-/// The mean of y y' over the time of a motion.
-fn mean_of_products(weighted: &[DVector<f64>], time: &[f64]) -> Mat<f64> {
-    let n = weighted[0].len();
+/// The mean over the time of a motion of y y', for the columns y of `weighted`.
+fn mean_of_products(weighted: &Mat<f64>, time: &[f64]) -> Mat<f64> {
     let last = time.len() - 1;
-    let mut sum = DMatrix::zeros(n, n);
-    for (i, y) in weighted.iter().enumerate() {
-        let share = 0.5 * (time[(i + 1).min(last)] - time[i.saturating_sub(1)]);
-        sum.ger(share, y, y, 1.0);
-    }
-    Mat::from_fn(n, n, |i, j| sum[(i, j)])
+    let share = |i: usize| 0.5 * (time[(i + 1).min(last)] - time[i.saturating_sub(1)]);
+    let shared = Mat::from_fn(time.len(), weighted.nrows(), |i, j| share(i) * weighted[(j, i)]);
+    symmetric_part(&combine(weighted.as_ref(), shared.as_ref()))
 }
 
 /// What the first r of the `directions` leave out of the motion at the most, relative to the largest of it,
 /// for every r.
-fn left_out(weighted: &[DVector<f64>], directions: &DMatrix<f64>) -> Vec<f64> {
+fn left_out(weighted: &Mat<f64>, directions: &Mat<f64>) -> Vec<f64> {
+    let parts = gram(directions.as_ref(), weighted.as_ref());
+    let rests = weighted - directions * &parts;
+    let square = |a: &Mat<f64>, i: usize| a.col(i).squared_norm_l2();
     let mut largest = 0.0;
     let mut left = vec![0.0f64; directions.ncols() + 1];
-    for y in weighted {
-        largest = larger(largest, y.norm_squared());
-        let parts = directions.tr_mul(y);
-        let mut rest = (y - directions * &parts).norm_squared();
+    for i in 0..weighted.ncols() {
+        largest = larger(largest, square(weighted, i));
+        let mut rest = square(&rests, i);
         for r in (0..left.len()).rev() {
             left[r] = larger(left[r], rest);
             if r > 0 {
-                rest += parts[r - 1] * parts[r - 1];
+                rest += parts[(r - 1, i)] * parts[(r - 1, i)];
             }
         }
     }

@@ -5,7 +5,6 @@ use crate::body::flex_body::{FlexBody, LumpedBody, MassStructure};
 use crate::model::FeModel;
 use crate::motion::dynamics::Configuration;
 use crate::motion::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
-use crate::numerics::linalg::{gram, multiply};
 use faer::Mat;
 use nalgebra::DVector;
 
@@ -44,10 +43,7 @@ impl Source {
     /// The same as a candidate beside the body `reference` of the same model; `None` when one of them is not
     /// of `model`.
     pub fn beside(mut self, reference: &FlexBody, model: &FeModel) -> Option<Self> {
-        let (own, others) = (self.body.vectors_of(model)?, reference.vectors_of(model)?);
-        let mut product = Mat::zeros(others.nrows(), others.ncols());
-        multiply(model.stiffness(), 1, others.as_ref(), product.as_mut());
-        self.shared = Some(gram(own.as_ref(), product.as_ref()));
+        self.shared = Some(self.body.stiffness_beside(reference, model)?);
         Some(self)
     }
 
