@@ -2,6 +2,7 @@
 //! Every test binary uses its own part of it.
 #![allow(dead_code)]
 
+pub mod beams;
 pub mod cases;
 pub mod cuboid;
 pub mod elements;
