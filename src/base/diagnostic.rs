@@ -84,6 +84,7 @@ codes! {
     DeckRows = "FB112", Error, BadInput, "rows of the matrices are not those of the input deck", "write deck and matrices in one run";
     DeckRenumbered = "FB113", Note, Done, "nodes of instances are numbered anew", "nothing to do; interfaces go by node sets";
     JobStep = "FB114", Note, Done, "one of several steps with matrices is taken", "nothing to do if it is the right one; else remove the others";
+    NodeFileSyntax = "FB115", Error, BadInput, "file of nodes cannot be read", "write it again, or give a table with the columns node, x, y, z";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";

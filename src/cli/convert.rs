@@ -409,7 +409,9 @@ fn refuse_for_manifest(arguments: &ConvertArguments) -> Result<()> {
         ConvertArguments { units: Some(_), .. } => {
             "--units are for --stiffness, --from and jobs: a manifest states its own"
         }
-        ConvertArguments { format: Some(_), .. } => "--format is for jobs: a manifest says `program` in [files]",
+        ConvertArguments { format: Some(_), .. } => {
+            "--format is for jobs: a manifest says `program` in [files]"
+        }
         ConvertArguments { interface, .. } if !interface.is_empty() => {
             "--interface is for jobs: a manifest has [[interface]]"
         }

@@ -14,8 +14,10 @@ mod hdf5;
 mod hdf5;
 mod jobs;
 mod manifest;
+mod mapping;
 mod matrix_market;
 mod model_files;
+mod node_files;
 mod npy;
 mod read_model;
 mod reader;
@@ -34,7 +36,8 @@ pub use compression::Compression;
 pub use jobs::{JobFile, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
-    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, TableFiles, parse_units,
+    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, TableFiles,
+    parse_units,
 };
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};

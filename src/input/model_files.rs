@@ -161,7 +161,12 @@ impl ModelFiles {
             }
             ModelSource::Job(job) => job.family(),
         };
-        own.into_iter().chain(self.manifest.clone()).chain(damping).chain(geometric).chain(interfaces).collect()
+        own.into_iter()
+            .chain(self.manifest.clone())
+            .chain(damping)
+            .chain(geometric)
+            .chain(interfaces)
+            .collect()
     }
 
     /// The job of an FE program without a manifest, named after its main file; `units` as in

@@ -3,10 +3,12 @@
 use super::bytes::InputFile;
 use super::compression::Compression;
 use super::jobs::{JobModel, read_job};
+use super::mapping::Mapping;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
+use super::node_files::{NodeFile, read_node_file};
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
-use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
+use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
@@ -53,8 +55,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, &opened, files)))
         .collect();
     diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
-    let (Some(matrices), false) =
-        (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
+    let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
         return Err(Error::new(diagnostics));
     };
@@ -130,8 +131,8 @@ impl From<JobModel> for ModelMatrices {
 struct ParsedTables {
     stiffness: Found<RawMatrix>,
     mass: Found<RawMatrix>,
-    nodes: Found<Nodes>,
-    dofs: Option<Found<Vec<DofLabel>>>,
+    nodes: Found<NodeFile>,
+    dofs: Option<Found<Mapping>>,
 }
 
 impl ParsedTables {
@@ -145,14 +146,20 @@ impl ParsedTables {
             None => None,
         };
         let tables = files.tables().expect("tables were read");
+        let (stiffness, mass, NodeFile { nodes, sets }) = (stiffness?, mass?, nodes?);
+        let dofs_path = tables.dofs.clone().unwrap_or_default();
+        let dofs = match dofs {
+            Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
+            None => None,
+        };
         Some(ModelMatrices {
-            stiffness: stiffness?,
-            mass: mass?,
-            nodes: nodes?,
+            stiffness,
+            mass,
+            nodes,
             nodes_path: tables.nodes.clone(),
             dofs,
-            dofs_path: tables.dofs.clone().unwrap_or_default(),
-            sets: Vec::new(),
+            dofs_path,
+            sets,
             files: Vec::new(),
             diagnostics: Vec::new(),
         })
@@ -177,8 +184,8 @@ impl Parsed {
                     },
                     || {
                         rayon::join(
-                            || read_nodes(opened.get(&tables.nodes)?, files.dimension),
-                            || tables.dofs.as_ref().map(|path| read_dofs(opened.get(path)?)),
+                            || read_node_file(opened.get(&tables.nodes)?, files.dimension),
+                            || tables.dofs.as_ref().map(|path| Mapping::read(opened.get(path)?)),
                         )
                     },
                 );
@@ -210,14 +217,20 @@ impl<'m> Places<'m> {
     }
 
     /// The nodes of an interface. Without a model, whose files say why, regions and sets have none.
-    fn node_set(&self, interface: &InterfaceSource, opened: &OpenFiles, files: &ModelFiles) -> Found<NodeSet> {
+    fn node_set(
+        &self,
+        interface: &InterfaceSource,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+    ) -> Found<NodeSet> {
         let nodes = match &interface.nodes {
             InterfaceNodes::Listed(nodes) => nodes.clone(),
             InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
             InterfaceNodes::Set(name) => self.of_set(interface, name, files)?,
             InterfaceNodes::Region(region) => {
                 let nodes = self.matrices.map_or(Vec::new(), |matrices| {
-                    let all = matrices.nodes.ids.iter().copied().zip(matrices.nodes.positions.iter().copied());
+                    let all =
+                        matrices.nodes.ids.iter().copied().zip(matrices.nodes.positions.iter().copied());
                     region.nodes(all.filter(|(id, _)| self.moves(*id)))
                 });
                 self.refuse_empty(interface, nodes, "no node of the model lies in the region", files)?
@@ -238,7 +251,9 @@ impl<'m> Places<'m> {
             let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
             let help = match names.is_empty() {
-                true => "only decks of FE programs have node sets: list the nodes, or give a region".to_owned(),
+                true => {
+                    "only decks of FE programs have node sets: list the nodes, or give a region".to_owned()
+                }
                 false => format!("node sets: {}", names.join(", ")),
             };
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
@@ -246,7 +261,12 @@ impl<'m> Places<'m> {
         // A set may list nodes without degrees of freedom, and some twice.
         let mut seen = HashSet::new();
         let nodes = nodes.iter().copied().filter(|id| self.moves(*id) && seen.insert(*id)).collect();
-        self.refuse_empty(interface, nodes, &format!("no node of the set `{name}` has degrees of freedom"), files)
+        self.refuse_empty(
+            interface,
+            nodes,
+            &format!("no node of the set `{name}` has degrees of freedom"),
+            files,
+        )
     }
 
     fn refuse_empty(
@@ -367,7 +387,8 @@ fn sources(
         let file = InputFile::open(path).ok()?;
         Some(SourceFile::new(role, path, file.sha256()))
     };
-    let (manifest, others): (Vec<_>, Vec<_>) = roles(files).into_iter().partition(|(role, _)| *role == "manifest");
+    let (manifest, others): (Vec<_>, Vec<_>) =
+        roles(files).into_iter().partition(|(role, _)| *role == "manifest");
     let job: Vec<Option<SourceFile>> = job.par_iter().map(of_job).collect();
     manifest.into_iter().map(source).chain(job).chain(others.into_iter().map(source)).flatten().collect()
 }

@@ -3,7 +3,7 @@
 
 use crate::support::cases::Case;
 use flexbody::base::diagnostic::Severity;
-use flexbody::input::{ModelFiles, read_manifest, read_model};
+use flexbody::input::{ModelFiles, ModelSource, read_manifest, read_model};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -80,10 +80,11 @@ fn read(role: &str, name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
             None,
         )
         .unwrap();
+        let ModelSource::Tables(tables) = &mut files.source else { unreachable!("made of tables") };
         match role {
-            "stiffness" => files.stiffness.path = path,
-            "nodes" => files.nodes = path,
-            _ => files.dofs = Some(path),
+            "stiffness" => tables.stiffness.path = path,
+            "nodes" => tables.nodes = path,
+            _ => tables.dofs = Some(path),
         }
         read_model(&files).map(|model| {
             let n = model.stiffness.matrix.n_rows();

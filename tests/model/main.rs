@@ -9,6 +9,8 @@ mod input_hdf5;
 mod input_readers;
 mod input_tables;
 mod interface_names;
+mod jobs;
+mod node_files;
 mod manifest_settings;
 mod plane;
 mod plausibility;

@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 /// The reader of Abaqus jobs.
 pub(super) struct Abaqus;
 
-const HELP: &str = "write them with *MATRIX GENERATE, STIFFNESS, MASS and *MATRIX OUTPUT, STIFFNESS, MASS in a step";
+const HELP: &str =
+    "write them with *MATRIX GENERATE, STIFFNESS, MASS and *MATRIX OUTPUT, STIFFNESS, MASS in a step";
 
 impl JobReader for Abaqus {
     fn name(&self) -> &'static str {
@@ -103,7 +104,8 @@ impl Matrices {
         };
         let mass_path = mass.iter().find(|(own, _)| own == number).map(|(_, path)| path.clone());
         let note = (stiffness.len() > 1).then(|| {
-            let message = format!("of {} steps with matrices the last one, {number}, is taken", stiffness.len());
+            let message =
+                format!("of {} steps with matrices the last one, {number}, is taken", stiffness.len());
             Diagnostic::new(Code::JobStep, message).in_file(stiffness_path)
         });
         Ok(Self { stiffness: stiffness_path.clone(), mass: mass_path.expect("found above"), note })
@@ -122,7 +124,11 @@ fn is_data(line: &[u8]) -> bool {
 }
 
 /// Matrices whose rows are numbered, with the labels that the deck gives them.
-fn numbered(mesh: &DeckMesh, deck: &Path, [stiffness, mass]: [&PathBuf; 2]) -> Found<(Vec<DofLabel>, [RawMatrix; 2])> {
+fn numbered(
+    mesh: &DeckMesh,
+    deck: &Path,
+    [stiffness, mass]: [&PathBuf; 2],
+) -> Found<(Vec<DofLabel>, [RawMatrix; 2])> {
     let labels = labels(mesh, deck)?;
     let read = |path: &PathBuf, role| CoordinateFile::read(path, role, u32::MAX);
     let (k, m) = rayon::join(|| read(stiffness, MatrixRole::Stiffness), || read(mass, MatrixRole::Mass));
@@ -185,7 +191,10 @@ impl LabelledLines {
                     lines.push(line);
                 }
                 None if bad.len() < SHOWN => {
-                    let message = format!("expected node, direction, node, direction, value, found `{}`", excerpt(text));
+                    let message = format!(
+                        "expected node, direction, node, direction, value, found `{}`",
+                        excerpt(text)
+                    );
                     bad.push(Diagnostic::new(Code::MatrixSyntax, message).in_file(path).at_line(k + 1));
                 }
                 None => {}

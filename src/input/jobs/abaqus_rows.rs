@@ -31,13 +31,17 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
     if !unknown.is_empty() {
         unknown.sort_unstable();
         unknown.dedup();
-        let message =
-            format!("what the nodes of {} can do is not known here, and the matrices do not say", unknown.join(", "));
+        let message = format!(
+            "what the nodes of {} can do is not known here, and the matrices do not say",
+            unknown.join(", ")
+        );
         return Err(vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(deck).with_help(HELP)]);
     }
     let label = |(node, bits): (&i64, &u8)| {
         let (node, bits) = (*node, *bits);
-        (1..=6u8).filter(move |direction| bits & 1 << direction != 0).map(move |direction| DofLabel { node, direction })
+        (1..=6u8)
+            .filter(move |direction| bits & 1 << direction != 0)
+            .map(move |direction| DofLabel { node, direction })
     };
     Ok(directions.iter().flat_map(label).collect())
 }

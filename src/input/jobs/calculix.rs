@@ -17,7 +17,8 @@ use std::path::Path;
 /// The reader of CalculiX jobs.
 pub(super) struct Calculix;
 
-const HELP: &str = "run the deck with *FREQUENCY, SOLVER=MATRIXSTORAGE, and keep .sti, .mas and .dof beside it";
+const HELP: &str =
+    "run the deck with *FREQUENCY, SOLVER=MATRIXSTORAGE, and keep .sti, .mas and .dof beside it";
 
 /// Elements that CalculiX expands into solids: several rows have the same label.
 const EXPANDED: &[&str] = &["S", "B", "CPS", "CPE", "CAX", "M3D", "T3D", "T2D"];
@@ -38,7 +39,8 @@ impl JobReader for Calculix {
 
     fn read(&self, path: &Path) -> Found<JobModel> {
         let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| beside(path, extension));
-        let absent = [(&sti, "stiffness matrix"), (&mas, "mass matrix"), (&dof, "list of degrees of freedom")];
+        let absent =
+            [(&sti, "stiffness matrix"), (&mas, "mass matrix"), (&dof, "list of degrees of freedom")];
         let absent = absent.iter().filter(|(file, _)| !file.exists());
         let absent: Vec<Diagnostic> = absent.map(|(file, what)| missing(file, what, HELP)).collect();
         if !absent.is_empty() {
@@ -67,7 +69,8 @@ impl JobReader for Calculix {
         // The nodes that only name rotations stand at no place of their own.
         let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
         let (ids, positions) = placed.map(|(id, x)| (*id, *x)).unzip();
-        let mut files: Vec<(&'static str, _)> = deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
+        let mut files: Vec<(&'static str, _)> =
+            deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
         files.extend([("stiffness", sti), ("mass", mas), ("dofs", dof)]);
         Ok(JobModel {
             stiffness,
@@ -97,7 +100,9 @@ fn read_labels(path: &Path) -> Found<Vec<DofLabel>> {
         let Some(label) = label else {
             let message = format!("expected a node and a direction as in `17.3`, found `{}`", excerpt(line));
             let diagnostic = Diagnostic::new(Code::TableRow, message).in_file(path).at_line(k + 1);
-            return Err(vec![diagnostic.with_help("structures have the directions 1 to 3: write the file again")]);
+            return Err(vec![
+                diagnostic.with_help("structures have the directions 1 to 3: write the file again"),
+            ]);
         };
         labels.push(label);
     }
@@ -129,7 +134,9 @@ fn refuse_expanded(mesh: &DeckMesh, labels: &[DofLabel], path: &Path) -> Found<(
 fn rotation_nodes(deck: &Deck) -> Found<HashMap<i64, i64>> {
     let mut rotations = HashMap::new();
     for card in deck.cards().iter().filter(|card| card.keyword == "RIGID BODY") {
-        let node = |name: &str| card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer));
+        let node = |name: &str| {
+            card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer))
+        };
         match (node("REFNODE"), node("ROTNODE")) {
             (Some(reference), Some(rotation)) => {
                 rotations.insert(rotation, reference);
@@ -137,7 +144,9 @@ fn rotation_nodes(deck: &Deck) -> Found<HashMap<i64, i64>> {
             (Some(_), None) => {
                 let message = "*RIGID BODY has no ROT NODE: which rows are its rotations cannot be told";
                 let diagnostic = deck.about(card, Code::DeckUnsupported, message);
-                return Err(vec![diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B")]);
+                return Err(vec![
+                    diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B"),
+                ]);
             }
             _ => {}
         }

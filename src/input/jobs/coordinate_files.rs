@@ -35,7 +35,9 @@ impl CoordinateFile {
         let mut body = Coordinates::new(Limits { n, integer: false }, None, 0);
         let first = blocks.next().map_err(|e| vec![crate::input::compression::broken(path, &e)])?;
         let Some(first) = first else {
-            return Err(vec![Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes").in_file(path)]);
+            return Err(vec![
+                Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes").in_file(path),
+            ]);
         };
         let newline = body.read(&source, blocks, first, 0).map_err(in_file)?;
         let found = body.bad_lines(newline);

@@ -110,8 +110,11 @@ impl Deck {
                     let before = self.cards.last().cloned();
                     self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
                         // A missing file is looked for where it is included.
-                        Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self
-                            .about(&card, Code::FileUnreadable, format!("{} is included: {}", path.display(), diagnostic.message())),
+                        Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
+                            &card,
+                            Code::FileUnreadable,
+                            format!("{} is included: {}", path.display(), diagnostic.message()),
+                        ),
                         _ => diagnostic,
                     })?;
                     // Data below *INCLUDE goes on with what stood above it.
@@ -230,7 +233,8 @@ mod tests {
     #[test]
     fn cards_have_their_parameters_and_data_and_included_files_go_on_with_them() {
         let folder = tempfile::tempdir().expect("a folder");
-        fs::write(folder.path().join("more.inp"), "3, 1, 0, 0\n** end\n*elset, elset=E\n7\n").expect("written");
+        fs::write(folder.path().join("more.inp"), "3, 1, 0, 0\n** end\n*elset, elset=E\n7\n")
+            .expect("written");
         let text = "** head\n*Heading\n a title\n*Solid  Section,\n elset = \"All of it\" , Material=STEEL\n,\n\
             *NODE\n1, 0, 0, 0\n*INCLUDE, INPUT=more.inp\n8\n*End Step\n";
         let path = folder.path().join("job.inp");

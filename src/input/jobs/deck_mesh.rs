@@ -46,11 +46,6 @@ impl DeckMesh {
         let found = reading.finish();
         if found.is_empty() { scopes.assembled() } else { Err(found) }
     }
-
-    /// The node set of this name, in any case.
-    pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
-        self.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name)).map(|(_, nodes)| &nodes[..])
-    }
 }
 
 /// Nodes, elements and sets of a part, of the assembly, or of a deck that has neither.
@@ -83,8 +78,10 @@ impl Scope {
         let wanted = self.element_sets.get(&set.to_uppercase())?;
         let wanted: std::collections::HashSet<i64> = wanted.iter().copied().collect();
         let members = self.elements.iter().flat_map(|own| &own.members);
-        let mut nodes: Vec<i64> =
-            members.filter(|(id, _)| wanted.contains(id)).flat_map(|(_, nodes)| nodes.iter().copied()).collect();
+        let mut nodes: Vec<i64> = members
+            .filter(|(id, _)| wanted.contains(id))
+            .flat_map(|(_, nodes)| nodes.iter().copied())
+            .collect();
         nodes.sort_unstable();
         nodes.dedup();
         Some(nodes)
@@ -197,7 +194,8 @@ impl DeckMesh {
     fn add(&mut self, scope: &Scope, shift: i64, instance: &Instance) {
         self.nodes.extend(scope.nodes.iter().map(|(id, x)| (id + shift, instance.moved.of(*x))));
         for elements in &scope.elements {
-            let member = |(id, nodes): &(i64, Vec<i64>)| (id + shift, nodes.iter().map(|id| id + shift).collect());
+            let member =
+                |(id, nodes): &(i64, Vec<i64>)| (id + shift, nodes.iter().map(|id| id + shift).collect());
             let members = elements.members.iter().map(member).collect();
             self.elements.push(Elements { kind: elements.kind.clone(), members });
         }
@@ -230,7 +228,8 @@ impl Reading<'_> {
             "END PART" => scopes.part = None,
             "INSTANCE" => {
                 let moved = self.placement(card);
-                let (name, part) = (card.name("NAME").unwrap_or_default(), card.name("PART").unwrap_or_default());
+                let (name, part) =
+                    (card.name("NAME").unwrap_or_default(), card.name("PART").unwrap_or_default());
                 scopes.instances.push(Instance { name, part, own: Scope::default(), moved });
                 scopes.in_instance = true;
             }
@@ -258,7 +257,9 @@ impl Reading<'_> {
     fn finish(mut self) -> Vec<Diagnostic> {
         if self.bad_count > self.bad.len() {
             let message = format!("{} more lines are bad", self.bad_count - self.bad.len());
-            self.bad.extend(self.deck.paths().next().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)));
+            self.bad.extend(
+                self.deck.paths().next().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
+            );
         }
         self.bad
     }
@@ -359,7 +360,8 @@ impl Reading<'_> {
         let mut members = Vec::new();
         for (line, text) in self.deck.data(card) {
             if generate {
-                let bounds: Option<Vec<i64>> = fields(text).filter(|field| !field.is_empty()).map(integer).collect();
+                let bounds: Option<Vec<i64>> =
+                    fields(text).filter(|field| !field.is_empty()).map(integer).collect();
                 match bounds.as_deref() {
                     Some(&[first, last]) if first <= last => members.extend(first..=last),
                     Some(&[first, last, step]) if first <= last && step > 0 => {

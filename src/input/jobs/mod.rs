@@ -11,11 +11,14 @@ mod element_kinds;
 
 use super::bytes::InputFile;
 use super::compression::Compression;
+use super::node_files::NodeFile;
 use super::reader::HEAD;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Nodes, RawMatrix};
 use abaqus::Abaqus;
 use calculix::Calculix;
+use deck::Deck;
+use deck_mesh::DeckMesh;
 use std::path::{Path, PathBuf};
 
 /// A job of an FE program: its main file, and the program where the user said which.
@@ -121,6 +124,16 @@ fn unknown(job: &JobFile) -> Diagnostic {
         None => "neither a manifest nor the job of an FE program with its matrices beside it".to_owned(),
     };
     Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
+}
+
+/// The nodes and node sets of a keyword deck.
+///
+/// # Errors
+/// FB101, FB106, FB110, FB111.
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
+    let DeckMesh { nodes, sets, .. } = DeckMesh::of(&Deck::read(file.path())?)?;
+    let (ids, positions) = nodes.into_iter().unzip();
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets })
 }
 
 /// The file `STEM.EXTENSION` beside the main file of a job.

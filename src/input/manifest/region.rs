@@ -108,7 +108,9 @@ impl Walk<'_> {
     fn sensible(&mut self, key: &str, region: &Region, span: Range<usize>) -> Option<Region> {
         let message = match region {
             Region::Box { min, max } if (0..3).any(|k| min[k] > max[k]) => "`min` lies beyond `max`",
-            Region::Cylinder { from, to, .. } if from == to => "`from` and `to` are one point: there is no axis",
+            Region::Cylinder { from, to, .. } if from == to => {
+                "`from` and `to` are one point: there is no axis"
+            }
             Region::Plane { normal, .. } if normal.iter().all(|x| *x == 0.0) => "`normal` is zero",
             _ => return Some(*region),
         };
