@@ -1,5 +1,6 @@
-//! Reading: manifest, matrices, tables of nodes and degrees of freedom. One file per matrix format behind
-//! [`Reader`] and [`READERS`]; the contract users see is `docs/input.md`.
+//! Reading: manifest, matrices, tables of nodes and degrees of freedom, jobs of FE programs. One file per
+//! matrix format behind [`Reader`] and [`READERS`], one per FE program in `jobs`; the contracts users see
+//! are `docs/input.md` and `docs/fe_programs.md`.
 
 mod array;
 mod assemble;

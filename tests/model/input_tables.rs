@@ -145,6 +145,10 @@ fn the_manifest_of_the_documentation_is_in_order() {
         (files.name.as_str(), files.units.mass.to_si(), files.interfaces.len()),
         ("conrod", 1000.0, 2)
     );
+    let docs = include_str!("../../docs/fe_programs.md");
+    let example =
+        docs.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    assert_eq!(manifest(example).unwrap().interfaces.len(), 5);
 }
 
 #[test]
