@@ -67,7 +67,7 @@ fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
     assert_eq!(of(900), [1, 2, 3, 4, 5, 6], "the reference node moves and turns");
     assert_eq!(of(901), [] as [u8; 0], "the rotation node is no node");
     assert!(!raw.nodes.ids.contains(&901));
-    assert_eq!(of(902), [1, 2, 3], "an internal node of the first brick");
+    assert_eq!(of(906), [1, 2, 3], "an internal node of the first brick");
     assert_eq!(raw.interfaces[0].nodes.len(), 4);
     assert!(raw.interfaces[1].nodes.iter().all(|node| !of(*node).is_empty()), "nodes with rows only");
     let roles: Vec<&str> = raw.sources.iter().map(|source| source.role.as_str()).collect();

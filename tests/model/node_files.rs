@@ -45,7 +45,9 @@ fn nodes_of_ansys_are_those_of_the_table() {
     let own = nodes();
     let mut cdb = "/COM,ANSYS RELEASE 2021 R1\n/PREP7\nNBLOCK,6,SOLID,4,4\n(3i9,6e21.13e3)\n".to_owned();
     let mut table = "Knotennummer\tX-Position (m)\tY-Position (m)\tZ-Position (m)\t\n".to_owned();
-    let mut list = " LIST ALL SELECTED NODES.   DSYS=      0\n\n   NODE        X             Y             Z\n".to_owned();
+    let mut list =
+        " LIST ALL SELECTED NODES.   DSYS=      0\n\n   NODE        X             Y             Z\n"
+            .to_owned();
     for (id, [x, y, z]) in &own {
         let real = |value: f64| {
             let text = format!("{value:.13e}");
@@ -84,7 +86,12 @@ fn damaged_node_files_are_refused_where_they_are_damaged() {
     let mesh = fs::read_to_string(fixtures().join("small/meshes/block41.msh")).expect("a mesh");
     let cases = [
         ("a.cdb", format!("{head}        1        0        0 1.0\n"), Code::NodeFileSyntax, "cut off"),
-        ("a.cdb", format!("{head}      one        0        0 1.0\nN,R5.3,LOC\n"), Code::NodeFileSyntax, "a node and coordinates"),
+        (
+            "a.cdb",
+            format!("{head}      one        0        0 1.0\nN,R5.3,LOC\n"),
+            Code::NodeFileSyntax,
+            "a node and coordinates",
+        ),
         ("a.cdb", "/PREP7\nNBLOCK,6\n(something)\n".to_owned(), Code::NodeFileSyntax, "no format"),
         ("a.cdb", "/PREP7\nFINISH\n".to_owned(), Code::NodeFileSyntax, "no nodes"),
         ("a.msh", mesh[..mesh.len() / 3].to_owned(), Code::NodeFileSyntax, "end of the file"),
@@ -144,7 +151,9 @@ fn mappings_of_ansys_label_the_rows() {
     let (_folder, path) = written("map.txt", &array);
     let dofs = tetrahedron(&table, Some(&path), &[]).expect("readable").dofs.expect("labels");
     assert_eq!(dofs.len(), 12);
-    assert!(dofs.iter().enumerate().all(|(row, l)| (l.node, l.direction) == (own[row / 3].0, row as u8 % 3 + 1)));
+    assert!(
+        dofs.iter().enumerate().all(|(row, l)| (l.node, l.direction) == (own[row / 3].0, row as u8 % 3 + 1))
+    );
     let (_folder, path) = written("map.txt", &array.replace("4 1\n", "5 1\n7\n"));
     let error = tetrahedron(&table, Some(&path), &[]).expect_err("12 rows of five nodes");
     assert!(error.has(Code::DofCount), "{error}");
@@ -171,5 +180,8 @@ fn the_rotor_of_ansys_is_read_as_it_was_written() {
     files.allow_implausible = false;
     let checked = FeModel::from_raw(read_model(&files).expect("readable")).expect("a free body");
     assert_eq!(checked.model.nodes().len(), 115);
-    assert!(checked.diagnostics.iter().any(|found| found.code() == Code::MassDiagonal), "lumped mass is told");
+    assert!(
+        checked.diagnostics.iter().any(|found| found.code() == Code::MassDiagonal),
+        "lumped mass is told"
+    );
 }

@@ -107,7 +107,6 @@ impl Deck {
             match included {
                 Some(path) => {
                     let path = path?;
-                    let before = self.cards.last().cloned();
                     self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
                         // A missing file is looked for where it is included.
                         Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
@@ -117,8 +116,7 @@ impl Deck {
                         ),
                         _ => diagnostic,
                     })?;
-                    // Data below *INCLUDE goes on with what stood above it.
-                    let rest = self.continued(&card, before);
+                    let rest = self.continued(&card);
                     self.cards.extend(rest);
                 }
                 None => self.cards.push(card),
@@ -136,11 +134,11 @@ impl Deck {
         }
     }
 
-    /// The data below `card` as a card like `before`, if there is any.
-    fn continued(&self, card: &Card, before: Option<Card>) -> Option<Card> {
-        self.data(card).next()?;
-        let before = before?;
-        Some(Card { file: card.file, line: card.line, data: card.data.clone(), first: card.first, ..before })
+    /// The data below an *INCLUDE, if there is any: it goes on with the last card of the included file.
+    fn continued(&self, include: &Card) -> Option<Card> {
+        self.data(include).next()?;
+        let Card { file, line, ref data, first, .. } = *include;
+        Some(Card { file, line, data: data.clone(), first, ..self.cards.last()?.clone() })
     }
 
     /// The card that begins at a byte of a file, `None` where only comments stand, and where the next begins.
@@ -252,7 +250,7 @@ mod tests {
         assert_eq!(texts(&deck, node), [(8, "1, 0, 0, 0".to_owned())]);
         assert_eq!(texts(&deck, more), [(1, "3, 1, 0, 0".to_owned())]);
         assert_eq!(texts(&deck, elset), [(4, "7".to_owned())]);
-        // What stands below *INCLUDE goes on with the card above it.
+        // What stands below *INCLUDE goes on with the last card of the included file.
         assert_eq!(texts(&deck, rest), [(10, "8".to_owned())]);
     }
 

@@ -69,8 +69,7 @@ fn banner(line: &[u8]) -> Result<(bool, Symmetry), Vec<Diagnostic>> {
     if !has_banner(line) {
         let message =
             format!("first line is `{shown}`, expected `%%MatrixMarket matrix coordinate real symmetric`");
-        let help =
-            "CalculiX and Abaqus write `row column value` without a header: convert their deck (.inp) with the matrices beside it";
+        let help = "CalculiX and Abaqus write `row column value` without a header: convert their deck (.inp) with the matrices beside it";
         return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(1).with_help(help)]);
     }
     let words: Vec<String> =

@@ -66,8 +66,11 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
     };
     for (k, line) in text.iter().enumerate().skip(head + 2) {
         let end = line.trim_ascii();
-        if end.is_empty() || end.starts_with(b"N,") || end.starts_with(b"-1") {
+        if end.starts_with(b"N,") || end.starts_with(b"-1") {
             return Ok(k + 1);
+        }
+        if end.is_empty() {
+            continue;
         }
         let id = integer(field(line, 0, 0, width));
         let mut x = [0.0; 3];
