@@ -13,7 +13,7 @@ fn fixture(path: &str) -> PathBuf {
 
 /// One change of the bytes, at a place given as a fraction of the length.
 #[derive(Debug, Clone)]
-enum Damage {
+pub enum Damage {
     Flip(f64, u8),
     Set(f64, u8),
     Insert(f64, Vec<u8>),
@@ -22,7 +22,7 @@ enum Damage {
     CutOff(f64),
 }
 
-fn damage() -> impl Strategy<Value = Damage> {
+pub fn damage() -> impl Strategy<Value = Damage> {
     let at = 0.0..1.0f64;
     prop_oneof![
         3 => (at.clone(), 0..8u8).prop_map(|(at, bit)| Damage::Flip(at, bit)),
@@ -37,7 +37,7 @@ fn damage() -> impl Strategy<Value = Damage> {
     ]
 }
 
-fn apply(bytes: &mut Vec<u8>, damage: &Damage) {
+pub fn apply(bytes: &mut Vec<u8>, damage: &Damage) {
     let len = bytes.len();
     if len == 0 {
         return;

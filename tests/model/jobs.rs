@@ -1,5 +1,6 @@
 //! Jobs of FE programs: matrices, labels, node sets and regions from what the programs have written.
 
+use crate::input_fuzz::{apply, damage};
 use crate::support::program::{fixtures, flexbody};
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
@@ -8,6 +9,7 @@ use flexbody::body::flex_body::FlexBody;
 use flexbody::input::{InterfaceNodes, InterfaceSource, ModelFiles, Region, read_manifest, read_model};
 use flexbody::model::{Coupling, FeModel, RawModel, Reference};
 use flexbody::numerics::eigen::Wanted;
+use proptest::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -170,4 +172,42 @@ fn jobs_of_the_programs_give_what_the_programs_say() {
     assert!((block.invariants().mass() / (2900.0 * 4.0) - 1.0).abs() < 1e-6, "{}", block.invariants().mass());
     let rotor = body(job(&samples.join("abaqus/rotorDiscTest.inp"), Vec::new()), 6);
     assert!(rotor.invariants().mass() > 0.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Damaged files of jobs and meshes are read or refused, nothing else.
+    #[test]
+    fn damaged_jobs_never_panic(of in 0..8usize, damages in proptest::collection::vec(damage(), 1..4)) {
+        let (folder, file) = [
+            ("calculix", "job.inp"),
+            ("calculix", "nodes.inp"),
+            ("calculix", "job.dof"),
+            ("calculix", "job.sti"),
+            ("abaqus", "job.inp"),
+            ("abaqus", "job_STIF1.mtx"),
+            ("abaqus_labels", "job_MASS1.mtx"),
+            ("meshes", "block41.msh"),
+        ][of];
+        let place = tempfile::tempdir().expect("a folder");
+        for entry in fs::read_dir(fixtures().join("small").join(folder)).expect("a folder") {
+            let path = entry.expect("a file").path();
+            let name = path.file_name().expect("a name");
+            let mut bytes = fs::read(&path).expect("a file");
+            if name == file {
+                damages.iter().for_each(|damage| apply(&mut bytes, damage));
+            }
+            fs::write(place.path().join(name), bytes).expect("written");
+        }
+        let files = if folder == "meshes" {
+            let small = |name: &str| fixtures().join("small/tet4").join(name);
+            ModelFiles::from_arguments(small("K.mtx"), small("M.mtx"), place.path().join(file), None, None)
+        } else {
+            ModelFiles::from_job(place.path().join("job.inp"), None, vec![set("left", "LEFT")], None)
+        };
+        if let Ok(raw) = read_model(&files.expect("files")) {
+            let _ = FeModel::from_raw(raw);
+        }
+    }
 }

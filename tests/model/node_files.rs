@@ -94,6 +94,32 @@ fn damaged_node_files_are_refused_where_they_are_damaged() {
         ),
         ("a.cdb", "/PREP7\nNBLOCK,6\n(something)\n".to_owned(), Code::NodeFileSyntax, "no format"),
         ("a.cdb", "/PREP7\nFINISH\n".to_owned(), Code::NodeFileSyntax, "no nodes"),
+        (
+            "a.cdb",
+            "/PREP7\nNBLOCK,6\n(3i99999999999999999,6e21.13)\n".to_owned(),
+            Code::NodeFileSyntax,
+            "no format",
+        ),
+        (
+            "a.cdb",
+            format!(
+                "{head}        1        0        0\nN,R5\nCMBLOCK,A,NODE,99999999999999999\n(8i10)\n         1-999999999\n"
+            ),
+            Code::NodeFileSyntax,
+            "expected 99999999999999999 numbers",
+        ),
+        (
+            "a.inp",
+            "*NODE\n1, 0, 0, 0\n*NSET, NSET=A, GENERATE\n1, 9000000000000000000, 1\n".to_owned(),
+            Code::DeckSyntax,
+            "first, last and increment",
+        ),
+        (
+            "a.inp",
+            "*INSTANCE, NAME=A, PART=B\n0, 0, 0\n1, 1, 1, 1, 1, 1, 90\n".to_owned(),
+            Code::DeckSyntax,
+            "two points of an axis",
+        ),
         ("a.msh", mesh[..mesh.len() / 3].to_owned(), Code::NodeFileSyntax, "end of the file"),
         ("a.msh", mesh.replace("4.1 0 8", "4.1 1 8"), Code::NodeFileSyntax, "binary"),
         ("a.msh", mesh.replace("4.1 0 8", "5.2 0 8"), Code::NodeFileSyntax, "not read"),

@@ -11,6 +11,12 @@ use std::collections::{BTreeMap, HashMap};
 /// Number of bad lines of a deck that are reported one by one.
 const SHOWN: usize = 5;
 
+/// Members that a line of a generated set stands for at the most.
+const MOST_GENERATED: i64 = 100_000_000;
+
+/// Numbers of nodes that are renumbered are below this.
+const LARGEST: i64 = 1_000_000_000_000;
+
 /// Elements of one type.
 #[derive(Debug, Clone)]
 pub(super) struct Elements {
@@ -158,10 +164,18 @@ impl Scopes {
             .collect();
         let mut taken: std::collections::HashSet<i64> = mesh.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
-        let highest = placed.iter().filter_map(|(_, scope)| scope.nodes.keys().next_back()).max();
-        let stride = if unique { 0 } else { power_of_ten_above(*highest.unwrap_or(&0)) };
+        let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&mesh.nodes]);
+        let highest = keys.filter_map(|nodes| nodes.keys().next_back().copied()).max().unwrap_or(0);
+        if !unique && highest > LARGEST / placed.len() as i64 {
+            let message =
+                format!("instances share node numbers, which are too large ({highest}) to be changed");
+            return Err(vec![Diagnostic::new(Code::DeckUnsupported, message)]);
+        }
+        let stride = if unique { 0 } else { power_of_ten_above(highest) };
+        // Nodes of the assembly keep their numbers.
+        let first = i64::from(!mesh.nodes.is_empty());
         for (k, (instance, scope)) in placed.iter().enumerate() {
-            let shift = stride * k as i64;
+            let shift = stride * (k as i64 + first);
             if shift > 0 {
                 let message = format!(
                     "nodes of the instance `{}` are numbered from {}: instances share numbers",
@@ -293,7 +307,12 @@ impl Reading<'_> {
             }
         }
         if let Some(row) = rows.get(1) {
-            placement.turn = row.as_slice().try_into().ok();
+            let turn: Option<[f64; 7]> = row.as_slice().try_into().ok();
+            placement.turn = turn.filter(|[a, b, c, d, e, f, _]| [a, b, c] != [d, e, f]);
+            if placement.turn.is_none() {
+                let message = "*INSTANCE: expected two points of an axis and an angle";
+                self.complain(self.deck.about(card, Code::DeckSyntax, message).with_help("correct the line"));
+            }
         }
         placement
     }
@@ -362,11 +381,17 @@ impl Reading<'_> {
             if generate {
                 let bounds: Option<Vec<i64>> =
                     fields(text).filter(|field| !field.is_empty()).map(integer).collect();
-                match bounds.as_deref() {
-                    Some(&[first, last]) if first <= last => members.extend(first..=last),
-                    Some(&[first, last, step]) if first <= last && step > 0 => {
-                        members.extend((first..=last).step_by(step as usize));
-                    }
+                let range = match bounds.as_deref() {
+                    Some(&[first, last]) => Some((first, last, 1)),
+                    Some(&[first, last, step]) if step > 0 => Some((first, last, step)),
+                    _ => None,
+                };
+                let few = |&(first, last, step): &(i64, i64, i64)| {
+                    first <= last
+                        && last.checked_sub(first).is_some_and(|length| length / step < MOST_GENERATED)
+                };
+                match range.filter(few) {
+                    Some((first, last, step)) => members.extend((first..=last).step_by(step as usize)),
                     _ => self.syntax(card, line, "first, last and increment", text),
                 }
                 continue;
@@ -376,7 +401,8 @@ impl Reading<'_> {
                 let name = name.trim_matches('"');
                 // `instance.12` and `instance.SET` name members of an instance.
                 let bare = name.rsplit_once('.').map_or(name, |(_, bare)| bare);
-                match integer(bare.as_bytes()).map(|id| vec![id]).or_else(|| known(bare)) {
+                let number = integer(bare.as_bytes()).map(|id| vec![id]);
+                match number.or_else(|| known(name)).or_else(|| known(bare)) {
                     Some(more) => members.extend(more),
                     None => self.syntax(card, line, "numbers or names of sets above", text),
                 }

@@ -48,7 +48,8 @@ fn widths(format: &[u8]) -> Option<[(usize, usize); 2]> {
         Some(part) => group(part, 'e').or_else(|| group(part, 'g')).or_else(|| group(part, 'f'))?,
         None => (0, 0),
     };
-    Some([whole, reals])
+    let fits = |(count, width): (usize, usize)| count <= 1000 && width <= 1000;
+    (fits(whole) && fits(reals)).then_some([whole, reals])
 }
 
 /// The k-th field of a width, behind so many bytes; trailing fields may be missing.
@@ -116,6 +117,8 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
         ));
     };
     let lines = count.div_ceil(per_line.max(1));
+    let mut known = read.nodes.ids.clone();
+    known.sort_unstable();
     let mut members: Vec<i64> = Vec::new();
     for k in 0..count {
         let line = text.get(head + 2 + k / per_line.max(1)).copied().unwrap_or_default();
@@ -128,7 +131,10 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
         };
         match members.last() {
             // A negative number ends a range that the one before it begins.
-            Some(&first) if member < 0 => members.extend(first + 1..=-member),
+            Some(&first) if member < 0 => {
+                let after = known.partition_point(|id| *id <= first);
+                members.extend(known[after..].iter().take_while(|id| **id <= member.saturating_neg()));
+            }
             _ => members.push(member),
         }
     }
