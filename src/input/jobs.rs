@@ -11,7 +11,6 @@ mod element_kinds;
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use super::node_files::NodeFile;
 use super::reader::HEAD;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Nodes, RawMatrix};
@@ -130,10 +129,10 @@ fn unknown(job: &JobFile) -> Diagnostic {
 ///
 /// # Errors
 /// FB101, FB106, FB110, FB111.
-pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, Vec<(String, Vec<i64>)>)> {
     let DeckMesh { nodes, sets, .. } = DeckMesh::of(&Deck::read(file.path())?)?;
     let (ids, positions) = nodes.into_iter().unzip();
-    Ok(NodeFile { nodes: Nodes { ids, positions }, sets })
+    Ok((Nodes { ids, positions }, sets))
 }
 
 /// The file `STEM.EXTENSION` beside the main file of a job.

@@ -31,7 +31,7 @@ struct Format {
 const FORMATS: &[Format] = &[
     Format { recognises: gmsh::recognises, read: gmsh::read },
     Format { recognises: cdb::recognises, read: cdb::read },
-    Format { recognises: is_deck, read: nodes_of_deck },
+    Format { recognises: is_deck, read: deck },
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
 ];
 
@@ -76,6 +76,10 @@ fn is_deck(head: &str) -> bool {
     let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
     first
         .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
+}
+
+fn deck(file: &InputFile) -> Found<NodeFile> {
+    nodes_of_deck(file).map(|(nodes, sets)| NodeFile { nodes, sets })
 }
 
 /// FB115 at a line.
