@@ -49,11 +49,9 @@ fn main() {
         return;
     };
     let files = read_manifest(std::path::Path::new(&manifest)).unwrap_or_else(|e| panic!("{e}"));
-    let bytes: u64 = [&files.stiffness.path, &files.mass.path]
-        .iter()
-        .map(|path| std::fs::metadata(path).map_or(0, |meta| meta.len()))
-        .sum();
-    println!("{} threads, matrices of {:.0} MB on disk", rayon::current_num_threads(), bytes as f64 * 1e-6);
+    let bytes: u64 =
+        files.paths().iter().map(|path| std::fs::metadata(path).map_or(0, |meta| meta.len())).sum();
+    println!("{} threads, files of {:.0} MB", rayon::current_num_threads(), bytes as f64 * 1e-6);
     let (raw, wall) = measure("reading", 1, || read_model(&files).unwrap_or_else(|e| panic!("{e}")));
     let kept = megabytes(&raw.stiffness.matrix) + megabytes(&raw.mass.matrix);
     println!("{:14} {:.0} MB/s; matrices of {kept:.0} MB in memory", "", bytes as f64 * 1e-6 / wall);

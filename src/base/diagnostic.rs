@@ -77,6 +77,14 @@ codes! {
     OutputFolderMissing = "FB105", Error, BadInput, "folder of the output file does not exist", "make the folder first";
     FileEmpty = "FB106", Error, BadInput, "file is empty", "write the file again";
     OutputNotFile = "FB107", Error, BadInput, "output path does not name a file", "name a file that may be made or replaced";
+    JobUnknown = "FB108", Error, BadInput, "not the job of an FE program that is read", "give a manifest, or name the program with --format";
+    JobIncomplete = "FB109", Error, BadInput, "file of an FE job is missing", "write all of them in one run and keep them beside the deck";
+    DeckSyntax = "FB110", Error, BadInput, "input deck cannot be read", "correct the line";
+    DeckUnsupported = "FB111", Error, BadInput, "input deck says what is not read", "write the model without it, or give matrices and tables by a manifest";
+    DeckRows = "FB112", Error, BadInput, "rows of the matrices are not those of the input deck", "write deck and matrices in one run";
+    DeckRenumbered = "FB113", Note, Done, "nodes of instances are numbered anew", "nothing to do; interfaces go by node sets";
+    JobStep = "FB114", Note, Done, "one of several steps with matrices is taken", "nothing to do if it is the right one; else remove the others";
+    NodeFileSyntax = "FB115", Error, BadInput, "file of nodes cannot be read", "write it again, or give a table with the columns node, x, y, z";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
@@ -97,6 +105,7 @@ codes! {
     SeriesRange = "FB217", Error, BadInput, "file of a history does not cover the run", "shorten the run, or say with `outside` = \"hold\" that the first and the last value hold outside of the file";
     PlaceUnknown = "FB218", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
     SceneCase = "FB219", Error, BadInput, "load case is not in the scene, or none is named where one is needed", "name a case of the scene with --case NAME";
+    NodeSetUnknown = "FB220", Error, BadInput, "node set or region has no nodes of the model", "name a node set of the deck, or correct the region";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";

@@ -26,7 +26,7 @@ pub struct Arguments {
 pub enum Command {
     /// Make a flexible body from the matrices of an FE model
     #[command(
-        after_help = "Examples:\n  flexbody convert model.toml -o rod.flex.h5\n  flexbody convert --stiffness K.mtx \
+        after_help = "Examples:\n  flexbody convert model.toml -o rod.flex.h5\n  flexbody convert job.inp --units mm,t,s --interface bore=SET_BORE,rigid -o rod.flex.h5\n  flexbody convert --stiffness K.mtx \
         --mass M.mtx.gz --nodes nodes.csv --units mm,t,s --modes 40 -o rod.flex.h5 --report rod.html"
     )]
     Convert(Box<ConvertArguments>),
@@ -133,6 +133,11 @@ pub struct AuditArguments {
 /// Names of the formats that are read.
 fn foreign_formats() -> clap::builder::PossibleValuesParser {
     IMPORT_FORMATS.iter().map(|format| PossibleValue::new(format.name())).collect::<Vec<_>>().into()
+}
+
+/// Names of the FE programs whose jobs are read.
+fn job_programs() -> clap::builder::PossibleValuesParser {
+    crate::input::job_programs().map(PossibleValue::new).collect::<Vec<_>>().into()
 }
 
 /// Arguments of `trade`.
@@ -314,12 +319,20 @@ pub struct SimulateArguments {
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Manifest of the model (see docs/input.md); with --from the file of another program
-    #[arg(value_name = "MODEL.toml", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
+    /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md); with
+    /// --from the body of another program
+    #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
     #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split"])]
     pub from: Option<String>,
+    /// FE program that has written the job [default: by its files]
+    #[arg(long, value_name = "PROGRAM", value_parser = job_programs(), conflicts_with_all = ["from", "stiffness"])]
+    pub format: Option<String>,
+    /// Node set of the job as an interface: NAME=SET, SET for both, and a coupling after a comma as in
+    /// bore=SET_BORE,rigid (repeatable)
+    #[arg(long, value_name = "NAME=SET[,COUPLING]", conflicts_with_all = ["from", "stiffness"])]
+    pub interface: Vec<String>,
     /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
     pub stiffness: Option<PathBuf>,
@@ -332,7 +345,7 @@ pub struct ConvertArguments {
     /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub dofs: Option<PathBuf>,
-    /// Units of length, mass and time of --stiffness or --from [default: m,kg,s, not checked]
+    /// Units of length, mass and time of --stiffness, --from or a job [default: m,kg,s, not checked]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
     /// 2 for a plane model, with x and y only [default: 3]

@@ -2,6 +2,7 @@
 
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
 use super::import;
+use super::models::is_manifest;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
@@ -18,9 +19,10 @@ use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;
 use crate::formats::flex_body_file;
 use crate::input::{
-    LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model, read_nodal_masses, read_shapes,
+    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model,
+    read_nodal_masses, read_shapes,
 };
-use crate::model::{CheckedModel, FeModel};
+use crate::model::{CheckedModel, Coupling, FeModel, Reference};
 use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
@@ -380,11 +382,15 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
 
 fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
-        (Some(_), ..) if arguments.units.is_some() => {
-            let message = "--units are for --stiffness and --from: a manifest states its own";
-            Err(Diagnostic::new(Code::Usage, message).into())
+        (Some(manifest), ..) if is_manifest(manifest) => {
+            refuse_for_manifest(arguments)?;
+            read_manifest(manifest)
         }
-        (Some(manifest), ..) => read_manifest(manifest),
+        (Some(job), ..) => {
+            let interfaces = arguments.interface.iter().map(|text| interface_source(text));
+            let interfaces = interfaces.collect::<Result<Vec<_>>>()?;
+            ModelFiles::from_job(job, arguments.format.clone(), interfaces, arguments.units.as_deref())
+        }
         (None, Some(stiffness), Some(mass), Some(nodes)) => ModelFiles::from_arguments(
             stiffness,
             mass,
@@ -395,6 +401,46 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
         .map(|files| ModelFiles { dimension: arguments.dimension.unwrap_or(files.dimension), ..files }),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
+}
+
+/// Options that a manifest says itself.
+fn refuse_for_manifest(arguments: &ConvertArguments) -> Result<()> {
+    let message = match arguments {
+        ConvertArguments { units: Some(_), .. } => {
+            "--units are for --stiffness, --from and jobs: a manifest states its own"
+        }
+        ConvertArguments { format: Some(_), .. } => {
+            "--format is for jobs: a manifest says `program` in [files]"
+        }
+        ConvertArguments { interface, .. } if !interface.is_empty() => {
+            "--interface is for jobs: a manifest has [[interface]]"
+        }
+        _ => return Ok(()),
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
+}
+
+/// An interface as named on the command line: `NAME=SET`, `SET`, each with `,COUPLING`.
+fn interface_source(text: &str) -> Result<InterfaceSource> {
+    let (names, coupling) = match text.rsplit_once(',') {
+        Some((names, coupling)) => (names, Some(coupling.trim())),
+        None => (text, None),
+    };
+    let coupling = coupling.map(|name| {
+        Coupling::ALL.into_iter().find(|coupling| coupling.name() == name).ok_or_else(|| {
+            let known = Coupling::ALL.map(Coupling::name).join(", ");
+            let message = format!("--interface {text}: `{name}` is no coupling");
+            Diagnostic::new(Code::Usage, message).with_help(format!("couplings: {known}"))
+        })
+    });
+    let coupling = coupling.transpose()?;
+    let (name, set) = names.split_once('=').unwrap_or((names, names));
+    if name.is_empty() || set.is_empty() || name.chars().any(char::is_control) {
+        let message = format!("--interface {text}: expected NAME=SET, or NAME=SET,COUPLING");
+        return Err(Diagnostic::new(Code::Usage, message).into());
+    }
+    let nodes = InterfaceNodes::Set(set.to_owned());
+    Ok(InterfaceSource { name: name.to_owned(), nodes, coupling, reference: Reference::Mean })
 }
 
 /// No output may replace an input or another output.
@@ -415,7 +461,8 @@ fn refuse_overwriting(
         LoadSource::File(location) => Some(&location.path),
         _ => None,
     });
-    let inputs = files.paths().into_iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
+    let own = files.paths();
+    let inputs = own.iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
     let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     refuse_replacing(inputs.chain(series), outputs.iter().flat_map(Places::all))
 }

@@ -6,7 +6,7 @@ use crate::input::{ModelFiles, read_manifest, read_model};
 use crate::model::{CheckedModel, FeModel};
 use std::path::{Path, PathBuf};
 
-/// Whether a path is that of a manifest, not of a flex-body file.
+/// Whether a path is that of a manifest.
 pub(super) fn is_manifest(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "toml")
 }
@@ -18,7 +18,7 @@ pub(super) fn read_checked<'p>(
     outputs: impl Iterator<Item = &'p PathBuf>,
 ) -> Result<(ModelFiles, CheckedModel)> {
     let files = read_manifest(manifest)?;
-    refuse_replacing(files.paths().into_iter(), outputs)?;
+    refuse_replacing(files.paths().iter(), outputs)?;
     let checked = FeModel::from_raw(read_model(&files)?)?;
     Ok((files, checked))
 }

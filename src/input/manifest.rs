@@ -1,6 +1,7 @@
 //! The manifest `model.toml`. Its machine-readable contract is `schemas/manifest.schema.json`.
 
-use super::model_files::{MatrixLocation, ModelFiles, stem};
+use super::jobs::JobFile;
+use super::model_files::{MatrixLocation, ModelFiles, ModelSource, TableFiles, stem};
 use super::walk::{Table, Value, Walk, integer, read_toml, real};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -13,11 +14,12 @@ mod basis;
 mod damping;
 mod geometric_stiffness;
 mod interface;
+mod region;
 
 const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
-const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs"];
+const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program"];
 
 /// Reads a manifest. Relative paths in it are taken from its folder. The files themselves are not touched.
 ///
@@ -55,35 +57,53 @@ impl Walk<'_> {
             }
             return None;
         };
-        self.known_keys(files, "[files]", FILES);
-        let mut required = |key: &str| {
-            if !files.contains_key(key) {
-                self.complain(
-                    Code::ManifestSyntax,
-                    span.clone(),
-                    format!("key `{key}` is missing in [files]"),
-                );
-            }
-            self.string(files, key)
-        };
-        let (stiffness, mass, nodes) = (required("stiffness"), required("mass"), required("nodes"));
-        let dofs = self.string(files, "dofs");
-        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let source = self.source(files, span);
         Some(ModelFiles {
             name: name.unwrap_or_else(|| stem(self.path)),
             dimension,
             units,
             allow_implausible,
-            stiffness: MatrixLocation::parse(stiffness?).relative_to(folder),
-            mass: MatrixLocation::parse(mass?).relative_to(folder),
-            nodes: folder.join(nodes?),
-            dofs: dofs.map(|dofs| folder.join(dofs)),
+            source: source?,
             interfaces: interfaces?,
             damping,
             geometric_stiffness,
             residual_vectors,
             manifest: Some(self.path.to_path_buf()),
         })
+    }
+
+    /// Where the matrices come from: a file each, or a job.
+    fn source(&mut self, files: &Table, span: Range<usize>) -> Option<ModelSource> {
+        self.known_keys(files, "[files]", FILES);
+        let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
+        if files.contains_key("job") {
+            let others = ["stiffness", "mass", "nodes", "dofs"].iter().find(|key| files.contains_key(**key));
+            if let Some(key) = others {
+                let message = format!("[files] has both `job` and `{key}`");
+                self.complain(Code::ManifestSyntax, span, message);
+                return None;
+            }
+            let (job, program) = (self.string(files, "job"), self.string(files, "program"));
+            return Some(ModelSource::Job(JobFile { path: folder.join(job?), program }));
+        }
+        let mut required = |key: &str| {
+            if !files.contains_key(key) {
+                let message = format!("key `{key}` is missing in [files]");
+                self.complain(Code::ManifestSyntax, span.clone(), message);
+            }
+            self.string(files, key)
+        };
+        let (stiffness, mass, nodes) = (required("stiffness"), required("mass"), required("nodes"));
+        let dofs = self.string(files, "dofs");
+        if files.contains_key("program") {
+            self.complain(Code::ManifestSyntax, span, "`program` in [files] belongs to a `job`".to_owned());
+        }
+        Some(ModelSource::Tables(TableFiles {
+            stiffness: MatrixLocation::parse(stiffness?).relative_to(&folder),
+            mass: MatrixLocation::parse(mass?).relative_to(&folder),
+            nodes: folder.join(nodes?),
+            dofs: dofs.map(|dofs| folder.join(dofs)),
+        }))
     }
 
     fn dimension(&mut self, table: &Table) -> Option<u8> {
@@ -156,6 +176,7 @@ mod tests {
     use super::damping::{BAND, DAMPING, RAYLEIGH};
     use super::geometric_stiffness::GEOMETRIC_STIFFNESS;
     use super::interface::INTERFACE;
+    use super::region::{BOX, CYLINDER, NEAREST, PLANE};
     use super::*;
 
     /// The schema and the reader name the same keys.
@@ -173,6 +194,10 @@ mod tests {
             ("/properties/model/properties/units/properties", UNITS),
             ("/properties/files/properties", FILES),
             ("/properties/interface/items/properties", INTERFACE),
+            ("/$defs/box/properties", BOX),
+            ("/$defs/cylinder/properties", CYLINDER),
+            ("/$defs/plane/properties", PLANE),
+            ("/$defs/nearest/properties", NEAREST),
             ("/properties/damping/properties", DAMPING),
             ("/properties/damping/properties/bands/items/properties", BAND),
             ("/properties/damping/properties/rayleigh/properties", RAYLEIGH),

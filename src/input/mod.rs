@@ -1,23 +1,29 @@
-//! Reading: manifest, matrices, tables of nodes and degrees of freedom. One file per matrix format behind
-//! [`Reader`] and [`READERS`]; the contract users see is `docs/input.md`.
+//! Reading: manifest, matrices, tables of nodes and degrees of freedom, jobs of FE programs. One file per
+//! matrix format behind [`Reader`] and [`READERS`], one per FE program in `jobs`; the contracts users see
+//! are `docs/input.md` and `docs/fe_programs.md`.
 
 mod array;
 mod assemble;
 mod bytes;
 mod compression;
+mod coordinates;
 mod digits;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(not(feature = "hdf5"))]
 #[path = "without_hdf5.rs"]
 mod hdf5;
+mod jobs;
 mod manifest;
+mod mapping;
 mod matrix_market;
 mod model_files;
+mod node_files;
 mod npy;
 mod read_model;
 mod reader;
 mod readers;
+mod region;
 mod series;
 mod shapes;
 mod table;
@@ -28,11 +34,16 @@ mod zstd_frames;
 pub(crate) use assemble::check_size;
 pub use bytes::InputFile;
 pub use compression::Compression;
+pub use jobs::{JobFile, job_programs};
 pub use manifest::read_manifest;
-pub use model_files::{InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, parse_units};
+pub use model_files::{
+    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, TableFiles,
+    parse_units,
+};
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
 pub use readers::READERS;
+pub use region::Region;
 pub(crate) use series::{ColumnKey, Series, read_series};
 pub use shapes::read_shapes;
 pub(crate) use walk::{Table, Value, Walk, integer, read_toml, real};

@@ -1,5 +1,7 @@
 //! Which files make up a model.
 
+use super::jobs::JobFile;
+use super::region::Region;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::units::UnitSystem;
@@ -18,14 +20,8 @@ pub struct ModelFiles {
     pub units: UnitSystem,
     /// Whether findings that a person has looked at are warnings: see [`RawModel`](crate::model::RawModel).
     pub allow_implausible: bool,
-    /// Stiffness matrix K.
-    pub stiffness: MatrixLocation,
-    /// Mass matrix M.
-    pub mass: MatrixLocation,
-    /// Node table.
-    pub nodes: PathBuf,
-    /// Labels of the matrix rows; without it node-major x, y, z in the order of the node table.
-    pub dofs: Option<PathBuf>,
+    /// Where matrices, nodes and labels come from.
+    pub source: ModelSource,
     /// Named node sets.
     pub interfaces: Vec<InterfaceSource>,
     /// Damping, where it is given.
@@ -36,6 +32,28 @@ pub struct ModelFiles {
     pub residual_vectors: Vec<LoadSource>,
     /// The manifest, when there is one.
     pub manifest: Option<PathBuf>,
+}
+
+/// Where matrices, nodes and labels of a model come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelSource {
+    /// A file each.
+    Tables(TableFiles),
+    /// What an FE program has written.
+    Job(JobFile),
+}
+
+/// Matrices and tables in files of their own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableFiles {
+    /// Stiffness matrix K.
+    pub stiffness: MatrixLocation,
+    /// Mass matrix M.
+    pub mass: MatrixLocation,
+    /// Node table.
+    pub nodes: PathBuf,
+    /// Labels of the matrix rows; without it node-major x, y, z in the order of the node table.
+    pub dofs: Option<PathBuf>,
 }
 
 /// An interface and where its nodes are listed.
@@ -52,12 +70,16 @@ pub struct InterfaceSource {
 }
 
 /// Nodes of an interface.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceNodes {
     /// Node numbers in the manifest.
     Listed(Vec<i64>),
     /// A table with the column `node`.
     File(PathBuf),
+    /// A node set of the job, by its name in any case.
+    Set(String),
+    /// Nodes that lie in a region.
+    Region(Region),
 }
 
 /// Loads of residual vectors and where they come from.
@@ -116,18 +138,67 @@ impl std::fmt::Display for MatrixLocation {
 }
 
 impl ModelFiles {
+    /// The files of the matrices and tables; `None` of a job.
+    pub fn tables(&self) -> Option<&TableFiles> {
+        match &self.source {
+            ModelSource::Tables(tables) => Some(tables),
+            ModelSource::Job(_) => None,
+        }
+    }
+
     /// Every file that they name, but those of [`ModelFiles::residual_vectors`], which a conversion may
-    /// replace.
-    pub fn paths(&self) -> Vec<&PathBuf> {
+    /// replace. Of a job, the main file and those beside it that have its name.
+    pub fn paths(&self) -> Vec<PathBuf> {
         let interfaces = self.interfaces.iter().filter_map(|interface| match &interface.nodes {
-            InterfaceNodes::File(path) => Some(path),
-            InterfaceNodes::Listed(_) => None,
+            InterfaceNodes::File(path) => Some(path.clone()),
+            _ => None,
         });
-        let damping = self.damping.as_ref().and_then(Damping::matrix).map(|place| &place.path);
-        let geometric = self.geometric_stiffness.iter().map(|one| &one.matrix.path);
-        let matrices = [&self.stiffness.path, &self.mass.path, &self.nodes].into_iter();
-        let others = self.dofs.iter().chain(&self.manifest).chain(damping);
-        matrices.chain(others).chain(geometric).chain(interfaces).collect()
+        let damping = self.damping.as_ref().and_then(Damping::matrix).map(|place| place.path.clone());
+        let geometric = self.geometric_stiffness.iter().map(|one| one.matrix.path.clone());
+        let own = match &self.source {
+            ModelSource::Tables(TableFiles { stiffness, mass, nodes, dofs }) => {
+                [&stiffness.path, &mass.path, nodes].into_iter().chain(dofs).cloned().collect()
+            }
+            ModelSource::Job(job) => job.family(),
+        };
+        own.into_iter()
+            .chain(self.manifest.clone())
+            .chain(damping)
+            .chain(geometric)
+            .chain(interfaces)
+            .collect()
+    }
+
+    /// The job of an FE program without a manifest, named after its main file; `units` as in
+    /// [`ModelFiles::from_arguments`].
+    ///
+    /// # Errors
+    /// FB202 when the units are not three known ones.
+    pub fn from_job(
+        path: impl Into<PathBuf>,
+        program: Option<String>,
+        interfaces: Vec<InterfaceSource>,
+        units: Option<&str>,
+    ) -> Result<Self> {
+        let path = path.into();
+        let (name, job) = (stem(&path), JobFile { path, program });
+        let own = Self::of(name, ModelSource::Job(job), units)?;
+        Ok(Self { interfaces, ..own })
+    }
+
+    fn of(name: String, source: ModelSource, units: Option<&str>) -> Result<Self> {
+        Ok(Self {
+            name,
+            dimension: 3,
+            units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
+            allow_implausible: false,
+            source,
+            interfaces: Vec::new(),
+            damping: None,
+            geometric_stiffness: Vec::new(),
+            residual_vectors: Vec::new(),
+            manifest: None,
+        })
     }
 
     /// A three-dimensional model without a manifest, named after its stiffness file; `units` is
@@ -143,21 +214,9 @@ impl ModelFiles {
         units: Option<&str>,
     ) -> Result<Self> {
         let stiffness = MatrixLocation::parse(stiffness);
-        Ok(Self {
-            name: stem(&stiffness.path),
-            dimension: 3,
-            units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
-            allow_implausible: false,
-            stiffness,
-            mass: MatrixLocation::parse(mass),
-            nodes: nodes.into(),
-            dofs,
-            interfaces: Vec::new(),
-            damping: None,
-            geometric_stiffness: Vec::new(),
-            residual_vectors: Vec::new(),
-            manifest: None,
-        })
+        let name = stem(&stiffness.path);
+        let tables = TableFiles { stiffness, mass: MatrixLocation::parse(mass), nodes: nodes.into(), dofs };
+        Self::of(name, ModelSource::Tables(tables), units)
     }
 }
 

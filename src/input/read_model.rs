@@ -2,15 +2,19 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use super::model_files::{InterfaceNodes, MatrixLocation, ModelFiles};
+use super::jobs::{JobModel, read_job};
+use super::mapping::Mapping;
+use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
+use super::node_files::{NodeFile, read_node_file};
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
-use super::tables::{read_dofs, read_masses, read_node_list, read_nodes};
+use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
-use crate::model::{Damping, GeometricStiffness, NodeSet, RawMatrix, RawModel};
+use crate::model::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Below this many significant digits a matrix is warned about.
@@ -32,41 +36,45 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 /// stiffness, interfaces.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let opened = OpenFiles::new(files);
-    let (parsed, fingerprints) = rayon::join(|| parse(files, &opened), || opened.fingerprints());
-    let Parsed { manifest, stiffness, mass, nodes, dofs, damping, geometric_stiffness, interfaces } = parsed;
-
+    let (parsed, fingerprints) = rayon::join(|| Parsed::of(files, &opened), || opened.fingerprints());
     let mut diagnostics = Vec::new();
-    manifest.unwrap_or_else(|found| collect(&mut diagnostics, found));
-    let stiffness = take(&mut diagnostics, stiffness);
-    let mass = take(&mut diagnostics, mass);
-    let nodes = take(&mut diagnostics, nodes);
-    let dofs = dofs.and_then(|dofs| take(&mut diagnostics, dofs));
-    let damping = damping.and_then(|damping| take(&mut diagnostics, damping));
+    if let Some(path) = &files.manifest {
+        opened.get(path).map(|_| ()).unwrap_or_else(|found| collect(&mut diagnostics, found));
+    }
+    let matrices = match parsed.matrices {
+        Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
+        Matrices::Job(job) => take(&mut diagnostics, *job),
+    };
+    let damping = parsed.damping.and_then(|damping| take(&mut diagnostics, damping));
     let geometric_stiffness =
-        geometric_stiffness.into_iter().filter_map(|one| take(&mut diagnostics, one)).collect();
-    let interfaces: Vec<NodeSet> =
-        interfaces.into_iter().filter_map(|interface| take(&mut diagnostics, interface)).collect();
-    diagnostics.extend(stiffness.as_ref().and_then(few_digits));
-    let (Some(stiffness), Some(mass), Some(nodes), false) =
-        (stiffness, mass, nodes, diagnostics.iter().any(|d| d.severity() == Severity::Error))
+        parsed.geometric_stiffness.into_iter().filter_map(|one| take(&mut diagnostics, one)).collect();
+    let places = Places::of(matrices.as_ref());
+    let interfaces: Vec<NodeSet> = files
+        .interfaces
+        .iter()
+        .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, &opened, files)))
+        .collect();
+    diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
+    let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
         return Err(Error::new(diagnostics));
     };
+    diagnostics.extend(matrices.diagnostics);
     Ok(RawModel {
         name: files.name.clone(),
         dimension: files.dimension,
         units: files.units.clone(),
-        stiffness,
-        mass,
-        nodes,
-        nodes_path: files.nodes.clone(),
-        dofs,
-        dofs_path: files.dofs.clone().unwrap_or_default(),
+        stiffness: matrices.stiffness,
+        mass: matrices.mass,
+        nodes: matrices.nodes,
+        nodes_path: matrices.nodes_path,
+        dofs: matrices.dofs,
+        dofs_path: matrices.dofs_path,
         interfaces,
         damping,
         geometric_stiffness,
         allow_implausible: files.allow_implausible,
-        sources: sources(files, &fingerprints),
+        sources: sources(files, &matrices.files, &fingerprints),
         diagnostics,
     })
 }
@@ -81,54 +89,207 @@ pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
 
 type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
 
+/// What stands in the files, each with what is wrong with it.
 struct Parsed {
-    manifest: Found<()>,
-    stiffness: Found<RawMatrix>,
-    mass: Found<RawMatrix>,
-    nodes: Found<crate::model::Nodes>,
-    dofs: Option<Found<Vec<crate::model::DofLabel>>>,
+    matrices: Matrices,
     damping: Option<Found<Damping<RawMatrix>>>,
     geometric_stiffness: Vec<Found<GeometricStiffness<RawMatrix>>>,
-    interfaces: Vec<Found<NodeSet>>,
 }
 
-fn parse(files: &ModelFiles, opened: &OpenFiles) -> Parsed {
-    let matrix = |location: &MatrixLocation, role| {
-        let file = opened.get(&location.path)?;
-        read_opened(file, location.group.as_deref(), role).map_err(Error::into_diagnostics)
-    };
-    let ((stiffness, mass), (nodes, dofs)) = rayon::join(
-        || {
-            rayon::join(
-                || matrix(&files.stiffness, MatrixRole::Stiffness),
-                || matrix(&files.mass, MatrixRole::Mass),
-            )
-        },
-        || {
-            rayon::join(
-                || read_nodes(opened.get(&files.nodes)?, files.dimension),
-                || files.dofs.as_ref().map(|path| read_dofs(opened.get(path)?)),
-            )
-        },
-    );
-    let interfaces = files.interfaces.iter().map(|interface| {
+enum Matrices {
+    Tables(Box<ParsedTables>),
+    Job(Box<Found<ModelMatrices>>),
+}
+
+/// Matrices, nodes and labels of a model.
+struct ModelMatrices {
+    stiffness: RawMatrix,
+    mass: RawMatrix,
+    nodes: Nodes,
+    nodes_path: PathBuf,
+    dofs: Option<Vec<DofLabel>>,
+    dofs_path: PathBuf,
+    /// Node sets of a job.
+    sets: Vec<(String, Vec<i64>)>,
+    /// Files of a job.
+    files: Vec<(&'static str, PathBuf)>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl From<JobModel> for ModelMatrices {
+    fn from(job: JobModel) -> Self {
+        let JobModel { stiffness, mass, nodes, dofs, sets, files, diagnostics } = job;
+        let path = |role: &str| {
+            let file = files.iter().find(|(own, _)| *own == role).or(files.first());
+            file.map(|(_, path)| path.clone()).unwrap_or_default()
+        };
+        let (nodes_path, dofs_path) = (path("deck"), path("dofs"));
+        Self { stiffness, mass, nodes, nodes_path, dofs: Some(dofs), dofs_path, sets, files, diagnostics }
+    }
+}
+
+struct ParsedTables {
+    stiffness: Found<RawMatrix>,
+    mass: Found<RawMatrix>,
+    nodes: Found<NodeFile>,
+    dofs: Option<Found<Mapping>>,
+}
+
+impl ParsedTables {
+    /// The tables, if all of them could be read.
+    fn taken(self, files: &ModelFiles, diagnostics: &mut Vec<Diagnostic>) -> Option<ModelMatrices> {
+        let stiffness = take(diagnostics, self.stiffness);
+        let mass = take(diagnostics, self.mass);
+        let nodes = take(diagnostics, self.nodes);
+        let dofs = match self.dofs {
+            Some(dofs) => Some(take(diagnostics, dofs)?),
+            None => None,
+        };
+        let tables = files.tables().expect("tables were read");
+        let (stiffness, mass, NodeFile { nodes, sets }) = (stiffness?, mass?, nodes?);
+        let dofs_path = tables.dofs.clone().unwrap_or_default();
+        let dofs = match dofs {
+            Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
+            None => None,
+        };
+        Some(ModelMatrices {
+            stiffness,
+            mass,
+            nodes,
+            nodes_path: tables.nodes.clone(),
+            dofs,
+            dofs_path,
+            sets,
+            files: Vec::new(),
+            diagnostics: Vec::new(),
+        })
+    }
+}
+
+impl Parsed {
+    fn of(files: &ModelFiles, opened: &OpenFiles) -> Self {
+        let matrix = |location: &MatrixLocation, role| {
+            let file = opened.get(&location.path)?;
+            read_opened(file, location.group.as_deref(), role).map_err(Error::into_diagnostics)
+        };
+        let matrices = match &files.source {
+            ModelSource::Job(job) => Matrices::Job(Box::new(read_job(job).map(ModelMatrices::from))),
+            ModelSource::Tables(tables) => {
+                let ((stiffness, mass), (nodes, dofs)) = rayon::join(
+                    || {
+                        rayon::join(
+                            || matrix(&tables.stiffness, MatrixRole::Stiffness),
+                            || matrix(&tables.mass, MatrixRole::Mass),
+                        )
+                    },
+                    || {
+                        rayon::join(
+                            || read_node_file(opened.get(&tables.nodes)?, files.dimension),
+                            || tables.dofs.as_ref().map(|path| Mapping::read(opened.get(path)?)),
+                        )
+                    },
+                );
+                Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs }))
+            }
+        };
+        let damping = files.damping.as_ref();
+        let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
+        let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
+            let matrix = matrix(&one.matrix, MatrixRole::GeometricStiffness)?;
+            Ok(GeometricStiffness { load: one.load.clone(), matrix })
+        });
+        let geometric_stiffness = geometric_stiffness.collect();
+        Self { matrices, damping, geometric_stiffness }
+    }
+}
+
+/// Where the nodes of a model lie, and its sets, for interfaces that name these.
+struct Places<'m> {
+    matrices: Option<&'m ModelMatrices>,
+    /// Nodes that have rows, where labels say so.
+    moving: Option<HashSet<i64>>,
+}
+
+impl<'m> Places<'m> {
+    fn of(matrices: Option<&'m ModelMatrices>) -> Self {
+        let dofs = matrices.and_then(|matrices| matrices.dofs.as_ref());
+        Self { matrices, moving: dofs.map(|dofs| dofs.iter().map(|label| label.node).collect()) }
+    }
+
+    /// The nodes of an interface. Without a model, whose files say why, regions and sets have none.
+    fn node_set(
+        &self,
+        interface: &InterfaceSource,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+    ) -> Found<NodeSet> {
         let nodes = match &interface.nodes {
             InterfaceNodes::Listed(nodes) => nodes.clone(),
             InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
+            InterfaceNodes::Set(name) => self.of_set(interface, name, files)?,
+            InterfaceNodes::Region(region) => {
+                let nodes = self.matrices.map_or(Vec::new(), |matrices| {
+                    let all =
+                        matrices.nodes.ids.iter().copied().zip(matrices.nodes.positions.iter().copied());
+                    region.nodes(all.filter(|(id, _)| self.moves(*id)))
+                });
+                self.refuse_empty(interface, nodes, "no node of the model lies in the region", files)?
+            }
         };
         let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
         Ok(NodeSet { name, nodes, coupling, reference })
-    });
-    let interfaces = interfaces.collect();
-    let damping = files.damping.as_ref();
-    let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
-    let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
-        let matrix = matrix(&one.matrix, MatrixRole::GeometricStiffness)?;
-        Ok(GeometricStiffness { load: one.load.clone(), matrix })
-    });
-    let geometric_stiffness = geometric_stiffness.collect();
-    let manifest = files.manifest.as_ref().map_or(Ok(()), |path| opened.get(path).map(|_| ()));
-    Parsed { manifest, stiffness, mass, nodes, dofs, damping, geometric_stiffness, interfaces }
+    }
+
+    fn moves(&self, node: i64) -> bool {
+        self.moving.as_ref().is_none_or(|moving| moving.contains(&node))
+    }
+
+    fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
+        let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
+        let known = matrices.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
+        let Some((_, nodes)) = known else {
+            let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
+            let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
+            let help = match names.is_empty() {
+                true => {
+                    "only decks of FE programs have node sets: list the nodes, or give a region".to_owned()
+                }
+                false => format!("node sets: {}", names.join(", ")),
+            };
+            return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
+        };
+        // A set may list nodes without degrees of freedom, and some twice.
+        let mut seen = HashSet::new();
+        let nodes = nodes.iter().copied().filter(|id| self.moves(*id) && seen.insert(*id)).collect();
+        self.refuse_empty(
+            interface,
+            nodes,
+            &format!("no node of the set `{name}` has degrees of freedom"),
+            files,
+        )
+    }
+
+    fn refuse_empty(
+        &self,
+        interface: &InterfaceSource,
+        nodes: Vec<i64>,
+        why: &str,
+        files: &ModelFiles,
+    ) -> Found<Vec<i64>> {
+        if nodes.is_empty() && self.matrices.is_some() {
+            let message = format!("interface `{}`: {why}", interface.name);
+            return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message))]);
+        }
+        Ok(nodes)
+    }
+}
+
+fn said_in(files: &ModelFiles, diagnostic: Diagnostic) -> Diagnostic {
+    match (&files.manifest, &files.source) {
+        (Some(path), _) => diagnostic.in_file(path),
+        (None, ModelSource::Job(job)) => diagnostic.in_file(&job.path),
+        _ => diagnostic,
+    }
 }
 
 fn read_opened(file: &InputFile, group: Option<&str>, role: MatrixRole) -> Result<RawMatrix> {
@@ -195,25 +356,39 @@ impl OpenFiles {
 fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     let mut roles: Vec<(&'static str, &Path)> = Vec::new();
     roles.extend(files.manifest.as_deref().map(|path| ("manifest", path)));
-    roles.push((MatrixRole::Stiffness.name(), &files.stiffness.path));
-    roles.push((MatrixRole::Mass.name(), &files.mass.path));
-    roles.push(("nodes", &files.nodes));
-    roles.extend(files.dofs.as_deref().map(|path| ("dofs", path)));
+    if let Some(tables) = files.tables() {
+        roles.push((MatrixRole::Stiffness.name(), &tables.stiffness.path));
+        roles.push((MatrixRole::Mass.name(), &tables.mass.path));
+        roles.push(("nodes", &tables.nodes));
+        roles.extend(tables.dofs.as_deref().map(|path| ("dofs", path)));
+    }
     let damping = files.damping.as_ref().and_then(Damping::matrix);
     roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
     let geometric = files.geometric_stiffness.iter().map(|one| one.matrix.path.as_path());
     roles.extend(geometric.map(|path| (MatrixRole::GeometricStiffness.name(), path)));
     roles.extend(files.interfaces.iter().filter_map(|interface| match &interface.nodes {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),
-        InterfaceNodes::Listed(_) => None,
+        _ => None,
     }));
     roles
 }
 
-fn sources(files: &ModelFiles, fingerprints: &[(&Path, String)]) -> Vec<SourceFile> {
+/// Every file with its fingerprint: the manifest, those of a job, then the others.
+fn sources(
+    files: &ModelFiles,
+    job: &[(&'static str, PathBuf)],
+    fingerprints: &[(&Path, String)],
+) -> Vec<SourceFile> {
     let source = |(role, path): (&str, &Path)| {
         let (_, sha256) = fingerprints.iter().find(|(known, _)| *known == path)?;
         Some(SourceFile::new(role, path, sha256.clone()))
     };
-    roles(files).into_iter().filter_map(source).collect()
+    let of_job = |(role, path): &(&'static str, PathBuf)| {
+        let file = InputFile::open(path).ok()?;
+        Some(SourceFile::new(role, path, file.sha256()))
+    };
+    let (manifest, others): (Vec<_>, Vec<_>) =
+        roles(files).into_iter().partition(|(role, _)| *role == "manifest");
+    let job: Vec<Option<SourceFile>> = job.par_iter().map(of_job).collect();
+    manifest.into_iter().map(source).chain(job).chain(others.into_iter().map(source)).flatten().collect()
 }

@@ -35,7 +35,8 @@ impl MassPairs {
                 let mut coupled = by_mass(mass, &diagonal, rows, vertex);
                 coupled.retain(|&other| other as usize > vertex);
                 part.count += coupled.len();
-                if !coupled.is_empty() {
+                // Bubbles of one element share mass, but their strains may be orthogonal.
+                if !coupled.is_empty() && rows.is_node(vertex) {
                     let tied = neighbours(stiffness, rows, vertex, |_, _, value| value != 0.0);
                     coupled.retain(|other| tied.binary_search(other).is_err());
                     part.foreign.extend(coupled.into_iter().map(|other| [vertex as u32, other]));

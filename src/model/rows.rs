@@ -82,6 +82,11 @@ impl Rows {
         [self.dimension * self.nodes..self.displacements(), last..self.len()]
     }
 
+    /// Whether a vertex ([`Rows::vertex`]) is a node.
+    pub(super) fn is_node(&self, vertex: usize) -> bool {
+        vertex < self.nodes
+    }
+
     /// Where a row belongs: the nodes, then the vectors, then each of the other rows by itself.
     pub(super) fn vertex(&self, row: usize) -> usize {
         let after = self.displacements();

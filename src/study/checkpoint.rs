@@ -88,9 +88,9 @@ fn identity(files: &ModelFiles, model: &FeModel) -> String {
     let relevant =
         model.sources().iter().filter(|s| !["manifest", "interface", "damping"].contains(&s.role.as_str()));
     let group = |role: &str| {
-        let location = match role {
-            "stiffness" => &files.stiffness,
-            "mass" => &files.mass,
+        let location = match (role, files.tables()) {
+            ("stiffness", Some(tables)) => &tables.stiffness,
+            ("mass", Some(tables)) => &tables.mass,
             _ => return String::new(),
         };
         location.group.as_ref().map(|group| format!(" {group}")).unwrap_or_default()

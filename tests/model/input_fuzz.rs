@@ -3,7 +3,7 @@
 
 use crate::support::cases::Case;
 use flexbody::base::diagnostic::Severity;
-use flexbody::input::{ModelFiles, read_manifest, read_model};
+use flexbody::input::{ModelFiles, ModelSource, read_manifest, read_model};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ fn fixture(path: &str) -> PathBuf {
 
 /// One change of the bytes, at a place given as a fraction of the length.
 #[derive(Debug, Clone)]
-enum Damage {
+pub enum Damage {
     Flip(f64, u8),
     Set(f64, u8),
     Insert(f64, Vec<u8>),
@@ -22,7 +22,7 @@ enum Damage {
     CutOff(f64),
 }
 
-fn damage() -> impl Strategy<Value = Damage> {
+pub fn damage() -> impl Strategy<Value = Damage> {
     let at = 0.0..1.0f64;
     prop_oneof![
         3 => (at.clone(), 0..8u8).prop_map(|(at, bit)| Damage::Flip(at, bit)),
@@ -37,7 +37,7 @@ fn damage() -> impl Strategy<Value = Damage> {
     ]
 }
 
-fn apply(bytes: &mut Vec<u8>, damage: &Damage) {
+pub fn apply(bytes: &mut Vec<u8>, damage: &Damage) {
     let len = bytes.len();
     if len == 0 {
         return;
@@ -80,10 +80,11 @@ fn read(role: &str, name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
             None,
         )
         .unwrap();
+        let ModelSource::Tables(tables) = &mut files.source else { unreachable!("made of tables") };
         match role {
-            "stiffness" => files.stiffness.path = path,
-            "nodes" => files.nodes = path,
-            _ => files.dofs = Some(path),
+            "stiffness" => tables.stiffness.path = path,
+            "nodes" => tables.nodes = path,
+            _ => tables.dofs = Some(path),
         }
         read_model(&files).map(|model| {
             let n = model.stiffness.matrix.n_rows();

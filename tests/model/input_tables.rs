@@ -120,16 +120,17 @@ nodes_file = "right.csv"
     )
     .unwrap();
     let folder = files.manifest.as_ref().unwrap().parent().unwrap().to_path_buf();
-    assert_eq!((files.name.as_str(), files.dimension, files.dofs), ("beam", 2, None));
+    let tables = files.tables().expect("tables");
+    assert_eq!((files.name.as_str(), files.dimension, &tables.dofs), ("beam", 2, &None));
     let units = &files.units;
     assert_eq!((units.length.to_si(), units.mass.to_si(), units.time.to_si()), (1e-3, 1000.0, 1e-3));
     assert_eq!((units.mass.name(), units.time.name(), units.stated), ("1000", "1e-3", true));
     assert_eq!(
-        files.stiffness,
+        tables.stiffness,
         MatrixLocation { path: folder.join("matrices.h5"), group: Some("/fe/K".into()) }
     );
-    assert_eq!(files.mass, MatrixLocation { path: "/tmp/M.mtx".into(), group: None });
-    assert_eq!(files.nodes, folder.join("sub/nodes.csv"));
+    assert_eq!(tables.mass, MatrixLocation { path: "/tmp/M.mtx".into(), group: None });
+    assert_eq!(tables.nodes, folder.join("sub/nodes.csv"));
     assert_eq!(files.interfaces[0].nodes, InterfaceNodes::Listed(vec![3, 16, -1]));
     assert_eq!(files.interfaces[1].nodes, InterfaceNodes::File(folder.join("right.csv")));
 }
@@ -144,6 +145,10 @@ fn the_manifest_of_the_documentation_is_in_order() {
         (files.name.as_str(), files.units.mass.to_si(), files.interfaces.len()),
         ("conrod", 1000.0, 2)
     );
+    let docs = include_str!("../../docs/fe_programs.md");
+    let example =
+        docs.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    assert_eq!(manifest(example).unwrap().interfaces.len(), 5);
 }
 
 #[test]

@@ -43,6 +43,12 @@ def body(flexbody, model, path, *options):
     return path
 
 
+def body_of(flexbody, job, path, *options):
+    """Converts the job of an FE program."""
+    run(flexbody, "convert", job, "--units", "m,kg,s", "--lumped", "none", "--quiet", "-o", path, *options)
+    return path
+
+
 def export(flexbody, path, to, out, *options):
     run(flexbody, "export", path, "--to", to, "--allow-loss", "--quiet", "-o", out, *options)
     return out

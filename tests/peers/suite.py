@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Exports in the programs that they are for, in one table: installs what it can, runs what there is, and says what was not found.
+"""Exports in the programs that they are for, and jobs of FE programs beside their own results, in tables: installs what it can, runs what there is, and says what was not found.
 
     python3 tests/peers/suite.py --install --write
 
@@ -25,7 +25,7 @@ from common import ROOT, Absent, Row
 
 VENV = ROOT / "target/peers"
 PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "welib==4.2.0", "h5py", "numpy", "scipy"]
-APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi"]
+APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "calculix-ccx"]
 
 
 def other_libraries(flexbody, folder):
@@ -38,6 +38,15 @@ def other_libraries(flexbody, folder):
     read_exports.main(str(flexbody), str(path))
     program = f"h5py {h5py.__version__}, scipy {scipy.__version__}"
     return [Row(program, "json, npz, simscape, chrono", "every array is that of the body, rigid motion has its inertia (1: no)", 0.0, 0.0)]
+
+
+def calculix(flexbody, folder):
+    """Jobs in, bodies out: a table of its own page."""
+    import calculix as jobs
+
+    rows = jobs.rows(flexbody, folder)
+    TABLES["docs/fe_programs.md", "calculix"] = table(rows, [])
+    return rows
 
 
 def arm_table(flexbody, folder):
@@ -63,6 +72,7 @@ PEERS = [
     ("scipy's integrator", "scipy_spin.rows", True),
     ("compilers", "compilers.rows", True),
     ("ARM compiler", "suite.arm_table", True),
+    ("CalculiX", "suite.calculix", True),
 ]
 
 
@@ -116,7 +126,7 @@ def install():
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
     subprocess.run([python, "-m", "pip", "install", "--quiet", *PIP], check=True)
-    missing = [name for name, tool in zip(APT, ["octave-cli", "g++", "arm-none-eabi-gcc", "arm-none-eabi-gcc"]) if not shutil.which(tool)]
+    missing = [name for name, tool in zip(APT, ["octave-cli", "g++", "arm-none-eabi-gcc", "arm-none-eabi-gcc", "ccx"]) if not shutil.which(tool)]
     if missing:
         command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
         if shutil.which("apt-get") and os.geteuid() == 0:
@@ -142,7 +152,8 @@ def main():
     rows, absent = measure(args.flexbody.resolve(), args.small)
     bad = [row for row in rows if not row.good()]
     if args.write and not (bad or args.small):
-        TABLES["docs/export.md", "peers"] = table(rows, absent)
+        of_exports = [row for row in rows if not row.program.startswith("CalculiX")]
+        TABLES["docs/export.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():
             write(page, mark, text)
     print(f"\n{len(rows)} comparisons, {len(bad)} worse than allowed" + "".join(f"\nnot found: {one}" for one in absent))

@@ -9,8 +9,22 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::DeValue;
 
-pub(super) const INTERFACE: &[&str] =
-    &["name", "nodes", "nodes_file", "coupling", "reference", "reference_node"];
+pub(super) const INTERFACE: &[&str] = &[
+    "name",
+    "nodes",
+    "nodes_file",
+    "set",
+    "box",
+    "cylinder",
+    "plane",
+    "nearest",
+    "coupling",
+    "reference",
+    "reference_node",
+];
+
+/// Keys of [`INTERFACE`] that say which nodes it has.
+const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane", "nearest"];
 
 impl Walk<'_> {
     /// `None` when anything is wrong with the list.
@@ -54,30 +68,14 @@ impl Walk<'_> {
             self.complain(Code::ManifestSyntax, span, message);
             return None;
         }
-        let nodes = match (table.get("nodes"), table.contains_key("nodes_file")) {
-            (Some(list), false) => InterfaceNodes::Listed(self.node_list(&name, list)?),
-            (None, true) => {
-                let folder = self.path.parent().unwrap_or(Path::new(""));
-                InterfaceNodes::File(folder.join(PathBuf::from(self.string(table, "nodes_file")?)))
-            }
-            (None, false) => {
-                let message = format!("interface `{name}` has neither `nodes` nor `nodes_file`");
-                self.complain(Code::ManifestSyntax, span, message);
-                return None;
-            }
-            (Some(_), true) => {
-                let message = format!("interface `{name}` has both `nodes` and `nodes_file`");
-                self.complain(Code::ManifestSyntax, span, message);
-                return None;
-            }
-        };
+        let nodes = self.interface_nodes(table, &name, span.clone(), dimension)?;
         let coupling = match table.get("coupling") {
             Some(value) => Some(self.coupling(value)?),
             None => None,
         };
         let reference = match (table.get("reference"), table.get("reference_node")) {
             (None, None) => Reference::Mean,
-            (Some(point), None) => Reference::Point(self.point(point, dimension)?),
+            (Some(point), None) => Reference::Point(self.point("reference", point, dimension)?),
             (None, Some(node)) => match integer(node) {
                 Some(node) => Reference::Node(node),
                 None => {
@@ -92,6 +90,36 @@ impl Walk<'_> {
             }
         };
         Some(InterfaceSource { name, nodes, coupling, reference })
+    }
+
+    /// Which nodes an interface has: one key says it.
+    fn interface_nodes(
+        &mut self,
+        table: &Table,
+        name: &str,
+        span: Range<usize>,
+        dimension: usize,
+    ) -> Option<InterfaceNodes> {
+        let given: Vec<&str> = NODES.iter().copied().filter(|key| table.contains_key(*key)).collect();
+        let &[key] = given.as_slice() else {
+            let message = match given.as_slice() {
+                [] => format!("interface `{name}` has neither `nodes` nor `nodes_file`"),
+                [one, other, ..] => format!("interface `{name}` has both `{one}` and `{other}`"),
+                [_] => unreachable!("matched above"),
+            };
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        };
+        let value = table.get(key)?;
+        Some(match key {
+            "nodes" => InterfaceNodes::Listed(self.node_list(name, value)?),
+            "nodes_file" => {
+                let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
+                InterfaceNodes::File(folder.join(PathBuf::from(self.string(table, key)?)))
+            }
+            "set" => InterfaceNodes::Set(self.string(table, key)?),
+            _ => InterfaceNodes::Region(self.region(key, value, dimension)?),
+        })
     }
 
     fn coupling(&mut self, value: &Value) -> Option<Coupling> {
@@ -109,7 +137,7 @@ impl Walk<'_> {
     }
 
     /// A point in space; in the plane its two coordinates.
-    fn point(&mut self, value: &Value, dimension: usize) -> Option<[f64; 3]> {
+    pub(super) fn point(&mut self, key: &str, value: &Value, dimension: usize) -> Option<[f64; 3]> {
         let coordinates: Option<Vec<f64>> = match value.get_ref() {
             DeValue::Array(list) => list.iter().map(real).collect(),
             _ => None,
@@ -121,7 +149,7 @@ impl Walk<'_> {
                 Some(point)
             }
             _ => {
-                let message = format!("`reference` is not a list of {dimension} coordinates");
+                let message = format!("`{key}` is not a list of {dimension} coordinates");
                 self.complain(Code::ManifestSyntax, value.span(), message);
                 None
             }

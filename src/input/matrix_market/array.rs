@@ -1,12 +1,12 @@
 //! Matrix Market arrays: dense, column by column.
 
-use super::header::{excerpt, has_banner, size};
-use super::line::real;
-use super::text::Blocks;
-use super::{Compression, broken, written_digits};
+use super::header::{has_banner, size};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::input::array::Array;
+use crate::input::compression::{Compression, broken};
+use crate::input::coordinates::{Blocks, excerpt, real};
+use crate::input::digits::written_digits;
 
 /// Values whose written digits are counted.
 const COUNTED: usize = 4096;

@@ -1,6 +1,7 @@
 //! Banner, comments and size line.
 
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::input::coordinates::excerpt;
 
 /// Which entries of the matrix are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,8 +69,7 @@ fn banner(line: &[u8]) -> Result<(bool, Symmetry), Vec<Diagnostic>> {
     if !has_banner(line) {
         let message =
             format!("first line is `{shown}`, expected `%%MatrixMarket matrix coordinate real symmetric`");
-        let help =
-            "CalculiX and Abaqus write `row column value` without a header: docs/input.md says how to add it";
+        let help = "CalculiX and Abaqus write `row column value` without a header: convert their deck (.inp) with the matrices beside it";
         return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(1).with_help(help)]);
     }
     let words: Vec<String> =
@@ -122,18 +122,6 @@ fn banner(line: &[u8]) -> Result<(bool, Symmetry), Vec<Diagnostic>> {
         }
     };
     if found.is_empty() { Ok((integer, kind)) } else { Err(found) }
-}
-
-/// A line, or its begin, printable.
-pub(super) fn excerpt(line: &[u8]) -> String {
-    const SHOWN: usize = 60;
-    match std::str::from_utf8(line) {
-        Ok(text) if text.len() <= SHOWN && !text.contains(|c: char| c.is_control() && c != '\t') => {
-            text.to_owned()
-        }
-        _ if line.len() <= SHOWN => line.escape_ascii().to_string(),
-        _ => format!("{}...", line[..SHOWN].escape_ascii()),
-    }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ const BLOCK: usize = 8 << 20;
 const PIECE: usize = 1 << 20;
 
 /// Gives a file block by block.
-pub(super) enum Blocks<'a> {
+pub(in crate::input) enum Blocks<'a> {
     /// The rest of a file as it lies on disk.
     Plain { rest: &'a [u8], newline: bool },
     /// A compressed file; `carry` is the begin of the next line.
@@ -18,7 +18,7 @@ pub(super) enum Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    pub(super) fn new(compression: Compression, bytes: &'a [u8]) -> Self {
+    pub(in crate::input) fn new(compression: Compression, bytes: &'a [u8]) -> Self {
         match compression {
             Compression::None => Self::Plain { rest: bytes, newline: true },
             _ => Self::Packed { stream: compression.stream(bytes), carry: Vec::new(), newline: true },
@@ -27,7 +27,7 @@ impl<'a> Blocks<'a> {
 
     /// The next block: it ends at a line end, or at the end of the file, or (a line longer than a block)
     /// anywhere.
-    pub(super) fn next(&mut self) -> std::io::Result<Option<Cow<'a, [u8]>>> {
+    pub(in crate::input) fn next(&mut self) -> std::io::Result<Option<Cow<'a, [u8]>>> {
         let (block, newline) = match self {
             Self::Plain { rest, newline } => {
                 let end = whole_lines(&rest[..BLOCK.min(rest.len())], rest.len() <= BLOCK);
@@ -52,7 +52,7 @@ impl<'a> Blocks<'a> {
     }
 
     /// Whether what was given so far ends with a line end.
-    pub(super) fn ends_with_newline(&self) -> bool {
+    pub(in crate::input) fn ends_with_newline(&self) -> bool {
         match self {
             Self::Plain { newline, .. } | Self::Packed { newline, .. } => *newline,
         }
@@ -68,7 +68,7 @@ fn whole_lines(block: &[u8], ends_file: bool) -> usize {
 }
 
 /// Cuts a block at line ends into pieces of about [`PIECE`] bytes.
-pub(super) fn line_aligned(block: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(in crate::input) fn line_aligned(block: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = block;
     std::iter::from_fn(move || {
         if rest.is_empty() {

@@ -1,19 +1,19 @@
 //! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect
 //! and says what is wrong.
 
-use super::{Entry, header::excerpt, written_digits};
+use super::{Entry, excerpt, written_digits};
 use crate::base::diagnostic::Code;
 
 /// What the header says about every line.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limits {
+pub(in crate::input) struct Limits {
     pub n: u32,
     pub integer: bool,
 }
 
 /// A line that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct BadLine {
+pub(in crate::input) struct BadLine {
     /// From 1, counted from the first line of the piece (later: of the file).
     pub line: usize,
     pub code: Code,
@@ -23,7 +23,7 @@ pub(super) struct BadLine {
 
 /// A parsed piece of the file.
 #[derive(Debug, Default)]
-pub(super) struct Piece {
+pub(in crate::input) struct Piece {
     pub entries: Vec<Entry>,
     pub lines: usize,
     /// The first few bad lines, and how many there are.
@@ -40,7 +40,7 @@ pub(super) struct Piece {
 const COUNTED: usize = 512;
 
 /// Parses whole lines.
-pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
+pub(in crate::input) fn parse(text: &[u8], limits: Limits) -> Piece {
     let mut piece = Piece { entries: Vec::with_capacity(text.len() / 24 + 1), ..Piece::default() };
     let mut at = 0;
     while at < text.len() {
@@ -165,7 +165,7 @@ fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Bad> {
 
 /// A number in the dialects of Fortran too: `1.0D+05`, `1.0Q5`, and `1.0-105` as three-digit exponents come
 /// out.
-pub(super) fn real(field: &[u8]) -> Option<f64> {
+pub(in crate::input) fn real(field: &[u8]) -> Option<f64> {
     if let Ok(value) = fast_float2::parse(field) {
         return Some(value);
     }

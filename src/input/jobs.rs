@@ -1,0 +1,146 @@
+//! Models as FE programs write them: one file names the job, its other files stand beside it. One file per
+//! program behind [`JobReader`] and [`JOBS`].
+
+mod abaqus;
+mod abaqus_rows;
+mod calculix;
+mod coordinate_files;
+mod deck;
+mod deck_mesh;
+mod element_kinds;
+
+use super::bytes::InputFile;
+use super::compression::Compression;
+use super::reader::HEAD;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::model::{DofLabel, Nodes, RawMatrix};
+use abaqus::Abaqus;
+use calculix::Calculix;
+use deck::Deck;
+use deck_mesh::DeckMesh;
+use std::path::{Path, PathBuf};
+
+/// A job of an FE program: its main file, and the program where the user said which.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JobFile {
+    /// Input deck of the job, or the file that the program's reader asks for.
+    pub path: PathBuf,
+    /// Name of the program; `None`: by the content of the file and what stands beside it.
+    pub program: Option<String>,
+}
+
+impl JobFile {
+    /// The main file and the files beside it that have its name, which a run must not replace.
+    pub(super) fn family(&self) -> Vec<PathBuf> {
+        let stem = self.path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
+        let folder = match self.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut family = vec![self.path.clone()];
+        let Some(stem) = stem else { return family };
+        const MATRICES: &[&str] = &["sti", "mas", "dof", "mtx"];
+        for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let name = file.file_name().to_string_lossy().to_lowercase();
+            let is_matrix = MATRICES.iter().any(|extension| name.ends_with(&format!(".{extension}")));
+            if name.starts_with(&stem) && is_matrix {
+                family.push(self.path.with_file_name(file.file_name()));
+            }
+        }
+        family.sort();
+        family
+    }
+}
+
+/// What a job says of its model.
+pub(super) struct JobModel {
+    pub stiffness: RawMatrix,
+    pub mass: RawMatrix,
+    pub nodes: Nodes,
+    /// Label of every matrix row.
+    pub dofs: Vec<DofLabel>,
+    /// Named sets of nodes, in the order of the job. Names are compared without regard to case.
+    pub sets: Vec<(String, Vec<i64>)>,
+    /// Role and path of every file that was read.
+    pub files: Vec<(&'static str, PathBuf)>,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// All that is wrong with a job.
+pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// Reads the jobs of one FE program.
+pub(super) trait JobReader: Sync {
+    /// Name of the program, as `--format` and the manifest take it.
+    fn name(&self) -> &'static str;
+
+    /// What the reader needs, in words: the main file and what stands beside it.
+    fn needs(&self) -> &'static str;
+
+    /// Whether the file at `path`, which begins with `head`, is the main file of such a job.
+    fn recognises(&self, path: &Path, head: &[u8]) -> bool;
+
+    /// Reads matrices, nodes, labels and sets.
+    ///
+    /// # Errors
+    /// FB101 to FB111, FB2xx and FB3xx, as many as are found.
+    fn read(&self, path: &Path) -> Found<JobModel>;
+}
+
+/// Every FE program whose jobs are read; the first that recognises a file takes it.
+const JOBS: &[&dyn JobReader] = &[&Calculix, &Abaqus];
+
+/// Names of the FE programs whose jobs are read.
+pub fn job_programs() -> impl Iterator<Item = &'static str> {
+    JOBS.iter().map(|reader| reader.name())
+}
+
+/// Reads a job.
+///
+/// # Errors
+/// FB108 when no reader knows the file, and those of [`JobReader::read`].
+pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
+    let reader = match &job.program {
+        Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
+        None => {
+            let file = InputFile::open(&job.path).map_err(|diagnostic| vec![diagnostic])?;
+            let head = Compression::of(file.bytes()).head(file.bytes(), HEAD);
+            JOBS.iter().find(|reader| reader.recognises(&job.path, &head))
+        }
+    };
+    match reader {
+        Some(reader) => reader.read(&job.path),
+        None => Err(vec![unknown(job)]),
+    }
+}
+
+fn unknown(job: &JobFile) -> Diagnostic {
+    let needed: Vec<String> =
+        JOBS.iter().map(|reader| format!("{}: {}", reader.name(), reader.needs())).collect();
+    let message = match &job.program {
+        Some(program) => format!("`{program}` is no program whose jobs are read"),
+        None => "neither a manifest nor the job of an FE program with its matrices beside it".to_owned(),
+    };
+    Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
+}
+
+/// The nodes and node sets of a keyword deck.
+///
+/// # Errors
+/// FB101, FB106, FB110, FB111.
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, Vec<(String, Vec<i64>)>)> {
+    let DeckMesh { nodes, sets, .. } = DeckMesh::of(&Deck::read(file.path())?)?;
+    let (ids, positions) = nodes.into_iter().unzip();
+    Ok((Nodes { ids, positions }, sets))
+}
+
+/// The file `STEM.EXTENSION` beside the main file of a job.
+pub(super) fn beside(path: &Path, extension: &str) -> PathBuf {
+    path.with_extension(extension)
+}
+
+/// FB109: a file of a job is missing.
+fn missing(path: &Path, what: &str, help: &str) -> Diagnostic {
+    Diagnostic::new(Code::JobIncomplete, format!("{what} is missing")).in_file(path).with_help(help)
+}

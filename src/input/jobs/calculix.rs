@@ -1,0 +1,155 @@
+//! Jobs of CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes `job.sti`, `job.mas` (upper triangles, 14
+//! digits) and `job.dof` (a line `node.direction` for every row) beside the deck `job.inp`.
+
+use super::coordinate_files::CoordinateFile;
+use super::deck::{Deck, fields};
+use super::deck_mesh::DeckMesh;
+use super::{Found, JobModel, JobReader, beside, missing};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::input::bytes::InputFile;
+use crate::input::coordinates::excerpt;
+use crate::input::reader::MatrixRole;
+use crate::input::table::integer;
+use crate::model::{DofLabel, Nodes};
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+/// The reader of CalculiX jobs.
+pub(super) struct Calculix;
+
+const HELP: &str =
+    "run the deck with *FREQUENCY, SOLVER=MATRIXSTORAGE, and keep .sti, .mas and .dof beside it";
+
+/// Elements that CalculiX expands into solids: several rows have the same label.
+const EXPANDED: &[&str] = &["S", "B", "CPS", "CPE", "CAX", "M3D", "T3D", "T2D"];
+
+impl JobReader for Calculix {
+    fn name(&self) -> &'static str {
+        "calculix"
+    }
+
+    fn needs(&self) -> &'static str {
+        "job.inp with job.sti, job.mas and job.dof beside it"
+    }
+
+    fn recognises(&self, path: &Path, _head: &[u8]) -> bool {
+        let is_deck = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"));
+        is_deck && ["sti", "mas", "dof"].iter().any(|extension| beside(path, extension).exists())
+    }
+
+    fn read(&self, path: &Path) -> Found<JobModel> {
+        let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| beside(path, extension));
+        let absent =
+            [(&sti, "stiffness matrix"), (&mas, "mass matrix"), (&dof, "list of degrees of freedom")];
+        let absent = absent.iter().filter(|(file, _)| !file.exists());
+        let absent: Vec<Diagnostic> = absent.map(|(file, what)| missing(file, what, HELP)).collect();
+        if !absent.is_empty() {
+            return Err(absent);
+        }
+        let deck = Deck::read(path)?;
+        let mesh = DeckMesh::of(&deck)?;
+        let labels = read_labels(&dof)?;
+        refuse_expanded(&mesh, &labels, &dof)?;
+        let n = labels.len();
+        let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
+        let (stiffness, mass) =
+            rayon::join(|| read(&sti, MatrixRole::Stiffness), || read(&mas, MatrixRole::Mass));
+        let (stiffness, mass) = match (stiffness, mass) {
+            (Ok(stiffness), Ok(mass)) => (stiffness, mass),
+            (stiffness, mass) => {
+                return Err([stiffness.err(), mass.err()].into_iter().flatten().flatten().collect());
+            }
+        };
+        let rotations = rotation_nodes(&deck)?;
+        let label = |own: &DofLabel| match rotations.get(&own.node) {
+            Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
+            None => *own,
+        };
+        let dofs = labels.iter().map(label).collect();
+        // The nodes that only name rotations stand at no place of their own.
+        let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
+        let (ids, positions) = placed.map(|(id, x)| (*id, *x)).unzip();
+        let mut files: Vec<(&'static str, _)> =
+            deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
+        files.extend([("stiffness", sti), ("mass", mas), ("dofs", dof)]);
+        Ok(JobModel {
+            stiffness,
+            mass,
+            nodes: Nodes { ids, positions },
+            dofs,
+            sets: mesh.sets,
+            files,
+            diagnostics: mesh.notes,
+        })
+    }
+}
+
+/// Labels of the rows: lines `node.direction`.
+fn read_labels(path: &Path) -> Found<Vec<DofLabel>> {
+    let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
+    let mut labels = Vec::with_capacity(file.bytes().len() / 6);
+    for (k, line) in file.bytes().split(|&b| b == b'\n').enumerate() {
+        let line = line.trim_ascii();
+        if line.is_empty() {
+            continue;
+        }
+        let label = line.iter().position(|&b| b == b'.').and_then(|dot| {
+            let (node, direction) = (integer(&line[..dot])?, integer(&line[dot + 1..])?);
+            (1..=3).contains(&direction).then_some(DofLabel { node, direction: direction as u8 })
+        });
+        let Some(label) = label else {
+            let message = format!("expected a node and a direction as in `17.3`, found `{}`", excerpt(line));
+            let diagnostic = Diagnostic::new(Code::TableRow, message).in_file(path).at_line(k + 1);
+            return Err(vec![
+                diagnostic.with_help("structures have the directions 1 to 3: write the file again"),
+            ]);
+        };
+        labels.push(label);
+    }
+    Ok(labels)
+}
+
+/// FB111 where several rows have the same label: those of shells, beams and plane elements, which CalculiX
+/// expands into solids whose nodes the deck does not have.
+fn refuse_expanded(mesh: &DeckMesh, labels: &[DofLabel], path: &Path) -> Found<()> {
+    let mut seen = HashSet::new();
+    let Some(twice) = labels.iter().find(|label| !seen.insert(**label)) else { return Ok(()) };
+    let expanded = |kind: &&str| EXPANDED.iter().any(|head| kind.starts_with(head));
+    let mut kinds: Vec<&str> = mesh.elements.iter().map(|own| own.kind.as_str()).filter(expanded).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let message = format!(
+        "{twice} labels several rows: CalculiX expands {} into solids, and the deck does not say where their nodes lie",
+        if kinds.is_empty() { "elements".to_owned() } else { kinds.join(", ") }
+    );
+    Err(vec![
+        Diagnostic::new(Code::DeckUnsupported, message)
+            .in_file(path)
+            .with_help("model the part with solid elements: C3D4, C3D8, C3D10, C3D20 and their kin"),
+    ])
+}
+
+/// Nodes whose directions 1 to 3 are rotations, each with the reference node that turns: ROT NODE of
+/// *RIGID BODY.
+fn rotation_nodes(deck: &Deck) -> Found<HashMap<i64, i64>> {
+    let mut rotations = HashMap::new();
+    for card in deck.cards().iter().filter(|card| card.keyword == "RIGID BODY") {
+        let node = |name: &str| {
+            card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer))
+        };
+        match (node("REFNODE"), node("ROTNODE")) {
+            (Some(reference), Some(rotation)) => {
+                rotations.insert(rotation, reference);
+            }
+            (Some(_), None) => {
+                let message = "*RIGID BODY has no ROT NODE: which rows are its rotations cannot be told";
+                let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+                return Err(vec![
+                    diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B"),
+                ]);
+            }
+            _ => {}
+        }
+    }
+    Ok(rotations)
+}

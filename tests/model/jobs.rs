@@ -1,0 +1,213 @@
+//! Jobs of FE programs: matrices, labels, node sets and regions from what the programs have written.
+
+use crate::input_fuzz::{apply, damage};
+use crate::support::program::{fixtures, flexbody};
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::ModeSettings;
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::input::{InterfaceNodes, InterfaceSource, ModelFiles, Region, read_manifest, read_model};
+use flexbody::model::{Coupling, FeModel, RawModel, Reference};
+use flexbody::numerics::eigen::Wanted;
+use proptest::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn set(name: &str, set: &str) -> InterfaceSource {
+    let nodes = InterfaceNodes::Set(set.to_owned());
+    InterfaceSource {
+        name: name.to_owned(),
+        nodes,
+        coupling: Some(Coupling::Rigid),
+        reference: Reference::Mean,
+    }
+}
+
+fn job(path: &Path, interfaces: Vec<InterfaceSource>) -> RawModel {
+    let files = ModelFiles::from_job(path, None, interfaces, Some("m,kg,s")).expect("units");
+    read_model(&files).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn small(name: &str) -> PathBuf {
+    fixtures().join("small").join(name).join("job.inp")
+}
+
+fn body(raw: RawModel, modes: usize) -> FlexBody {
+    let model = FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{error}")).model;
+    let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
+    convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT).expect("a body").body
+}
+
+/// Mass of the block of `fixtures/make/make_jobs.py`.
+const MASS: f64 = 7850.0 * 0.2 * 0.08 * 0.06;
+
+/// A part of steel of this size has these principal moments of inertia.
+fn block_inertia() -> [f64; 3] {
+    let [a, b, c]: [f64; 3] = [0.2, 0.08, 0.06];
+    [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| MASS * sum / 12.0)
+}
+
+fn assert_is_the_block(body: &FlexBody) {
+    let invariants = body.invariants();
+    assert!((invariants.mass() / MASS - 1.0).abs() < 1e-12, "{}", invariants.mass());
+    let mut own: Vec<f64> = (0..3).map(|k| invariants.inertia()[(k, k)]).collect();
+    own.sort_by(f64::total_cmp);
+    let mut exact = block_inertia();
+    exact.sort_by(f64::total_cmp);
+    // Consistent masses of bricks integrate a block exactly.
+    assert!(own.iter().zip(exact).all(|(own, exact)| (own / exact - 1.0).abs() < 1e-11), "{own:?} {exact:?}");
+}
+
+/// Bricks with incompatible modes, whose internal rows CalculiX numbers beyond the nodes of the deck, an
+/// included file, and a rigid body, whose rotation node stands for rotations of its reference node.
+#[test]
+fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
+    let raw = job(&small("calculix"), vec![set("right", "RIGHT"), set("all", "ALL")]);
+    let labels = raw.dofs.as_ref().expect("labels");
+    let of =
+        |node: i64| labels.iter().filter(|label| label.node == node).map(|l| l.direction).collect::<Vec<_>>();
+    assert_eq!(of(900), [1, 2, 3, 4, 5, 6], "the reference node moves and turns");
+    assert_eq!(of(901), [] as [u8; 0], "the rotation node is no node");
+    assert!(!raw.nodes.ids.contains(&901));
+    assert_eq!(of(906), [1, 2, 3], "an internal node of the first brick");
+    assert_eq!(raw.interfaces[0].nodes.len(), 4);
+    assert!(raw.interfaces[1].nodes.iter().all(|node| !of(*node).is_empty()), "nodes with rows only");
+    let roles: Vec<&str> = raw.sources.iter().map(|source| source.role.as_str()).collect();
+    assert_eq!(roles, ["deck", "deck", "stiffness", "mass", "dofs"]);
+    let names: Vec<&str> = raw.sources.iter().map(|source| source.name.as_str()).collect();
+    assert_eq!(names, ["job.inp", "nodes.inp", "job.sti", "job.mas", "job.dof"]);
+    assert_is_the_block(&body(raw, 6));
+}
+
+/// The same matrices without labels and with: rows and places come from the part and its instance.
+#[test]
+fn both_forms_of_abaqus_are_one_model() {
+    let bodies = ["abaqus", "abaqus_labels"].map(|name| {
+        let raw = job(&small(name), vec![set("left", "left")]);
+        assert_eq!(raw.interfaces[0].nodes.len(), 4);
+        let lies_left = |node: &i64| {
+            let at = raw.nodes.ids.iter().position(|id| id == node).expect("a node");
+            raw.nodes.positions[at][0].abs() < 1e-12
+        };
+        assert!(raw.interfaces[0].nodes.iter().all(lies_left), "the instance turns and moves the part");
+        body(raw, 8)
+    });
+    bodies.iter().for_each(assert_is_the_block);
+    let [a, b] = bodies.map(|body| body.modes().eigenvalue.clone());
+    assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 1e-10), "{a:?} {b:?}");
+}
+
+/// A manifest names a job, and interfaces by set and by region; the command line names sets.
+#[test]
+fn manifests_and_command_lines_take_jobs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    for name in ["job.inp", "nodes.inp", "job.sti", "job.mas", "job.dof"] {
+        fs::copy(fixtures().join("small/calculix").join(name), place.join(name)).expect("copied");
+    }
+    let text = "[model.units]\nlength = \"m\"\nmass = \"kg\"\ntime = \"s\"\n[files]\njob = \"job.inp\"\nprogram = \"calculix\"\n\
+        [[interface]]\nname = \"right\"\nset = \"right\"\n\
+        [[interface]]\nname = \"box\"\nbox = { min = [0.15, -1, -1], max = [0.25, 1, 1] }\n\
+        [[interface]]\nname = \"plane\"\nplane = { point = [0.2, 0, 0], normal = [3, 0, 0], within = 0.001 }\n\
+        [[interface]]\nname = \"cylinder\"\ncylinder = { from = [0.2, 0.04, 0.03], to = [0.3, 0.04, 0.03], radius = [0.04, 0.06] }\n\
+        [[interface]]\nname = \"near\"\nnearest = { point = [0.3, 0.04, 0.03], count = 4 }\n";
+    fs::write(place.join("model.toml"), text).expect("written");
+    let raw = read_model(&read_manifest(place.join("model.toml")).expect("a manifest")).expect("readable");
+    let right = &raw.interfaces[0].nodes;
+    assert_eq!(right.len(), 4);
+    for interface in &raw.interfaces[1..] {
+        let mut nodes = interface.nodes.clone();
+        nodes.sort_unstable();
+        let mut right = right.clone();
+        right.sort_unstable();
+        assert_eq!(nodes, right, "{}", interface.name);
+    }
+    let one = ["convert", "model.toml", "--modes", "4", "-o", "one.flex.h5", "--quiet"];
+    assert!(flexbody(place, &one).status.success());
+    let two = [
+        "convert",
+        "job.inp",
+        "--units",
+        "m,kg,s",
+        "--interface",
+        "right,rigid",
+        "--modes",
+        "4",
+        "-o",
+        "two.flex.h5",
+    ];
+    let run = flexbody(place, &two);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let compared = flexbody(place, &["compare", "one.flex.h5", "two.flex.h5"]);
+    assert!(compared.status.success(), "{}", String::from_utf8_lossy(&compared.stdout));
+    // No output replaces a file of the job.
+    let run = flexbody(place, &["convert", "job.inp", "--modes", "4", "-o", "job.mas"]);
+    assert_eq!(run.status.code(), Some(2));
+}
+
+#[test]
+fn regions_hold_their_nodes_in_the_order_of_the_model() {
+    let region = Region::Nearest { point: [0.0; 3], count: 2 };
+    let nodes = [(5, [3.0, 0.0, 0.0]), (9, [1.0, 0.0, 0.0]), (2, [2.0, 0.0, 0.0])];
+    assert_eq!(region.nodes(nodes.into_iter()), [9, 2]);
+}
+
+/// Jobs of the programs themselves, where they are there; frequencies as CalculiX has printed them.
+#[test]
+fn jobs_of_the_programs_give_what_the_programs_say() {
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/samples");
+    let calculix = samples.join("calculix/beam_c3d20.inp");
+    if !calculix.exists() {
+        return;
+    }
+    let beam = body(job(&calculix, Vec::new()), 6);
+    let mass = 7850.0 * 1.0 * 0.04 * 0.02;
+    assert!((beam.invariants().mass() / mass - 1.0).abs() < 1e-12);
+    let printed = [0.4488001e6, 0.1771818e7, 0.3470427e7, 0.1332602e8, 0.1371875e8, 0.3901634e8];
+    for (own, printed) in beam.modes().eigenvalue.iter().zip(printed) {
+        assert!((own / printed - 1.0).abs() < 2e-7, "{own} {printed}");
+    }
+    // Lumped masses of steel discs and aluminium blocks, as the decks describe them.
+    let block = body(job(&samples.join("abaqus/blockC3D4.inp"), vec![set("all", "Set-1")]), 6);
+    assert!((block.invariants().mass() / (2900.0 * 4.0) - 1.0).abs() < 1e-6, "{}", block.invariants().mass());
+    let rotor = body(job(&samples.join("abaqus/rotorDiscTest.inp"), Vec::new()), 6);
+    assert!(rotor.invariants().mass() > 0.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Damaged files of jobs and meshes are read or refused, nothing else.
+    #[test]
+    fn damaged_jobs_never_panic(of in 0..8usize, damages in proptest::collection::vec(damage(), 1..4)) {
+        let (folder, file) = [
+            ("calculix", "job.inp"),
+            ("calculix", "nodes.inp"),
+            ("calculix", "job.dof"),
+            ("calculix", "job.sti"),
+            ("abaqus", "job.inp"),
+            ("abaqus", "job_STIF1.mtx"),
+            ("abaqus_labels", "job_MASS1.mtx"),
+            ("meshes", "block41.msh"),
+        ][of];
+        let place = tempfile::tempdir().expect("a folder");
+        for entry in fs::read_dir(fixtures().join("small").join(folder)).expect("a folder") {
+            let path = entry.expect("a file").path();
+            let name = path.file_name().expect("a name");
+            let mut bytes = fs::read(&path).expect("a file");
+            if name == file {
+                damages.iter().for_each(|damage| apply(&mut bytes, damage));
+            }
+            fs::write(place.path().join(name), bytes).expect("written");
+        }
+        let files = if folder == "meshes" {
+            let small = |name: &str| fixtures().join("small/tet4").join(name);
+            ModelFiles::from_arguments(small("K.mtx"), small("M.mtx"), place.path().join(file), None, None)
+        } else {
+            ModelFiles::from_job(place.path().join("job.inp"), None, vec![set("left", "LEFT")], None)
+        };
+        if let Ok(raw) = read_model(&files.expect("files")) {
+            let _ = FeModel::from_raw(raw);
+        }
+    }
+}
