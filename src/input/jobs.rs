@@ -59,13 +59,16 @@ pub(super) struct JobModel {
     pub nodes: Nodes,
     /// Label of every matrix row.
     pub dofs: Vec<DofLabel>,
-    /// Named sets of nodes, in the order of the job. Names are compared without regard to case.
-    pub sets: Vec<(String, Vec<i64>)>,
+    /// Names are compared without regard to case.
+    pub sets: NodeSets,
     /// Role and path of every file that was read.
     pub files: Vec<(&'static str, PathBuf)>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
+
+/// Named sets of nodes, in the order of their file.
+pub(super) type NodeSets = Vec<(String, Vec<i64>)>;
 
 /// All that is wrong with a job.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -129,7 +132,7 @@ fn unknown(job: &JobFile) -> Diagnostic {
 ///
 /// # Errors
 /// FB101, FB106, FB110, FB111.
-pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, Vec<(String, Vec<i64>)>)> {
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets)> {
     let DeckMesh { nodes, sets, .. } = DeckMesh::of(&Deck::read(file.path())?)?;
     let (ids, positions) = nodes.into_iter().unzip();
     Ok((Nodes { ids, positions }, sets))

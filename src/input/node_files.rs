@@ -5,7 +5,7 @@ mod cdb;
 mod gmsh;
 
 use super::bytes::InputFile;
-use super::jobs::nodes_of_deck;
+use super::jobs::{NodeSets, nodes_of_deck};
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::Nodes;
@@ -17,8 +17,7 @@ type Found<T> = Result<T, Vec<Diagnostic>>;
 #[derive(Debug, Default)]
 pub(super) struct NodeFile {
     pub nodes: Nodes,
-    /// Named sets in the order of the file.
-    pub sets: Vec<(String, Vec<i64>)>,
+    pub sets: NodeSets,
 }
 
 /// A format of node files besides our table.

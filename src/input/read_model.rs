@@ -2,7 +2,7 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use super::jobs::{JobModel, read_job};
+use super::jobs::{JobModel, NodeSets, read_job};
 use super::mapping::Mapping;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
 use super::node_files::{NodeFile, read_node_file};
@@ -110,7 +110,7 @@ struct ModelMatrices {
     dofs: Option<Vec<DofLabel>>,
     dofs_path: PathBuf,
     /// Node sets of a job.
-    sets: Vec<(String, Vec<i64>)>,
+    sets: NodeSets,
     /// Files of a job.
     files: Vec<(&'static str, PathBuf)>,
     diagnostics: Vec<Diagnostic>,

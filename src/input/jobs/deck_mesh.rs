@@ -1,7 +1,7 @@
 //! Nodes, elements and sets of a keyword deck, parts and instances of Abaqus included.
 
-use super::Found;
 use super::deck::{Card, Deck, fields};
+use super::{Found, NodeSets};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::coordinates::excerpt;
 use crate::input::table::integer;
@@ -33,7 +33,7 @@ pub(super) struct DeckMesh {
     pub nodes: BTreeMap<i64, [f64; 3]>,
     pub elements: Vec<Elements>,
     /// Node sets by name as the deck has it, in the order of the deck.
-    pub sets: Vec<(String, Vec<i64>)>,
+    pub sets: NodeSets,
     /// Notes about the numbering.
     pub notes: Vec<Diagnostic>,
 }
@@ -60,7 +60,7 @@ struct Scope {
     nodes: BTreeMap<i64, [f64; 3]>,
     elements: Vec<Elements>,
     /// Node sets in their order, by name in upper case.
-    sets: Vec<(String, Vec<i64>)>,
+    sets: NodeSets,
     element_sets: HashMap<String, Vec<i64>>,
     /// Sets of the assembly: members with the instance that they belong to.
     of_instances: Vec<(String, String, Vec<i64>)>,
