@@ -5,12 +5,13 @@ use super::compression::Compression;
 use super::hdf5::Hdf5;
 use super::matrix_market::MatrixMarket;
 use super::reader::{HEAD, Reader};
+use super::scipy_npz::ScipyNpz;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use std::path::Path;
 
 /// Every matrix format that is understood.
-pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5];
+pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz];
 
 /// The reader for a file: by its content, else by its extension.
 ///
