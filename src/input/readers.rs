@@ -45,7 +45,7 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
 
 /// First bytes of files that people have and that are not read, what they are, and what to do.
 const NOT_READ: &[(&[u8], &str, &str)] = &[
-    (b"PK\x03\x04", "a zip archive (scipy's .npz?)", "write it by scipy.io.mmwrite, or unpack it"),
+    (b"PK\x03\x04", "a zip archive", "unpack it"),
     (b"MATLAB 5.0", "a MATLAB file of version 5 to 7", "save it with the option -v7.3, which is HDF5"),
     (b"BZh", "compressed by bzip2", "unpack it, or compress it by gzip or zstd"),
     (b"\xfd7zXZ", "compressed by xz", "unpack it, or compress it by gzip or zstd"),
