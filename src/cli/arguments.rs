@@ -333,7 +333,7 @@ pub struct ConvertArguments {
     /// bore=SET_BORE,rigid (repeatable)
     #[arg(long, value_name = "NAME=SET[,COUPLING]", conflicts_with_all = ["from", "stiffness"])]
     pub interface: Vec<String>,
-    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst) or HDF5 (FILE.h5:/group)
+    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group) or SciPy (.npz)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
     pub stiffness: Option<PathBuf>,
     /// Mass matrix, consistent

@@ -24,6 +24,7 @@ mod read_model;
 mod reader;
 mod readers;
 mod region;
+mod scipy_npz;
 mod series;
 mod shapes;
 mod table;

@@ -37,6 +37,58 @@ pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
     Ok(Array { rows, cols, row_major: !fortran, values, digits: if size == 4 { 7 } else { 17 } })
 }
 
+/// Whole numbers with one extent, of any integer type.
+pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
+    let (header, data) = split(bytes)?;
+    let Header { descr, shape, .. } =
+        parse(header).ok_or_else(|| syntax("header is not understood".into()))?;
+    let (size, big) = match (descr.get(1..).and_then(|size| size.strip_prefix(['i', 'u'])), descr.as_bytes())
+    {
+        (Some("1"), _) => (1, false),
+        (Some("2"), [order, ..]) => (2, *order == b'>'),
+        (Some("4"), [order, ..]) => (4, *order == b'>'),
+        (Some("8"), [order, ..]) => (8, *order == b'>'),
+        _ => {
+            let message = format!("array has the type `{}`, expected whole numbers", descr.escape_default());
+            return Err(Diagnostic::new(Code::MatrixKind, message));
+        }
+    };
+    let &[count] = shape.as_slice() else {
+        return Err(Diagnostic::new(
+            Code::MatrixKind,
+            format!("array has {} extents, expected 1", shape.len()),
+        ));
+    };
+    if count.checked_mul(size) != Some(data.len()) {
+        let message = format!("header announces {count} values of {size} bytes, {} bytes follow", data.len());
+        return Err(Diagnostic::new(Code::MatrixCount, message));
+    }
+    let signed = descr.as_bytes()[1] == b'i';
+    let decode = |bytes: &[u8]| {
+        let digits = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+        let number = match big {
+            true => bytes.iter().fold(0, digits),
+            false => bytes.iter().rev().fold(0, digits),
+        };
+        let unused = 64 - 8 * size as u32;
+        if signed { ((number << unused) as i64) >> unused } else { i64::try_from(number).unwrap_or(i64::MAX) }
+    };
+    Ok(data.chunks_exact(size).map(decode).collect())
+}
+
+/// The text of an array that is one word (`|S3`, `<U3`).
+pub(super) fn read_word(bytes: &[u8]) -> Option<String> {
+    let (header, data) = split(bytes).ok()?;
+    let Header { descr, .. } = parse(header)?;
+    let letters = match descr.as_bytes() {
+        [b'|', b'S', ..] => data.to_vec(),
+        [b'<', b'U', ..] => data.iter().copied().step_by(4).collect(),
+        _ => return None,
+    };
+    let text = String::from_utf8(letters).ok()?;
+    Some(text.trim_end_matches('\0').to_owned())
+}
+
 fn syntax(what: String) -> Diagnostic {
     Diagnostic::new(Code::MatrixSyntax, what).with_help("write the array again by numpy.save")
 }

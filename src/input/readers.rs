@@ -5,12 +5,13 @@ use super::compression::Compression;
 use super::hdf5::Hdf5;
 use super::matrix_market::MatrixMarket;
 use super::reader::{HEAD, Reader};
+use super::scipy_npz::ScipyNpz;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use std::path::Path;
 
 /// Every matrix format that is understood.
-pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5];
+pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz];
 
 /// The reader for a file: by its content, else by its extension.
 ///
@@ -44,7 +45,7 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
 
 /// First bytes of files that people have and that are not read, what they are, and what to do.
 const NOT_READ: &[(&[u8], &str, &str)] = &[
-    (b"PK\x03\x04", "a zip archive (scipy's .npz?)", "write it by scipy.io.mmwrite, or unpack it"),
+    (b"PK\x03\x04", "a zip archive", "unpack it"),
     (b"MATLAB 5.0", "a MATLAB file of version 5 to 7", "save it with the option -v7.3, which is HDF5"),
     (b"BZh", "compressed by bzip2", "unpack it, or compress it by gzip or zstd"),
     (b"\xfd7zXZ", "compressed by xz", "unpack it, or compress it by gzip or zstd"),

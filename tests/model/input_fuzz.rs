@@ -134,6 +134,14 @@ proptest! {
     }
 
     #[test]
+    fn damaged_npz(
+        file in prop::sample::select(vec!["csc.npz", "csr_stored.npz", "coo.npz"]),
+        damages in damages(),
+    ) {
+        survives("stiffness", &fixture("readers/scipy-npz").join(file), &damages)?;
+    }
+
+    #[test]
     fn damaged_zstd(damages in damages()) {
         let text = std::fs::read(fixture("readers/matrix-market/scipy.mtx")).unwrap();
         let mut bytes = ruzstd::encoding::compress_to_vec(&text[..], ruzstd::encoding::CompressionLevel::Fastest);

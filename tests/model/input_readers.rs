@@ -71,6 +71,73 @@ fn every_registered_reader_reads_its_fixtures_and_nobody_elses() {
     }
 }
 
+/// An array of NumPy.
+fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+    [&b"\x93NUMPY\x01\0"[..], &(header.len() as u16).to_le_bytes(), header.as_bytes(), data].concat()
+}
+
+fn archive(members: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for (name, bytes) in members {
+        zip.start_file(format!("{name}.npy"), stored).expect("a member");
+        zip.write_all(bytes).expect("written");
+    }
+    zip.finish().expect("an archive").into_inner()
+}
+
+/// A matrix of two rows in archives of SciPy that are well, and not.
+#[test]
+fn archives_of_scipy_are_read_or_refused() {
+    let whole = |values: &[i16]| {
+        let data: Vec<u8> = values.iter().flat_map(|value| value.to_be_bytes()).collect();
+        npy(">i2", &format!("({},)", values.len()), &data)
+    };
+    let real = |values: &[f64]| {
+        let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        npy("<f8", &format!("({},)", values.len()), &data)
+    };
+    let form = |name: &str| npy("|S3", "()", name.as_bytes());
+    let coo = |form_name: &str, rows: &[i16], columns: &[i16], values: &[f64]| {
+        archive(&[
+            ("row", whole(rows)),
+            ("col", whole(columns)),
+            ("format", form(form_name)),
+            ("shape", whole(&[2, 2])),
+            ("data", real(values)),
+        ])
+    };
+    let good = read_bytes("K.npz", &coo("coo", &[0, 1, 0, 1], &[0, 1, 1, 0], &[2.0, 3.0, 1.0, 1.0]));
+    let expected = CscMatrix::from_triplets(2, 2, &[(0, 0, 2.0), (1, 1, 3.0), (0, 1, 1.0), (1, 0, 1.0)]);
+    assert_eq!(good.expect("a matrix").matrix, expected);
+    let csc = |pointers: &[i16]| {
+        archive(&[
+            ("indices", whole(&[0, 1])),
+            ("indptr", whole(pointers)),
+            ("format", form("csc")),
+            ("shape", whole(&[2, 2])),
+            ("data", real(&[2.0, 3.0])),
+        ])
+    };
+    assert_eq!(read_bytes("K.npz", &csc(&[0, 1, 2])).expect("a matrix").matrix.values(), [2.0, 3.0]);
+    for (bytes, code) in [
+        (coo("bsr", &[0], &[0], &[1.0]), Code::MatrixKind),
+        (coo("coo", &[0, 2], &[0, 0], &[1.0, 1.0]), Code::MatrixIndex),
+        (coo("coo", &[0, -1], &[0, 0], &[1.0, 1.0]), Code::MatrixIndex),
+        (coo("coo", &[0, 1], &[0], &[1.0, 1.0]), Code::MatrixCount),
+        (coo("coo", &[0, 1], &[0, 1], &[1.0, f64::NAN]), Code::MatrixNotFinite),
+        (coo("coo", &[0, 1, 1], &[0, 1, 0], &[1.0, 1.0, 0.5]), Code::MatrixAsymmetric),
+        (csc(&[0, 2, 1]), Code::MatrixSyntax),
+        (csc(&[0, 2]), Code::MatrixSyntax),
+        (archive(&[("format", form("coo"))]), Code::MatrixSyntax),
+        (archive(&[("shape", real(&[2.0, 2.0])), ("format", form("coo"))]), Code::MatrixKind),
+    ] {
+        let error = read_bytes("K.npz", &bytes).expect_err("refused");
+        assert!(error.has(code), "{code:?}: {error}");
+    }
+}
+
 #[test]
 fn dialects_of_matrix_market_mean_the_same() {
     let expected = CscMatrix::from_triplets(3, 3, &[(0, 0, 2e5), (1, 0, -1.5), (0, 1, -1.5), (2, 2, 4.0)]);
