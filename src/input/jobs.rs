@@ -10,8 +10,6 @@ mod deck_mesh;
 mod element_kinds;
 
 use super::bytes::InputFile;
-use super::compression::Compression;
-use super::reader::HEAD;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Nodes, RawMatrix};
 use abaqus::Abaqus;
@@ -32,21 +30,10 @@ pub struct JobFile {
 impl JobFile {
     /// The main file and the files beside it that have its name, which a run must not replace.
     pub(super) fn family(&self) -> Vec<PathBuf> {
-        let stem = self.path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
-        let folder = match self.path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut family = vec![self.path.clone()];
-        let Some(stem) = stem else { return family };
-        const MATRICES: &[&str] = &["sti", "mas", "dof", "mtx"];
-        for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            let name = file.file_name().to_string_lossy().to_lowercase();
-            let is_matrix = MATRICES.iter().any(|extension| name.ends_with(&format!(".{extension}")));
-            if name.starts_with(&stem) && is_matrix {
-                family.push(self.path.with_file_name(file.file_name()));
-            }
-        }
+        const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx"];
+        let is_matrix = |rest: &str| MATRICES.iter().any(|extension| rest.ends_with(extension));
+        let matrices = siblings(&self.path).filter(|(rest, _)| is_matrix(rest)).map(|(_, path)| path);
+        let mut family: Vec<PathBuf> = std::iter::once(self.path.clone()).chain(matrices).collect();
         family.sort();
         family
     }
@@ -81,8 +68,8 @@ pub(super) trait JobReader: Sync {
     /// What the reader needs, in words: the main file and what stands beside it.
     fn needs(&self) -> &'static str;
 
-    /// Whether the file at `path`, which begins with `head`, is the main file of such a job.
-    fn recognises(&self, path: &Path, head: &[u8]) -> bool;
+    /// Whether the file at `path` is the main file of such a job.
+    fn recognises(&self, path: &Path) -> bool;
 
     /// Reads matrices, nodes, labels and sets.
     ///
@@ -107,9 +94,8 @@ pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
     let reader = match &job.program {
         Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
         None => {
-            let file = InputFile::open(&job.path).map_err(|diagnostic| vec![diagnostic])?;
-            let head = Compression::of(file.bytes()).head(file.bytes(), HEAD);
-            JOBS.iter().find(|reader| reader.recognises(&job.path, &head))
+            InputFile::open(&job.path).map_err(|diagnostic| vec![diagnostic])?;
+            JOBS.iter().find(|reader| reader.recognises(&job.path))
         }
     };
     match reader {
@@ -138,9 +124,32 @@ pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets)> {
     Ok((Nodes { ids, positions }, sets))
 }
 
-/// The file `STEM.EXTENSION` beside the main file of a job.
-pub(super) fn beside(path: &Path, extension: &str) -> PathBuf {
-    path.with_extension(extension)
+/// Whether a path is that of a keyword deck, by its name.
+fn is_deck(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"))
+}
+
+/// Files beside the main file of a job whose names begin with its stem, in any case: what follows the stem,
+/// in lower case, and the path.
+fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
+    let stem = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
+    let folder = match main.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    std::fs::read_dir(folder).into_iter().flatten().flatten().filter_map(move |file| {
+        let name = file.file_name().to_string_lossy().to_lowercase();
+        let rest = name.strip_prefix(stem.as_ref()?)?.to_owned();
+        Some((rest, main.with_file_name(file.file_name())))
+    })
+}
+
+/// Both of two, or all that is wrong with them.
+fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
+    match (a, b) {
+        (Ok(a), Ok(b)) => Ok((a, b)),
+        (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),
+    }
 }
 
 /// FB109: a file of a job is missing.

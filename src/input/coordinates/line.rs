@@ -13,7 +13,7 @@ pub(in crate::input) struct Limits {
 
 /// A line that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::input) struct BadLine {
+pub(super) struct BadLine {
     /// From 1, counted from the first line of the piece (later: of the file).
     pub line: usize,
     pub code: Code,
@@ -23,7 +23,7 @@ pub(in crate::input) struct BadLine {
 
 /// A parsed piece of the file.
 #[derive(Debug, Default)]
-pub(in crate::input) struct Piece {
+pub(super) struct Piece {
     pub entries: Vec<Entry>,
     pub lines: usize,
     /// The first few bad lines, and how many there are.
@@ -40,7 +40,7 @@ pub(in crate::input) struct Piece {
 const COUNTED: usize = 512;
 
 /// Parses whole lines.
-pub(in crate::input) fn parse(text: &[u8], limits: Limits) -> Piece {
+pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
     let mut piece = Piece { entries: Vec::with_capacity(text.len() / 24 + 1), ..Piece::default() };
     let mut at = 0;
     while at < text.len() {

@@ -6,7 +6,7 @@ use super::abaqus_rows::{labels, refuse_other};
 use super::coordinate_files::CoordinateFile;
 use super::deck::{Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::{Found, JobModel, JobReader, missing};
+use super::{Found, JobModel, JobReader, both, is_deck, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Storage, assemble, check_size, push};
 use crate::input::bytes::InputFile;
@@ -33,9 +33,8 @@ impl JobReader for Abaqus {
         "job.inp with job_STIF1.mtx and job_MASS1.mtx beside it"
     }
 
-    fn recognises(&self, path: &Path, _head: &[u8]) -> bool {
-        let is_deck = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"));
-        is_deck && Matrices::beside(path).is_ok()
+    fn recognises(&self, path: &Path) -> bool {
+        is_deck(path) && Matrices::beside(path).is_ok()
     }
 
     fn read(&self, path: &Path) -> Found<JobModel> {
@@ -76,19 +75,12 @@ impl Matrices {
     /// Files whose names are that of the deck with STIF and MASS and the same number; those with the highest
     /// number.
     fn beside(deck: &Path) -> Found<Self> {
-        let stem = deck.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let folder = match deck.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
         let mut found: [Vec<(u32, PathBuf)>; 2] = [Vec::new(), Vec::new()];
-        for file in names {
-            let name = file.file_name().to_string_lossy().to_lowercase();
-            let rest = name.strip_prefix(&stem).map(|rest| rest.trim_start_matches('_'));
-            let number = |kind: &str| rest?.strip_prefix(kind)?.strip_suffix(".mtx")?.parse::<u32>().ok();
+        for (rest, path) in siblings(deck) {
+            let rest = rest.trim_start_matches('_');
+            let number = |kind: &str| rest.strip_prefix(kind)?.strip_suffix(".mtx")?.parse::<u32>().ok();
             for (k, kind) in ["stif", "mass"].iter().enumerate() {
-                found[k].extend(number(kind).map(|number| (number, deck.with_file_name(file.file_name()))));
+                found[k].extend(number(kind).map(|number| (number, path.clone())));
             }
         }
         found.iter_mut().for_each(|files| files.sort());
@@ -144,13 +136,6 @@ fn numbered(
     let (k, m) = rayon::join(|| k.into_matrix(n), || m.into_matrix(n));
     let (k, m) = both(k, m)?;
     Ok((labels, [k, m]))
-}
-
-fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
-    match (a, b) {
-        (Ok(a), Ok(b)) => Ok((a, b)),
-        (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),
-    }
 }
 
 /// Matrices whose lines name the degrees of freedom: rows in ascending order of node and direction.

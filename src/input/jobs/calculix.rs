@@ -4,7 +4,7 @@
 use super::coordinate_files::CoordinateFile;
 use super::deck::{Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::{Found, JobModel, JobReader, beside, missing};
+use super::{Found, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::excerpt;
@@ -32,13 +32,12 @@ impl JobReader for Calculix {
         "job.inp with job.sti, job.mas and job.dof beside it"
     }
 
-    fn recognises(&self, path: &Path, _head: &[u8]) -> bool {
-        let is_deck = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"));
-        is_deck && ["sti", "mas", "dof"].iter().any(|extension| beside(path, extension).exists())
+    fn recognises(&self, path: &Path) -> bool {
+        is_deck(path) && ["sti", "mas", "dof"].iter().any(|extension| path.with_extension(extension).exists())
     }
 
     fn read(&self, path: &Path) -> Found<JobModel> {
-        let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| beside(path, extension));
+        let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| path.with_extension(extension));
         let absent =
             [(&sti, "stiffness matrix"), (&mas, "mass matrix"), (&dof, "list of degrees of freedom")];
         let absent = absent.iter().filter(|(file, _)| !file.exists());
@@ -54,12 +53,7 @@ impl JobReader for Calculix {
         let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
         let (stiffness, mass) =
             rayon::join(|| read(&sti, MatrixRole::Stiffness), || read(&mas, MatrixRole::Mass));
-        let (stiffness, mass) = match (stiffness, mass) {
-            (Ok(stiffness), Ok(mass)) => (stiffness, mass),
-            (stiffness, mass) => {
-                return Err([stiffness.err(), mass.err()].into_iter().flatten().flatten().collect());
-            }
-        };
+        let (stiffness, mass) = both(stiffness, mass)?;
         let rotations = rotation_nodes(&deck)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },

@@ -67,14 +67,6 @@ struct Scope {
 }
 
 impl Scope {
-    fn set_mut(&mut self, name: &str) -> &mut Vec<i64> {
-        let at = self.sets.iter().position(|(own, _)| own.eq_ignore_ascii_case(name)).unwrap_or_else(|| {
-            self.sets.push((name.to_owned(), Vec::new()));
-            self.sets.len() - 1
-        });
-        &mut self.sets[at].1
-    }
-
     fn set(&self, name: &str) -> Option<&Vec<i64>> {
         self.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name)).map(|(_, nodes)| nodes)
     }
@@ -188,7 +180,7 @@ impl Scopes {
             for (set, of, members) in &self.top.of_instances {
                 if of.eq_ignore_ascii_case(&instance.name) {
                     let shifted = members.iter().map(|id| id + shift);
-                    mesh.set_mut(set).extend(shifted);
+                    set_mut(&mut mesh.sets, set).extend(shifted);
                 }
             }
         }
@@ -197,14 +189,6 @@ impl Scopes {
 }
 
 impl DeckMesh {
-    fn set_mut(&mut self, name: &str) -> &mut Vec<i64> {
-        let at = self.sets.iter().position(|(own, _)| own.eq_ignore_ascii_case(name)).unwrap_or_else(|| {
-            self.sets.push((name.to_owned(), Vec::new()));
-            self.sets.len() - 1
-        });
-        &mut self.sets[at].1
-    }
-
     fn add(&mut self, scope: &Scope, shift: i64, instance: &Instance) {
         self.nodes.extend(scope.nodes.iter().map(|(id, x)| (id + shift, instance.moved.of(*x))));
         for elements in &scope.elements {
@@ -214,9 +198,18 @@ impl DeckMesh {
             self.elements.push(Elements { kind: elements.kind.clone(), members });
         }
         for (name, nodes) in &scope.sets {
-            self.set_mut(name).extend(nodes.iter().map(|id| id + shift));
+            set_mut(&mut self.sets, name).extend(nodes.iter().map(|id| id + shift));
         }
     }
+}
+
+/// The members of the set of this name, in any case; of a new one where there is none.
+fn set_mut<'s>(sets: &'s mut NodeSets, name: &str) -> &'s mut Vec<i64> {
+    let at = sets.iter().position(|(own, _)| own.eq_ignore_ascii_case(name)).unwrap_or_else(|| {
+        sets.push((name.to_owned(), Vec::new()));
+        sets.len() - 1
+    });
+    &mut sets[at].1
 }
 
 /// The least power of ten that no number reaches.
@@ -341,7 +334,7 @@ impl Reading<'_> {
             }
         }
         if let Some(name) = card.parameter("NSET") {
-            scope.set_mut(name).extend(ids);
+            set_mut(&mut scope.sets, name).extend(ids);
         }
     }
 
@@ -418,7 +411,7 @@ impl Reading<'_> {
         };
         if let Some(elements) = card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
             match scope.nodes_of_elements(elements) {
-                Some(nodes) => scope.set_mut(&name).extend(nodes),
+                Some(nodes) => set_mut(&mut scope.sets, &name).extend(nodes),
                 None => {
                     let message = format!("element set `{elements}` is not known here");
                     let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
@@ -430,7 +423,7 @@ impl Reading<'_> {
         let members = self.members(card, |set| scope.set(set).cloned());
         match card.name("INSTANCE") {
             Some(instance) => scope.of_instances.push((name, instance, members)),
-            None => scope.set_mut(&name).extend(members),
+            None => set_mut(&mut scope.sets, &name).extend(members),
         }
     }
 
