@@ -155,9 +155,12 @@ mod study;
 pub mod study;
 
 pub use api::{
-    Accuracy, Basis, Conversion, ConvertOptions, FlexBody, Frame, Identity, Matrix, Model, ModelBuilder,
-    Motion, Scene, Selection, SparseMatrix,
+    Accuracy, Basis, Conversion, ConvertOptions, Coupling, FlexBody, Frame, GeometricStiffness, Identity,
+    Interface, InterfaceCoordinates, Listener, Matrix, Model, ModelBuilder, Motion, PointPath, Progress,
+    ReportFormat, Scene, Selection, SourceFile, SparseMatrix,
 };
+#[cfg(feature = "hdf5")]
+pub use api::{Trade, TradeOptions};
 /// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity
 /// forces, accelerations, momenta, energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`]
 /// makes them, [`FlexBody::node_point`] and [`FlexBody::interface_point`] the points where joints hold a
@@ -172,7 +175,7 @@ pub mod dynamics {
 pub use base::diagnostic::{Code, Diagnostic, Severity};
 pub use base::error::{Error, ExitCode, Result};
 
-/// What `src/main.rs` runs. No part of the interface.
+/// What `src/main.rs` and the command of the Python package run. No part of the interface.
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod program {

@@ -12,7 +12,7 @@ static ALLOCATOR: process::Allocator = process::Allocator;
 fn main() -> std::process::ExitCode {
     keep_freed_memory();
     process::prepare();
-    let arguments = match parse() {
+    let arguments = match parse(&std::env::args_os().collect::<Vec<_>>()) {
         Ok(arguments) => arguments,
         Err(code) => return std::process::ExitCode::from(code as u8),
     };

@@ -1,18 +1,19 @@
 //! A flexible body.
 
 use super::matrix::shown;
+use super::progress::{Listener, NOBODY, heard};
 use super::{Matrix, Motion, Scene, Selection};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
-use crate::base::progress::SILENT;
+use crate::base::progress::Event;
 use crate::body::flex_body;
 use crate::body::verification::own_identities;
 use crate::formats::export::ExportOptions;
-use crate::formats::{export, find_format};
+use crate::formats::{FORMATS, export, find_format};
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::motion::scene::{Point, body_point, simulate};
-use crate::study::selection::{select, select_for_cases};
+use crate::study::selection::select_for_cases;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
@@ -68,6 +69,11 @@ impl FlexBody {
         Ok(lost)
     }
 
+    /// Formats that [`FlexBody::export`] writes: the name of each, and the programs that read it.
+    pub fn export_formats() -> Vec<(&'static str, &'static str)> {
+        FORMATS.iter().map(|format| (format.name(), format.reader())).collect()
+    }
+
     /// Number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.0.n_modes()
@@ -81,6 +87,17 @@ impl FlexBody {
     /// Positions of the nodes (n x 3), body frame. Unit: length.
     pub fn positions(&self) -> &[[f64; 3]] {
         &self.0.nodes().positions
+    }
+
+    /// Triangles of the surface by indices of their nodes, counterclockwise seen from outside; empty where no
+    /// surface is known.
+    pub fn mesh_triangles(&self) -> &[[u32; 3]] {
+        self.0.mesh().map_or(&[], |mesh| mesh.triangles())
+    }
+
+    /// Edges of the surface and beams by indices of their nodes; empty where none are known.
+    pub fn mesh_edges(&self) -> &[[u32; 2]] {
+        self.0.mesh().map_or(&[], |mesh| mesh.edges())
     }
 
     /// Origin of the body frame in model coordinates, and its axes as columns.
@@ -188,7 +205,7 @@ impl FlexBody {
     /// # Errors
     /// FB212 where the scene does not fit the body; FB540 when its motion cannot be integrated.
     pub fn select(&self, scene: &Scene) -> Result<Selection> {
-        select(&self.0, &scene.0, None, SILENT).map(Selection)
+        self.select_for_cases(std::slice::from_ref(scene))
     }
 
     /// The equations of motion of the body, with all terms that it holds.
@@ -205,8 +222,19 @@ impl FlexBody {
     /// # Panics
     /// When there is no case.
     pub fn select_for_cases(&self, cases: &[Scene]) -> Result<Selection> {
+        self.select_for_cases_heard(cases, NOBODY)
+    }
+
+    /// The same, heard and perhaps stopped by a listener.
+    ///
+    /// # Errors
+    /// As [`FlexBody::select`]; FB605 where the listener stops it.
+    ///
+    /// # Panics
+    /// When there is no case.
+    pub fn select_for_cases_heard(&self, cases: &[Scene], listener: Listener<'_>) -> Result<Selection> {
         let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
-        select_for_cases(&self.0, &[], &scenes, None, SILENT).map(Selection)
+        heard(listener, |watch| select_for_cases(&self.0, &[], &scenes, None, watch)).map(Selection)
     }
 
     /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v
@@ -258,7 +286,19 @@ impl FlexBody {
     /// FB212 where the scene does not fit the body; FB540 when the integration cannot go on; FB550 when it
     /// takes more steps than it may.
     pub fn simulate(&self, scene: &Scene) -> Result<Motion> {
-        let (recording, diagnostics) = simulate(&self.0, &scene.0, None, |_| ())?;
-        Ok(Motion { recording, diagnostics })
+        self.simulate_heard(scene, NOBODY)
+    }
+
+    /// The same, heard and perhaps stopped by a listener.
+    ///
+    /// # Errors
+    /// As [`FlexBody::simulate`]; FB605 where the listener stops it.
+    pub fn simulate_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+        let (recording, diagnostics) = heard(listener, |watch| {
+            watch(Event::Phase("simulation"));
+            simulate(&self.0, &scene.0, None, |part| watch(Event::Fraction(part)))
+        })?;
+        let (units, extent) = (self.0.units().clone(), self.0.extent());
+        Ok(Motion { recording, units, extent, diagnostics })
     }
 }

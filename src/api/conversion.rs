@@ -1,11 +1,11 @@
 //! From a model to a body.
 
+use super::progress::{Listener, NOBODY, heard};
 use super::{FlexBody, Model, Scene, Selection};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::base::progress::SILENT;
 use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
-use crate::body::convert::{ConvertSettings, Lumping, convert};
+use crate::body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert};
 use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;
 use crate::motion::scene;
@@ -64,6 +64,7 @@ pub struct ConvertOptions {
     accuracy: Accuracy,
     frame: Frame,
     without_comparators: bool,
+    mesh: MeshChoice,
 }
 
 impl ConvertOptions {
@@ -103,6 +104,18 @@ impl ConvertOptions {
         self
     }
 
+    /// Leaves the surface of the model out.
+    pub fn without_mesh(mut self) -> Self {
+        self.mesh = MeshChoice::Without;
+        self
+    }
+
+    /// A surface of so many triangles at the most.
+    pub fn mesh_triangles(mut self, most: usize) -> Self {
+        self.mesh = MeshChoice::AtMost(most);
+        self
+    }
+
     fn settings(&self, model: &Model, scenes: &[scene::Scene]) -> Result<ConvertSettings> {
         let loads = match (self.basis, self.accuracy) {
             (Basis::Free | Basis::Scene, Accuracy::Fast | Accuracy::Standard) => {
@@ -126,6 +139,7 @@ impl ConvertOptions {
                 Frame::CentreOfMass => BodyFrame::Com,
                 Frame::Model => BodyFrame::Model,
             },
+            mesh: self.mesh,
             ..ConvertSettings::default()
         };
         settings.modes.accuracy = match self.accuracy {
@@ -164,14 +178,21 @@ impl Model {
     /// where there are none, FB514 where the damping feeds energy to them, FB601 where the memory does not
     /// suffice; FB714 where an identity does not hold.
     pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
+        self.convert_heard(options, NOBODY)
+    }
+
+    /// The same, heard and perhaps stopped by a listener.
+    ///
+    /// # Errors
+    /// As [`Model::convert`]; FB605 where the listener stops it.
+    pub fn convert_heard(&self, options: &ConvertOptions, listener: Listener<'_>) -> Result<Conversion> {
         if options.basis == Basis::Scene {
             let message = "a basis made for a scene needs one: `convert_for`";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let settings = options.settings(self, &[])?;
-        let conversion = convert(&self.checked, &settings, SILENT)?;
-        accept(&conversion.body)?;
-        Ok(Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics })
+        let conversion = heard(listener, |watch| convert(&self.checked, &settings, watch))?;
+        accepted(conversion)
     }
 
     /// The same with the terms and modes alone that `scene` needs, and the decision about each.
@@ -194,16 +215,37 @@ impl Model {
         cases: &[Scene],
         options: &ConvertOptions,
     ) -> Result<(Conversion, Selection)> {
+        self.convert_for_cases_heard(cases, options, NOBODY)
+    }
+
+    /// The same, heard and perhaps stopped by a listener.
+    ///
+    /// # Errors
+    /// As [`Model::convert_for`]; FB605 where the listener stops it.
+    ///
+    /// # Panics
+    /// When there is no case.
+    pub fn convert_for_cases_heard(
+        &self,
+        cases: &[Scene],
+        options: &ConvertOptions,
+        listener: Listener<'_>,
+    ) -> Result<(Conversion, Selection)> {
         let scenes: Vec<scene::Scene> = cases.iter().map(|case| case.0.clone()).collect();
         let settings = options.settings(self, &scenes)?;
         let by_band = options.modes.is_none()
             && options.highest.is_none()
             && matches!(options.basis, Basis::Free | Basis::Scene);
         let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
-        let (conversion, selection) =
-            convert_for_cases(&self.checked, &tailoring, &scenes, Resume::default(), SILENT)?;
-        accept(&conversion.body)?;
-        let converted = Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics };
-        Ok((converted, Selection(selection)))
+        let (conversion, selection) = heard(listener, |watch| {
+            convert_for_cases(&self.checked, &tailoring, &scenes, Resume::default(), watch)
+        })?;
+        Ok((accepted(conversion)?, Selection(selection)))
     }
+}
+
+/// A finished conversion as users see it, once its body has passed every check.
+fn accepted(conversion: convert::Conversion) -> Result<Conversion> {
+    accept(&conversion.body)?;
+    Ok(Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics })
 }

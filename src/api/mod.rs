@@ -1,14 +1,28 @@
 //! The front door: what a program that uses the library sees. It wraps the types of the other rooms, so that
 //! these can change, and shows arrays as slices.
 
+mod arrays;
 mod body;
 mod conversion;
+mod interface;
 mod matrix;
 mod model;
+mod motion;
+mod progress;
+mod report;
 mod scene;
+#[cfg(feature = "hdf5")]
+mod trade;
 
+pub use arrays::{GeometricStiffness, SourceFile};
 pub use body::{FlexBody, Identity};
 pub use conversion::{Accuracy, Basis, Conversion, ConvertOptions, Frame};
+pub use interface::{Coupling, Interface, InterfaceCoordinates};
 pub use matrix::Matrix;
 pub use model::{Model, ModelBuilder, SparseMatrix};
-pub use scene::{Motion, Scene, Selection};
+pub use motion::{Motion, PointPath};
+pub use progress::{Listener, Progress};
+pub use report::ReportFormat;
+pub use scene::{Scene, Selection};
+#[cfg(feature = "hdf5")]
+pub use trade::{Trade, TradeOptions};

@@ -1,12 +1,17 @@
 //! A finite element model, read from files or made of matrices in memory.
 
+use super::Coupling;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::units::UnitSystem;
-use crate::input::{LoadSource, check_size, read_manifest, read_model};
-use crate::model::{CheckedModel, Coupling, Damping, DofLabel, FeModel, NodeSet, Nodes, RawModel};
+use crate::input::{
+    InterfaceNodes, InterfaceSource, LoadSource, ModelFiles, check_size, read_manifest, read_model,
+};
+use crate::model::{
+    CheckedModel, Damping, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel, Reference, SurfaceMesh,
+};
 use crate::numerics::linalg::CscMatrix;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A sparse matrix with both triangles of a symmetric one.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,10 +99,39 @@ impl Model {
         Self::checked(read_model(&files)?, files.residual_vectors)
     }
 
+    /// Reads what an FE program has written (docs/fe_programs.md): the deck or another main file of a job.
+    ///
+    /// * `program`: name of the program as on the command line; `None`: by its files.
+    /// * `units`: of length, mass and time, as in a manifest; `None`: not stated.
+    /// * `interfaces`: names with the node sets of the deck that they are.
+    ///
+    /// # Errors
+    /// As [`Model::read`]; FB108 to FB112 for what is wrong with a job, FB220 for a set that it does not
+    /// have.
+    pub fn read_job(
+        path: impl AsRef<Path>,
+        program: Option<&str>,
+        units: Option<[&str; 3]>,
+        interfaces: &[(&str, &str, Option<Coupling>)],
+    ) -> Result<Self> {
+        let source = |&(name, set, coupling): &(&str, &str, Option<Coupling>)| InterfaceSource {
+            name: name.to_owned(),
+            nodes: InterfaceNodes::Set(set.to_owned()),
+            coupling: coupling.map(Coupling::inner),
+            reference: Reference::Mean,
+        };
+        let interfaces = interfaces.iter().map(source).collect();
+        let units = units.map(|units| units.join(","));
+        let path = path.as_ref();
+        let files = ModelFiles::from_job(path, program.map(str::to_owned), interfaces, units.as_deref())?;
+        Self::checked(read_model(&files)?, Vec::new())
+    }
+
     /// A model of matrices in memory: rows node by node, x, y, z in the order of the nodes.
     pub fn builder(name: impl Into<String>, stiffness: SparseMatrix, mass: SparseMatrix) -> ModelBuilder {
         let nodes = Nodes { ids: Vec::new(), positions: Vec::new() };
-        ModelBuilder { raw: RawModel::in_memory(name, stiffness.0, mass.0, nodes) }
+        let raw = RawModel::in_memory(name, stiffness.0, mass.0, nodes);
+        ModelBuilder { raw, residual_vectors: Vec::new() }
     }
 
     fn checked(raw: RawModel, residual_vectors: Vec<LoadSource>) -> Result<Self> {
@@ -135,6 +169,7 @@ impl Model {
 #[derive(Debug, Clone)]
 pub struct ModelBuilder {
     raw: RawModel,
+    residual_vectors: Vec<LoadSource>,
 }
 
 impl ModelBuilder {
@@ -142,6 +177,18 @@ impl ModelBuilder {
     pub fn nodes(mut self, ids: Vec<i64>, positions: Vec<[f64; 3]>) -> Self {
         self.raw.nodes = Nodes { ids, positions };
         self
+    }
+
+    /// The surface to draw the body by: triangles, counterclockwise seen from outside, and edges, both by
+    /// indices into the nodes, which are given before.
+    ///
+    /// # Errors
+    /// FB125 for an index that is no node's, a triangle or an edge that has a node twice, or neither triangles
+    /// nor edges.
+    pub fn mesh(mut self, triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Result<Self> {
+        let mesh = SurfaceMesh::new(triangles, edges, self.raw.nodes.len());
+        self.raw.mesh = Some(mesh.map_err(|problem| Diagnostic::new(Code::MeshForeign, problem))?);
+        Ok(self)
     }
 
     /// Node number and direction of every row (1 to 3 displacements, 4 to 6 rotations), where rows are not x,
@@ -172,8 +219,38 @@ impl ModelBuilder {
 
     /// As [`ModelBuilder::interface`], with nodes that move as a rigid body.
     pub fn rigid_interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
-        let coupling = Some(Coupling::Rigid);
+        let coupling = Some(Coupling::Rigid.inner());
         self.raw.interfaces.push(NodeSet { coupling, ..NodeSet::new(name, nodes) });
+        self
+    }
+
+    /// As [`ModelBuilder::interface`], with a coupling, and a reference point elsewhere than at the mean of
+    /// the nodes, in model axes.
+    pub fn coupled_interface(
+        mut self,
+        name: impl Into<String>,
+        nodes: Vec<i64>,
+        coupling: Coupling,
+        reference: Option<[f64; 3]>,
+    ) -> Self {
+        let coupling = Some(coupling.inner());
+        let reference = reference.map_or(Reference::Mean, Reference::Point);
+        self.raw.interfaces.push(NodeSet { coupling, reference, ..NodeSet::new(name, nodes) });
+        self
+    }
+
+    /// A plane model: nodes lie in z = 0 and have rows x and y (directions 1, 2 and the rotation 6).
+    pub fn plane(mut self) -> Self {
+        self.raw.dimension = 2;
+        self
+    }
+
+    /// Unit forces and torques at every interface, centrifugal loads, or both, whose static responses join
+    /// free modes as residual vectors.
+    pub fn residual_vectors(mut self, interfaces: bool, centrifugal: bool) -> Self {
+        let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
+        self.residual_vectors =
+            loads.into_iter().filter_map(|(wanted, load)| wanted.then_some(load)).collect();
         self
     }
 
@@ -183,11 +260,31 @@ impl ModelBuilder {
         self
     }
 
+    /// Rayleigh damping D = alpha M + beta K. Units: 1/time, time.
+    pub fn rayleigh_damping(mut self, alpha: f64, beta: f64) -> Self {
+        self.raw.damping = Some(Damping::Rayleigh { alpha, beta });
+        self
+    }
+
+    /// A damping matrix with the rows of K. Unit: mass/time.
+    pub fn damping_matrix(mut self, damping: SparseMatrix) -> Self {
+        let matrix = RawMatrix { matrix: damping.0, digits: 17, path: PathBuf::new() };
+        self.raw.damping = Some(Damping::Matrix(matrix));
+        self
+    }
+
+    /// Takes what a person has looked at as warnings: densities that no matter has, mass between nodes that
+    /// no stiffness joins.
+    pub fn allow_implausible(mut self) -> Self {
+        self.raw.allow_implausible = true;
+        self
+    }
+
     /// Checks the model.
     ///
     /// # Errors
     /// FB305 to FB439: what is wrong with matrices, nodes and interfaces, all of a stage together.
     pub fn build(self) -> Result<Model> {
-        Model::checked(self.raw, Vec::new())
+        Model::checked(self.raw, self.residual_vectors)
     }
 }

@@ -1,10 +1,9 @@
-//! What a body is to do, what it does, and what it needs for that.
+//! What a body is to do, and what it needs for that.
 
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
-use crate::motion::scene::{self, Recording, read_case, read_cases};
+use crate::motion::scene::{self, read_case, read_cases};
 use crate::study::selection;
-use nalgebra::Vector3;
 use std::path::Path;
 
 /// What a body is to do: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).
@@ -43,46 +42,6 @@ impl Scene {
     }
 }
 
-/// The motion of a body in a scene. Units are those of the model.
-#[derive(Debug, Clone)]
-pub struct Motion {
-    pub(super) recording: Recording,
-    pub(super) diagnostics: Vec<Diagnostic>,
-}
-
-impl Motion {
-    /// Instants at which the motion is written.
-    pub fn times(&self) -> &[f64] {
-        &self.recording.time
-    }
-
-    /// Modal coordinates at an instant (nf).
-    ///
-    /// # Panics
-    /// When there is no such instant.
-    pub fn modal_coordinates(&self, instant: usize) -> &[f64] {
-        &self.recording.states[instant].q
-    }
-
-    /// Place of the origin of the frame at an instant, world axes.
-    ///
-    /// # Panics
-    /// When there is no such instant.
-    pub fn origin(&self, instant: usize) -> Vector3<f64> {
-        self.recording.states[instant].origin
-    }
-
-    /// The largest deflection of any node, also between the instants. Unit: length.
-    pub fn largest_deflection(&self) -> f64 {
-        self.recording.extremes.deflection.value
-    }
-
-    /// Warnings and notes.
-    pub fn diagnostics(&self) -> &[Diagnostic] {
-        &self.diagnostics
-    }
-}
-
 /// Which terms and modes a body needs in a scene.
 #[derive(Debug, Clone)]
 pub struct Selection(pub(super) selection::Selection);
@@ -101,5 +60,10 @@ impl Selection {
     /// Whether the tolerances of the scene hold, as far as they were measured.
     pub fn holds(&self) -> bool {
         self.0.holds()
+    }
+
+    /// Warnings and notes.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        &self.0.diagnostics
     }
 }

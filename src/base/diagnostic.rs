@@ -71,7 +71,7 @@ macro_rules! codes {
 codes! {
     // FB1xx: files
     FileUnreadable = "FB101", Error, BadInput, "file cannot be read", "check the path and its permissions";
-    FileFormatUnknown = "FB102", Error, BadInput, "file format not recognised", "give Matrix Market (.mtx, .mtx.gz, .mtx.zst), HDF5 (.h5, .hdf5) or SciPy (.npz) matrices";
+    FileFormatUnknown = "FB102", Error, BadInput, "file format not recognised", "give Matrix Market (.mtx, .mtx.gz, .mtx.zst), HDF5 (.h5, .hdf5), SciPy (.npz), MATLAB (.mat), PETSc or Nastran (.op4, .pch) matrices";
     FileCompressionBroken = "FB103", Error, BadInput, "compressed file is damaged or cut off", "transfer or write the file again";
     OutputUnwritable = "FB104", Error, Resources, "output cannot be written", "check the folder, its permissions and the free space";
     OutputFolderMissing = "FB105", Error, BadInput, "folder of the output file does not exist", "make the folder first";
@@ -85,6 +85,15 @@ codes! {
     DeckRenumbered = "FB113", Note, Done, "nodes of instances are numbered anew", "nothing to do; interfaces go by node sets";
     JobStep = "FB114", Note, Done, "one of several steps with matrices is taken", "nothing to do if it is the right one; else remove the others";
     NodeFileSyntax = "FB115", Error, BadInput, "file of nodes cannot be read", "write it again, or give a table with the columns node, x, y, z";
+    DeckSupports = "FB116", Note, Done, "input deck supports the body", "matrices that are written before the supports are applied (KGG, MGG) are free; for others take the supports out";
+    RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids";
+    DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
+    JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all grids (KGG, MGG) where it matters how the inertia changes with the deformation";
+    MeshPartial = "FB124", Note, Done, "surface to draw the body by is not whole", "nothing to do for the results; connectors and springs are not drawn";
+    MeshForeign = "FB125", Error, BadInput, "mesh is not that of the nodes", "give the mesh that the matrices were computed on, in the same units, or leave `mesh` out";
+    ModesDiffer = "FB127", Warning, Done, "modes of the file are not those of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";
+    ModeFileSyntax = "FB128", Error, BadInput, "file of modes cannot be read", "write it again as docs/fe_programs.md says, or give the shapes as an array";
+    ModesCompleted = "FB129", Note, Done, "rows that the file of modes lacks follow from the others by K and M", "nothing to do: the modes that the file states fulfil the equations of motion there too";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
@@ -116,7 +125,7 @@ codes! {
     MatrixAsymmetric = "FB307", Error, BadInput, "matrix is not symmetric", "only symmetric K and M describe a conservative body; gyroscopic, follower and friction terms do not belong here";
     MatrixSizesDiffer = "FB308", Error, BadInput, "stiffness and mass matrix differ in size", "write both from the same analysis";
     MatrixTriangles = "FB309", Error, BadInput, "entries on both sides of the diagonal of a matrix declared symmetric", "write one triangle, or declare the matrix general";
-    Hdf5Layout = "FB310", Error, BadInput, "no sparse matrix found in the HDF5 file or group", "store data, indices, indptr and shape (CSC, CSR) or data, row, col and shape (COO); name the group as FILE.h5:/group";
+    Hdf5Layout = "FB310", Error, BadInput, "no such matrix in the file or group", "store data, indices, indptr and shape (CSC, CSR) or data, row, col and shape (COO); name the group as FILE.h5:/group";
     MatrixDigits = "FB311", Warning, Done, "matrix values carry few digits", "write 15 to 17 significant digits: thin bodies lose them all";
     MatrixEmpty = "FB312", Error, BadInput, "matrix has no nonzero entries", "write the matrix again";
     MatrixTooLarge = "FB313", Error, BadInput, "matrix is larger than 4294967295 rows", "split the model";
@@ -198,6 +207,7 @@ codes! {
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
     CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
     WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
+    Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
     // FB7xx: flex-body files and checkpoints
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
@@ -222,6 +232,8 @@ codes! {
     ForeignIncomplete = "FB731", Error, BadInput, "file lacks what a body is made of", "write the file anew with the missing part";
     ForeignChanged = "FB732", Note, Done, "modes of the file are no free-surface modes: rigid motion was taken out of them", "nothing to do: the body is the same, its coordinates are others";
     ForeignDropped = "FB733", Warning, Done, "file lacks terms of the kinetic energy: the body does without them", "take a format that holds them";
+    MotionUnreadable = "FB734", Error, BadInput, "not the motion of a simulation, or a damaged one", "give the file that flexbody simulate -o writes";
+    MotionForeign = "FB735", Error, BadInput, "motion of another body", "simulate this body, or give the body that was simulated";
     AuditIdentity = "FB740", Error, CheckFailed, "identity of inertia data violated", "write the file anew with the program that made it, or with flexbody export";
     AuditLumped = "FB741", Error, CheckFailed, "inertia comes from lumped masses", "condense the consistent mass matrix: flexbody convert";
     AuditLayout = "FB742", Error, CheckFailed, "arrays are laid out in another order than the dialect has", "name the dialect to the reader, or write the file anew with flexbody export";

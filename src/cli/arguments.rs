@@ -1,11 +1,14 @@
 //! What can be said on the command line.
 
+mod guidance;
+
 use crate::formats::FORMATS;
 use crate::formats::IMPORT_FORMATS;
 use crate::formats::export::ExportFormat;
 use crate::study::response::{Band, Settings as ResponseSettings};
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+pub use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
 use std::path::PathBuf;
 
 /// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
@@ -35,6 +38,9 @@ pub enum Command {
     /// Check a flex-body file: its schema and every identity that must hold
     Check(CheckArguments),
     /// Compare two flex-body files, whatever the signs and bases of their modes
+    #[command(
+        after_help = "Example:\n  flexbody compare released.flex.h5 new.flex.h5 --frequency 1e-6 --report comparison.html --report comparison.xml"
+    )]
     Compare(CompareArguments),
     /// Decide which terms and modes a body needs in a scene, with the bound or the measurement behind each
     #[command(
@@ -57,14 +63,53 @@ pub enum Command {
         after_help = "Examples:\n  flexbody response model.toml --modes 20 --band 0..2000 --from big_end --to small_end --damping 0.01 --report response.html\n  flexbody response model.toml rod.flex.h5 --scene crank.toml --csv response.csv\n  flexbody response rod.flex.h5 --band 10..2000 --from big_end:z --to 17:x,z"
     )]
     Response(ResponseArguments),
+    /// Write a page that shows the modes of a body, or a simulation, in motion: one file for any browser
+    #[command(
+        after_help = "Examples:\n  flexbody view rod.flex.h5 -o rod.html\n  flexbody view rod.flex.h5 --simulation tumble.h5 -o tumble.html"
+    )]
+    View(ViewArguments),
     /// Write a body in the format of another program
     #[command(
         after_help = "Examples:\n  flexbody export rod.flex.h5 --to exudyn -o rod.hdf5\n  flexbody export rod.flex.h5 --to sid --dialect py-sid --points interfaces -o rod.SID_FEM"
     )]
     Export(ExportArguments),
+    /// Say how an FE program is made to write its matrices: the lines of the deck, and the command that goes
+    /// on from there
+    #[command(after_help = "Example:\n  flexbody recipe calculix")]
+    Recipe(RecipeArguments),
     /// Check a flexible-body file of another program: dialect, identities, digits, units, in plain words
     #[command(after_help = "Example:\n  flexbody audit rod.SID_FEM")]
     Audit(AuditArguments),
+    /// Tell what the program is made of and what it finds on this machine: threads, memory, instructions
+    Doctor(DoctorArguments),
+    /// Print the completions of a shell
+    #[command(
+        after_help = "Example:\n  flexbody completions bash > ~/.local/share/bash-completion/completions/flexbody"
+    )]
+    Completions(CompletionsArguments),
+    /// Print a page of the manual
+    #[command(after_help = "Example:\n  flexbody man convert > flexbody-convert.1")]
+    Man(ManArguments),
+}
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub struct ViewArguments {
+    /// Flex-body file
+    #[arg(value_name = "BODY.flex.h5")]
+    pub body: PathBuf,
+    /// Page to write
+    #[arg(short, long, value_name = "VIEW.html")]
+    pub output: PathBuf,
+    /// Motion of the body to play instead of its modes: the file that `simulate -o` has written
+    #[arg(long, value_name = "MOTION.h5")]
+    pub simulation: Option<PathBuf>,
+    /// Triangles of the surface at the most [default: as many as keep the page below 10 MB]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub triangles: Option<u32>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
 }
 
 /// Arguments of `export`.
@@ -140,24 +185,42 @@ fn job_programs() -> clap::builder::PossibleValuesParser {
     crate::input::job_programs().map(PossibleValue::new).collect::<Vec<_>>().into()
 }
 
+/// What a manifest would say of the job of an FE program, for every command that takes a model.
+#[derive(Debug, Args)]
+pub struct JobArguments {
+    /// FE program that has written the job [default: by its files]
+    #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]
+    pub format: Option<String>,
+    /// Units of length, mass and time where no manifest states them [default: m,kg,s, not checked]
+    #[arg(long, value_name = "L,M,T")]
+    pub units: Option<String>,
+    /// Node set of the job as an interface: NAME=SET, SET for both, and a coupling after a comma as in
+    /// bore=SET_BORE,rigid (repeatable)
+    #[arg(long, value_name = "NAME=SET[,COUPLING]")]
+    pub interface: Vec<String>,
+}
+
 /// Arguments of `trade`.
 #[derive(Debug, Args)]
 pub struct TradeArguments {
-    /// Flex-body file, whose modes and groups of terms are candidates; or a manifest (.toml), of which
-    /// settings of `convert` are too
-    #[arg(value_name = "BODY.flex.h5|MODEL.toml")]
+    /// Flex-body file, whose modes and groups of terms are candidates; or a model, its manifest or the job of
+    /// an FE program, of which settings of `convert` are too
+    #[arg(value_name = "BODY.flex.h5|MODEL.toml|JOB.inp")]
     pub body: PathBuf,
+    /// The job of an FE program.
+    #[command(flatten)]
+    pub job: JobArguments,
     /// What the body does, and the tolerances (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
     /// Load case of the scene to take, by its name (a scene with cases needs one)
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
-    /// What errors are measured against: full, the body with all modes and groups, of a manifest twice the
-    /// modes and residual vectors; nodal, the unreduced equations (manifests only)
+    /// What errors are measured against: full, the body with all modes and groups, of a model twice the
+    /// modes and residual vectors; nodal, the unreduced equations (models only)
     #[arg(long, value_enum, default_value_t = ReferenceName::Full)]
     pub reference: ReferenceName,
-    /// Free modes that candidates of a manifest have at most
+    /// Free modes that candidates of a model have at most
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000))]
     pub modes: Option<u32>,
     /// Simulations per candidate whose median time is told
@@ -187,13 +250,16 @@ pub struct TradeArguments {
 /// Arguments of `response`.
 #[derive(Debug, Args)]
 pub struct ResponseArguments {
-    /// Manifest (.toml) of the model, which says how large the errors are; or a flex-body file alone, whose
-    /// error is then not known
-    #[arg(value_name = "MODEL.toml|BODY.flex.h5")]
+    /// Manifest of the model or the job of an FE program, whose matrices say how large the errors are; or a
+    /// flex-body file alone, whose error is then not known
+    #[arg(value_name = "MODEL.toml|JOB.inp|BODY.flex.h5")]
     pub model: PathBuf,
     /// Flex-body file that was made of the model [default: the model is converted]
     #[arg(value_name = "BODY.flex.h5")]
     pub body: Option<PathBuf>,
+    /// The job of an FE program.
+    #[command(flatten)]
+    pub job: JobArguments,
     /// Where unit forces act: an interface or a node number, and after a colon directions of x, y, z, rx, ry,
     /// rz with commas [default: the displacements; with --scene where its loads act] (repeatable)
     #[arg(long, value_name = "PLACE[:DIRECTIONS]")]
@@ -260,9 +326,13 @@ pub enum ReferenceName {
 /// Arguments of `select`.
 #[derive(Debug, Args)]
 pub struct SelectArguments {
-    /// Flex-body file with all that there is to select from, or manifest of a model
-    #[arg(value_name = "BODY.flex.h5|MODEL.toml")]
+    /// Flex-body file with all that there is to select from, or a model: its manifest or the job of an FE
+    /// program
+    #[arg(value_name = "BODY.flex.h5|MODEL.toml|JOB.inp")]
     pub body: PathBuf,
+    /// The job of an FE program.
+    #[command(flatten)]
+    pub job: JobArguments,
     /// What the body does and how accurate it has to be (see docs/select.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
@@ -324,30 +394,24 @@ pub struct ConvertArguments {
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split"])]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split", "format", "interface"])]
     pub from: Option<String>,
-    /// FE program that has written the job [default: by its files]
-    #[arg(long, value_name = "PROGRAM", value_parser = job_programs(), conflicts_with_all = ["from", "stiffness"])]
-    pub format: Option<String>,
-    /// Node set of the job as an interface: NAME=SET, SET for both, and a coupling after a comma as in
-    /// bore=SET_BORE,rigid (repeatable)
-    #[arg(long, value_name = "NAME=SET[,COUPLING]", conflicts_with_all = ["from", "stiffness"])]
-    pub interface: Vec<String>,
-    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group) or SciPy (.npz)
-    #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"])]
+    /// The job of an FE program.
+    #[command(flatten)]
+    pub job: JobArguments,
+    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group), SciPy (.npz), MATLAB (FILE.mat:/K), PETSc
+    /// or Nastran (FILE.op4:/KGG)
+    #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"], conflicts_with_all = ["format", "interface"])]
     pub stiffness: Option<PathBuf>,
     /// Mass matrix, consistent
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub mass: Option<PathBuf>,
-    /// Node table: node,x,y,z
+    /// Nodes: a table node,x,y,z, a mesh (Gmsh, VTK, Exodus) or a deck
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub nodes: Option<PathBuf>,
     /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub dofs: Option<PathBuf>,
-    /// Units of length, mass and time of --stiffness, --from or a job [default: m,kg,s, not checked]
-    #[arg(long, value_name = "L,M,T")]
-    pub units: Option<String>,
     /// 2 for a plane model, with x and y only [default: 3]
     #[arg(long, value_name = "N", requires = "stiffness", value_parser = clap::value_parser!(u8).range(2..=3))]
     pub dimension: Option<u8>,
@@ -367,12 +431,13 @@ pub struct ConvertArguments {
     /// What the modes are made of
     #[arg(long, value_enum, default_value_t = BasisName::Free)]
     pub basis: BasisName,
-    /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array
+    /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array;
+    /// or modes by nodes: CalculiX (.frd), Nastran (.pch, .op2), lists of Ansys
     #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
     pub shapes: Option<PathBuf>,
     /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces,
-    /// loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. Replaces [basis] of the
-    /// manifest
+    /// loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. With @HZ the responses at
+    /// that frequency. Replaces [basis] of the manifest
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,
     /// Promise about the modes
@@ -400,6 +465,13 @@ pub struct ConvertArguments {
     /// Compute the modes of each lumped mass too, and compare after aligning the subspaces
     #[arg(long)]
     pub lumped_modes: bool,
+    /// Triangles that the surface to draw the body by has at the most [default: all that the elements of the
+    /// model have]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from")]
+    pub mesh_triangles: Option<u32>,
+    /// Leave the surface out of the file
+    #[arg(long, conflicts_with_all = ["from", "mesh_triangles"])]
+    pub no_mesh: bool,
     /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose
     /// residual vectors and modes where nothing else does
     #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
@@ -446,9 +518,13 @@ pub struct CheckArguments {
     /// Flex-body file
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
-    /// Also recompute invariants and residuals from the matrices of this model
-    #[arg(long, value_name = "MODEL.toml")]
+    /// Also recompute invariants and residuals from the matrices of this model, a manifest or the job of an
+    /// FE program
+    #[arg(long, value_name = "MODEL.toml|JOB.inp")]
     pub against: Option<PathBuf>,
+    /// The job of an FE program.
+    #[command(flatten)]
+    pub job: JobArguments,
     /// How to print.
     #[command(flatten)]
     pub printing: Printing,
@@ -482,6 +558,10 @@ pub struct CompareArguments {
     /// Largest difference of an invariant relative to its Cauchy-Schwarz bound
     #[arg(long, value_name = "REL", value_parser = positive)]
     pub invariants: Option<f64>,
+    /// Report to write, whether the bodies agree or not; format by extension: .html, .json, .txt, .md (Markdown)
+    /// or .xml (test cases as JUnit has them) (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
     /// How to print.
     #[command(flatten)]
     pub printing: Printing,

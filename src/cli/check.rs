@@ -1,21 +1,27 @@
 //! `flexbody check`.
 
 use super::arguments::CheckArguments;
+use super::models::of_manifest_or_job;
 use super::outcome::Outcome;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::body::verification::{changed_sources, own_identities, verify};
 use crate::formats::flex_body_file;
-use crate::input::{read_manifest, read_model};
+use crate::input::read_model;
 use crate::model::{FeModel, RawModel};
 use crate::report::{dropped_text, identities_json, identities_text};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
+    if let (None, Some(option)) = (&arguments.against, arguments.job.first()) {
+        let message = format!("{option} says something of the job of --against, which is missing");
+        return Err(Diagnostic::new(Code::Usage, message).into());
+    }
     let (body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     let mut checks = own_identities(&body);
-    if let Some(manifest) = &arguments.against {
-        let model = model_of(&body, read_model(&read_manifest(manifest)?)?)?;
+    if let Some(path) = &arguments.against {
+        let files = of_manifest_or_job(path, &arguments.job)?;
+        let model = model_of(&body, read_model(&files)?)?;
         diagnostics.extend(changed_sources(&body, &model));
         checks.extend(verify(&body, &model)?);
     }

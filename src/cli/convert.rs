@@ -2,7 +2,7 @@
 
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
 use super::import;
-use super::models::is_manifest;
+use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
@@ -14,15 +14,14 @@ use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::base::units::UnitSystem;
 use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, ModeSettings};
-use crate::body::convert::{Conversion, ConvertSettings, Lumping, convert_resuming};
+use crate::body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert_resuming};
 use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;
 use crate::formats::flex_body_file;
 use crate::input::{
-    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, read_manifest, read_model,
-    read_nodal_masses, read_shapes,
+    ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
-use crate::model::{CheckedModel, Coupling, FeModel, Reference};
+use crate::model::{CheckedModel, FeModel};
 use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
@@ -236,6 +235,11 @@ impl Job<'_> {
             },
             lumped: self.lumped.to_vec(),
             lumped_modes: arguments.lumped_modes,
+            mesh: match (arguments.no_mesh, arguments.mesh_triangles) {
+                (true, _) => MeshChoice::Without,
+                (false, Some(most)) => MeshChoice::AtMost(most as usize),
+                (false, None) => MeshChoice::Whole,
+            },
         }
     }
 }
@@ -252,18 +256,20 @@ fn residual_vectors(arguments: &ConvertArguments, files: &ModelFiles, scenes: &[
 pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
     let mut sets = Vec::new();
     let mut names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
-    for name in &names {
-        sets.push(match (*name, name.strip_prefix("loads=")) {
+    for text in &names {
+        let (name, hertz) = LoadSource::with_frequency(text);
+        let loads = match (name, name.strip_prefix("loads=")) {
             ("centrifugal", _) => LoadSource::Centrifugal,
             ("interfaces", _) => LoadSource::Interfaces,
             (_, Some(path)) if !path.is_empty() => LoadSource::File(MatrixLocation::parse(path)),
             _ => {
-                let message = format!("`{name}` is no set of loads for residual vectors");
+                let message = format!("`{text}` is no set of loads for residual vectors");
                 return Err(Diagnostic::new(Code::Usage, message)
-                    .with_help("centrifugal, interfaces, loads=FILE, or several of them with commas")
+                    .with_help("centrifugal, interfaces, loads=FILE, each with @HZ for the responses at a frequency, or several of them with commas")
                     .into());
             }
-        });
+        };
+        sets.push(loads.at(hertz));
     }
     names.sort_unstable();
     if names.windows(2).any(|pair| pair[0] == pair[1]) {
@@ -294,9 +300,7 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
             "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
         }
         _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
-        ConvertArguments { split: true, .. }
-            if loads.iter().any(|set| matches!(set, LoadSource::File(_))) =>
-        {
+        ConvertArguments { split: true, .. } if loads.iter().any(|set| set.file().is_some()) => {
             "--split: the rows of nodal loads are those of all bodies together"
         }
         ConvertArguments { lumped_modes: true, .. } if residual => {
@@ -320,8 +324,12 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
 fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) -> Result<BasisChoice> {
     match (arguments.basis, &arguments.shapes) {
         (BasisName::Imported, Some(shapes)) => {
-            let raw = read_shapes(&MatrixLocation::parse(shapes), model.stiffness().n(), "shapes")?;
-            ImportedShapes::new(model, raw).map(BasisChoice::Imported)
+            let location = MatrixLocation::parse(shapes);
+            let imported = match read_imported(&location, model.stiffness().n(), "shapes")? {
+                ImportedColumns::Rows(raw) => ImportedShapes::new(model, raw),
+                ImportedColumns::Modes(raw) => ImportedShapes::of_modes(model, raw),
+            };
+            imported.map(BasisChoice::Imported)
         }
         (BasisName::CraigBampton, _) => Ok(BasisChoice::CraigBampton(CraigBampton)),
         (name, _) => {
@@ -382,65 +390,17 @@ fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
 
 fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     match (&arguments.model, &arguments.stiffness, &arguments.mass, &arguments.nodes) {
-        (Some(manifest), ..) if is_manifest(manifest) => {
-            refuse_for_manifest(arguments)?;
-            read_manifest(manifest)
-        }
-        (Some(job), ..) => {
-            let interfaces = arguments.interface.iter().map(|text| interface_source(text));
-            let interfaces = interfaces.collect::<Result<Vec<_>>>()?;
-            ModelFiles::from_job(job, arguments.format.clone(), interfaces, arguments.units.as_deref())
-        }
+        (Some(model), ..) => of_manifest_or_job(model, &arguments.job),
         (None, Some(stiffness), Some(mass), Some(nodes)) => ModelFiles::from_arguments(
             stiffness,
             mass,
             nodes,
             arguments.dofs.clone(),
-            arguments.units.as_deref(),
+            arguments.job.units.as_deref(),
         )
         .map(|files| ModelFiles { dimension: arguments.dimension.unwrap_or(files.dimension), ..files }),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
-}
-
-/// Options that a manifest says itself.
-fn refuse_for_manifest(arguments: &ConvertArguments) -> Result<()> {
-    let message = match arguments {
-        ConvertArguments { units: Some(_), .. } => {
-            "--units are for --stiffness, --from and jobs: a manifest states its own"
-        }
-        ConvertArguments { format: Some(_), .. } => {
-            "--format is for jobs: a manifest says `program` in [files]"
-        }
-        ConvertArguments { interface, .. } if !interface.is_empty() => {
-            "--interface is for jobs: a manifest has [[interface]]"
-        }
-        _ => return Ok(()),
-    };
-    Err(Diagnostic::new(Code::Usage, message).into())
-}
-
-/// An interface as named on the command line: `NAME=SET`, `SET`, each with `,COUPLING`.
-fn interface_source(text: &str) -> Result<InterfaceSource> {
-    let (names, coupling) = match text.rsplit_once(',') {
-        Some((names, coupling)) => (names, Some(coupling.trim())),
-        None => (text, None),
-    };
-    let coupling = coupling.map(|name| {
-        Coupling::ALL.into_iter().find(|coupling| coupling.name() == name).ok_or_else(|| {
-            let known = Coupling::ALL.map(Coupling::name).join(", ");
-            let message = format!("--interface {text}: `{name}` is no coupling");
-            Diagnostic::new(Code::Usage, message).with_help(format!("couplings: {known}"))
-        })
-    });
-    let coupling = coupling.transpose()?;
-    let (name, set) = names.split_once('=').unwrap_or((names, names));
-    if name.is_empty() || set.is_empty() || name.chars().any(char::is_control) {
-        let message = format!("--interface {text}: expected NAME=SET, or NAME=SET,COUPLING");
-        return Err(Diagnostic::new(Code::Usage, message).into());
-    }
-    let nodes = InterfaceNodes::Set(set.to_owned());
-    Ok(InterfaceSource { name: name.to_owned(), nodes, coupling, reference: Reference::Mean })
 }
 
 /// No output may replace an input or another output.
@@ -457,10 +417,7 @@ fn refuse_overwriting(
         Scheme::Ready(_) => None,
     });
     let shapes = arguments.shapes.as_ref().map(|path| MatrixLocation::parse(path).path);
-    let loads = loads.iter().filter_map(|set| match set {
-        LoadSource::File(location) => Some(&location.path),
-        _ => None,
-    });
+    let loads = loads.iter().filter_map(LoadSource::file).map(|location| &location.path);
     let own = files.paths();
     let inputs = own.iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
     let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);

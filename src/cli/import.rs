@@ -20,7 +20,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
         let message = format!("--from {from} needs the file to convert");
         return Err(Diagnostic::new(Code::Usage, message).into());
     };
-    let units = arguments.units.as_deref().map(parse_units).transpose()?.unwrap_or_default();
+    let units = arguments.job.units.as_deref().map(parse_units).transpose()?.unwrap_or_default();
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let outputs = std::iter::once(&arguments.output).chain(&arguments.report);
     refuse_replacing(std::iter::once(path), outputs)?;

@@ -3,22 +3,26 @@
 use super::arguments::{Arguments, Command, Printing};
 use super::outcome::{Outcome, warnings};
 use super::resources::use_threads;
-use super::{audit, check, compare, convert, export, inspect, response, select, simulate, trade};
+use super::{
+    audit, check, compare, completions, convert, doctor, export, inspect, recipe, response, select, simulate,
+    trade, view,
+};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{ExitCode, Result};
 use crate::report::output_json;
 use clap::{CommandFactory, Parser};
+use std::ffi::OsString;
 use std::io::Write;
 
-/// The arguments of this process; where there is nothing to run, help or what is wrong is printed, and the
-/// exit code given.
+/// The arguments of a command line, the name of the program first; where there is nothing to run, help or
+/// what is wrong is printed, and the exit code given.
 ///
 /// # Errors
 /// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for a command line that is not
 /// understood.
-pub fn parse() -> std::result::Result<Arguments, ExitCode> {
-    Arguments::try_parse().map_err(|error| {
-        let words = || std::env::args_os().skip(1).take_while(|word| word != "--");
+pub fn parse(words: &[OsString]) -> std::result::Result<Arguments, ExitCode> {
+    Arguments::try_parse_from(words).map_err(|error| {
+        let words = || words.iter().skip(1).take_while(|word| *word != "--");
         if words().any(|word| word == "--json") && error.use_stderr() {
             let printing = Printing { json: true, quiet: false, deny_warnings: false };
             let given = words().find_map(|word| command_named(word.to_str()?));
@@ -66,8 +70,13 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Trade(arguments) => trade::run(arguments),
         Command::Response(arguments) => response::run(arguments),
+        Command::View(arguments) => view::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Audit(arguments) => audit::run(arguments),
+        Command::Recipe(arguments) => recipe::run(arguments),
+        Command::Doctor(_) => doctor::run(),
+        Command::Completions(arguments) => completions::completions(arguments),
+        Command::Man(arguments) => completions::man(arguments),
     };
     finish(Some(name), printing, outcome)
 }
@@ -82,8 +91,13 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
         Command::Simulate(arguments) => ("simulate", arguments.printing),
         Command::Trade(arguments) => ("trade", arguments.printing),
         Command::Response(arguments) => ("response", arguments.printing),
+        Command::View(arguments) => ("view", arguments.printing),
         Command::Export(arguments) => ("export", arguments.printing),
         Command::Audit(arguments) => ("audit", arguments.printing),
+        Command::Recipe(arguments) => ("recipe", arguments.printing),
+        Command::Doctor(arguments) => ("doctor", arguments.printing),
+        Command::Completions(arguments) => ("completions", arguments.printing),
+        Command::Man(arguments) => ("man", arguments.printing),
     }
 }
 

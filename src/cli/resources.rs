@@ -90,16 +90,24 @@ pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
     machine.into_iter().chain(control_groups()).chain(process_limits()).min()
 }
 
+/// Bytes of address space that this process may have (`ulimit -v`); `None` without a limit.
+pub(super) fn address_space_limit() -> Option<u64> {
+    process_limit(&std::fs::read_to_string("/proc/self/limits").ok()?, "Max address space")
+}
+
+/// The limit of that name in a table of limits, in bytes.
+fn process_limit(limits: &str, key: &str) -> Option<u64> {
+    let line = limits.lines().find(|line| line.starts_with(key))?;
+    line[key.len()..].split_whitespace().next()?.parse::<u64>().ok()
+}
+
 /// What the limits of this process leave (`ulimit -v` and `-d`). They count address space, of which more is
 /// reserved than is in use: who comes closer to a limit than that may still end at it.
 fn process_limits() -> Vec<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
-    let bytes = |key: &str| {
-        let line = limits.lines().find(|line| line.starts_with(key))?;
-        line[key.len()..].split_whitespace().next()?.parse::<u64>().ok()
-    };
-    let limits = ["Max address space", "Max data size"].into_iter().filter_map(bytes);
-    limits.map(|limit| limit.saturating_sub(resident_bytes())).collect()
+    let given =
+        ["Max address space", "Max data size"].into_iter().filter_map(|key| process_limit(&limits, key));
+    given.map(|limit| limit.saturating_sub(resident_bytes())).collect()
 }
 
 /// What each memory control group of this process leaves (versions 1 and 2); files that are mapped count as

@@ -2,7 +2,7 @@
 
 use super::arguments::{BasisName, ResponseArguments};
 use super::convert::load_sources;
-use super::models::{is_manifest, read_checked};
+use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -28,8 +28,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let inputs = || std::iter::once(&arguments.model).chain(&arguments.body).chain(&arguments.scene);
     refuse_replacing(inputs(), outputs(arguments))?;
-    let is_manifest = is_manifest(&arguments.model);
-    refuse_contradictions(arguments, is_manifest)?;
+    let is_model = is_model(&arguments.model, &arguments.job)?;
+    refuse_contradictions(arguments, is_model)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let threads = use_threads(arguments.threads);
@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     let scene =
         arguments.scene.as_ref().map(|path| read_case(path, arguments.case.as_deref())).transpose()?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
-    let (model, body, diagnostics) = if is_manifest {
+    let (model, body, diagnostics) = if is_model {
         let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
         (Some(model), body, diagnostics)
     } else {
@@ -73,14 +73,14 @@ fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> {
 }
 
 /// Options that say nothing together.
-fn refuse_contradictions(arguments: &ResponseArguments, is_manifest: bool) -> Result<()> {
+fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Result<()> {
     let converts =
         arguments.modes.is_some() || arguments.basis.is_some() || arguments.residual_vectors.is_some();
     let message = match arguments {
-        ResponseArguments { body: Some(_), .. } if !is_manifest => {
-            "the model comes first, as a manifest (.toml), and then the body that was made of it"
+        ResponseArguments { body: Some(_), .. } if !is_model => {
+            "the model comes first, as a manifest (.toml) or a job, and then the body that was made of it"
         }
-        _ if converts && !(is_manifest && arguments.body.is_none()) => {
+        _ if converts && !(is_model && arguments.body.is_none()) => {
             "--modes, --basis and --residual-vectors are for a model without a body: a file has the modes that it has"
         }
         ResponseArguments { basis: Some(BasisName::Scene), .. } => {
@@ -103,7 +103,7 @@ fn model_and_body(
     asked: Option<Vec<LoadSource>>,
     watch: Watch<'_>,
 ) -> Result<(FeModel, FlexBody, Vec<Diagnostic>)> {
-    let (files, checked) = read_checked(&arguments.model, outputs(arguments))?;
+    let (files, checked) = read_checked(&arguments.model, &arguments.job, outputs(arguments))?;
     let (model, mut diagnostics) = (checked.model, checked.diagnostics);
     if let Some(path) = &arguments.body {
         let (body, notes) = flex_body_file::read_with_notes(path)?;

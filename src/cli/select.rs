@@ -1,7 +1,7 @@
 //! `flexbody select`.
 
 use super::arguments::SelectArguments;
-use super::models::{is_manifest, read_checked};
+use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -26,6 +26,7 @@ use std::path::Path;
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), arguments.report.iter())?;
+    let is_model = is_model(&arguments.body, &arguments.job)?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let threads = use_threads(arguments.threads);
 
@@ -34,7 +35,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     refuse_replacing(series, arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
-    let (body, lacks, mut diagnostics) = if is_manifest(&arguments.body) {
+    let (body, lacks, mut diagnostics) = if is_model {
         converted(arguments, &scenes, &watch)?
     } else {
         refuse_modes(arguments)?;
@@ -74,7 +75,7 @@ fn converted(
     scenes: &[Scene],
     watch: Watch<'_>,
 ) -> Result<(FlexBody, Vec<Vec<ReferenceError>>, Vec<Diagnostic>)> {
-    let (files, checked) = read_checked(&arguments.body, arguments.report.iter())?;
+    let (files, checked) = read_checked(&arguments.body, &arguments.job, arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = checked;
     let loads = loads_for(scenes, &files.residual_vectors);
     let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);

@@ -1,7 +1,7 @@
 //! `flexbody trade`.
 
 use super::arguments::{ReferenceName, TradeArguments};
-use super::models::{is_manifest, read_checked};
+use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
@@ -22,8 +22,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let outputs = || arguments.csv.iter().chain(&arguments.report);
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), outputs())?;
-    let is_manifest = is_manifest(&arguments.body);
-    refuse_contradictions(arguments, is_manifest)?;
+    let is_model = is_model(&arguments.body, &arguments.job)?;
+    refuse_contradictions(arguments, is_model)?;
     let table = arguments.csv.as_ref().map(OutputSlot::prepare).transpose()?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let threads = use_threads(arguments.threads);
@@ -33,8 +33,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     refuse_replacing(scene.series.iter().map(|file| &file.path), outputs())?;
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();
-    let (model, sources, lacks) = if is_manifest {
-        let (_, checked) = read_checked(&arguments.body, outputs())?;
+    let (model, sources, lacks) = if is_model {
+        let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
         let longest = longest(arguments.allow_long);
@@ -107,13 +107,13 @@ fn candidate_bodies(
 }
 
 /// What a flex-body file cannot be asked for.
-fn refuse_contradictions(arguments: &TradeArguments, is_manifest: bool) -> Result<()> {
+fn refuse_contradictions(arguments: &TradeArguments, is_model: bool) -> Result<()> {
     let message = match arguments {
-        _ if is_manifest => return Ok(()),
+        _ if is_model => return Ok(()),
         TradeArguments { reference: ReferenceName::Nodal, .. } => {
-            "--reference nodal needs the matrices: give the manifest"
+            "--reference nodal needs the matrices: give the model"
         }
-        TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the manifest",
+        TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the model",
         _ => return Ok(()),
     };
     Err(Diagnostic::new(Code::Usage, message).into())

@@ -1,6 +1,7 @@
 //! Sparse matrices in HDF5 files: opening, and finding the group that holds the matrix.
 
 use super::compression::Compression;
+use super::named_matrices::NamedMatrices;
 use super::reader::{MatrixRole, MatrixSource, Reader, is_hdf5};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -8,16 +9,20 @@ use crate::model::RawMatrix;
 use hdf5_metno::{File, Group, LinkType};
 
 mod array;
+mod exodus;
 mod group;
 mod members;
 mod values;
 
 pub(super) use array::read_array;
+pub(super) use exodus::read_exodus;
 use members::Members;
 use values::Found;
 
 /// The HDF5 reader.
 pub(super) struct Hdf5;
+
+const NAMES: NamedMatrices = NamedMatrices { holder: "group", file: "FILE.h5", matrices: "sparse matrices" };
 
 /// Groups that are searched at most, and how deep: a file must not keep us busy.
 const GROUPS: usize = 1000;
@@ -29,7 +34,7 @@ impl Reader for Hdf5 {
     }
 
     fn extensions(&self) -> &'static [&'static str] {
-        &["h5", "hdf5", "hdf", "mat", "h5ad"]
+        &["h5", "hdf5", "hdf", "h5ad"]
     }
 
     fn recognises(&self, head: &[u8]) -> bool {
@@ -85,28 +90,11 @@ fn named(file: &File, name: &str) -> Found<Group> {
 /// The only matrix of the file, or the only one named after its role.
 fn search(file: &File, role: MatrixRole) -> Found<(String, Group)> {
     let mut found = matrices(file);
-    let last = |name: &str| name.rsplit('/').next().unwrap_or("").to_owned();
     if found.is_empty() {
         return Err(vec![layout("file holds no sparse matrix".into())]);
     }
-    if let [(name, _)] = found.as_slice() {
-        let named = |other: &&MatrixRole| **other != role && other.is_named(&last(name));
-        if let Some(other) = MatrixRole::ALL.iter().find(named).map(|other| other.name()) {
-            let message = format!("the only matrix of the file, `{name}`, is named like the {other} matrix");
-            let help = format!("if it is the {} matrix, name the group: FILE.h5:{name}", role.name());
-            return Err(vec![layout(message).with_help(help)]);
-        }
-        return Ok(found.remove(0));
-    }
-    let mut by_name: Vec<usize> = (0..found.len()).filter(|&k| role.is_named(&last(&found[k].0))).collect();
-    match (by_name.pop(), by_name.is_empty()) {
-        (Some(only), true) => Ok(found.remove(only)),
-        _ => {
-            let message =
-                format!("file holds {} sparse matrices; which is the {} matrix?", found.len(), role.name());
-            Err(vec![layout(message).with_help(listing(&found))])
-        }
-    }
+    let chosen = NAMES.choose(&names(&found), role).map_err(|diagnostic| vec![diagnostic])?;
+    Ok(found.swap_remove(chosen))
 }
 
 /// Names and groups of all sparse matrices of the file, breadth first.
@@ -140,13 +128,12 @@ fn matrices(file: &File) -> Vec<(String, Group)> {
     found
 }
 
+fn names(found: &[(String, Group)]) -> Vec<&str> {
+    found.iter().map(|(name, _)| name.as_str()).collect()
+}
+
 fn listing(found: &[(String, Group)]) -> String {
-    if found.is_empty() {
-        return Code::Hdf5Layout.help().to_owned();
-    }
-    let names: Vec<&str> = found.iter().take(8).map(|(name, _)| name.as_str()).collect();
-    let more = if found.len() > names.len() { ", ..." } else { "" };
-    format!("name the group as FILE.h5:/group; the file has {}{more}", names.join(", "))
+    if found.is_empty() { Code::Hdf5Layout.help().to_owned() } else { NAMES.listing(&names(found)) }
 }
 
 fn layout(message: String) -> Diagnostic {

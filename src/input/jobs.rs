@@ -8,14 +8,17 @@ mod coordinate_files;
 mod deck;
 mod deck_mesh;
 mod element_kinds;
+mod expanded;
+mod nastran;
 
 use super::bytes::InputFile;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{DofLabel, Nodes, RawMatrix};
+use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
 use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
 use deck_mesh::DeckMesh;
+use nastran::Nastran;
 use std::path::{Path, PathBuf};
 
 /// A job of an FE program: its main file, and the program where the user said which.
@@ -30,7 +33,7 @@ pub struct JobFile {
 impl JobFile {
     /// The main file and the files beside it that have its name, which a run must not replace.
     pub(super) fn family(&self) -> Vec<PathBuf> {
-        const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx"];
+        const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx", ".pch", ".op4"];
         let is_matrix = |rest: &str| MATRICES.iter().any(|extension| rest.ends_with(extension));
         let matrices = siblings(&self.path).filter(|(rest, _)| is_matrix(rest)).map(|(_, path)| path);
         let mut family: Vec<PathBuf> = std::iter::once(self.path.clone()).chain(matrices).collect();
@@ -48,6 +51,8 @@ pub(super) struct JobModel {
     pub dofs: Vec<DofLabel>,
     /// Names are compared without regard to case.
     pub sets: NodeSets,
+    /// What the part is drawn by.
+    pub elements: Elements,
     /// Role and path of every file that was read.
     pub files: Vec<(&'static str, PathBuf)>,
     /// Warnings and notes.
@@ -74,16 +79,21 @@ pub(super) trait JobReader: Sync {
     /// Reads matrices, nodes, labels and sets.
     ///
     /// # Errors
-    /// FB101 to FB111, FB2xx and FB3xx, as many as are found.
+    /// FB101 to FB112, FB2xx and FB3xx, as many as are found.
     fn read(&self, path: &Path) -> Found<JobModel>;
 }
 
 /// Every FE program whose jobs are read; the first that recognises a file takes it.
-const JOBS: &[&dyn JobReader] = &[&Calculix, &Abaqus];
+const JOBS: &[&dyn JobReader] = &[&Calculix, &Abaqus, &Nastran];
 
 /// Names of the FE programs whose jobs are read.
 pub fn job_programs() -> impl Iterator<Item = &'static str> {
     JOBS.iter().map(|reader| reader.name())
+}
+
+/// Whether a path is that of a job: a keyword deck by its name, or what a reader recognises.
+pub fn is_job(path: &Path) -> bool {
+    is_deck(path) || JOBS.iter().any(|reader| reader.recognises(path))
 }
 
 /// Reads a job.
@@ -114,14 +124,15 @@ fn unknown(job: &JobFile) -> Diagnostic {
     Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
 }
 
-/// The nodes and node sets of a keyword deck.
+/// The nodes, node sets and elements of a keyword deck.
 ///
 /// # Errors
 /// FB101, FB106, FB110, FB111.
-pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets)> {
-    let DeckMesh { nodes, sets, .. } = DeckMesh::of(&Deck::read(file.path())?)?;
-    let (ids, positions) = nodes.into_iter().unzip();
-    Ok((Nodes { ids, positions }, sets))
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
+    let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
+    let elements = mesh.drawn();
+    let (ids, positions) = mesh.nodes.into_iter().unzip();
+    Ok((Nodes { ids, positions }, mesh.sets, elements))
 }
 
 /// Whether a path is that of a keyword deck, by its name.

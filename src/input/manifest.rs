@@ -19,7 +19,7 @@ mod region;
 const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
-const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program"];
+const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "mesh"];
 
 /// Reads a manifest. Relative paths in it are taken from its folder. The files themselves are not touched.
 ///
@@ -58,12 +58,15 @@ impl Walk<'_> {
             return None;
         };
         let source = self.source(files, span);
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let mesh = self.string(files, "mesh").map(|mesh| folder.join(mesh));
         Some(ModelFiles {
             name: name.unwrap_or_else(|| stem(self.path)),
             dimension,
             units,
             allow_implausible,
             source: source?,
+            mesh,
             interfaces: interfaces?,
             damping,
             geometric_stiffness,

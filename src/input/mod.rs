@@ -4,10 +4,13 @@
 
 mod array;
 mod assemble;
+mod bulk_cards;
 mod bytes;
+mod compressed;
 mod compression;
 mod coordinates;
 mod digits;
+mod dmig;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(not(feature = "hdf5"))]
@@ -16,13 +19,21 @@ mod hdf5;
 mod jobs;
 mod manifest;
 mod mapping;
+mod mat5;
 mod matrix_market;
+mod mesh;
+mod mode_files;
 mod model_files;
+mod named_matrices;
+mod nastran_names;
 mod node_files;
 mod npy;
+mod output4;
+mod petsc;
 mod read_model;
 mod reader;
 mod readers;
+mod recipes;
 mod region;
 mod scipy_npz;
 mod series;
@@ -35,7 +46,7 @@ mod zstd_frames;
 pub(crate) use assemble::check_size;
 pub use bytes::InputFile;
 pub use compression::Compression;
-pub use jobs::{JobFile, job_programs};
+pub use jobs::{JobFile, is_job, job_programs};
 pub use manifest::read_manifest;
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, TableFiles,
@@ -44,7 +55,8 @@ pub use model_files::{
 pub use read_model::{read_matrix, read_model, read_nodal_masses};
 pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
 pub use readers::READERS;
+pub use recipes::{RECIPES, Recipe, Step};
 pub use region::Region;
 pub(crate) use series::{ColumnKey, Series, read_series};
-pub use shapes::read_shapes;
+pub use shapes::{ImportedColumns, read_imported, read_shapes};
 pub(crate) use walk::{Table, Value, Walk, integer, read_toml, real};

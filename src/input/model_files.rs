@@ -22,6 +22,8 @@ pub struct ModelFiles {
     pub allow_implausible: bool,
     /// Where matrices, nodes and labels come from.
     pub source: ModelSource,
+    /// File whose elements the part is drawn by, where it is not the one of the nodes.
+    pub mesh: Option<PathBuf>,
     /// Named node sets.
     pub interfaces: Vec<InterfaceSource>,
     /// Damping, where it is given.
@@ -83,7 +85,7 @@ pub enum InterfaceNodes {
 }
 
 /// Loads of residual vectors and where they come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum LoadSource {
     /// The six centrifugal loads.
     Centrifugal,
@@ -91,6 +93,41 @@ pub enum LoadSource {
     Interfaces,
     /// Nodal forces by matrix rows in a file.
     File(MatrixLocation),
+    /// Loads whose responses at a frequency are wanted instead of the static ones.
+    At {
+        /// The loads, not these again.
+        loads: Box<LoadSource>,
+        /// Positive; in hertz.
+        hertz: f64,
+    },
+}
+
+impl LoadSource {
+    /// The same loads at a frequency; static at zero.
+    pub fn at(self, hertz: f64) -> Self {
+        if hertz == 0.0 { self } else { Self::At { loads: Box::new(self), hertz } }
+    }
+
+    /// The file that they come from.
+    pub fn file(&self) -> Option<&MatrixLocation> {
+        match self {
+            Self::Centrifugal | Self::Interfaces => None,
+            Self::File(location) => Some(location),
+            Self::At { loads, .. } => loads.file(),
+        }
+    }
+
+    /// `NAME@HZ` in its parts; the frequency is zero where the text names none.
+    ///
+    /// ```
+    /// use flexbody::input::LoadSource;
+    /// assert_eq!(LoadSource::with_frequency("interfaces@500"), ("interfaces", 500.0));
+    /// assert_eq!(LoadSource::with_frequency("loads=at@home.npy"), ("loads=at@home.npy", 0.0));
+    /// ```
+    pub fn with_frequency(text: &str) -> (&str, f64) {
+        let parts = text.rsplit_once('@').and_then(|(name, hertz)| Some((name, hertz.parse::<f64>().ok()?)));
+        parts.filter(|(_, hertz)| hertz.is_finite() && *hertz >= 0.0).unwrap_or((text, 0.0))
+    }
 }
 
 /// A matrix file and, for formats that hold several matrices, the group within it.
@@ -163,6 +200,7 @@ impl ModelFiles {
         };
         own.into_iter()
             .chain(self.manifest.clone())
+            .chain(self.mesh.clone())
             .chain(damping)
             .chain(geometric)
             .chain(interfaces)
@@ -193,6 +231,7 @@ impl ModelFiles {
             units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
             allow_implausible: false,
             source,
+            mesh: None,
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),

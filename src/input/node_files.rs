@@ -2,22 +2,28 @@
 
 mod ansys_list;
 mod cdb;
+mod exodus;
 mod gmsh;
+mod vtk_legacy;
+mod vtk_numbers;
+mod vtk_xml;
+mod xml_elements;
 
 use super::bytes::InputFile;
 use super::jobs::{NodeSets, nodes_of_deck};
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::Nodes;
+use crate::model::{Elements, Nodes};
 use std::collections::HashSet;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// Nodes and what is known of sets of them.
+/// Nodes, and what is known of sets and elements of them.
 #[derive(Debug, Default)]
 pub(super) struct NodeFile {
     pub nodes: Nodes,
     pub sets: NodeSets,
+    pub elements: Elements,
 }
 
 /// A format of node files besides our table.
@@ -29,6 +35,9 @@ struct Format {
 /// The first that recognises the begin of a file reads it.
 const FORMATS: &[Format] = &[
     Format { recognises: gmsh::recognises, read: gmsh::read },
+    Format { recognises: vtk_xml::recognises, read: vtk_xml::read },
+    Format { recognises: vtk_legacy::recognises, read: vtk_legacy::read },
+    Format { recognises: exodus::recognises, read: exodus::read },
     Format { recognises: cdb::recognises, read: cdb::read },
     Format { recognises: is_deck, read: deck },
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
@@ -45,7 +54,7 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile>
     let bytes = file.bytes();
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
     let Some(format) = FORMATS.iter().find(|format| (format.recognises)(&head)) else {
-        return read_nodes(file, dimension).map(|nodes| NodeFile { nodes, sets: Vec::new() });
+        return read_nodes(file, dimension).map(|nodes| NodeFile { nodes, ..NodeFile::default() });
     };
     let read = (format.read)(file)?;
     let wrong = |code, message: String| Err(vec![Diagnostic::new(code, message).in_file(file.path())]);
@@ -78,10 +87,15 @@ fn is_deck(head: &str) -> bool {
 }
 
 fn deck(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_deck(file).map(|(nodes, sets)| NodeFile { nodes, sets })
+    nodes_of_deck(file).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
 }
 
 /// FB115 at a line.
 fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
+}
+
+/// FB115 of a file without lines.
+fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
 }

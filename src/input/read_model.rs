@@ -4,6 +4,7 @@ use super::bytes::InputFile;
 use super::compression::Compression;
 use super::jobs::{JobModel, NodeSets, read_job};
 use super::mapping::Mapping;
+use super::mesh::MeshReading;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
 use super::node_files::{NodeFile, read_node_file};
 use super::reader::{MatrixRole, MatrixSource};
@@ -12,7 +13,7 @@ use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
-use crate::model::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
+use crate::model::{Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 ///
 /// # Errors
 /// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric
-/// stiffness, interfaces.
+/// stiffness, interfaces, mesh.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let opened = OpenFiles::new(files);
     let (parsed, fingerprints) = rayon::join(|| Parsed::of(files, &opened), || opened.fingerprints());
@@ -54,12 +55,21 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         .iter()
         .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, &opened, files)))
         .collect();
+    let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
+    let mesh = matrices.as_ref().map(|matrices| {
+        let from = mesh_file.as_ref().zip(files.mesh.as_deref());
+        MeshReading { nodes: &matrices.nodes, elements: &matrices.elements, path: &matrices.nodes_path }
+            .mesh(from)
+    });
+    let mesh = mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
     let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
         return Err(Error::new(diagnostics));
     };
     diagnostics.extend(matrices.diagnostics);
+    let (mesh, partly) = mesh.unwrap_or_default();
+    diagnostics.extend(partly);
     Ok(RawModel {
         name: files.name.clone(),
         dimension: files.dimension,
@@ -68,6 +78,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         mass: matrices.mass,
         nodes: matrices.nodes,
         nodes_path: matrices.nodes_path,
+        mesh,
         dofs: matrices.dofs,
         dofs_path: matrices.dofs_path,
         interfaces,
@@ -92,6 +103,7 @@ type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
 /// What stands in the files, each with what is wrong with it.
 struct Parsed {
     matrices: Matrices,
+    mesh: Option<Found<NodeFile>>,
     damping: Option<Found<Damping<RawMatrix>>>,
     geometric_stiffness: Vec<Found<GeometricStiffness<RawMatrix>>>,
 }
@@ -111,6 +123,8 @@ struct ModelMatrices {
     dofs_path: PathBuf,
     /// Node sets of a job.
     sets: NodeSets,
+    /// What the part is drawn by.
+    elements: Elements,
     /// Files of a job.
     files: Vec<(&'static str, PathBuf)>,
     diagnostics: Vec<Diagnostic>,
@@ -118,13 +132,14 @@ struct ModelMatrices {
 
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
-        let JobModel { stiffness, mass, nodes, dofs, sets, files, diagnostics } = job;
+        let JobModel { stiffness, mass, nodes, dofs, sets, elements, files, diagnostics } = job;
         let path = |role: &str| {
             let file = files.iter().find(|(own, _)| *own == role).or(files.first());
             file.map(|(_, path)| path.clone()).unwrap_or_default()
         };
         let (nodes_path, dofs_path) = (path("deck"), path("dofs"));
-        Self { stiffness, mass, nodes, nodes_path, dofs: Some(dofs), dofs_path, sets, files, diagnostics }
+        let dofs = Some(dofs);
+        Self { stiffness, mass, nodes, nodes_path, dofs, dofs_path, sets, elements, files, diagnostics }
     }
 }
 
@@ -146,7 +161,7 @@ impl ParsedTables {
             None => None,
         };
         let tables = files.tables().expect("tables were read");
-        let (stiffness, mass, NodeFile { nodes, sets }) = (stiffness?, mass?, nodes?);
+        let (stiffness, mass, NodeFile { nodes, sets, elements }) = (stiffness?, mass?, nodes?);
         let dofs_path = tables.dofs.clone().unwrap_or_default();
         let dofs = match dofs {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
@@ -160,6 +175,7 @@ impl ParsedTables {
             dofs,
             dofs_path,
             sets,
+            elements,
             files: Vec::new(),
             diagnostics: Vec::new(),
         })
@@ -192,6 +208,7 @@ impl Parsed {
                 Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs }))
             }
         };
+        let mesh = files.mesh.as_ref().map(|path| read_node_file(opened.get(path)?, files.dimension));
         let damping = files.damping.as_ref();
         let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
         let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
@@ -199,7 +216,7 @@ impl Parsed {
             Ok(GeometricStiffness { load: one.load.clone(), matrix })
         });
         let geometric_stiffness = geometric_stiffness.collect();
-        Self { matrices, damping, geometric_stiffness }
+        Self { matrices, mesh, damping, geometric_stiffness }
     }
 }
 
@@ -252,7 +269,7 @@ impl<'m> Places<'m> {
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
             let help = match names.is_empty() {
                 true => {
-                    "only decks of FE programs have node sets: list the nodes, or give a region".to_owned()
+                    "the files of the model have no node sets: list the nodes, or give a region".to_owned()
                 }
                 false => format!("node sets: {}", names.join(", ")),
             };
@@ -362,6 +379,7 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
         roles.push(("nodes", &tables.nodes));
         roles.extend(tables.dofs.as_deref().map(|path| ("dofs", path)));
     }
+    roles.extend(files.mesh.as_deref().map(|path| ("mesh", path)));
     let damping = files.damping.as_ref().and_then(Damping::matrix);
     roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
     let geometric = files.geometric_stiffness.iter().map(|one| one.matrix.path.as_path());

@@ -2,6 +2,7 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::model::RawMatrix;
 
@@ -56,6 +57,24 @@ pub struct MatrixSource<'a> {
     pub group: Option<&'a str>,
     /// Role of the matrix in the model.
     pub role: MatrixRole,
+}
+
+impl<'a> MatrixSource<'a> {
+    /// Refuses a group in a file of a format (`what`, as in "an archive of SciPy") that has none.
+    pub(super) fn has_one_matrix(&self, what: &str) -> std::result::Result<(), Diagnostic> {
+        let Some(group) = self.group else { return Ok(()) };
+        let message = format!("group `{group}` is named, but {what} holds one matrix");
+        Err(Diagnostic::new(Code::Hdf5Layout, message).with_help("give the file without a group"))
+    }
+
+    /// The bytes of a file of a binary format (`what`, as in "PETSc file") that is read where it lies.
+    pub(super) fn not_packed(&self, what: &str) -> std::result::Result<&'a [u8], Diagnostic> {
+        if self.compression == Compression::None {
+            return Ok(self.file.bytes());
+        }
+        let message = format!("{what} is compressed as a whole");
+        Err(Diagnostic::new(Code::FileFormatUnknown, message).with_help("unpack it"))
+    }
 }
 
 /// Reads one matrix format. A new format is one file of this room, one entry in [`READERS`](super::READERS)

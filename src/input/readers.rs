@@ -2,8 +2,12 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
+use super::dmig::DmigPunch;
 use super::hdf5::Hdf5;
+use super::mat5::Mat5;
 use super::matrix_market::MatrixMarket;
+use super::output4::Output4;
+use super::petsc::Petsc;
 use super::reader::{HEAD, Reader};
 use super::scipy_npz::ScipyNpz;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -11,7 +15,7 @@ use crate::base::error::Result;
 use std::path::Path;
 
 /// Every matrix format that is understood.
-pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz];
+pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz, &Mat5, &Petsc, &Output4, &DmigPunch];
 
 /// The reader for a file: by its content, else by its extension.
 ///
@@ -46,7 +50,16 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
 /// First bytes of files that people have and that are not read, what they are, and what to do.
 const NOT_READ: &[(&[u8], &str, &str)] = &[
     (b"PK\x03\x04", "a zip archive", "unpack it"),
-    (b"MATLAB 5.0", "a MATLAB file of version 5 to 7", "save it with the option -v7.3, which is HDF5"),
+    (
+        b"[row ",
+        "printed by MFEM's SparseMatrix::Print",
+        "write it by A.PrintMM(file), which is Matrix Market",
+    ),
+    (
+        b"% size ",
+        "printed by MFEM's SparseMatrix::PrintMatlab",
+        "write it by A.PrintMM(file), which is Matrix Market",
+    ),
     (b"BZh", "compressed by bzip2", "unpack it, or compress it by gzip or zstd"),
     (b"\xfd7zXZ", "compressed by xz", "unpack it, or compress it by gzip or zstd"),
     (b"\x1f\x8b", "compressed twice", "unpack it once"),

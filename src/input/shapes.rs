@@ -1,19 +1,41 @@
 //! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by
-//! content.
+//! content. Shapes come also by nodes, as FE programs write modes.
 
 use super::array::Array;
 use super::bytes::InputFile;
 use super::compression::Compression;
 use super::hdf5::Hdf5;
 use super::matrix_market::MatrixMarket;
+use super::mode_files::read_modes;
 use super::model_files::MatrixLocation;
 use super::reader::{HEAD, Reader};
 use super::{hdf5, matrix_market, npy};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
-use crate::model::RawShapes;
+use crate::model::{RawModes, RawShapes};
 use faer::Mat;
+
+/// Shapes as a file has them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ImportedColumns {
+    /// By matrix rows.
+    Rows(RawShapes),
+    /// By nodes, with eigenvalues.
+    Modes(RawModes),
+}
+
+/// Reads shapes for matrices with `n` rows, by rows or by nodes. `role` names the file in the provenance.
+///
+/// # Errors
+/// Those of [`read_shapes`]; FB128 and FB306 for files of modes.
+pub fn read_imported(location: &MatrixLocation, n: usize, role: &str) -> Result<ImportedColumns> {
+    let file = InputFile::open(&location.path)?;
+    match read_modes(&file, role).filter(|_| location.group.is_none()) {
+        Some(modes) => modes.map(ImportedColumns::Modes).map_err(Error::new),
+        None => read_shapes(location, n, role).map(ImportedColumns::Rows),
+    }
+}
 
 /// Reads shapes or loads for matrices with `n` rows: an array n x k, or k x n where k is not n too. `role`
 /// names the file in the provenance.

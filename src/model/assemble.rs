@@ -9,7 +9,7 @@ use super::matrix_checks::{check_diagonal, check_diagonals, check_matrix, symmet
 use super::references::resolve_references;
 use super::rigid::rigid_count;
 use super::wording::name_some;
-use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
+use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel, SurfaceMesh};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Result, stop_on_error};
 use crate::numerics::linalg::SymmetricMatrix;
@@ -29,6 +29,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let layout = layout.expect("a missing layout comes with an error");
     let nodes = layout.used_nodes(&raw.nodes);
     check_tables(&mut raw, &nodes, &mut found);
+    let mesh = mesh_of_used(&mut raw, &nodes, &mut found);
     stop_on_error(&mut found)?;
     let mut order = InternalOrder { layout: &layout, nodes: &nodes, found: &mut found };
     let stiffness = order.symmetric(&mut raw.stiffness, "stiffness");
@@ -45,7 +46,8 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
     let rows = layout.rows;
-    let body = Assembled { raw, nodes, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness };
+    let body =
+        Assembled { raw, nodes, mesh, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness };
     Ok((body, found))
 }
 
@@ -91,6 +93,27 @@ fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
         let message = format!("model has {rows} degrees of freedom");
         found.push(Diagnostic::new(Code::ModelTooSmall, message));
     }
+}
+
+/// The surface on the `nodes` that have rows. What it loses with the others is told: it leaves holes.
+fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) -> Option<SurfaceMesh> {
+    let mesh = raw.mesh.take()?;
+    if mesh.least_nodes() > raw.nodes.len() {
+        let message = format!("mesh has {} nodes, the node table {}", mesh.least_nodes(), raw.nodes.len());
+        found.push(Diagnostic::new(Code::MeshForeign, message));
+        return None;
+    }
+    let used = mesh.among(&raw.nodes.ids, &nodes.ids);
+    let left = used.as_ref().map_or(0, |used| used.triangles().len());
+    let all = mesh.triangles().len();
+    if left < all {
+        let message = format!(
+            "{} of {all} triangles have nodes without degrees of freedom: they are not drawn",
+            all - left
+        );
+        found.push(Diagnostic::new(Code::MeshPartial, message));
+    }
+    used
 }
 
 /// Coordinates are finite, and those of a plane model lie in its plane.

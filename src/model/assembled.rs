@@ -1,14 +1,16 @@
 //! A model between the checks of its matrices by themselves and those of the body that they describe.
 
-use super::{Damping, GeometricStiffness, Nodes, RawModel, Rows};
+use super::{Damping, GeometricStiffness, Nodes, RawModel, Rows, SurfaceMesh};
 use crate::numerics::linalg::SymmetricMatrix;
 
 /// A model in the internal order whose matrices are sound by themselves.
 pub(super) struct Assembled {
-    /// What was read, without matrices, nodes and labels.
+    /// What was read, without matrices, nodes, surface and labels.
     pub raw: RawModel,
     /// Nodes with degrees of freedom.
     pub nodes: Nodes,
+    /// The surface on these nodes.
+    pub mesh: Option<SurfaceMesh>,
     /// What the rows are; how those without a place move is not known yet.
     pub rows: Rows,
     /// K.

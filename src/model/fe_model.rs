@@ -3,7 +3,7 @@
 
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
-use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows};
+use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::{CscMatrix, Pencil, SymmetricMatrix, larger};
@@ -17,6 +17,7 @@ pub struct FeModel {
     name: String,
     units: UnitSystem,
     nodes: Nodes,
+    mesh: Option<SurfaceMesh>,
     rows: Rows,
     stiffness: SymmetricMatrix,
     /// Ms, or what comes closest to it.
@@ -45,13 +46,14 @@ impl FeModel {
         diagonal_mass: bool,
         number: Option<BodyNumber>,
     ) -> Self {
-        let Assembled { raw, nodes, rows, stiffness, mass, damping, geometric_stiffness, .. } = body;
+        let Assembled { raw, nodes, mesh, rows, stiffness, mass, damping, geometric_stiffness, .. } = body;
         let scalar = form.commutes && rows.len() == rows.displacements();
         Self {
             digits: raw.stiffness.digits,
             name: raw.name,
             units: raw.units,
             nodes,
+            mesh,
             rows,
             stiffness,
             mean_mass: form.scalar,
@@ -87,6 +89,11 @@ impl FeModel {
     /// Nodes that carry degrees of freedom, in the order of the node table.
     pub fn nodes(&self) -> &Nodes {
         &self.nodes
+    }
+
+    /// The surface, by indices of the nodes, where elements are known.
+    pub fn mesh(&self) -> Option<&SurfaceMesh> {
+        self.mesh.as_ref()
     }
 
     /// K, row d i + k for direction k of node i, then the other rows.

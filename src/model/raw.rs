@@ -1,6 +1,6 @@
 //! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
 
-use super::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes};
+use super::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, SurfaceMesh};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
@@ -33,6 +33,25 @@ pub struct RawShapes {
     pub source: Option<SourceFile>,
 }
 
+/// Modes as an FE program has written them: by nodes, with the eigenvalues that it found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawModes {
+    /// Node and direction of every row of `matrix`, each once.
+    pub labels: Vec<DofLabel>,
+    /// One column for every mode.
+    pub matrix: Mat<f64>,
+    /// Eigenvalue of every mode in radians^2/time^2; `None` where the file states none.
+    pub eigenvalues: Vec<Option<f64>>,
+    /// Significant decimal digits of the eigenvalues.
+    pub eigenvalue_digits: u8,
+    /// Significant decimal digits that the values of the shapes carry at the most.
+    pub digits: u8,
+    /// Where they came from.
+    pub path: PathBuf,
+    /// The same with its fingerprint.
+    pub source: SourceFile,
+}
+
 /// Everything that describes one model, before the checks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawModel {
@@ -50,6 +69,8 @@ pub struct RawModel {
     pub nodes: Nodes,
     /// Where the node table came from; empty when handed over in memory.
     pub nodes_path: PathBuf,
+    /// The surface, by indices of `nodes`, where elements are known.
+    pub mesh: Option<SurfaceMesh>,
     /// Label of each matrix row; `None`: node-major x, y, z in the order of the node table.
     pub dofs: Option<Vec<DofLabel>>,
     /// Where the labels came from; empty when handed over in memory.
@@ -63,7 +84,7 @@ pub struct RawModel {
     /// Whether findings that a person has looked at are warnings: densities that no matter has, mass between
     /// nodes that no stiffness joins.
     pub allow_implausible: bool,
-    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `manifest`), file name
+    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `mesh`, `manifest`), file name
     /// and SHA-256 (hex) of every file read.
     pub sources: Vec<SourceFile>,
     /// Warnings and notes of the readers; never an error.
@@ -84,6 +105,7 @@ impl RawModel {
             mass: matrix(mass),
             nodes,
             nodes_path: PathBuf::new(),
+            mesh: None,
             dofs: None,
             dofs_path: PathBuf::new(),
             interfaces: Vec::new(),

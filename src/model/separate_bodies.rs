@@ -168,6 +168,7 @@ fn part(
     let name = format!("{}-{number}", whole.raw.name);
     Assembled {
         raw: RawModel { name, interfaces, ..whole.raw.clone() },
+        mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
         nodes,
         rows,
         stiffness: whole.stiffness.principal(kept),

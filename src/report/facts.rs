@@ -18,7 +18,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 4;
+const MINOR: u32 = 5;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -61,6 +61,8 @@ pub(super) struct ModelFacts {
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
+    /// `None`: no surface is known.
+    pub mesh: Option<MeshFacts>,
     pub settings: serde_json::Value,
 }
 
@@ -68,6 +70,32 @@ pub(super) struct ModelFacts {
 pub(super) struct BodyFacts {
     pub number: usize,
     pub of: usize,
+}
+
+/// The surface that the body is drawn by.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct MeshFacts {
+    pub triangles: usize,
+    pub edges: usize,
+    /// Nodes that it is drawn on.
+    pub nodes: usize,
+}
+
+impl MeshFacts {
+    fn of(body: &FlexBody) -> Option<Self> {
+        let mesh = body.mesh()?;
+        Some(Self {
+            triangles: mesh.triangles().len(),
+            edges: mesh.edges().len(),
+            nodes: mesh.drawn_nodes().len(),
+        })
+    }
+
+    /// `1200 triangles and 80 edges on 602 nodes`.
+    pub fn in_words(&self) -> String {
+        let (triangles, edges) = (counted(self.triangles, "triangle"), counted(self.edges, "edge"));
+        format!("{triangles} and {edges} on {}", counted(self.nodes, "node"))
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -283,6 +311,7 @@ impl ModelFacts {
                 .iter()
                 .map(|interface| InterfaceFacts::of(interface, body))
                 .collect(),
+            mesh: MeshFacts::of(body),
             settings: source.settings.clone(),
         }
     }

@@ -39,7 +39,7 @@ impl MassProperties {
         let com = centre_of_mass(invariants);
         Self {
             mass: invariants.mass(),
-            centre_of_mass: (frame.origin + frame.axes * com).into(),
+            centre_of_mass: frame.to_model(com.into()),
             principal_inertia: moments,
             radii_of_gyration: moments.map(|i| (i / invariants.mass()).sqrt()),
             frame_origin: frame.origin.into(),

@@ -1,11 +1,13 @@
 //! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two
-//! bodies; simulations; selections; trade studies; frequency responses; audits.
+//! bodies; simulations; selections; trade studies; frequency responses; audits; the page that shows a body in
+//! motion.
 
 mod audit;
 mod bar_chart;
 mod clusters;
 mod common_modes;
 mod comparison;
+mod comparison_report;
 mod completeness;
 mod craig_bampton;
 mod errors_in_words;
@@ -36,9 +38,12 @@ mod text;
 mod trade;
 #[cfg(feature = "hdf5")]
 mod trade_verdict;
+#[cfg(feature = "hdf5")]
+mod view;
 
 pub use audit::{audit_json, audit_text};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
+pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use facts::Facts;
 pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use output::output_json;
@@ -50,3 +55,5 @@ pub use simulation::{SimulationFacts, simulation_csv};
 pub use term_facts::dropped_text;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};
+#[cfg(feature = "hdf5")]
+pub use view::View;

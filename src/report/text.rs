@@ -110,6 +110,9 @@ fn heading(page: &mut Page, facts: &Facts) {
     if let Some(remark) = model.approximation {
         page.entry("", remark);
     }
+    if let Some(mesh) = &model.mesh {
+        page.entry("surface", &mesh.in_words());
+    }
     if let Some(rounded) = model.storage_in_words() {
         page.entry("storage", rounded);
     }

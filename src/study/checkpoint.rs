@@ -85,8 +85,10 @@ impl ModelCheckpoint {
 /// What modes depend on: a line with role and SHA-256 of each file but the manifest, the damping and the
 /// interfaces, the groups of HDF5 files that hold several matrices, and which of several bodies it is.
 fn identity(files: &ModelFiles, model: &FeModel) -> String {
-    let relevant =
-        model.sources().iter().filter(|s| !["manifest", "interface", "damping"].contains(&s.role.as_str()));
+    let relevant = model
+        .sources()
+        .iter()
+        .filter(|s| !["manifest", "interface", "damping", "mesh"].contains(&s.role.as_str()));
     let group = |role: &str| {
         let location = match (role, files.tables()) {
             ("stiffness", Some(tables)) => &tables.stiffness,

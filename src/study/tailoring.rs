@@ -207,15 +207,21 @@ pub fn loads_for(scenes: &[Scene], stated: &[LoadSource]) -> Vec<LoadSource> {
 /// # Errors
 /// Those of [`read_shapes`] and [`UserLoads::new`].
 pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
-    let read = |set: &LoadSource| match set {
+    loads.iter().map(|set| read_set(set, model)).collect()
+}
+
+fn read_set(set: &LoadSource, model: &FeModel) -> Result<Loads> {
+    match set {
         LoadSource::Centrifugal => Ok(Loads::Centrifugal),
         LoadSource::Interfaces => Ok(Loads::Interfaces),
         LoadSource::File(location) => {
             let raw = read_shapes(location, model.stiffness().n(), "loads")?;
             UserLoads::new(model, raw).map(Loads::User)
         }
-    };
-    loads.iter().map(read).collect()
+        LoadSource::At { loads, hertz } => {
+            Ok(Loads::At { loads: Box::new(read_set(loads, model)?), hertz: *hertz })
+        }
+    }
 }
 
 /// Converts `model` to a body with the terms and modes that `scene` needs: what bounds of tier 0 rule out is

@@ -296,3 +296,63 @@ fn what_cannot_be_is_refused_before_the_work() {
     let without = FeModel::from_raw(plate.raw_model()).expect("sound").model;
     assert!(modes(&without, &lowest(5), vec![Loads::Interfaces]).expect_err("none").has(Code::InterfaceNode));
 }
+
+/// H = B'(K - w^2 M)^-1 B without the rigid motion, of modes with these eigenvalues.
+fn transfer(shapes: &Mat<f64>, lambda: &[f64], loads: &Mat<f64>, square: f64) -> Mat<f64> {
+    let modal = gram(shapes.as_ref(), loads.as_ref());
+    let answered = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / (lambda[p] - square));
+    modal.transpose() * answered
+}
+
+/// Largest difference of two transfer functions, relative to the first.
+fn difference(exact: &Mat<f64>, other: &Mat<f64>) -> f64 {
+    (exact - other).norm_max() / exact.norm_max()
+}
+
+#[test]
+fn responses_at_a_frequency_give_the_transfer_function_there_and_its_slope() {
+    let plate = curved_plate();
+    let model = model(&plate);
+    let all = dense_modes(&plate);
+    let mut loads = Mat::zeros(3 * plate.nodes.len(), 3);
+    (0..3).for_each(|k| loads[(3 * 8 + k, k)] = 1.0);
+    // Among the six modes that are kept, and beyond them.
+    for below in [3, 8] {
+        let gap = all.eigenvalues[below + 1] - all.eigenvalues[below];
+        let square = all.eigenvalues[below] + 0.4 * gap;
+        let hertz = model.units().frequency_of(square);
+        let at = Loads::At { loads: Box::new(Loads::Interfaces), hertz };
+        let errors_of = |wanted: Vec<Loads>| {
+            let solution = modes(&model, &lowest(6), wanted).expect("modes").solution;
+            [0.0, 0.01, 0.02].map(|aside| {
+                let square = square + aside * gap;
+                let exact = transfer(&all.shapes, &all.eigenvalues, &loads, square);
+                difference(&exact, &transfer(&solution.vectors, &solution.eigenvalues, &loads, square))
+            })
+        };
+        let [there, near, farther] = errors_of(vec![at]);
+        assert!(there < 1e-10, "{there:e} at {hertz} Hz");
+        // What is left grows with the square of the distance: the slope is that of the model.
+        let growth = farther / near;
+        assert!((3.5..5.0).contains(&growth) && near < 1e-3, "{near:e} {farther:e}");
+        let [statically, ..] = errors_of(vec![Loads::Interfaces]);
+        assert!(statically > 1e3 * there, "{statically:e}");
+    }
+}
+
+#[test]
+fn a_frequency_of_a_mode_that_is_kept_is_no_resonance_and_of_another_one_is_told() {
+    let plate = curved_plate();
+    let model = model(&plate);
+    let all = dense_modes(&plate);
+    let at = |mode: usize| {
+        let hertz = model.units().frequency_of(all.eigenvalues[mode]);
+        vec![Loads::At { loads: Box::new(Loads::Interfaces), hertz }]
+    };
+    let basis = modes(&model, &lowest(6), at(2)).expect("the mode takes the resonance");
+    assert!(basis.solution.eigenvalues.len() > 6);
+    assert!(basis.provenance.iter().any(|origin| origin.contains(" Hz")), "{:?}", basis.provenance);
+    assert!(basis.truncation.is_empty(), "of static responses only");
+    let error = modes(&model, &lowest(6), at(9)).expect_err("a resonance that no mode has");
+    assert!(error.has(Code::FactorizationFailed), "{error}");
+}

@@ -3,7 +3,7 @@
 use crate::support::file_bodies::{Random, body, fingerprint, seal};
 use flexbody::base::diagnostic::Code;
 use flexbody::base::error::Error;
-use flexbody::body::flex_body::FlexBody;
+use flexbody::body::flex_body::{FlexBody, SurfaceMesh};
 use flexbody::formats::flex_body_file;
 use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
@@ -160,6 +160,43 @@ fn a_newer_minor_with_unknown_entries_is_read() {
     seal(&file);
     file.close().unwrap();
     assert_eq!(flex_body_file::read(&case.path).unwrap(), before);
+}
+
+/// 4 nodes with a surface of two triangles and an edge, or without.
+fn drawn(mesh: bool) -> Case {
+    let mut parts = body(5, 4, 3, 1, 1).into_parts();
+    let surface = || SurfaceMesh::new(vec![[0, 1, 2], [1, 3, 2]], vec![[0, 3]], 4).unwrap();
+    parts.mesh = mesh.then(surface);
+    stored(&FlexBody::new(parts).unwrap())
+}
+
+/// A file states the least version that has what it holds.
+#[test]
+fn files_without_a_surface_are_those_of_the_version_before() {
+    for (mesh, minor) in [(false, 4), (true, 5)] {
+        let file = hdf5::File::open(drawn(mesh).path).unwrap();
+        assert_eq!(file.attr("format_minor").unwrap().read_scalar::<i64>().unwrap(), minor);
+        assert_eq!(file.link_exists("mesh"), mesh);
+    }
+}
+
+#[test]
+fn surfaces_on_nodes_that_there_are_not_are_refused() {
+    let triangles =
+        |values: [i32; 6]| refused(drawn(true), move |f| replace(f, "mesh/triangles", &[2, 3], &values));
+    let index = "/mesh: a mesh with node index 4, expected indices below 4";
+    assert_says(&triangles([0, 1, 2, 1, 3, 4]), Code::BodySchema, &[index]);
+    let twice = "/mesh: a mesh whose triangle 1 has a node twice";
+    assert_says(&triangles([0, 1, 2, 3, 1, 3]), Code::BodySchema, &[twice]);
+    let negative =
+        ["/mesh/triangles: expected indices of nodes, found -1", "/mesh: a mesh with node index 4294967295"];
+    assert_says(&triangles([0, 1, 2, 1, -1, 2]), Code::BodySchema, &negative);
+    let error = refused(drawn(true), |f| replace(f, "mesh/edges", &[1, 2], &[2i32, 2]));
+    assert_says(&error, Code::BodySchema, &["/mesh: a mesh whose edge 0 has a node twice"]);
+    let error = refused(drawn(true), |f| replace(f, "mesh/edges", &[1, 2], &[0i64, 1]));
+    assert_says(&error, Code::BodySchema, &["/mesh/edges: expected 32-bit integers, found type int64"]);
+    let error = refused(drawn(true), |f| replace(f, "mesh/triangles", &[3, 2], &[0i32, 1, 2, 1, 3, 2]));
+    assert_says(&error, Code::BodySchema, &["/mesh/triangles: expected shape [nt, 3], found [3, 2]"]);
 }
 
 #[test]

@@ -59,6 +59,7 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
                 .iter()
                 .any(|s| parent == format!("/groups/interface_coordinates/{s}"))
             || key.starts_with("digits_")
+            || ["mesh", "triangles", "edges"].contains(&key.as_str())
             || whole.pointer(&pointer) == Some(&serde_json::json!({}));
         assert_eq!(validator.is_valid(&broken), optional, "{pointer}");
         removed += 1;

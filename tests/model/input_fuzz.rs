@@ -142,6 +142,32 @@ proptest! {
     }
 
     #[test]
+    fn damaged_mat5(
+        file in prop::sample::select(vec![
+            "scipy.mat", "scipy_compressed.mat", "scipy_full.mat", "octave_v7.mat", "big_endian.mat",
+        ]),
+        damages in damages(),
+    ) {
+        survives("stiffness", &fixture("readers/matlab").join(file), &damages)?;
+    }
+
+    #[test]
+    fn damaged_petsc(file in prop::sample::select(vec!["aij.petsc", "aij_64.dat"]), damages in damages()) {
+        survives("stiffness", &fixture("readers/petsc").join(file), &damages)?;
+    }
+
+    #[test]
+    fn damaged_meshes(
+        file in prop::sample::select(vec![
+            "tet4_ascii.vtu", "tet4_zlib.vtu", "tet4_plain.vtu", "tet4_inline.vtu", "tet4_raw.vtu", "tet4_base64.vtu",
+            "tet4_raw_big_endian_64.vtu", "tet4_51.vtk", "tet4_51_ascii.vtk", "tet4_ascii.vtk", "tet4_binary.vtk",
+        ]),
+        damages in damages(),
+    ) {
+        survives("nodes", &fixture("small/meshes").join(file), &damages)?;
+    }
+
+    #[test]
     fn damaged_zstd(damages in damages()) {
         let text = std::fs::read(fixture("readers/matrix-market/scipy.mtx")).unwrap();
         let mut bytes = ruzstd::encoding::compress_to_vec(&text[..], ruzstd::encoding::CompressionLevel::Fastest);
@@ -180,5 +206,13 @@ proptest! {
         damages in damages(),
     ) {
         survives("stiffness", &fixture("readers/hdf5").join(file), &damages)?;
+    }
+
+    #[test]
+    fn damaged_exodus(
+        file in prop::sample::select(vec!["tet4.exo", "tet4_named.exo"]),
+        damages in damages(),
+    ) {
+        survives("nodes", &fixture("small/meshes").join(file), &damages)?;
     }
 }

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 /// The files of the tetrahedron of `fixtures/small`, with nodes and labels in other files.
-fn tetrahedron(nodes: &Path, dofs: Option<&Path>, sets: &[&str]) -> Result<RawModel, Error> {
+pub fn tetrahedron(nodes: &Path, dofs: Option<&Path>, sets: &[&str]) -> Result<RawModel, Error> {
     let small = |name: &str| fixtures().join("small/tet4").join(name);
     let dofs = dofs.map_or_else(|| small("dofs.csv"), Path::to_path_buf);
     let mut files =
@@ -25,7 +25,7 @@ fn tetrahedron(nodes: &Path, dofs: Option<&Path>, sets: &[&str]) -> Result<RawMo
 }
 
 /// Numbers and positions of the tetrahedron.
-fn nodes() -> Vec<(i64, [f64; 3])> {
+pub fn nodes() -> Vec<(i64, [f64; 3])> {
     let own = fixtures().join("small/tet4/nodes.csv");
     let raw = tetrahedron(&own, None, &[]).expect("readable");
     raw.nodes.ids.into_iter().zip(raw.nodes.positions).collect()

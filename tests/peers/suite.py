@@ -3,7 +3,7 @@
 
     python3 tests/peers/suite.py --install --write
 
-installs Exudyn, welib, h5py and scipy by pip into target/peers, Octave and an ARM compiler by apt-get (as root; else it says the command), runs every
+installs Exudyn, welib, open FE codes, h5py and scipy by pip into target/peers, Octave, GetFEM, FEniCSx and an ARM compiler by apt-get (as root; else it says the command), runs every
 peer with target/release/flexbody and writes the table of docs/export.md and that of docs/formats/embedded.md. Some minutes. Without options it runs what is
 installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
 FEMBEAM (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
@@ -24,8 +24,10 @@ import common
 from common import ROOT, Absent, Row
 
 VENV = ROOT / "target/peers"
-PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "welib==4.2.0", "h5py", "numpy", "scipy"]
+PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "pyNastran==1.4.1", "welib==4.2.0", "h5py", "numpy", "scipy", "scikit-fem==12.0.2", "ngsolve==6.2.2608", "mfem==4.10.0.1"]
 APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "calculix-ccx"]
+# Packages of modules for Debian's own Python.
+APT_MODULES = {"python3-getfem": "getfem", "python3-dolfinx-real": "dolfinx"}
 
 
 def other_libraries(flexbody, folder):
@@ -46,6 +48,24 @@ def calculix(flexbody, folder):
 
     rows = jobs.rows(flexbody, folder)
     TABLES["docs/fe_programs.md", "calculix"] = table(rows, [])
+    return rows
+
+
+def recipes(flexbody, folder):
+    """Matrices of open FE codes: a table of its own page."""
+    import open_codes
+
+    rows = open_codes.rows(flexbody, folder)
+    TABLES["docs/recipes.md", "recipes"] = table(rows, [])
+    return rows
+
+
+def nastran(flexbody, folder):
+    """Files of Nastran that other libraries write and read: a table of the same page."""
+    import nastran as files
+
+    rows = files.rows(flexbody, folder)
+    TABLES["docs/fe_programs.md", "nastran"] = table(rows, [])
     return rows
 
 
@@ -73,6 +93,8 @@ PEERS = [
     ("compilers", "compilers.rows", True),
     ("ARM compiler", "suite.arm_table", True),
     ("CalculiX", "suite.calculix", True),
+    ("open FE codes", "suite.recipes", True),
+    ("pyNastran, pyYeti", "suite.nastran", True),
 ]
 
 
@@ -127,6 +149,8 @@ def install():
         subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
     subprocess.run([python, "-m", "pip", "install", "--quiet", *PIP], check=True)
     missing = [name for name, tool in zip(APT, ["octave-cli", "g++", "arm-none-eabi-gcc", "arm-none-eabi-gcc", "ccx"]) if not shutil.which(tool)]
+    debian = "/usr/bin/python3"
+    missing += [name for name, module in APT_MODULES.items() if subprocess.run([debian, "-c", f"import {module}"], capture_output=True).returncode]
     if missing:
         command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
         if shutil.which("apt-get") and os.geteuid() == 0:
@@ -152,7 +176,8 @@ def main():
     rows, absent = measure(args.flexbody.resolve(), args.small)
     bad = [row for row in rows if not row.good()]
     if args.write and not (bad or args.small):
-        of_exports = [row for row in rows if not row.program.startswith("CalculiX")]
+        elsewhere = ("CalculiX", "pyNastran", "pyYeti", "NX Nastran")
+        of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith("recipe"))]
         TABLES["docs/export.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():
             write(page, mark, text)

@@ -5,6 +5,7 @@
 use flexbody::base::diagnostic;
 use flexbody::base::diagnostic::{Code, Severity};
 use flexbody::formats::flex_body_file;
+use flexbody::input::RECIPES;
 use std::path::{Path, PathBuf};
 
 #[track_caller]
@@ -33,6 +34,19 @@ fn format_schema() {
 #[test]
 fn diagnostic_codes() {
     assert_generated("docs/codes.md", &diagnostic::codes_markdown());
+}
+
+/// What `flexbody recipe` prints stands in the page on FE programs, each piece in a block of its own.
+#[test]
+fn recipes_are_those_of_the_page() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/fe_programs.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    for recipe in RECIPES {
+        for step in recipe.steps {
+            let block = format!("{}:\n\n```\n{}\n```\n", step.place, step.lines);
+            assert!(page.contains(&block), "{}: docs/fe_programs.md lacks\n{block}", recipe.program);
+        }
+    }
 }
 
 /// README, ARCHITECTURE, CHANGELOG and all of `docs/`, `fixtures/` and `benches/` with their text.

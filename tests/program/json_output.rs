@@ -86,10 +86,19 @@ fn every_command_prints_an_object_of_the_schema() {
             0,
         ),
         ("response b.h5 --band 0..1000 --from nowhere --to 2", 2),
+        ("view b.h5 -o b.html", 0),
+        ("view b.h5 --simulation scene.toml -o b.html", 2),
         ("export b.h5 --to sid -o b.sid --allow-loss", 0),
         ("export b.h5 --to nothing -o b.x", 2),
         ("audit b.sid", 0),
         ("audit b.h5 --from sid", 2),
+        ("recipe calculix", 0),
+        ("recipe patran", 2),
+        ("doctor", 0),
+        ("completions bash", 0),
+        ("completions tcsh", 2),
+        ("man convert", 0),
+        ("man melt", 2),
     ];
     let mut commands = Vec::new();
     for (line, code) in lines {

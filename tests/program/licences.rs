@@ -1,4 +1,4 @@
-//! Every dependency that ends up in the program has a permissive licence.
+//! Every dependency that ends up in the program or in the Python package has a permissive licence.
 
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -107,13 +107,14 @@ fn has_known_file(package: &Value) -> bool {
     std::fs::read_to_string(file).is_ok_and(|text| text.contains(sentence))
 }
 
-#[test]
-fn every_linked_dependency_is_permissive() {
+/// Packages that the package of `manifest` is linked with on this machine, and that are not permissive.
+fn offenders(manifest: &str) -> Vec<String> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
     let version = output_of(&rustc, &["-vV"]);
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).expect("a host triple");
     let metadata = ["metadata", "--locked", "--format-version", "1", "--filter-platform", host];
+    let metadata = [&metadata[..], &["--manifest-path", manifest]].concat();
     let metadata: Value = serde_json::from_str(&output_of(&cargo, &metadata)).expect("JSON");
     let root = metadata["resolve"]["root"].as_str().expect("one package");
     let linked = linked(&metadata, root);
@@ -132,7 +133,15 @@ fn every_linked_dependency_is_permissive() {
             offenders.push(format!("{} {}: {licence}", package["name"], package["version"]));
         }
     }
-    assert!(offenders.is_empty(), "not permissive:\n{}", offenders.join("\n"));
+    offenders
+}
+
+#[test]
+fn every_linked_dependency_is_permissive() {
+    for manifest in ["Cargo.toml", "python/Cargo.toml"] {
+        let offenders = offenders(manifest);
+        assert!(offenders.is_empty(), "{manifest}: not permissive:\n{}", offenders.join("\n"));
+    }
 }
 
 #[test]

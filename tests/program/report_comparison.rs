@@ -9,8 +9,11 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::{FlexBody, Parts};
 use flexbody::body::invariants::{BodyFrame, Frame, choose_frame};
 use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
-use flexbody::report::{BodyComparison, Tolerances, compare, compare_common};
+use flexbody::report::{
+    BodyComparison, ComparisonFormat, ComparisonReport, Tolerances, compare, compare_common,
+};
 use nalgebra::Vector3;
+use std::path::Path;
 
 fn compared(a: &FlexBody, b: &FlexBody) -> BodyComparison {
     compare(a, b, &Tolerances::default()).unwrap_or_else(|e| panic!("{e}"))
@@ -286,4 +289,37 @@ fn json_and_text_say_the_same() {
     let text = comparison.text();
     assert!(text.lines().nth(1).unwrap().ends_with("1e-9  DIFFERS"), "{text}");
     assert!(text.ends_with("the bodies DIFFER in 1 quantity\n"), "{text}");
+}
+
+#[test]
+fn reports_have_a_test_case_for_every_quantity_and_escape_names() {
+    let reference = block(BodyFrame::Principal);
+    let heavier = changed(&reference, |parts| parts.modes.eigenvalue[5] *= 1.001);
+    let comparison = compared(&reference, &heavier);
+    let failures = failed(&comparison);
+    assert!(failures.contains(&"frequency") && failures.len() < comparison.rows().len(), "{failures:?}");
+    let report = ComparisonReport { comparison: &comparison, a: "a & b.flex.h5", b: "<new>.flex.h5" };
+    let written = |name: &str| report.render(ComparisonFormat::from_path(Path::new(name)).expect("known"));
+
+    let junit = written("r.XML");
+    assert_eq!(junit.matches("<testcase ").count(), comparison.rows().len());
+    assert_eq!(junit.matches("<failure ").count(), failures.len());
+    let counts = format!("tests=\"{}\" failures=\"{}\"", comparison.rows().len(), failures.len());
+    assert_eq!(junit.matches(&counts).count(), 2, "{junit}");
+    assert!(junit.contains("&lt;new&gt;.flex.h5 beside a &amp; b.flex.h5"), "{junit}");
+
+    let markdown = written("r.md");
+    assert_eq!(
+        markdown.matches("| agrees |").count() + failures.len(),
+        comparison.rows().len(),
+        "{markdown}"
+    );
+    assert!(markdown.contains(&format!("differ in {} of", failures.len())), "{markdown}");
+
+    let html = written("r.html");
+    assert!(html.contains("&lt;new&gt;") && !html.contains("<new>"), "{html}");
+    assert_eq!(written("r.txt"), comparison.text());
+    let json: serde_json::Value = serde_json::from_str(&written("r.json")).expect("JSON");
+    assert_eq!(json, comparison.json());
+    assert!(ComparisonFormat::from_path(Path::new("r.pdf")).is_none());
 }

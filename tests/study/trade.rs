@@ -428,8 +428,8 @@ fn the_program_writes_what_its_schema_says() {
     assert_eq!(run.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&run.stdout).contains("no candidate is as cheap as allowed"));
     for (more, said) in [
-        (&["--reference", "nodal"][..], "give the manifest"),
-        (&["--modes", "3"], "give the manifest"),
+        (&["--reference", "nodal"][..], "give the model"),
+        (&["--modes", "3"], "give the model"),
         (&["--csv", "scene.toml"], "is an input"),
         (&["--report", "t.pdf"], "no known extension"),
     ] {

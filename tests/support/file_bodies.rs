@@ -7,7 +7,7 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
     InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
-    Truncation, UnitLoad,
+    SurfaceMesh, Truncation, UnitLoad,
 };
 use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, Invariants, PrimaryData};
 use flexbody::model::{BodyNumber, Coupling, Nodes};
@@ -99,6 +99,19 @@ impl Random {
         let rows = self.below(4);
         let dofs = (0..rows).map(|i| [1000 + i as i64, 1 + self.below(6) as i64]).collect();
         (rows > 0).then(|| InternalRows { dofs, shape: self.matrix(rows, nf) })
+    }
+
+    /// A surface of triangles, of edges or of both, on the last of `n` nodes and others; none of few nodes.
+    fn mesh(&mut self, n: usize) -> Option<SurfaceMesh> {
+        let (triangles, edges) = (self.below(4), self.below(4));
+        let mut other = |last: u32, apart: u32| {
+            let room = last - 1 - apart;
+            apart + self.below(room as usize + 1) as u32
+        };
+        let last = u32::try_from(n).expect("few nodes").checked_sub(1).filter(|last| *last >= 2)?;
+        let triangles = (0..triangles).map(|_| [last, 0, other(last, 1)]).collect();
+        let edges = (0..edges).map(|_| [other(last, 0), last]).collect();
+        SurfaceMesh::new(triangles, edges, n).ok()
     }
 }
 
@@ -248,6 +261,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             .collect(),
         coordinates: (n * nf % 2 == 1).then(|| coordinates(&mut r, 1 + interfaces, nf)),
         terms: Vec::new(),
+        mesh: r.mesh(n),
         storage: Storage::F64,
     }
 }

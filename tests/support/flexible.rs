@@ -141,6 +141,7 @@ pub fn made_of(
         interfaces: Vec::new(),
         coordinates: None,
         terms: Vec::new(),
+        mesh: None,
         storage: Storage::F64,
     })
     .expect("valid parts")

@@ -128,6 +128,7 @@ pub fn engine_mount() -> FlexBody {
         }],
         coordinates: None,
         terms: Vec::new(),
+        mesh: None,
         storage: Storage::F64,
     })
     .unwrap_or_else(|e| panic!("{e}"))
@@ -274,6 +275,7 @@ pub fn condensed(
         interfaces: vec![],
         coordinates: None,
         terms: Vec::new(),
+        mesh: None,
         storage: Storage::F64,
     })
     .unwrap_or_else(|e| panic!("{e}"))

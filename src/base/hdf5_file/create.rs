@@ -6,6 +6,12 @@ use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
+/// Version of the HDF5 library.
+pub(crate) fn library_version() -> String {
+    let (major, minor, release) = hdf5::library_version();
+    format!("{major}.{minor}.{release}")
+}
+
 /// An empty file at a temporary `path`.
 pub(crate) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
     hdf5::File::with_options()

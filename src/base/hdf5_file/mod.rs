@@ -6,7 +6,7 @@ mod open;
 mod record;
 mod value;
 
-pub(crate) use create::{create, make, put_text};
+pub(crate) use create::{create, library_version, make, put_text};
 pub(crate) use open::open_sound;
 pub(crate) use record::{Record, attribute_record, dataset_record};
 pub(crate) use value::{

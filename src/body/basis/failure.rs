@@ -1,9 +1,10 @@
 //! Failures of the eigen-solver as messages that name nodes.
 
+use super::modal_basis::input_error;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Error;
 use crate::model::{FeModel, rigid_count};
-use crate::numerics::eigen::EigenFailure;
+use crate::numerics::eigen::{EigenFailure, Unresisted, unresisted_motions};
 use faer::Mat;
 
 /// A failure that a single-precision factor may have caused by itself: nothing is known about the model then.
@@ -38,10 +39,7 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         EigenFailure::NotConverged { converged, wanted } => {
             Diagnostic::new(Code::NotConverged, format!("{converged} of {wanted} modes converged"))
         }
-        EigenFailure::NotPositiveDefinite { shift } => Diagnostic::new(
-            Code::StiffnessIndefinite,
-            format!("K + {shift:.3e} M is not positive definite: K or M is indefinite"),
-        ),
+        EigenFailure::NotPositiveDefinite { shift } => not_positive_definite(model, shift),
         EigenFailure::NegativeEigenvalue { eigenvalue, vector } => {
             let moved = most_moved(model, &vector);
             let message =
@@ -74,6 +72,23 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
     diagnostic.into()
 }
 
+/// Why K + tau M cannot be factored: motions without any energy, or an indefinite matrix.
+fn not_positive_definite(model: &FeModel, shift: f64) -> Diagnostic {
+    let Some(Unresisted { count, vectors }) = unresisted_motions(&model.pencil(), shift, input_error(model))
+    else {
+        let message = format!("K + {shift:.3e} M is not positive definite: K or M is indefinite");
+        return Diagnostic::new(Code::StiffnessIndefinite, message);
+    };
+    let moved = most_moved(model, &vectors);
+    let message = match count {
+        1 => format!("one motion has neither strain energy nor mass: it moves nodes {moved} most"),
+        _ => format!("{count} motions have neither strain energy nor mass: they move nodes {moved} most"),
+    };
+    Diagnostic::new(Code::Mechanism, message).with_help(
+        "elements with reduced integration (C3D20R, C3D8R) have such motions in meshes one element across: take more elements across, or full integration",
+    )
+}
+
 /// Numbers of the nodes that the columns of `vectors` move most.
 fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
     let d = model.dimension();
@@ -103,7 +118,7 @@ fn mechanism(model: &FeModel, count: usize, vectors: &Mat<f64>) -> Diagnostic {
         )
     } else {
         Diagnostic::new(Code::Mechanism, message).with_help(
-            "connect the parts or remove the free degree of freedom; of a body very thin, or with stiffnesses far apart, K has lost its softest ones to rounding",
+            "connect the parts or remove the free degree of freedom; meshes one element across of elements with reduced integration need more elements across; of a body very thin, or with stiffnesses far apart, K has lost its softest ones to rounding",
         )
     }
 }

@@ -5,12 +5,13 @@
 use super::columns::columns;
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
+use super::nodal_modes::{StatedModes, by_rows};
 use super::pseudo_free_surface::independent;
 use super::rigid_modes::rigid_modes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
-use crate::model::{FeModel, RawShapes};
+use crate::model::{FeModel, RawModes, RawShapes};
 use crate::numerics::eigen::{Accuracy, EigenFailure, Proof, Wanted, modes_of_span};
 use faer::Mat;
 
@@ -22,6 +23,10 @@ pub struct ImportedShapes {
     digits: u8,
     source: Option<SourceFile>,
     origin: Origin,
+    /// What the file says of the modes that the shapes are.
+    stated: Option<StatedModes>,
+    /// What was done to the shapes.
+    notes: Vec<Diagnostic>,
 }
 
 /// Where shapes come from.
@@ -44,12 +49,26 @@ impl ImportedShapes {
     /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let (digits, source) = (raw.digits, raw.source.clone());
-        Ok(Self { shapes: columns(model, raw, "shape")?, digits, source, origin: Origin::User })
+        let shapes = columns(model, raw, "shape")?;
+        Ok(Self { shapes, digits, source, origin: Origin::User, stated: None, notes: Vec::new() })
+    }
+
+    /// Modes of `model` that an FE program has written by nodes. Rows that they lack follow from the others
+    /// by the equations of motion, and the eigenvalues of the file are compared with those of K and M.
+    ///
+    /// # Errors
+    /// [`ShapesSize`](Code::ShapesSize) when the nodes are not those of the model, or too few of them;
+    /// [`ShapesZero`](Code::ShapesZero).
+    pub fn of_modes(model: &FeModel, raw: RawModes) -> Result<Self> {
+        let (shapes, notes) = by_rows(model, &raw)?;
+        let (digits, source, stated) = (raw.digits, Some(raw.source.clone()), Some(StatedModes::of(raw)));
+        Ok(Self { shapes, digits, source, origin: Origin::User, stated, notes })
     }
 
     /// Shapes that a motion was found to be made of (N x k, by the rows of the model).
     pub fn of_motion(shapes: Mat<f64>) -> Self {
-        Self { shapes, digits: COMPUTED_DIGITS, source: None, origin: Origin::Motion }
+        let digits = COMPUTED_DIGITS;
+        Self { shapes, digits, source: None, origin: Origin::Motion, stated: None, notes: Vec::new() }
     }
 
     /// What one of them is called, and several.
@@ -68,7 +87,7 @@ impl ImportedShapes {
     /// Part of its M-norm that must be left of a shape after those before it: digits that the values do not
     /// have say nothing.
     fn dependent(&self) -> f64 {
-        10f64.powi(2 - i32::from(self.digits)).max(1e-8)
+        10f64.powi(2 - i32::from(self.digits)).clamp(1e-8, 0.1)
     }
 }
 
@@ -96,7 +115,11 @@ impl Basis for ImportedShapes {
         }
         let solution = modes_of_span(&problem, independent.vectors, settings, watch).map_err(failed)?;
         let mut basis = ModalBasis::new(model, &problem, settings, solution, one)?;
-        basis.diagnostics.extend(notes);
+        let compared = self
+            .stated
+            .as_ref()
+            .map(|stated| stated.beside(model, self.shapes.as_ref(), &independent.kept, &basis.solution));
+        basis.diagnostics.extend(self.notes.iter().cloned().chain(compared.flatten()).chain(notes));
         let given = basis.solution.eigenvalues.len();
         if let Wanted::Lowest(wanted) = settings.wanted
             && wanted > given

@@ -12,6 +12,7 @@ mod imported;
 mod interface_coordinates;
 mod interface_rows;
 mod modal_basis;
+mod nodal_modes;
 mod pseudo_free_surface;
 mod residual_vectors;
 mod rigid_modes;

@@ -34,7 +34,7 @@ pub(super) struct Independent {
 
 /// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns in
 /// their order by the modified Gram-Schmidt process, twice. A column of which less than `dependent` of its
-/// M-norm is left after those before it is left out.
+/// M-norm is left after those before it, or after the rigid motions, is left out.
 ///
 /// `None`: a column has a negative M-norm beyond rounding, M is indefinite.
 pub(super) fn independent(
@@ -48,7 +48,7 @@ pub(super) fn independent(
     set.scale_to_unit_mass()?;
     // Twice: a shape may be rigid motion but for its last digits.
     set.remove_rigid(rigid);
-    set.leave_out_rigid();
+    set.leave_out_rigid(RIGID.max(dependent));
     set.remove_rigid(rigid);
     Some(set.orthonormalised(dependent))
 }
@@ -115,10 +115,10 @@ impl<'a> ShapeSet<'a> {
     }
 
     /// Leaves out what was rigid motion; unit M-norms again for the others.
-    fn leave_out_rigid(&mut self) {
+    fn leave_out_rigid(&mut self, rigid: f64) {
         for (j, square) in self.squares().into_iter().enumerate() {
             let left = square.max(0.0).sqrt();
-            if self.is_in[j] && left < RIGID {
+            if self.is_in[j] && left < rigid {
                 self.outcome.rigid.push(j);
                 self.is_in[j] = false;
             } else if self.is_in[j] {

@@ -1,5 +1,5 @@
-//! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have (theory section
-//! 8).
+//! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have, and those at
+//! chosen frequencies (theory section 8).
 
 use super::columns::columns;
 use super::failure::explain;
@@ -9,13 +9,13 @@ use super::pseudo_free_surface::independent;
 use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
 use crate::model::{Coupling, FeModel, RawShapes, centre_and_length};
 use crate::numerics::eigen::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Resume,
-    Wanted, modes_of_span, static_responses,
+    Wanted, dynamic_responses, modes_of_span, static_responses,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
 use faer::{Mat, MatRef};
@@ -74,6 +74,15 @@ pub enum Loads {
     User(UserLoads),
     /// What a motion leaves unbalanced at the nodes (N x m): the loads that a body lacks the responses to.
     Motion(Mat<f64>),
+    /// The responses (K - w^2 M)^-1 f to loads that oscillate, instead of the static ones: with them the
+    /// transfer functions between these loads are those of the model at w, and with the same slope there
+    /// (moments of rational Krylov spaces; Grimme, Krylov projection methods for model reduction, 1997).
+    At {
+        /// The loads, at rest.
+        loads: Box<Loads>,
+        /// w / 2 pi, positive, in hertz; no natural frequency.
+        hertz: f64,
+    },
 }
 
 /// Nodal forces in the order of a model's degrees of freedom, one load in each column.
@@ -96,12 +105,21 @@ impl UserLoads {
 
 impl Loads {
     /// Name in files.
-    pub fn name(&self) -> &'static str {
+    pub fn name(&self) -> String {
         match self {
-            Self::Centrifugal => "centrifugal",
-            Self::Interfaces => "interfaces",
-            Self::User(_) => "loads",
-            Self::Motion(_) => "motion",
+            Self::Centrifugal => "centrifugal".to_owned(),
+            Self::Interfaces => "interfaces".to_owned(),
+            Self::User(_) => "loads".to_owned(),
+            Self::Motion(_) => "motion".to_owned(),
+            Self::At { loads, hertz } => format!("{}@{hertz}", loads.name()),
+        }
+    }
+
+    /// Frequency at which they oscillate, in hertz; zero: at rest.
+    fn hertz(&self) -> f64 {
+        match self {
+            Self::At { hertz, .. } => *hertz,
+            _ => 0.0,
         }
     }
 
@@ -109,6 +127,7 @@ impl Loads {
     pub fn source(&self) -> Option<&SourceFile> {
         match self {
             Self::User(loads) => loads.source.as_ref(),
+            Self::At { loads, .. } => loads.source(),
             _ => None,
         }
     }
@@ -120,6 +139,13 @@ impl Loads {
             Self::Interfaces => interfaces(model),
             Self::User(UserLoads { loads, .. }) => Ok(numbered("load", loads)),
             Self::Motion(loads) => Ok(numbered("motion", loads)),
+            Self::At { loads, hertz } => {
+                let at_rest = loads.forces(problem, model)?;
+                Ok(at_rest
+                    .into_iter()
+                    .map(|(name, force)| (format!("{name} at {hertz} Hz"), force))
+                    .collect())
+            }
         }
     }
 }
@@ -190,6 +216,9 @@ pub(super) struct NamedLoads {
     names: Vec<String>,
     /// N x m.
     forces: Mat<f64>,
+    /// Of every load the frequency of its oscillation in hertz, and its square w^2 as an eigenvalue; zero: at
+    /// rest.
+    frequencies: Vec<(f64, f64)>,
 }
 
 impl NamedLoads {
@@ -209,10 +238,29 @@ impl NamedLoads {
             let message = format!("{what}s are no eigenvectors and cannot be certified");
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
         }
-        let named = loads.iter().map(|loads| loads.forces(problem, model)).collect::<Result<Vec<_>>>()?;
-        let (names, forces): (Vec<String>, Vec<Mat<f64>>) = named.into_iter().flatten().unzip();
+        let (mut names, mut forces, mut frequencies) = (Vec::new(), Vec::new(), Vec::new());
+        for loads in loads {
+            let frequency = (loads.hertz(), model.units().eigenvalue_of(loads.hertz()));
+            for (name, force) in loads.forces(problem, model)? {
+                names.push(name);
+                forces.push(force);
+                frequencies.push(frequency);
+            }
+        }
         let forces: Vec<_> = forces.iter().map(Mat::as_ref).collect();
-        Ok(Self { what: what.to_owned(), names, forces: side_by_side(&forces) })
+        Ok(Self { what: what.to_owned(), names, forces: side_by_side(&forces), frequencies })
+    }
+
+    /// The frequencies, each once, with the numbers of its loads.
+    fn by_frequency(&self) -> Vec<((f64, f64), Vec<usize>)> {
+        let mut groups: Vec<((f64, f64), Vec<usize>)> = Vec::new();
+        for (j, frequency) in self.frequencies.iter().enumerate() {
+            match groups.iter_mut().find(|(known, _)| known == frequency) {
+                Some((_, columns)) => columns.push(j),
+                None => groups.push((*frequency, vec![j])),
+            }
+        }
+        groups
     }
 }
 
@@ -230,7 +278,8 @@ pub(super) fn with_residual_vectors(
     let failed = |failure: EigenFailure| explain(model, failure);
     let modes = &free.solution.vectors;
     let mut counters = free.solution.counters;
-    let responses = Responses::new(problem, &free.solution, loads, &mut counters).map_err(failed)?;
+    let beside = beside_modes(model, problem, &free.solution, loads, &mut counters)?;
+    let responses = Responses::new(problem, &free.solution, loads, beside);
     let added =
         responses.added(problem, modes.as_ref()).ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
     let span = side_by_side(&[modes.as_ref(), added.vectors.as_ref()]);
@@ -257,12 +306,49 @@ pub(super) fn with_residual_vectors(
     Ok(basis)
 }
 
-/// Static responses to loads, and what free modes have of them.
+/// What free modes do not have of the responses to loads (N x m).
+fn beside_modes(
+    model: &FeModel,
+    problem: &EigenProblem<'_>,
+    free: &EigenSolution,
+    loads: &NamedLoads,
+    counters: &mut Counters,
+) -> Result<Mat<f64>> {
+    let (modes, first) = (free.vectors.as_ref(), free.eigenvalues[0]);
+    let precision = free.plan.map_or(Precision::Double, |plan| plan.precision);
+    let mut beside = Mat::zeros(loads.forces.nrows(), loads.forces.ncols());
+    for ((hertz, square), columns) in loads.by_frequency() {
+        let forces = Mat::from_fn(beside.nrows(), columns.len(), |i, c| loads.forces[(i, columns[c])]);
+        let responses = if square == 0.0 {
+            static_responses(problem, modes, forces, first, precision, ResponseAccuracy::FULL, counters)
+                .map_err(|failure| explain(model, failure))?
+        } else {
+            dynamic_responses(problem, modes, forces, square, counters)
+                .map_err(|failure| no_response(model, hertz, failure))?
+        };
+        for (c, &j) in columns.iter().enumerate() {
+            beside.col_mut(j).copy_from(responses.col(c));
+        }
+    }
+    Ok(beside)
+}
+
+/// Why there is no response at a frequency.
+fn no_response(model: &FeModel, hertz: f64, failure: EigenFailure) -> Error {
+    let EigenFailure::Inaccurate { residual } = failure else { return explain(model, failure) };
+    let message =
+        format!("the responses at {hertz} Hz are found with a relative residual of {residual:.1e} only");
+    Diagnostic::new(Code::FactorizationFailed, message)
+        .with_help("a natural frequency beyond the modes may be too near: name another frequency")
+        .into()
+}
+
+/// Responses to loads, and what free modes have of them.
 struct Responses<'a> {
     loads: &'a NamedLoads,
-    /// K^+ f without what the modes have of it (N x m).
+    /// K^+ f, at a frequency (K - w^2 M)^-1 f, without what the modes have of it (N x m).
     beside: Mat<f64>,
-    /// K^+ f (N x m).
+    /// The same with what the modes have of K^+ f (N x m).
     whole: Mat<f64>,
     /// Squares of the norms of the whole responses in K and in M, and of what is beside the modes.
     energy: Vec<f64>,
@@ -278,13 +364,10 @@ impl<'a> Responses<'a> {
         problem: &EigenProblem<'_>,
         free: &EigenSolution,
         loads: &'a NamedLoads,
-        counters: &mut Counters,
-    ) -> std::result::Result<Self, EigenFailure> {
+        beside: Mat<f64>,
+    ) -> Self {
         let (pencil, forces) = (&problem.pencil, &loads.forces);
         let (modes, lambda) = (free.vectors.as_ref(), &free.eigenvalues);
-        let precision = free.plan.map_or(Precision::Double, |plan| plan.precision);
-        let full = ResponseAccuracy::FULL;
-        let beside = static_responses(problem, modes, forces.clone(), lambda[0], precision, full, counters)?;
         // K^+ f = Psi Lambda^-1 Psi'f + what the modes do not have.
         let modal = gram(modes, forces.as_ref());
         let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);
@@ -295,7 +378,7 @@ impl<'a> Responses<'a> {
         let in_mass = |x: &Mat<f64>| column_products(x.as_ref(), pencil.apply_mass(x.as_ref()).as_ref());
         let energy = in_stiffness(&whole);
         let deforms = deforming(problem, forces, &energy);
-        Ok(Self {
+        Self {
             loads,
             mass: in_mass(&whole),
             mass_beside: in_mass(&beside),
@@ -304,7 +387,7 @@ impl<'a> Responses<'a> {
             whole,
             energy,
             deforms,
-        })
+        }
     }
 
     /// What the modes lack, M-orthonormalised against them; `None` when M is indefinite.
@@ -333,7 +416,7 @@ impl<'a> Responses<'a> {
         Some(Added { vectors: found.vectors, kept, dropped })
     }
 
-    /// What the free modes lack of each response, and what the modes of the whole span do.
+    /// What the free modes lack of each static response, and what the modes of the whole span do.
     fn truncation(self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
         let modal = gram(ritz.vectors.as_ref(), self.loads.forces.as_ref());
         let amplitudes =
@@ -349,7 +432,8 @@ impl<'a> Responses<'a> {
             before: error(self.energy_beside[j], j),
             after: error(rest[j], j),
         };
-        self.loads.names.iter().enumerate().map(truncation).collect()
+        let is_static = |(j, _): &(usize, &String)| self.loads.frequencies[*j].1 == 0.0;
+        self.loads.names.iter().enumerate().filter(is_static).map(truncation).collect()
     }
 }
 

@@ -112,6 +112,7 @@ impl ModalModel<'_> {
             interfaces: self.interfaces.clone(),
             coordinates: self.coordinates(),
             nodes: self.nodes.clone(),
+            mesh: self.settings.surface(self.model),
             modes,
             invariants: condensed.invariants.clone(),
             geometric_stiffness: self.geometric_stiffness.clone(),

@@ -25,4 +25,4 @@ pub(crate) use damping::modal_damping;
 pub(crate) use geometric_stiffness::modal_geometric_stiffness;
 pub use lumped::LumpedPipeline;
 pub use modal_model::ModalModel;
-pub use settings::{ConvertSettings, Lumping};
+pub use settings::{ConvertSettings, Lumping, MeshChoice};

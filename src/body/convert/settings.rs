@@ -2,7 +2,7 @@
 
 use crate::body::basis::{BasisChoice, Loads, ModeSettings};
 use crate::body::invariants::{BodyFrame, LumpedScheme};
-use crate::model::{Damping, FeModel};
+use crate::model::{Damping, FeModel, SurfaceMesh};
 use crate::numerics::eigen::Wanted;
 
 /// A lumped comparator that is wanted.
@@ -26,6 +26,18 @@ impl Lumping {
     }
 }
 
+/// Which surface the body is to have, to be drawn by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MeshChoice {
+    /// That of the model, where it has one.
+    #[default]
+    Whole,
+    /// The same with so many triangles at the most.
+    AtMost(usize),
+    /// None.
+    Without,
+}
+
 /// Settings of a conversion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvertSettings {
@@ -39,6 +51,8 @@ pub struct ConvertSettings {
     pub lumped: Vec<Lumping>,
     /// Also compute the modes of each lumped mass.
     pub lumped_modes: bool,
+    /// Surface of the body.
+    pub mesh: MeshChoice,
 }
 
 impl Default for ConvertSettings {
@@ -50,6 +64,7 @@ impl Default for ConvertSettings {
             frame: BodyFrame::default(),
             lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
             lumped_modes: false,
+            mesh: MeshChoice::default(),
         }
     }
 }
@@ -62,7 +77,7 @@ impl ConvertSettings {
             Wanted::Below(lambda) => (None, Some(lambda)),
         };
         let schemes: Vec<&str> = self.lumped.iter().map(|lumping| lumping.scheme().name()).collect();
-        let loads: Vec<&str> = self.basis.residual_vectors().iter().map(Loads::name).collect();
+        let loads: Vec<String> = self.basis.residual_vectors().iter().map(Loads::name).collect();
         let mut described = serde_json::json!({
             "accuracy": self.modes.accuracy.name(),
             "basis": self.basis.basis().name(),
@@ -75,7 +90,21 @@ impl ConvertSettings {
         if let Some(damping) = model.damping() {
             described["damping"] = serde_json::json!({ damping.name(): damping_numbers(damping) });
         }
+        // Whether there is a surface at all is seen in the file.
+        if let (MeshChoice::AtMost(most), Some(_)) = (self.mesh, model.mesh()) {
+            described["mesh_triangles"] = serde_json::json!(most);
+        }
         described
+    }
+
+    /// The surface of the body.
+    pub(super) fn surface(&self, model: &FeModel) -> Option<SurfaceMesh> {
+        let mesh = model.mesh()?;
+        match self.mesh {
+            MeshChoice::Whole => Some(mesh.clone()),
+            MeshChoice::AtMost(most) => mesh.decimated(&model.nodes().positions, most),
+            MeshChoice::Without => None,
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
 use crate::base::error::{Error, Result};
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
-use crate::model::{Coupling, GeometricStiffness, Nodes, extents};
+use crate::model::{Coupling, GeometricStiffness, Nodes, SurfaceMesh, extents};
 use faer::Mat;
 
 /// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
@@ -26,7 +26,7 @@ impl FlexBody {
     /// damping ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are
     /// unique; the body number lies between 1 and the number of bodies; names of lumping schemes and of
     /// interfaces are unique and not empty; loads of geometric stiffness are those of the dimension, each
-    /// once; interfaces name existing nodes, those declared free have no reference point; matrices in
+    /// once; surface and interfaces name existing nodes, interfaces declared free have no reference point; matrices in
     /// interface coordinates are symmetric; a group of the kinetic energy is dropped by a decision of
     /// [`Parts::terms`] or held, here and by the lumped comparators; no text contains a NUL character (no
     /// file could hold it).
@@ -85,9 +85,22 @@ impl FlexBody {
         &self.parts.nodes
     }
 
+    /// The surface to draw the body by, where it is known.
+    pub fn mesh(&self) -> Option<&SurfaceMesh> {
+        self.parts.mesh.as_ref()
+    }
+
     /// Largest extent of the nodes along an axis of the body frame. Unit: length.
     pub fn extent(&self) -> f64 {
         extents(&self.parts.nodes.positions).into_iter().fold(0.0, f64::max)
+    }
+
+    /// The same along an axis of the model.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn extent_in_model(&self) -> f64 {
+        let places: Vec<[f64; 3]> =
+            self.parts.nodes.positions.iter().map(|x| self.parts.frame.to_model(*x)).collect();
+        extents(&places).into_iter().fold(0.0, f64::max)
     }
 
     /// Largest displacement of a node by mode `j` at unit amplitude.

@@ -37,6 +37,18 @@ pub enum Carrier {
     Node(i64),
 }
 
+#[cfg(feature = "hdf5")]
+impl Carrier {
+    /// The carrier that files of simulations name: `interface NAME` or `node 17`.
+    pub(crate) fn from_words(words: &str) -> Option<Self> {
+        match words.split_once(' ')? {
+            ("interface", name) => Some(Self::Interface(name.to_owned())),
+            ("node", number) => Some(Self::Node(number.parse().ok()?)),
+            _ => None,
+        }
+    }
+}
+
 impl std::fmt::Display for Carrier {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

@@ -17,7 +17,7 @@ mod terms;
 mod validate;
 
 pub use crate::body::invariants::{Frame, Group, Groups};
-pub use crate::model::{GeometricStiffness, LoadKind, UnitLoad};
+pub use crate::model::{GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
 pub use body::FlexBody;
 pub use carried::Carrier;
 pub use fixed_interface::FixedInterface;

@@ -4,7 +4,7 @@ use super::{FixedInterface, Interface, InterfaceCoordinates, Storage, TermDecisi
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{DIGITS, Frame, Invariants};
-use crate::model::{BodyNumber, GeometricStiffness, Nodes};
+use crate::model::{BodyNumber, GeometricStiffness, Nodes, SurfaceMesh};
 use faer::Mat;
 
 /// Where a body came from.
@@ -158,6 +158,8 @@ pub struct Parts {
     pub frame: Frame,
     /// Node numbers and positions in the BODY frame.
     pub nodes: Nodes,
+    /// The surface to draw the body by, on some of the nodes; nothing is computed from it.
+    pub mesh: Option<SurfaceMesh>,
     /// Modes.
     pub modes: Modes,
     /// Exact invariants about the frame origin, body axes.

@@ -53,6 +53,7 @@ impl FlexBody {
             units: parts.units.clone(),
             frame: parts.frame,
             nodes: parts.nodes.clone(),
+            mesh: parts.mesh.clone(),
             modes: parts.modes.some(modes),
             geometric_stiffness: parts
                 .geometric_stiffness

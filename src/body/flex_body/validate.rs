@@ -1,6 +1,6 @@
 //! What must hold for the parts of a flexible body, checked once, all violations collected.
 
-use super::{Group, MassStructure, Parts};
+use super::{Group, MassStructure, Parts, SurfaceMesh};
 use crate::base::diagnostic::Diagnostic;
 use crate::body::invariants::DIGITS;
 use crate::body::problems::{LARGEST, Problems};
@@ -19,6 +19,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.plane(parts);
     check.frame(parts);
     check.nodes(parts);
+    check.mesh(parts, n);
     check.modes(parts, n, nf);
     if !(parts.units.hertz().is_finite() && parts.units.hertz() * LARGEST.sqrt() <= LARGEST) {
         check.add(format!(
@@ -113,6 +114,14 @@ impl Problems {
         let mut seen = HashSet::with_capacity(nodes.ids.len());
         if let Some(id) = nodes.ids.iter().find(|&&id| !seen.insert(id)) {
             self.add(format!("`nodes.ids` has node {id} twice, expected unique node numbers"));
+        }
+    }
+
+    /// The mesh itself is in order; here it is that of these nodes.
+    fn mesh(&mut self, parts: &Parts, n: usize) {
+        let least = parts.mesh.as_ref().map_or(0, SurfaceMesh::least_nodes);
+        if least > n {
+            self.add(format!("`mesh` names node index {}, expected indices below {n}", least - 1));
         }
     }
 

@@ -32,6 +32,11 @@ impl Frame {
         positions.iter().map(|x| (to_body * (Vector3::from(*x) - self.origin)).into()).collect()
     }
 
+    /// A position in body coordinates, in model coordinates: x_model = r0 + A0 x.
+    pub fn to_model(self, x: [f64; 3]) -> [f64; 3] {
+        (self.origin + self.axes * Vector3::from(x)).into()
+    }
+
     /// Turns the components of shapes (3n x nf, row 3 i + k) from model axes to body axes, in place.
     ///
     /// # Panics

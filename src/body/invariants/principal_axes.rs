@@ -15,7 +15,7 @@ const EQUAL_COMPONENTS: f64 = 1e-6;
 /// An axis of a distinct moment is positive along its largest component (the first such). Within a plane of
 /// equal moments the first axis is the projection of the model axis closest to the plane (the first such);
 /// three equal moments give the model axes themselves. The last axis closes the right-handed frame.
-pub(super) fn principal_axes(inertia: &Matrix3<f64>) -> Matrix3<f64> {
+pub(crate) fn principal_axes(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     let (moments, vectors) = jacobi(inertia);
     let equal = |a: usize, b: usize| moments[b] - moments[a] <= EQUAL_MOMENTS * moments[2].abs();
     match (equal(0, 1), equal(1, 2)) {

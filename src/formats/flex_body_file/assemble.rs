@@ -7,7 +7,8 @@ use super::value::Value;
 use crate::base::units::UnitSystem;
 use crate::body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, TermDecision, UnitLoad,
+    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, SurfaceMesh, TermDecision,
+    UnitLoad,
 };
 use crate::body::invariants::{DIGITS, GeneralTerms, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass};
 use crate::model::{BodyNumber, Coupling, Nodes};
@@ -30,6 +31,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         ids: take.ints("/nodes/id"),
         positions: take.floats("/nodes/position").as_chunks().0.to_vec(),
     };
+    let mesh = take.mesh(nodes.len());
     let modes = take.modes(nodes.len());
     let nf = modes.eigenvalue.len();
     let groups = take.scan.held()?;
@@ -47,6 +49,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         units,
         frame,
         nodes,
+        mesh,
         modes,
         invariants,
         geometric_stiffness,
@@ -168,6 +171,29 @@ impl Take<'_> {
             self.scan.add(format!("{} and {}: expected both or none, found one", paths[0], paths[1]));
         }
         Some(BodyNumber { number: number?, of: of? })
+    }
+
+    /// The surface on `n` nodes, where there is one.
+    fn mesh(&mut self, n: usize) -> Option<SurfaceMesh> {
+        let [triangles, edges] = ["/mesh/triangles", "/mesh/edges"].map(|path| self.indices(path));
+        if triangles.is_none() && edges.is_none() {
+            return None;
+        }
+        let triangles = triangles.unwrap_or_default().as_chunks().0.to_vec();
+        let edges = edges.unwrap_or_default().as_chunks().0.to_vec();
+        SurfaceMesh::new(triangles, edges, n)
+            .map_err(|problem| self.scan.add(format!("/mesh: {problem}")))
+            .ok()
+    }
+
+    /// Indices of nodes, where they are stored; negative ones are problems.
+    fn indices(&mut self, path: &str) -> Option<Vec<u32>> {
+        let Some(Value::Indices(values)) = self.scan.values.remove(path) else { return None };
+        if let Some(negative) = values.iter().find(|&&index| index < 0) {
+            self.scan.add(format!("{path}: expected indices of nodes, found {negative}"));
+        }
+        // Negative ones become such that no body has.
+        Some(values.into_iter().map(i32::cast_unsigned).collect())
     }
 
     fn modes(&mut self, n: usize) -> Modes {

@@ -70,6 +70,9 @@ pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
                     None => {}
                     Some(Value::Floats(values)) => array(Numbers::Floats(values)),
                     Some(Value::Ints(values)) => array(Numbers::Ints(values)),
+                    Some(Value::Indices(values)) => {
+                        array(Numbers::Ints(values.into_iter().map(i64::from).collect()));
+                    }
                     Some(Value::Text(text)) => attribute(text.into()),
                     Some(Value::Int(value)) => attribute(value.into()),
                     Some(Value::Float(value)) => attribute(value.into()),

@@ -44,6 +44,7 @@ macro_rules! number {
 number!(f64, "float64");
 number!(f32, "float32");
 number!(i64, "int64");
+number!(i32, "int32");
 
 /// The digest of a dataset as far as its numbers go: `values` row-major in the extents `shape`.
 pub(super) fn of_numbers<T: Number>(shape: &[usize], values: &[T]) -> Fingerprint {

@@ -16,7 +16,8 @@ const INTRODUCTION: &str = "\
 A flex-body file is an HDF5 file (readable by HDF5 1.8 and later). All arrays are row-major in the shapes given here
 (MATLAB and Fortran show the extents in reverse order); numbers are 64-bit little-endian; texts are UTF-8 of variable
 length. Every dataset has the text attributes `units`, `symbol` and `description`. Numbers are in the units of the root
-group. n is the number of nodes, nf the number of modes, k the number of nodes of an interface, nc the number of interface coordinates.
+group. n is the number of nodes, nf the number of modes, k the number of nodes of an interface, nc the number of interface coordinates,
+nt and ne those of triangles and edges of the surface.
 
 W1, W2, W3 are component-blocked: the column (or row) of component b = 0, 1, 2 and mode j is b nf + j.
 
@@ -60,7 +61,7 @@ its attributes alone, the root without `digests` and `sha256`. A record is the l
 
     LENGTH NAME TYPE SHAPE BYTES
 
-followed by the content. NAME is the attribute's name, empty for the dataset itself, and LENGTH the number of its bytes; TYPE is `float64`, `float32`, `int64` (and other
+followed by the content. NAME is the attribute's name, empty for the dataset itself, and LENGTH the number of its bytes; TYPE is `float64`, `float32`, `int64`, `int32` (and other
 `int` and `uint`) or `text`; SHAPE is the extents with `x` between them, empty for a single value; BYTES is the number of bytes of the content: numbers row-major and
 little-endian, texts in UTF-8 without an end mark. One space stands between the fields, a line feed ends the line. Other types, arrays of texts, links that are not hard and more than eight levels of groups occur in no flex-body file.
 
@@ -159,6 +160,7 @@ fn kind(item: &Item) -> &'static str {
         Kind::Floats(_) if item.large => "float64 or float32",
         Kind::Floats(_) | Kind::Float | Kind::Named => "float64",
         Kind::Ints(_) | Kind::Int => "int64",
+        Kind::Indices(_) => "int32",
         Kind::Text => "text",
     }
 }
@@ -172,6 +174,8 @@ fn symbol(extent: Extent) -> String {
         Extent::InterfaceNodes => "k".to_owned(),
         Extent::InternalRows => "m".to_owned(),
         Extent::Coordinates => "nc".to_owned(),
+        Extent::Triangles => "nt".to_owned(),
+        Extent::Edges => "ne".to_owned(),
     }
 }
 
@@ -292,7 +296,7 @@ fn entry(item: &Item) -> Value {
         Kind::Text => json!({ "type": "string" }),
         Kind::Int => json!({ "type": "integer" }),
         Kind::Float | Kind::Named => json!({ "type": "number" }),
-        Kind::Floats(extents) | Kind::Ints(extents) => {
+        Kind::Floats(extents) | Kind::Ints(extents) | Kind::Indices(extents) => {
             let sizes = extents.iter().map(|extent| match extent {
                 Extent::Fixed(size) => json!({ "const": size }),
                 Extent::ThreeModes => json!({ "type": "integer", "minimum": 3, "multipleOf": 3 }),

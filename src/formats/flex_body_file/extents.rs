@@ -12,6 +12,8 @@ pub(super) struct Sizes {
     pub interface_nodes: Option<usize>,
     pub internal_rows: Option<usize>,
     coordinates: Option<usize>,
+    triangles: Option<usize>,
+    edges: Option<usize>,
 }
 
 /// Reads a dataset of the stated shape, with its extents.
@@ -49,6 +51,8 @@ impl Sizes {
             Extent::InterfaceNodes => size == *self.interface_nodes.get_or_insert(size),
             Extent::InternalRows => size == *self.internal_rows.get_or_insert(size),
             Extent::Coordinates => size == *self.coordinates.get_or_insert(size),
+            Extent::Triangles => size == *self.triangles.get_or_insert(size),
+            Extent::Edges => size == *self.edges.get_or_insert(size),
         }
     }
 
@@ -65,6 +69,8 @@ impl Sizes {
             Extent::InterfaceNodes => known("k", self.interface_nodes),
             Extent::InternalRows => known("m", self.internal_rows),
             Extent::Coordinates => known("nc", self.coordinates),
+            Extent::Triangles => known("nt", self.triangles),
+            Extent::Edges => known("ne", self.edges),
         }
     }
 }

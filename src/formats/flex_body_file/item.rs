@@ -19,8 +19,12 @@ pub(super) enum Extent {
     InternalRows,
     /// nc, the interface coordinates.
     Coordinates,
+    /// nt, the triangles of the surface.
+    Triangles,
+    /// ne, the edges of the surface.
+    Edges,
 }
-use Extent::{Coordinates, Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes};
+use Extent::{Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes, Triangles};
 
 /// How an entry is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +33,8 @@ pub(super) enum Kind {
     Floats(&'static [Extent]),
     /// Dataset of 64-bit signed integers.
     Ints(&'static [Extent]),
+    /// Dataset of 32-bit signed integers: indices of nodes.
+    Indices(&'static [Extent]),
     /// Attribute: UTF-8 text of variable length.
     Text,
     /// Attribute: 64-bit signed integer.
@@ -38,7 +44,7 @@ pub(super) enum Kind {
     /// Attributes, 64-bit floats, whose names are data.
     Named,
 }
-use Kind::{Float, Floats, Int, Ints, Named, Text};
+use Kind::{Float, Floats, Indices, Int, Ints, Named, Text};
 
 /// Takes the value of an entry from a body; `None` only for entries that are not required.
 pub(super) type Get = fn(&View<'_>) -> Option<Value>;
@@ -154,7 +160,7 @@ impl Item {
     /// Shape of a dataset; `None` for attributes.
     pub fn shape(&self) -> Option<&'static [Extent]> {
         match self.kind {
-            Floats(shape) | Ints(shape) => Some(shape),
+            Floats(shape) | Ints(shape) | Indices(shape) => Some(shape),
             Text | Int | Float | Named => None,
         }
     }
@@ -169,6 +175,8 @@ impl Item {
             ThreeModes => 3 * nf,
             InterfaceNodes => view.interface_nodes().len(),
             Coordinates => view.body.coordinates.as_ref().map_or(0, |c| c.names.len()),
+            Triangles => view.body.mesh.as_ref().map_or(0, |mesh| mesh.triangles().len()),
+            Edges => view.body.mesh.as_ref().map_or(0, |mesh| mesh.edges().len()),
             InternalRows => view.body.modes.internal.as_ref().map_or(0, |internal| internal.dofs.len()),
         };
         self.shape().unwrap_or(&[]).iter().map(size).collect()

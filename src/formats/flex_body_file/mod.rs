@@ -23,6 +23,8 @@ mod schema;
 #[cfg(feature = "hdf5")]
 mod simulation;
 #[cfg(feature = "hdf5")]
+mod simulation_read;
+#[cfg(feature = "hdf5")]
 mod structure;
 mod value;
 #[cfg(feature = "hdf5")]
@@ -37,6 +39,8 @@ pub use document::{format_markdown, format_schema};
 pub use read::{read, read_with_notes, validate};
 #[cfg(feature = "hdf5")]
 pub use simulation::fill_simulation;
+#[cfg(feature = "hdf5")]
+pub use simulation_read::{RecordedMotion, read_simulation};
 #[cfg(feature = "hdf5")]
 pub use structure::structure;
 #[cfg(feature = "hdf5")]

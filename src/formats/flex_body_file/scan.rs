@@ -203,6 +203,11 @@ impl Scan {
                     .inspect(|read| self.hash(name, read));
                 Ok(values.map(|(values, _)| Value::Ints(values)))
             }
+            Kind::Indices(shape) => {
+                let values = dataset::<i32>(place, item.name, shape, sizes, &mut self.stored)?
+                    .inspect(|read| self.hash(name, read));
+                Ok(values.map(|(values, _)| Value::Indices(values)))
+            }
             Kind::Text => Ok(hdf5_file::text(place, item.name)?.map(Value::Text)),
             Kind::Int => Ok(hdf5_file::int(place, item.name)?.map(Value::Int)),
             Kind::Float => match hdf5_file::float(place, item.name)? {
@@ -368,6 +373,7 @@ fn kind(item: &Item) -> &'static str {
     match item.kind {
         Kind::Floats(_) => "a dataset of 64-bit floats",
         Kind::Ints(_) => "a dataset of 64-bit integers",
+        Kind::Indices(_) => "a dataset of 32-bit integers",
         Kind::Text => "a text attribute",
         Kind::Int => "an integer attribute",
         Kind::Float | Kind::Named => "a float attribute",

@@ -1,11 +1,11 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow
 //! it.
 
-use super::item::Extent::{Fixed, InternalRows, Modes, Nodes, ThreeModes};
-use super::item::Kind::{Floats, Int, Ints, Named, Text};
+use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, ThreeModes, Triangles};
+use super::item::Kind::{Floats, Indices, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
 use super::item::{Get, Group, Item, Kind, Origin, Per};
-use super::value::{Units, Value, count, matrix, rows, shape_rows, small, text};
+use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
 use crate::base::provenance;
 use crate::body::flex_body::{Group as TermGroup, MassStructure, Storage};
 use crate::body::invariants::GENERAL_REMARK;
@@ -26,8 +26,11 @@ pub(super) const WHOLE: &str = "sha256";
 
 /// Version of the format: readers refuse a newer major; a newer minor only adds entries.
 pub(super) const MAJOR: i64 = 1;
-/// See [`MAJOR`].
-pub(super) const MINOR: i64 = 4;
+/// The minor version that has all entries; see [`MAJOR`]. A file states the least version that has those that
+/// it holds.
+pub(super) const MINOR: i64 = 5;
+/// The minor version of files without a surface.
+const WITHOUT_MESH: i64 = 4;
 /// The minor version from which on every file has digests.
 pub(super) const DIGESTS_SINCE: i64 = 4;
 /// Value of the root attribute `format`.
@@ -103,7 +106,7 @@ const ROOT: &[Item] = &[
         Int,
         ONE,
         "additions within the major version; a reader ignores what it does not know",
-        |_| Some(Value::Int(MINOR)),
+        |v| Some(Value::Int(if v.body.mesh.is_some() { MINOR } else { WITHOUT_MESH })),
     ),
     attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
         text(provenance::generator())
@@ -231,6 +234,33 @@ const NODES: &[Item] = &[
         "undeformed node positions in the body frame",
         |v| Some(Value::Floats(v.body.nodes.positions.as_flattened().to_vec())),
     ),
+];
+
+const MESH: &[Item] = &[
+    dataset(
+        "triangles",
+        Indices(&[Triangles, Fixed(3)]),
+        ONE,
+        "",
+        "triangles of the surface by the indices of their nodes in `/nodes`, from 0, counterclockwise seen from outside; absent: lines only",
+        |v| {
+            let triangles = v.body.mesh.as_ref()?.triangles();
+            (!triangles.is_empty()).then(|| indices(triangles.as_flattened()))
+        },
+    )
+    .added(5),
+    dataset(
+        "edges",
+        Indices(&[Edges, Fixed(2)]),
+        ONE,
+        "",
+        "edges to draw: where the surface turns by more than 30 degrees or ends, and beams; absent: none",
+        |v| {
+            let edges = v.body.mesh.as_ref()?.edges();
+            (!edges.is_empty()).then(|| indices(edges.as_flattened()))
+        },
+    )
+    .added(5),
 ];
 
 const MODES: &[Item] = &[
@@ -465,6 +495,12 @@ pub(super) const TABLE: &[Group] = &[
     Group { path: "/source", per: Per::Body, description: "Where the body came from.", items: &[SOURCE] },
     Group { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
     Group { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
+    Group {
+        path: "/mesh",
+        per: Per::Body,
+        description: "The surface of the part on some of its nodes, to draw it by. Nothing is computed from it. Absent: not known. Since 1.5; a file without it is one of 1.4.",
+        items: &[MESH],
+    },
     Group {
         path: "/modes",
         per: Per::Body,

@@ -14,8 +14,10 @@ use hdf5_metno as hdf5;
 use nalgebra::Vector3;
 use std::path::Path;
 
-const FORMAT: &str = "flexbody-simulation";
-const VERSION: i64 = 2;
+/// Value of the root attribute `format`.
+pub(super) const FORMAT: &str = "flexbody-simulation";
+/// Version of the format.
+pub(super) const VERSION: i64 = 2;
 
 /// Unit exponents of mass^(1/2), length and time.
 const fn unit(mass_halves: i8, length: i8, time: i8) -> Units {
@@ -115,7 +117,9 @@ impl Writer<'_> {
         self.file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
         put_text(&self.file, "generator", &generator())?;
         put_text(&self.file, "scene", &self.recording.scene)?;
-        put_text(&self.file, "body", &self.recording.body)
+        put_text(&self.file, "body", &self.recording.body)?;
+        let carrier = self.recording.setting.carrier.as_ref();
+        carrier.map_or(Ok(()), |carrier| put_text(&self.file, "carrier", carrier))
     }
 
     /// The integration method and its settings.

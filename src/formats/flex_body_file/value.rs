@@ -10,6 +10,7 @@ use faer::{Mat, MatRef};
 pub(super) enum Value {
     Floats(Vec<f64>),
     Ints(Vec<i64>),
+    Indices(Vec<i32>),
     Text(String),
     Int(i64),
     Float(f64),
@@ -66,6 +67,11 @@ pub(super) fn matrix(m: MatRef<'_, f64>) -> Option<Value> {
 /// A 3-vector or 3x3 matrix of nalgebra, row by row.
 pub(super) fn small<const C: usize>(m: nalgebra::SMatrix<f64, 3, C>) -> Option<Value> {
     Some(Value::Floats(m.transpose().iter().copied().collect()))
+}
+
+/// Indices of nodes, of which no body has more than 2^31.
+pub(super) fn indices(values: &[u32]) -> Value {
+    Value::Indices(values.iter().map(|&i| i32::try_from(i).unwrap_or(i32::MAX)).collect())
 }
 
 /// A count as the file's integer. Counts of things in memory are far below 2^63.

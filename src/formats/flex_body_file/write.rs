@@ -104,20 +104,14 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
 
 /// Writes an entry; of a dataset, gives the fingerprint of its numbers.
 fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<Option<Fingerprint>> {
-    let shape = item.dims(view);
     match (item.kind, value) {
         (Kind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
             let short: Vec<f32> = values.into_iter().map(nearest_f32).collect();
             return put_floats(place, item, view, &short).map(Some);
         }
         (Kind::Floats(_), Value::Floats(values)) => return put_floats(place, item, view, &values).map(Some),
-        (Kind::Ints(_), Value::Ints(values)) => {
-            let fingerprint = of_numbers(&shape, &values);
-            let dataset = place.new_dataset::<i64>().obj_track_times(false).shape(shape).create(item.name)?;
-            dataset.write_raw(&values)?;
-            describe(&dataset, item, view)?;
-            return Ok(Some(fingerprint));
-        }
+        (Kind::Ints(_), Value::Ints(values)) => return put_whole(place, item, view, &values).map(Some),
+        (Kind::Indices(_), Value::Indices(values)) => return put_whole(place, item, view, &values).map(Some),
         (Kind::Text, Value::Text(text)) => put_text(place, item.name, &text)?,
         (Kind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v)?,
         (Kind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v)?,
@@ -127,6 +121,20 @@ fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5:
         (kind, value) => unreachable!("table entry {}: {kind:?} for {value:?}", item.name),
     }
     Ok(None)
+}
+
+fn put_whole<T: hdf5::H5Type + Number>(
+    place: &hdf5::Group,
+    item: &Item,
+    view: &View<'_>,
+    values: &[T],
+) -> hdf5::Result<Fingerprint> {
+    let shape = item.dims(view);
+    let fingerprint = of_numbers(&shape, values);
+    let dataset = place.new_dataset::<T>().obj_track_times(false).shape(shape).create(item.name)?;
+    dataset.write_raw(values)?;
+    describe(&dataset, item, view)?;
+    Ok(fingerprint)
 }
 
 fn put_floats<T: hdf5::H5Type + Number>(

@@ -46,34 +46,77 @@ impl Numbers {
     /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values that
     /// are not in this file.
     pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
-        let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
+        let (dataset, at) = stored_here(group, members, group_name, name)?;
         let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
-        if members.link(name) == Some(LinkType::External) {
-            return Err(refuse(Code::Hdf5Layout, "lies in another file".into()));
-        }
-        let dataset =
-            group.dataset(name).map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be opened: {e}")))?;
-        let properties =
-            dataset.dcpl().map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be read: {e}")))?;
-        if dataset.layout() == hdf5_metno::dataset::Layout::Virtual || !properties.external().is_empty() {
-            return Err(refuse(Code::Hdf5Layout, "keeps its values in another file".into()));
-        }
         let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| Kind::of(&t));
         let kind = kind.ok_or_else(|| {
             refuse(Code::MatrixKind, "holds no real numbers (complex, boolean or structured values?)".into())
         })?;
-        let declared =
-            dataset.shape().iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
-        let stored = dataset.storage_size();
-        if declared > stored.saturating_mul(RATIO) {
-            let message = format!("declares {declared} values, but only {stored} bytes are stored");
-            return Err(refuse(Code::MatrixCount, message));
-        }
+        check_stored(&dataset).map_err(|what| refuse(Code::MatrixCount, what))?;
         Ok(Self { dataset, name: at, kind })
     }
 
     pub(super) fn is_single_precision(&self) -> bool {
         self.kind == Kind::Single
+    }
+}
+
+/// Opens a dataset whose values are stored in this file, and gives its path for messages.
+///
+/// # Errors
+/// FB310 for values that are not in this file.
+fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<(Dataset, String)> {
+    let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
+    let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
+    if members.link(name) == Some(LinkType::External) {
+        return Err(refuse(Code::Hdf5Layout, "lies in another file".into()));
+    }
+    let dataset =
+        group.dataset(name).map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be opened: {e}")))?;
+    let properties = dataset.dcpl().map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be read: {e}")))?;
+    if dataset.layout() == hdf5_metno::dataset::Layout::Virtual || !properties.external().is_empty() {
+        return Err(refuse(Code::Hdf5Layout, "keeps its values in another file".into()));
+    }
+    Ok((dataset, at))
+}
+
+/// The rows of a dataset of single characters, as netCDF keeps names, without what fills them up.
+///
+/// # Errors
+/// FB302 for other datasets, FB304 for rows that are not stored, FB310 for those that are not in this file.
+pub(super) fn names_of(group: &Group, members: &Members, name: &str) -> Found<Vec<String>> {
+    let (dataset, at) = stored_here(group, members, "", name)?;
+    let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
+    let shape = dataset.shape();
+    let kind = dataset.dtype().and_then(|kind| kind.to_descriptor());
+    let (&[_, length], Ok(TypeDescriptor::FixedAscii(1))) = (shape.as_slice(), kind) else {
+        return Err(refuse(Code::MatrixKind, "holds no names".to_owned()));
+    };
+    // Names that were never written are blank.
+    if dataset.storage_size() == 0 {
+        return Ok(Vec::new());
+    }
+    check_stored(&dataset).map_err(|what| refuse(Code::MatrixCount, what))?;
+    let letters = dataset
+        .read_raw::<FixedAscii<1>>()
+        .map_err(|e| refuse(Code::FileUnreadable, format!("cannot be read: {e}")))?;
+    let letters: Vec<u8> =
+        letters.iter().map(|letter| letter.as_bytes().first().copied().unwrap_or(0)).collect();
+    let name = |row: &[u8]| {
+        let end = row.iter().position(|&letter| letter == 0).unwrap_or(row.len());
+        String::from_utf8_lossy(&row[..end]).trim().to_owned()
+    };
+    Ok(letters.chunks(length.max(1)).map(name).collect())
+}
+
+/// Refuses more values than the bytes in the file can stand for.
+fn check_stored(dataset: &Dataset) -> Result<(), String> {
+    let declared =
+        dataset.shape().iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
+    let stored = dataset.storage_size();
+    match declared > stored.saturating_mul(RATIO) {
+        true => Err(format!("declares {declared} values, but only {stored} bytes are stored")),
+        false => Ok(()),
     }
 }
 

@@ -56,6 +56,7 @@ impl JobReader for Abaqus {
             mass: mass_matrix,
             nodes: Nodes { ids, positions },
             dofs,
+            elements: mesh.drawn(),
             sets: mesh.sets,
             files,
             diagnostics: mesh.notes.into_iter().chain(note).collect(),

@@ -4,6 +4,7 @@
 use super::coordinate_files::CoordinateFile;
 use super::deck::{Deck, fields};
 use super::deck_mesh::DeckMesh;
+use super::expanded::label_once;
 use super::{Found, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
@@ -11,7 +12,7 @@ use crate::input::coordinates::excerpt;
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
 use crate::model::{DofLabel, Nodes};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// The reader of CalculiX jobs.
@@ -19,9 +20,6 @@ pub(super) struct Calculix;
 
 const HELP: &str =
     "run the deck with *FREQUENCY, SOLVER=MATRIXSTORAGE, and keep .sti, .mas and .dof beside it";
-
-/// Elements that CalculiX expands into solids: several rows have the same label.
-const EXPANDED: &[&str] = &["S", "B", "CPS", "CPE", "CAX", "M3D", "T3D", "T2D"];
 
 impl JobReader for Calculix {
     fn name(&self) -> &'static str {
@@ -48,12 +46,12 @@ impl JobReader for Calculix {
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::of(&deck)?;
         let labels = read_labels(&dof)?;
-        refuse_expanded(&mesh, &labels, &dof)?;
         let n = labels.len();
         let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
         let (stiffness, mass) =
             rayon::join(|| read(&sti, MatrixRole::Stiffness), || read(&mas, MatrixRole::Mass));
         let (stiffness, mass) = both(stiffness, mass)?;
+        let (labels, added) = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
         let rotations = rotation_nodes(&deck)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
@@ -62,7 +60,9 @@ impl JobReader for Calculix {
         let dofs = labels.iter().map(label).collect();
         // The nodes that only name rotations stand at no place of their own.
         let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
-        let (ids, positions) = placed.map(|(id, x)| (*id, *x)).unzip();
+        let (mut ids, mut positions): (Vec<_>, Vec<_>) = placed.map(|(id, x)| (*id, *x)).unzip();
+        ids.extend(added.ids);
+        positions.extend(added.positions);
         let mut files: Vec<(&'static str, _)> =
             deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
         files.extend([("stiffness", sti), ("mass", mas), ("dofs", dof)]);
@@ -71,6 +71,7 @@ impl JobReader for Calculix {
             mass,
             nodes: Nodes { ids, positions },
             dofs,
+            elements: mesh.drawn(),
             sets: mesh.sets,
             files,
             diagnostics: mesh.notes,
@@ -101,26 +102,6 @@ fn read_labels(path: &Path) -> Found<Vec<DofLabel>> {
         labels.push(label);
     }
     Ok(labels)
-}
-
-/// FB111 where several rows have the same label: those of shells, beams and plane elements, which CalculiX
-/// expands into solids whose nodes the deck does not have.
-fn refuse_expanded(mesh: &DeckMesh, labels: &[DofLabel], path: &Path) -> Found<()> {
-    let mut seen = HashSet::new();
-    let Some(twice) = labels.iter().find(|label| !seen.insert(**label)) else { return Ok(()) };
-    let expanded = |kind: &&str| EXPANDED.iter().any(|head| kind.starts_with(head));
-    let mut kinds: Vec<&str> = mesh.elements.iter().map(|own| own.kind.as_str()).filter(expanded).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    let message = format!(
-        "{twice} labels several rows: CalculiX expands {} into solids, and the deck does not say where their nodes lie",
-        if kinds.is_empty() { "elements".to_owned() } else { kinds.join(", ") }
-    );
-    Err(vec![
-        Diagnostic::new(Code::DeckUnsupported, message)
-            .in_file(path)
-            .with_help("model the part with solid elements: C3D4, C3D8, C3D10, C3D20 and their kin"),
-    ])
 }
 
 /// Nodes whose directions 1 to 3 are rotations, each with the reference node that turns: ROT NODE of

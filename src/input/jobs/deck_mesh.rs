@@ -1,10 +1,12 @@
 //! Nodes, elements and sets of a keyword deck, parts and instances of Abaqus included.
 
 use super::deck::{Card, Deck, fields};
+use super::element_kinds::{Drawing, drawing};
 use super::{Found, NodeSets};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::coordinates::excerpt;
 use crate::input::table::integer;
+use crate::model;
 use nalgebra::{Rotation3, Unit, Vector3};
 use std::collections::{BTreeMap, HashMap};
 
@@ -51,6 +53,21 @@ impl DeckMesh {
         }
         let found = reading.finish();
         if found.is_empty() { scopes.assembled() } else { Err(found) }
+    }
+
+    /// The elements as they are drawn.
+    pub(super) fn drawn(&self) -> model::Elements {
+        let mut drawn = model::Elements::default();
+        for Elements { kind, members } in &self.elements {
+            for (_, nodes) in members {
+                match drawing(kind, nodes) {
+                    Drawing::Shape(shape, nodes) => drawn.add(kind, shape, &nodes),
+                    Drawing::Nothing => {}
+                    Drawing::Unknown => drawn.leave_out(kind, 1),
+                }
+            }
+        }
+        drawn
     }
 }
 

@@ -1,5 +1,7 @@
 //! What element types of Abaqus and CalculiX are made of.
 
+use crate::model::ElementShape;
+
 /// Family of an element type: what its nodes can do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Family {
@@ -72,9 +74,69 @@ pub(super) fn n_nodes(kind: &str) -> Option<usize> {
     }
 }
 
+/// What there is to draw of an element.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Drawing {
+    /// A shape, and its nodes in the order of the shape.
+    Shape(ElementShape, Vec<i64>),
+    /// A point, or nothing.
+    Nothing,
+    /// The type or its number of nodes is not known.
+    Unknown,
+}
+
+/// How an element of a type is drawn that has these nodes.
+pub(super) fn drawing(kind: &str, nodes: &[i64]) -> Drawing {
+    let is_line = ["T3D", "B31", "B32", "B33"].iter().any(|head| kind.starts_with(head));
+    // Beams may have a node more, which says how they are turned.
+    let count = if is_line { n_nodes(kind).unwrap_or(nodes.len()).min(nodes.len()) } else { nodes.len() };
+    let shape = match (family(kind), count) {
+        (Some(Family::Mass | Family::Turner), _) => return Drawing::Nothing,
+        (Some(Family::Solid), 4 | 10) => ElementShape::Tetrahedron,
+        (Some(Family::Solid), 5 | 13) => ElementShape::Pyramid,
+        (Some(Family::Solid), 6 | 15 | 18) => ElementShape::Wedge,
+        (Some(Family::Solid), 8 | 20 | 27) => ElementShape::Hexahedron,
+        (Some(_), 2 | 3) if is_line => {
+            // The node in the middle stands between the ends here, behind them in shapes.
+            let ends_first =
+                if count == 3 { vec![nodes[0], nodes[2], nodes[1]] } else { nodes[..2].to_vec() };
+            return Drawing::Shape(ElementShape::Line, ends_first);
+        }
+        (Some(Family::Plane | Family::Turning | Family::Pulling), 3 | 6) => ElementShape::Triangle,
+        (Some(Family::Plane | Family::Turning | Family::Pulling), 4 | 8 | 9) => ElementShape::Quadrilateral,
+        _ => return Drawing::Unknown,
+    };
+    Drawing::Shape(shape, nodes.to_vec())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn elements_are_drawn_by_type_and_number_of_nodes() {
+        let nodes: Vec<i64> = (1..=27).collect();
+        for (kind, count, shape) in [
+            ("C3D10M", 10, ElementShape::Tetrahedron),
+            ("C3D15V", 18, ElementShape::Wedge),
+            ("C3D27", 27, ElementShape::Hexahedron),
+            ("SC8R", 8, ElementShape::Hexahedron),
+            ("SC6R", 6, ElementShape::Wedge),
+            ("STRI65", 6, ElementShape::Triangle),
+            ("S8R", 8, ElementShape::Quadrilateral),
+            ("CPS3", 3, ElementShape::Triangle),
+            ("M3D8R", 8, ElementShape::Quadrilateral),
+        ] {
+            let drawn = drawing(kind, &nodes[..count]);
+            assert_eq!(drawn, Drawing::Shape(shape, nodes[..count].to_vec()), "{kind}");
+        }
+        assert_eq!(drawing("B32", &[1, 2, 3]), Drawing::Shape(ElementShape::Line, vec![1, 3, 2]));
+        assert_eq!(drawing("B31", &[1, 2, 99]), Drawing::Shape(ElementShape::Line, vec![1, 2]));
+        assert_eq!(drawing("MASS", &[1]), Drawing::Nothing);
+        for (kind, count) in [("SPRINGA", 2), ("C3D8", 7), ("B31", 1), ("S4", 0)] {
+            assert_eq!(drawing(kind, &nodes[..count]), Drawing::Unknown, "{kind}");
+        }
+    }
 
     #[test]
     fn names_tell_families_and_numbers_of_nodes() {

@@ -16,15 +16,19 @@ impl Walk<'_> {
         let Some((table, _)) = self.table(top, "basis") else { return Vec::new() };
         self.known_keys(table, "[basis]", BASIS);
         let mut loads = self.load_sets(table);
-        if let Some(file) = self.string(table, "loads") {
-            let folder = self.path.parent().unwrap_or(Path::new(""));
-            loads.push(LoadSource::File(MatrixLocation::parse(file).relative_to(folder)));
-        }
+        loads.extend(self.load_file(table));
         loads
     }
 
+    /// Nodal forces of the user.
+    fn load_file(&mut self, table: &Table) -> Option<LoadSource> {
+        let file = self.string(table, "loads")?;
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        Some(LoadSource::File(MatrixLocation::parse(file).relative_to(folder)))
+    }
+
     fn load_sets(&mut self, table: &Table) -> Vec<LoadSource> {
-        const EXPECTED: &str = "a list of \"centrifugal\" and \"interfaces\"";
+        const EXPECTED: &str = "a list of \"centrifugal\" and \"interfaces\", each also with a frequency as in \"interfaces@500\"";
         let Some(value) = table.get("residual_vectors") else { return Vec::new() };
         let DeValue::Array(list) = value.get_ref() else {
             self.mistyped("residual_vectors", value, EXPECTED);
@@ -32,21 +36,27 @@ impl Walk<'_> {
         };
         let mut sets = Vec::new();
         for item in list.iter() {
-            let set = match item.get_ref() {
-                DeValue::String(name) if name == "centrifugal" => LoadSource::Centrifugal,
-                DeValue::String(name) if name == "interfaces" => LoadSource::Interfaces,
-                DeValue::String(name) => {
-                    let message =
-                        format!("`{name}` is no set of loads for residual vectors, expected {EXPECTED}");
-                    let complaint = self.at(Code::ManifestSyntax, item.span(), message);
-                    self.found.push(complaint.with_help("nodal forces of your own go into `loads`, a file"));
-                    continue;
-                }
-                _ => {
-                    self.mistyped("residual_vectors", item, EXPECTED);
-                    continue;
-                }
+            let DeValue::String(text) = item.get_ref() else {
+                self.mistyped("residual_vectors", item, EXPECTED);
+                continue;
             };
+            let (name, hertz) = LoadSource::with_frequency(text);
+            let known = match name {
+                "centrifugal" => Some(LoadSource::Centrifugal),
+                "interfaces" => Some(LoadSource::Interfaces),
+                "loads" if hertz > 0.0 => self.load_file(table),
+                _ => None,
+            };
+            let Some(loads) = known else {
+                let message =
+                    format!("`{text}` is no set of loads for residual vectors, expected {EXPECTED}");
+                let complaint = self.at(Code::ManifestSyntax, item.span(), message);
+                self.found.push(complaint.with_help(
+                    "nodal forces of your own go into `loads`, a file; \"loads@500\" names its responses at a frequency",
+                ));
+                continue;
+            };
+            let set = loads.at(hertz);
             if sets.contains(&set) {
                 let message = "`residual_vectors` names loads twice".to_owned();
                 self.complain(Code::ManifestSyntax, item.span(), message);

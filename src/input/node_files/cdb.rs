@@ -1,5 +1,7 @@
-//! Archives of Ansys (`CDWRITE`, .cdb): nodes in NBLOCK, components of nodes in CMBLOCK, both in fields of
-//! fixed width.
+//! Archives of Ansys (`CDWRITE`, .cdb): nodes in NBLOCK, components of nodes in CMBLOCK, elements in EBLOCK,
+//! all in fields of fixed width.
+
+mod eblock;
 
 use super::{Found, NodeFile, syntax};
 use crate::input::bytes::InputFile;
@@ -18,6 +20,7 @@ pub(super) fn recognises(head: &str) -> bool {
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let text: Vec<&[u8]> = file.bytes().split(|&b| b == b'\n').collect();
     let mut read = NodeFile::default();
+    let mut types = eblock::Types::default();
     let mut at = 0;
     while at < text.len() {
         let head = String::from_utf8_lossy(text[at]).trim().to_uppercase();
@@ -25,7 +28,10 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
             nodes(file, &text, at, &mut read)?
         } else if head.starts_with("CMBLOCK,") {
             component(file, &text, at, &mut read)?
+        } else if head.starts_with("EBLOCK,") {
+            eblock::elements(&text, at, &types, &mut read.elements)
         } else {
+            types.learn(&head);
             at + 1
         };
     }

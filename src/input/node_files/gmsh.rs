@@ -1,8 +1,10 @@
-//! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, and the nodes of physical groups as sets.
+//! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and
+//! elements.
 
 use super::{Found, NodeFile, syntax};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
+use crate::model::{ElementShape, Elements};
 use std::collections::{BTreeSet, HashMap};
 
 /// Whether the text is such a mesh.
@@ -130,6 +132,7 @@ impl Mesh {
             let tags =
                 (0..words.whole("a count")?).map(|_| words.whole("a tag")).collect::<Found<Vec<_>>>()?;
             let nodes = words.nodes(kind)?;
+            draw(&mut self.read.elements, kind, &nodes);
             if let (Some(&group), Some(dimension)) = (tags.first(), dimension_of(kind)) {
                 self.members.entry((dimension, group)).or_default().extend(nodes);
             }
@@ -149,6 +152,7 @@ impl Mesh {
             for _ in 0..count {
                 words.whole("an element")?;
                 let nodes = words.nodes(kind)?;
+                draw(&mut self.read.elements, kind, &nodes);
                 for group in &groups {
                     self.members.entry((dimension, *group)).or_default().extend(nodes.iter().copied());
                 }
@@ -191,6 +195,49 @@ fn dimension_of(kind: i64) -> Option<i64> {
         _ => return None,
     })
 }
+
+/// Type of a point.
+const POINT: i64 = 15;
+
+/// Adds an element of a type as it is drawn: those of the third order and higher by their corners alone.
+fn draw(elements: &mut Elements, kind: i64, nodes: &[i64]) {
+    let (shape, middles): (_, &[[usize; 2]]) = match kind {
+        POINT => return,
+        1 | 26..=28 => (ElementShape::Line, &[]),
+        2 | 20..=25 => (ElementShape::Triangle, &[]),
+        3 => (ElementShape::Quadrilateral, &[]),
+        4 | 29..=31 => (ElementShape::Tetrahedron, &[]),
+        5 => (ElementShape::Hexahedron, &[]),
+        6 => (ElementShape::Wedge, &[]),
+        7 => (ElementShape::Pyramid, &[]),
+        8 => (ElementShape::Line, ElementShape::Line.edges()),
+        9 => (ElementShape::Triangle, ElementShape::Triangle.edges()),
+        10 | 16 => (ElementShape::Quadrilateral, ElementShape::Quadrilateral.edges()),
+        11 => (ElementShape::Tetrahedron, &TETRAHEDRON),
+        12 | 17 => (ElementShape::Hexahedron, &HEXAHEDRON),
+        13 | 18 => (ElementShape::Wedge, &WEDGE),
+        14 | 19 => (ElementShape::Pyramid, &PYRAMID),
+        _ => return elements.leave_out(&format!("Gmsh type {kind}"), 1),
+    };
+    let corners = shape.corners();
+    let mut ordered: Vec<i64> = nodes.iter().take(corners).copied().collect();
+    for &[a, b] in shape.edges() {
+        let at = middles.iter().position(|&[c, d]| [c, d] == [a, b] || [d, c] == [a, b]);
+        ordered.extend(at.and_then(|at| nodes.get(corners + at)));
+    }
+    elements.add(&format!("Gmsh type {kind}"), shape, &ordered);
+}
+
+/// The edges whose middles follow the corners of elements of the second order, in the order of Gmsh where
+/// that is not the one of [`ElementShape::edges`].
+const TETRAHEDRON: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [2, 3], [1, 3]];
+/// See [`TETRAHEDRON`].
+const HEXAHEDRON: [[usize; 2]; 12] =
+    [[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]];
+/// See [`TETRAHEDRON`].
+const WEDGE: [[usize; 2]; 9] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]];
+/// See [`TETRAHEDRON`].
+const PYRAMID: [[usize; 2]; 8] = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]];
 
 /// The words of a mesh, with the line that they stand in.
 struct Words<'a> {

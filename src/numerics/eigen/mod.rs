@@ -3,9 +3,11 @@
 
 mod bounds;
 mod canonical;
+mod complement;
 mod completeness;
 mod counters;
 mod dense;
+mod dynamic_response;
 mod factorise;
 mod failure;
 mod krylov;
@@ -22,11 +24,13 @@ mod solve;
 mod span;
 mod start;
 mod static_response;
+mod unresisted;
 mod zero_energy;
 
 pub use canonical::{canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
 pub use counters::Counters;
+pub use dynamic_response::dynamic_responses;
 pub use failure::EigenFailure;
 pub use noise::{energy_noise, rounding_residual};
 pub use plan::Plan;
@@ -38,3 +42,4 @@ pub use solution::{EigenSolution, EigenvalueBounds};
 pub use solve::solve;
 pub use span::modes_of_span;
 pub use static_response::{ResponseAccuracy, static_responses, static_responses_twice};
+pub use unresisted::{Unresisted, unresisted_motions};

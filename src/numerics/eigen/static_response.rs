@@ -1,15 +1,14 @@
 //! Static responses of the free body: x = K^+ f on the M-orthogonal complement of given modes, by conjugate
 //! gradients that the factor of K + tau M preconditions.
 
+use super::complement::Complement;
 use super::counters::Counters;
 use super::factorise::factorise;
 use super::failure::EigenFailure;
 use super::noise::rounding_residual;
 use super::problem::EigenProblem;
 use super::settings::Precision;
-use crate::numerics::linalg::{
-    Analysis, Cholesky, Pencil, Solve, column_products, gram, side_by_side, subtract_combination,
-};
+use crate::numerics::linalg::{Analysis, Cholesky, Pencil, Solve, column_products};
 use faer::{Mat, MatRef};
 
 /// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of
@@ -88,64 +87,41 @@ fn with_responses<T>(
     respond: impl FnOnce(&Responses<'_>, &mut Counters) -> Result<T, EigenFailure>,
 ) -> Result<T, EigenFailure> {
     let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
-    let known = side_by_side(&[problem.rigid, modes]);
+    let complement = Complement::of(&problem.pencil, &[problem.rigid, modes]);
     // Without known modes K itself is definite, and its factor the solution but for rounding.
-    let tau = if known.ncols() == 0 { 0.0 } else { 0.5 * first };
+    let tau = if complement.is_everything() { 0.0 } else { 0.5 * first };
     match precision {
         Precision::Double => {
             let factor: Cholesky<'_, f64> = factorise(problem, &analysis, tau, counters)?;
-            respond(&Responses::new(&problem.pencil, &known, &factor, accuracy), counters)
+            respond(&Responses { pencil: &problem.pencil, complement, factor: &factor, accuracy }, counters)
         }
         Precision::Single => {
             let factor: Cholesky<'_, f32> = factorise(problem, &analysis, tau, counters)?;
-            respond(&Responses::new(&problem.pencil, &known, &factor, accuracy), counters)
+            respond(&Responses { pencil: &problem.pencil, complement, factor: &factor, accuracy }, counters)
         }
     }
 }
 
 struct Responses<'a> {
     pencil: &'a Pencil<'a>,
-    /// P and M P.
-    known: &'a Mat<f64>,
-    products: Mat<f64>,
+    complement: Complement,
     factor: &'a dyn Solve,
     accuracy: ResponseAccuracy,
 }
 
-impl<'a> Responses<'a> {
-    fn new(
-        pencil: &'a Pencil<'a>,
-        known: &'a Mat<f64>,
-        factor: &'a dyn Solve,
-        accuracy: ResponseAccuracy,
-    ) -> Self {
-        Self { pencil, known, products: pencil.apply_mass(known.as_ref()), factor, accuracy }
-    }
-
-    /// X <- (I - P P'M) X.
-    fn deflate(&self, x: &mut Mat<f64>) {
-        let along = gram(self.products.as_ref(), x.as_ref());
-        subtract_combination(x.as_mut(), self.known.as_ref(), along.as_ref());
-    }
-
-    /// F <- (I - M P P') F.
-    fn equilibrate(&self, f: &mut Mat<f64>) {
-        let along = gram(self.known.as_ref(), f.as_ref());
-        subtract_combination(f.as_mut(), self.products.as_ref(), along.as_ref());
-    }
-
+impl Responses<'_> {
     fn of(&self, mut loads: Mat<f64>, counters: &mut Counters) -> Result<Mat<f64>, EigenFailure> {
         // Twice: a load may be rigid but for its last digits.
-        self.equilibrate(&mut loads);
-        self.equilibrate(&mut loads);
+        self.complement.equilibrate(&mut loads);
+        self.complement.equilibrate(&mut loads);
         let mut x = Mat::zeros(loads.nrows(), loads.ncols());
         let mut residual = loads.clone();
         for _ in 0..self.accuracy.cycles {
             x += self.cycle(residual, counters);
-            self.deflate(&mut x);
+            self.complement.deflate(&mut x);
             counters.stiffness_columns += x.ncols() as u64;
             residual = &loads - self.pencil.apply_stiffness(x.as_ref());
-            self.equilibrate(&mut residual);
+            self.complement.equilibrate(&mut residual);
         }
         let rounding = rounding_residual(self.pencil.stiffness(), x.as_ref());
         for (j, rounding) in rounding.iter().enumerate() {
@@ -164,7 +140,7 @@ impl<'a> Responses<'a> {
             counters.solved_columns += columns as u64;
             let mut z = r.clone();
             self.factor.solve_in_place(z.as_mut());
-            self.deflate(&mut z);
+            self.complement.deflate(&mut z);
             z
         };
         let mut x = Mat::zeros(residual.nrows(), columns);

@@ -58,7 +58,7 @@ fn walk(group: &hdf5::Group, path: &str, found: &mut Contents, short: &mut Vec<S
                 short.extend((size == FloatSize::U4).then(|| name.clone()));
                 Array::Floats(shape, floats(dataset.read_raw::<f64>().expect("numbers")))
             }
-            TypeDescriptor::Integer(IntSize::U8) => {
+            TypeDescriptor::Integer(IntSize::U8 | IntSize::U4) => {
                 Array::Ints(shape, dataset.read_raw::<i64>().expect("numbers"))
             }
             other => panic!("{name}: {other}"),

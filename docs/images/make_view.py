@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+"""Draws docs/images/view.png: the page that `flexbody view` makes of the connecting rod of the fixtures, in Chromium.
+
+    cargo build --release --locked && python3 docs/images/make_view.py
+
+Needs Chromium on the PATH.
+"""
+
+import argparse
+import gzip
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+MODEL = ROOT / "fixtures/models/connecting_rod"
+BROWSERS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
+OPTIONS = (
+    "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
+    "--disable-background-networking --disable-component-update --disable-sync --window-size=1200,720"
+).split()
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--program", default=ROOT / "target/release/flexbody")
+    parser.add_argument("--output", default=ROOT / "docs/images/view.png")
+    parser.add_argument("--mode", default=1)
+    arguments = parser.parse_args()
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        sys.exit("no Chromium on the PATH")
+    with tempfile.TemporaryDirectory() as place:
+        place = Path(place)
+        for name in ("K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv"):
+            shutil.copy(MODEL / name, place)
+        (place / "mesh.inp").write_bytes(gzip.decompress((MODEL / "matrices.inp.gz").read_bytes()))
+        manifest = (MODEL / "model.toml").read_text().replace("[files]", '[files]\nmesh = "mesh.inp"')
+        (place / "model.toml").write_text(manifest)
+
+        def run(*words):
+            subprocess.run([arguments.program, *words], cwd=place, check=True, capture_output=True)
+
+        run("convert", "model.toml", "-o", "rod.flex.h5")
+        run("view", "rod.flex.h5", "-o", "rod.html")
+        page = f"file://{place}/rod.html#mode={arguments.mode}&phase=0.25"
+        shot = [f"--screenshot={Path(arguments.output).resolve()}", f"--user-data-dir={place}/browser"]
+        subprocess.run([browser, *OPTIONS, *shot, page], check=True, capture_output=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,236 @@
+"""Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
+
+    body = flexbody.convert(K, M, nodes, units=("m", "kg", "s"), modes=20)
+    body.write("body.flex.h5")
+
+K and M are sparse matrices of scipy (or dense ones), with both triangles, of the free body, with the
+consistent mass. Arrays come back as numpy arrays, in the units of the model. Long work releases the lock of
+the interpreter, and Ctrl-C ends it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from . import _inputs
+from ._errors import (
+    CheckError,
+    Diagnostic,
+    FlexbodyError,
+    FlexbodyWarning,
+    InputError,
+    InternalError,
+    NumericalError,
+    ResourceError,
+)
+from ._flexbody import (
+    Body,
+    EquationsOfMotion,
+    Model,
+    Motion,
+    Point,
+    Scene,
+    Selection,
+    Trade,
+    __version__,
+    export_formats,
+    read,
+)
+from ._types import Identity, Interface, InterfaceCoordinates, PointPath
+
+__all__ = [
+    "Body",
+    "CheckError",
+    "Diagnostic",
+    "EquationsOfMotion",
+    "FlexbodyError",
+    "FlexbodyWarning",
+    "Identity",
+    "InputError",
+    "Interface",
+    "InterfaceCoordinates",
+    "InternalError",
+    "Model",
+    "Motion",
+    "NumericalError",
+    "Point",
+    "PointPath",
+    "ResourceError",
+    "Scene",
+    "Selection",
+    "Trade",
+    "__version__",
+    "convert",
+    "export_formats",
+    "model",
+    "read",
+    "read_model",
+]
+
+
+def model(
+    stiffness: Any,
+    mass: Any,
+    nodes: ArrayLike,
+    *,
+    name: str = "model",
+    node_ids: ArrayLike | None = None,
+    dofs: ArrayLike | int | None = None,
+    interfaces: Mapping[str, Any] | None = None,
+    units: Sequence[object] | None = None,
+    damping: Any = None,
+    residual_vectors: str | Sequence[str] = (),
+    allow_implausible: bool = False,
+) -> Model:
+    """Makes a finite element model of matrices, and checks it.
+
+    Parameters
+    ----------
+    stiffness, mass
+        K and M (N x N) of the free body, real and symmetric, both triangles: any sparse matrix or array of
+        scipy, or a dense array. M is the consistent mass matrix.
+    nodes
+        Positions of the nodes (n x 3), of a plane model (n x 2). Unit: length.
+    node_ids
+        Numbers of the nodes (n); 1, 2, ... without.
+    dofs
+        Node number and direction of every row (N x 2), directions 1, 2, 3 being displacements along x, y, z
+        and 4, 5, 6 rotations about them. A number 2, 3 or 6 for so many directions of every node, node by
+        node. Without: x, y, z of every node, node by node (in the plane x, y).
+    interfaces
+        Sets of nodes that joints and loads act on: name to node numbers, or to a tuple of these with a
+        coupling ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes.
+    units
+        Units of length, mass and time, as in ("mm", "t", "s"); a number is a factor to SI. Without, they are
+        m, kg, s and plausibility is not checked.
+    damping
+        A damping ratio for all modes, a tuple (alpha, beta) for D = alpha M + beta K in 1/time and time, or
+        a matrix D with the rows of K in mass/time.
+    residual_vectors
+        Loads whose static responses join free modes: "interfaces", "centrifugal", or both in a list.
+    allow_implausible
+        Takes densities that no matter has, and mass between nodes that no stiffness joins, as warnings.
+
+    Raises
+    ------
+    InputError
+        All that is wrong with matrices, nodes and interfaces.
+    ValueError, TypeError
+        For arrays of the wrong shape or kind.
+    """
+    positions, plane = _inputs.coordinates(nodes)
+    ids = _inputs.numbers(node_ids, len(positions))
+    return Model._assembled(
+        name,
+        _inputs.compressed(stiffness, "stiffness"),
+        _inputs.compressed(mass, "mass"),
+        ids,
+        positions,
+        plane=plane,
+        dofs=_inputs.labels(dofs, ids),
+        interfaces=_inputs.interface_list(interfaces),
+        units=_inputs.unit_names(units),
+        damping=_inputs.damping_of(damping),
+        residual_vectors=_inputs.residual_loads(residual_vectors),
+        allow_implausible=allow_implausible,
+    )
+
+
+def read_model(
+    path: str | os.PathLike[str],
+    *,
+    program: str | None = None,
+    units: Sequence[object] | None = None,
+    interfaces: Mapping[str, str | tuple[str, str]] | None = None,
+) -> Model:
+    """Reads a model: a manifest (`model.toml`, docs/input.md), or what an FE program has written
+    (docs/fe_programs.md), of which `path` is the deck.
+
+    Parameters
+    ----------
+    program
+        Name of the FE program as on the command line; without, it goes by the files.
+    units
+        Units of length, mass and time of a job, as in ("mm", "t", "s").
+    interfaces
+        Name to the node set of the deck that it is, or to a tuple of the set and a coupling.
+
+    Raises
+    ------
+    InputError
+        All that is wrong with the files and the model.
+    """
+    sets = [
+        (name, *given) if isinstance(given, tuple) else (name, given, None) for name, given in (interfaces or {}).items()
+    ]
+    return Model._read(os.fspath(path), program, _inputs.unit_names(units), sets)
+
+
+def convert(
+    stiffness: Any,
+    mass: Any = None,
+    nodes: ArrayLike | None = None,
+    *,
+    modes: int | None = None,
+    max_frequency: float | None = None,
+    basis: str = "free",
+    accuracy: str = "standard",
+    frame: str = "principal",
+    comparators: bool = True,
+    scene: Any = None,
+    **of_model: Any,
+) -> Body:
+    """Makes a flexible body of a model.
+
+    The model is that of K, M and nodes, as `flexbody.model` takes them, or of a file, as
+    `flexbody.read_model` reads it: `convert(K, M, nodes)` or `convert("model.toml")`. Further keywords are
+    those of these two.
+
+    Parameters
+    ----------
+    modes
+        Number of flexible modes; 20 without.
+    max_frequency
+        All modes below a frequency instead. Unit: Hz.
+    basis
+        "free", "craig-bampton", "craig-chang" (with interfaces), "scene" (with a scene).
+    accuracy
+        "fast"; "standard" proves that no mode is missing; "certified" guarantees bounds.
+    frame
+        Body frame: "principal" (at the centre of mass, along the principal axes), "com" (there, along the
+        axes of the model), "model".
+    comparators
+        Whether to compute what lumped masses would have given.
+    scene
+        A Scene, a list of load cases, or the path of a scene file, for a body with the terms and modes alone
+        that it needs.
+
+    Raises
+    ------
+    InputError, NumericalError, ResourceError
+        As `flexbody.model`; where the modes cannot be trusted; where memory does not suffice.
+    """
+    if mass is None and nodes is None:
+        if isinstance(stiffness, Model):
+            if of_model:
+                raise TypeError(f"a model has its own {', '.join(of_model)}")
+            made = stiffness
+        else:
+            made = read_model(stiffness, **of_model)
+    elif mass is None or nodes is None:
+        raise TypeError("convert takes K, M and nodes, or a file or a model alone")
+    else:
+        made = model(stiffness, mass, nodes, **of_model)
+    return made.convert(
+        modes=modes,
+        max_frequency=max_frequency,
+        basis=basis,
+        accuracy=accuracy,
+        frame=frame,
+        comparators=comparators,
+        scene=scene,
+    )

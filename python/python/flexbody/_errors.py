@@ -1,0 +1,102 @@
+"""Exceptions, warnings, and the diagnostics that they carry."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from typing import NamedTuple
+
+
+class Diagnostic(NamedTuple):
+    """One finding: what, where, and what to do. docs/codes.md lists the codes."""
+
+    code: str
+    """Identity, as in "FB307"."""
+    severity: str
+    """"note", "warning" or "error"."""
+    message: str
+    """What is wrong, with the facts."""
+    file: str | None
+    """The file that it is about."""
+    line: int | None
+    """Line of that file, from 1."""
+    help: str
+    """What to do."""
+
+    def __str__(self) -> str:
+        place = f"\n  in {self.file}" if self.file else ""
+        place += f", line {self.line}" if self.file and self.line else ""
+        return f"{self.severity}[{self.code}]: {self.message}{place}\n  help: {self.help}"
+
+
+class FlexbodyError(Exception):
+    """What the library could not do. Its subclasses go by the exit code of the command."""
+
+    exit_code: int
+    """Exit code of the command `flexbody` for the same error."""
+    diagnostics: tuple[Diagnostic, ...]
+    """All that was found until the work had to stop, warnings and notes included."""
+
+    def __init__(self, diagnostics: tuple[Diagnostic, ...] = (), exit_code: int = 70) -> None:
+        super().__init__(diagnostics, exit_code)
+        self.diagnostics = tuple(diagnostics)
+        self.exit_code = exit_code
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Codes of the errors among the diagnostics."""
+        return tuple(one.code for one in self.diagnostics if one.severity == "error")
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.diagnostics))
+
+
+class CheckError(FlexbodyError):
+    """A check failed or a tolerance was exceeded; the inputs themselves were readable. Exit code 1."""
+
+
+class InputError(FlexbodyError, ValueError):
+    """Bad input. Exit code 2."""
+
+
+class NumericalError(FlexbodyError, ArithmeticError):
+    """No trustworthy numerical result: not converged, a mechanism, an indefinite matrix. Exit code 3."""
+
+
+class ResourceError(FlexbodyError):
+    """Not enough memory or disk, or an output that cannot be written. Exit code 4."""
+
+
+class InternalError(FlexbodyError, RuntimeError):
+    """A bug of the library. Exit code 70."""
+
+
+class FlexbodyWarning(UserWarning):
+    """A warning of the library."""
+
+    diagnostic: Diagnostic
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic)
+        self.diagnostic = diagnostic
+
+    def __str__(self) -> str:
+        return f"{self.diagnostic.message} [{self.diagnostic.code}]; {self.diagnostic.help}"
+
+
+_CLASSES = {1: CheckError, 2: InputError, 3: NumericalError, 4: ResourceError, 70: InternalError}
+
+
+def error_of(exit_code: int, diagnostics: tuple[Diagnostic, ...]) -> FlexbodyError:
+    """The exception for an error of the library, whose class goes by its exit code."""
+    return _CLASSES.get(exit_code, FlexbodyError)(diagnostics, exit_code)
+
+
+def warn(warning: Warning) -> None:
+    """Warns in the name of the first caller that is not of this package."""
+    here, level = os.path.dirname(__file__), 1
+    frame = sys._getframe()
+    while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == here:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(warning, stacklevel=level)

@@ -1,0 +1,152 @@
+"""Matrices, nodes and the like, as Python codes have them, in the form that the extension takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Compressed = tuple[int, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
+
+_DIRECTIONS = {2: (1, 2), 3: (1, 2, 3), 6: (1, 2, 3, 4, 5, 6)}
+
+
+def compressed(matrix: Any, name: str) -> Compressed:
+    """A square matrix with both triangles by compressed columns: rows, pointers, rows of entries, values.
+
+    Takes every sparse matrix and array of scipy, and what numpy makes a dense matrix of.
+    """
+    if hasattr(matrix, "tocsc"):
+        own = matrix.tocsc()
+        _check(own.shape, own.dtype, name)
+        if not own.has_canonical_format:
+            # Not in the caller's matrix.
+            own = own.copy() if own is matrix else own
+            own.sum_duplicates()
+        pointers, rows = own.indptr.astype(np.int64), own.indices.astype(np.int64)
+        values = np.ascontiguousarray(own.data, dtype=np.float64)
+    else:
+        dense = np.asarray(matrix)
+        _check(dense.shape, dense.dtype, name)
+        columns, rows = np.nonzero(dense.T)
+        values = np.ascontiguousarray(dense[rows, columns], dtype=np.float64)
+        pointers = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=dense.shape[1]))])
+        pointers, rows = pointers.astype(np.int64), rows.astype(np.int64)
+    size = len(pointers) - 1
+    _refuse_one_triangle(pointers, rows, name)
+    return size, pointers, np.ascontiguousarray(rows), values
+
+
+def _check(shape: tuple[int, ...], kind: np.dtype[Any], name: str) -> None:
+    if len(shape) != 2 or shape[0] != shape[1]:
+        raise ValueError(f"{name} has the shape {shape}, expected a square matrix")
+    if kind.kind not in "fiub":
+        raise TypeError(f"{name} has entries of type {kind}, expected real numbers")
+
+
+def _refuse_one_triangle(pointers: NDArray[np.int64], rows: NDArray[np.int64], name: str) -> None:
+    columns = np.repeat(np.arange(len(pointers) - 1), np.diff(pointers))
+    above, below = bool(np.any(rows < columns)), bool(np.any(rows > columns))
+    if above != below:
+        side = "upper" if above else "lower"
+        raise ValueError(
+            f"{name} has its {side} triangle only: give both, {name} + {name}.T - scipy.sparse.diags({name}.diagonal())"
+        )
+
+
+def coordinates(nodes: ArrayLike) -> tuple[NDArray[np.float64], bool]:
+    """Positions (n x 3), and whether they were those of a plane model (n x 2)."""
+    positions = np.array(nodes, dtype=np.float64)
+    if positions.ndim != 2 or positions.shape[1] not in (2, 3):
+        raise ValueError(f"nodes have the shape {positions.shape}, expected n x 3, or n x 2 of a plane model")
+    plane = positions.shape[1] == 2
+    if plane:
+        positions = np.column_stack([positions, np.zeros(len(positions))])
+    return np.ascontiguousarray(positions), plane
+
+
+def numbers(node_ids: ArrayLike | None, count: int) -> NDArray[np.int64]:
+    """Node numbers, 1, 2, ... where none are given."""
+    if node_ids is None:
+        return np.arange(1, count + 1, dtype=np.int64)
+    ids = _integers(node_ids, "node_ids")
+    if ids.shape != (count,):
+        raise ValueError(f"node_ids have the shape {ids.shape}, expected ({count},)")
+    return ids
+
+
+def _integers(given: ArrayLike, name: str) -> NDArray[np.int64]:
+    array = np.asarray(given)
+    if array.size and array.dtype.kind not in "iu":
+        raise TypeError(f"{name} are of type {array.dtype}, expected integers")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def labels(dofs: ArrayLike | int | None, node_ids: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Node number and direction of every row (N x 2); None where the rows are x, y, z of each node."""
+    if dofs is None:
+        return None
+    if isinstance(dofs, (int, np.integer)):
+        if dofs not in _DIRECTIONS:
+            raise ValueError(f"dofs is {dofs}, expected 2, 3 or 6 for each node, or an array of labels")
+        directions = np.array(_DIRECTIONS[int(dofs)])
+        each = np.tile(directions, len(node_ids))
+        return np.column_stack([np.repeat(node_ids, len(directions)), each]).astype(np.int64)
+    array = _integers(dofs, "dofs")
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise ValueError(f"dofs have the shape {array.shape}, expected N x 2: node number and direction of each row")
+    if np.any((array[:, 1] < 1) | (array[:, 1] > 6)):
+        raise ValueError("dofs have a direction that is not 1 to 6: 1, 2, 3 are displacements, 4, 5, 6 rotations")
+    return array
+
+
+def interface_list(
+    interfaces: Mapping[str, Any] | None,
+) -> list[tuple[str, list[int], str | None, tuple[float, float, float] | None]]:
+    """Name, nodes, coupling and reference point of every interface."""
+    found = []
+    for name, given in (interfaces or {}).items():
+        nodes, coupling, reference = given, None, None
+        if isinstance(given, tuple) and len(given) in (2, 3) and isinstance(given[1], (str, type(None))):
+            nodes, coupling = given[0], given[1]
+            reference = given[2] if len(given) == 3 else None
+        ids = _integers(nodes, f"nodes of interface {name!r}").ravel().tolist()
+        if reference is not None:
+            point = np.asarray(reference, dtype=np.float64)
+            if point.shape != (3,):
+                raise ValueError(f"the reference point of interface {name!r} has the shape {point.shape}, expected (3,)")
+            reference = (float(point[0]), float(point[1]), float(point[2]))
+        found.append((name, ids, coupling, reference))
+    return found
+
+
+def unit_names(units: Sequence[object] | None) -> tuple[str, str, str] | None:
+    """Units of length, mass and time; a number is a factor to SI."""
+    if units is None:
+        return None
+    if isinstance(units, str):
+        units = units.split(",")
+    if len(units) != 3:
+        raise ValueError(f"units are {units!r}, expected three: length, mass, time, as in ('mm', 't', 's')")
+    length, mass, time = (str(unit).strip() for unit in units)
+    return length, mass, time
+
+
+def damping_of(damping: Any) -> Any:
+    """A ratio, the two numbers of Rayleigh damping, or a compressed matrix."""
+    if damping is None or isinstance(damping, (float, int)):
+        return None if damping is None else float(damping)
+    if isinstance(damping, tuple) and len(damping) == 2:
+        return float(damping[0]), float(damping[1])
+    return compressed(damping, "damping")
+
+
+def residual_loads(names: Sequence[str]) -> tuple[bool, bool]:
+    """Whether the loads of residual vectors are those at interfaces, and the centrifugal ones."""
+    names = [names] if isinstance(names, str) else list(names)
+    unknown = set(names) - {"interfaces", "centrifugal"}
+    if unknown:
+        raise ValueError(f"residual_vectors are {names}, expected 'interfaces', 'centrifugal' or both")
+    return "interfaces" in names, "centrifugal" in names

@@ -1,0 +1,415 @@
+//! Flexible bodies.
+
+use crate::arrays::{Kept, by_node, matrix, matrix3, triples, vector};
+use crate::equations::EquationsOfMotion;
+use crate::errors::{diagnostics, warn};
+use crate::report::{loads, report};
+use crate::scene::{Motion, Scene, Selection, cases_of};
+use crate::trade::{Trade, options as trade_options};
+use crate::work::{brief, run};
+use flexbody::{Diagnostic, FlexBody, Matrix};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A flexible body with n nodes and nf modes: modes, and the constant invariants that the equations of motion
+/// of its floating frame are made of. Vectors are along the axes of the body frame, about its origin, in the
+/// units of the model. Arrays are read-only and made once: copy what you change.
+///
+/// `flexbody.convert` makes one, `flexbody.read` reads one.
+#[pyclass(frozen, eq, module = "flexbody")]
+pub struct Body {
+    inner: Arc<FlexBody>,
+    diagnostics: Vec<Diagnostic>,
+    kept: Kept,
+}
+
+impl PartialEq for Body {
+    fn eq(&self, other: &Self) -> bool {
+        self.inner == other.inner
+    }
+}
+
+impl Body {
+    pub fn new(inner: FlexBody, diagnostics: Vec<Diagnostic>) -> Self {
+        Self { inner: Arc::new(inner), diagnostics, kept: Kept::default() }
+    }
+
+    fn numbers<'py>(&self, py: Python<'py>, name: &'static str, of: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, name, || Ok(vector(py, of)))
+    }
+
+    /// A matrix, or None where the body has none of that name.
+    fn matrix<'py>(
+        &self,
+        py: Python<'py>,
+        name: &'static str,
+        of: impl FnOnce(&FlexBody) -> Option<Matrix>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, name, || match of(&self.inner) {
+            Some(own) => matrix(py, &own),
+            None => Ok(py.None().into_bound(py)),
+        })
+    }
+}
+
+#[pymethods]
+impl Body {
+    /// Name of the model.
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    /// Units of length, mass and time, as they were stated: ("mm", "t", "s"), or factors to SI.
+    #[getter]
+    fn units(&self) -> (&str, &str, &str) {
+        let [length, mass, time] = self.inner.units();
+        (length, mass, time)
+    }
+
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    #[getter]
+    fn dimension(&self) -> usize {
+        self.inner.dimension()
+    }
+
+    /// Number of nodes n.
+    #[getter]
+    fn n_nodes(&self) -> usize {
+        self.inner.node_ids().len()
+    }
+
+    /// Number of modes nf.
+    #[getter]
+    fn n_modes(&self) -> usize {
+        self.inner.n_modes()
+    }
+
+    /// Number of rows of the matrices; 0 where it is not known.
+    #[getter]
+    fn n_dofs(&self) -> usize {
+        self.inner.n_dofs()
+    }
+
+    /// "rotation-invariant", "diagonal" or "general": the structure of the mass matrix.
+    #[getter]
+    fn mass_structure(&self) -> &str {
+        self.inner.mass_structure()
+    }
+
+    /// Settings of the conversion that can change the result, as a dict.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        loads(py, &self.inner.settings_json())
+    }
+
+    /// The files that the body was made of: list of (role, name, SHA-256). Empty for matrices in memory.
+    #[getter]
+    fn sources(&self) -> Vec<(String, String, String)> {
+        let files = self.inner.source_files().into_iter();
+        files.map(|file| (file.role, file.name, file.sha256)).collect()
+    }
+
+    /// Warnings and notes of the conversion, as a tuple of `Diagnostic`; empty for a body that was read.
+    #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        diagnostics(py, &self.diagnostics)
+    }
+
+    /// Node numbers (n), int64.
+    #[getter]
+    fn node_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "node_ids", || Ok(PyArray1::from_slice(py, self.inner.node_ids()).into_any()))
+    }
+
+    /// Positions of the nodes, body frame (n x 3). Unit: length.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "positions", || triples(py, self.inner.positions()))
+    }
+
+    /// Origin of the body frame in model coordinates (3). Unit: length.
+    #[getter]
+    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "origin", self.inner.frame().0.as_slice())
+    }
+
+    /// Axes of the body frame as columns, in model axes (3 x 3): x_model = origin + axes @ x_body.
+    #[getter]
+    fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "axes", || matrix3(py, &self.inner.frame().1))
+    }
+
+    /// Frequencies of the modes, ascending (nf). Unit: Hz.
+    #[getter]
+    fn frequencies_hz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "frequencies_hz", &self.inner.frequencies_hz())
+    }
+
+    /// Eigenvalues of the modes, omega^2 (nf). Unit: 1/time^2.
+    #[getter]
+    fn eigenvalues<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "eigenvalues", self.inner.eigenvalues())
+    }
+
+    /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) of the modes (nf).
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "residuals", self.inner.residuals())
+    }
+
+    /// Damping ratios of the modes (nf).
+    #[getter]
+    fn damping_ratios<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "damping_ratios", self.inner.damping_ratios())
+    }
+
+    /// Where each mode comes from: "free mode", "imported shape", ...; empty where it is not known.
+    #[getter]
+    fn mode_origins(&self) -> Vec<String> {
+        self.inner.mode_origins().to_vec()
+    }
+
+    /// How many of the lowest modes are proved to be all that there are; None without a proof.
+    #[getter]
+    fn proved_complete(&self) -> Option<usize> {
+        self.inner.proved_complete()
+    }
+
+    /// Psi (nf x n x 3): displacements of the nodes in each mode, shapes[j] for mode j. Unit: 1/sqrt(mass).
+    #[getter]
+    fn shapes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "shapes", || by_node(py, &self.inner.shapes()))
+    }
+
+    /// Rotations of the nodes in each mode (nf x n x 3), zero at nodes without; None of models of
+    /// displacements. Unit: 1/(length sqrt(mass)).
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "rotations", || match self.inner.rotations() {
+            Some(rotations) => by_node(py, &rotations),
+            None => Ok(py.None().into_bound(py)),
+        })
+    }
+
+    /// m. Unit: mass.
+    #[getter]
+    fn mass(&self) -> f64 {
+        self.inner.mass()
+    }
+
+    /// c = sum m x (3), the first moment. Unit: mass length.
+    #[getter]
+    fn first_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "first_moment", self.inner.first_moment().as_slice())
+    }
+
+    /// J = sum m x x' (3 x 3). Unit: mass length^2.
+    #[getter]
+    fn second_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "second_moment", || matrix3(py, &self.inner.second_moment()))
+    }
+
+    /// I0 (3 x 3): inertia of the undeformed body. Unit: mass length^2.
+    #[getter(I0)]
+    fn i0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "I0", || matrix3(py, &self.inner.inertia()))
+    }
+
+    /// W0 (3 x 3nf): linear momentum of rotation, linear in the modal coordinates. Unit: sqrt(mass).
+    #[getter(W0)]
+    fn w0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "W0", |body| Some(body.w0()))
+    }
+
+    /// W1 (3 x 3nf): inertia linear in q, I(q) = I0 + W1 Q + Q'W2 Q with Q = kron(eye(3), q). None where the
+    /// body was made for a scene that does without. Unit: sqrt(mass) length.
+    #[getter(W1)]
+    fn w1<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "W1", FlexBody::w1)
+    }
+
+    /// W2 (3nf x 3nf): inertia quadratic in q. None as W1. Unit: 1.
+    #[getter(W2)]
+    fn w2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "W2", FlexBody::w2)
+    }
+
+    /// W3 (3nf x nf): coupling of rotation and modes through q. None as W1. Unit: 1.
+    #[getter(W3)]
+    fn w3<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "W3", FlexBody::w3)
+    }
+
+    /// C1 (3 x nf): coupling of translation and modes; zero for free modes. Unit: sqrt(mass).
+    #[getter(C1)]
+    fn c1<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "C1", |body| Some(body.c1()))
+    }
+
+    /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes. Unit:
+    /// sqrt(mass) length.
+    #[getter(C2)]
+    fn c2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "C2", |body| Some(body.c2()))
+    }
+
+    /// m_ff (nf x nf) = Psi' M Psi. Unit: 1.
+    #[getter]
+    fn modal_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "modal_mass", |body| Some(body.modal_mass()))
+    }
+
+    /// K_ff (nf x nf) = Psi' K Psi. Unit: 1/time^2.
+    #[getter]
+    fn modal_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "modal_stiffness", |body| Some(body.modal_stiffness()))
+    }
+
+    /// D (nf x nf): modal damping; diag(2 zeta_j omega_j) where ratios are all that is known. Unit: 1/time.
+    #[getter]
+    fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.matrix(py, "damping", |body| Some(body.damping()))
+    }
+
+    /// Psi' K_geo Psi (nf x nf) of unit loads: dict of load ("spin_xx", "force_z_tip", ...) to array. Unit:
+    /// 1/time^2 over that of the load.
+    #[getter]
+    fn geometric_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for one in self.inner.geometric_stiffness() {
+            all.set_item(one.load, matrix(py, &one.matrix)?)?;
+        }
+        Ok(all)
+    }
+
+    /// Interfaces: dict of name to Interface (node_ids, coupling, reference, translation, rotation).
+    #[getter]
+    fn interfaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (class, all) = (py.import("flexbody._types")?.getattr("Interface")?, PyDict::new(py));
+        let rows = |rows: Option<Matrix>| rows.map(|rows| matrix(py, &rows)).transpose();
+        for one in self.inner.interfaces() {
+            let interface = class.call1((
+                PyArray1::from_vec(py, one.node_ids),
+                one.coupling.map(|coupling| coupling.name()),
+                one.reference.map(|reference| vector(py, &reference)),
+                rows(one.translation)?,
+                rows(one.rotation)?,
+            ))?;
+            all.set_item(one.name, interface)?;
+        }
+        Ok(all)
+    }
+
+    /// K and M in the nc coordinates of a Craig-Bampton body at its interfaces: InterfaceCoordinates (names,
+    /// stiffness, mass, of_modes); None of other bodies.
+    #[getter]
+    fn interface_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(own) = self.inner.interface_coordinates() else { return Ok(None) };
+        let class = py.import("flexbody._types")?.getattr("InterfaceCoordinates")?;
+        let (stiffness, mass) = (matrix(py, &own.stiffness)?, matrix(py, &own.mass)?);
+        class.call1((own.names, stiffness, mass, matrix(py, &own.of_modes)?)).map(Some)
+    }
+
+    /// What was decided about the groups of the kinetic energy: list of (name, whether it is kept, reason).
+    /// Empty where nobody asked, and then all are kept.
+    #[getter]
+    fn terms(&self) -> Vec<(&str, bool, &str)> {
+        self.inner.terms()
+    }
+
+    /// What lumped masses would have given: dict of scheme to a dict of error norm to value, relative.
+    #[getter]
+    fn lumped_errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for (scheme, errors) in self.inner.lumped_errors() {
+            let own = PyDict::new(py);
+            errors.iter().try_for_each(|(name, value)| own.set_item(name, value))?;
+            all.set_item(scheme, own)?;
+        }
+        Ok(all)
+    }
+
+    /// Everything that must hold of the numbers of the body, checked anew: list of Identity (name, value,
+    /// limit, holds).
+    fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let class = py.import("flexbody._types")?.getattr("Identity")?;
+        let all = brief(py, || Ok(self.inner.identities()))?;
+        all.iter().map(|one| class.call1((one.name, one.value, one.limit, one.holds))).collect()
+    }
+
+    /// The equations of motion of the body, with all terms that it holds.
+    fn equations_of_motion(&self) -> EquationsOfMotion {
+        EquationsOfMotion::new(Arc::clone(&self.inner))
+    }
+
+    /// Writes a flex-body file (HDF5, docs/format.md): it appears whole or not at all. The bytes are those
+    /// of `flexbody convert` for the same model and settings.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        brief(py, || self.inner.write(&path))
+    }
+
+    /// Writes the body in a format of another program, by its name on the command line (docs/export.md):
+    /// the file, and others that belong beside it. What the format cannot hold is warned of; these warnings
+    /// and notes are returned.
+    fn export<'py>(&self, py: Python<'py>, format: &str, path: PathBuf) -> PyResult<Bound<'py, PyTuple>> {
+        let said = brief(py, || self.inner.export(format, &path))?;
+        warn(py, &said)?;
+        diagnostics(py, &said)
+    }
+
+    /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path
+    /// of a scene file.
+    fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
+        let (cases, body) = (cases_of(py, scene)?, Arc::clone(&self.inner));
+        Selection::told(py, run(py, move |listener| body.select_for_cases_heard(&cases, listener))?)
+    }
+
+    /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.
+    fn simulate(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Motion> {
+        let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
+        Motion::told(py, run(py, move |listener| body.simulate_heard(&scene, listener))?)
+    }
+
+    /// Measures what accuracy costs in a scene, of parts of this body. `Model.trade` compares conversions.
+    #[pyo3(signature = (scene, *, repeat=3))]
+    fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
+        let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
+        let options = trade_options(self.inner.n_modes(), repeat, "full")?;
+        Trade::told(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
+    }
+
+    /// The report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.
+    #[pyo3(signature = (form="dict"))]
+    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+        report(py, form, |format| self.inner.report(format))
+    }
+
+    fn __repr__(&self) -> String {
+        let (nodes, modes) = (self.inner.node_ids().len(), self.inner.n_modes());
+        let hertz = self.inner.frequencies_hz();
+        let (first, last) = (hertz.first().copied().unwrap_or(0.0), hertz.last().copied().unwrap_or(0.0));
+        let name = self.inner.name();
+        format!("<flexbody.Body {name:?}: {nodes} nodes, {modes} modes, {first:.6} to {last:.6} Hz>")
+    }
+}
+
+/// Reads a flex-body file.
+///
+/// Raises InputError when it cannot be read or is of a newer format, CheckError when it breaks its schema or
+/// was changed since it was written.
+#[pyfunction]
+pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Body> {
+    Ok(Body::new(brief(py, || FlexBody::read(&path))?, Vec::new()))
+}
+
+/// Formats that `Body.export` writes: name to the programs that read it.
+#[pyfunction]
+pub fn export_formats(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let all = PyDict::new(py);
+    FlexBody::export_formats().into_iter().try_for_each(|(name, reader)| all.set_item(name, reader))?;
+    Ok(all)
+}

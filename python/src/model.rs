@@ -1,0 +1,309 @@
+//! Models, and their conversion.
+
+use crate::arrays::rows_of_three;
+use crate::body::Body;
+use crate::errors::{diagnostics, exception, warn};
+use crate::scene::{Scene, cases_of};
+use crate::trade::{Trade, options as trade_options};
+use crate::work::run;
+use flexbody::{Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, Frame, ModelBuilder, SparseMatrix};
+use numpy::ndarray::ArrayView1;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A finite element model that passed every check: K and M are symmetric, K has the rigid motions and no
+/// other zero-energy motion, M is positive semidefinite and fits the nodes.
+///
+/// `flexbody.model` makes one of matrices, `flexbody.read_model` one of files.
+#[pyclass(frozen, module = "flexbody")]
+pub struct Model {
+    inner: Arc<flexbody::Model>,
+}
+
+/// A square matrix in compressed columns: number of rows, pointers, rows, values.
+#[derive(FromPyObject)]
+pub struct Compressed<'py>(
+    usize,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, f64>,
+);
+
+impl Compressed<'_> {
+    fn matrix(&self, py: Python<'_>) -> PyResult<SparseMatrix> {
+        let index = |array: &PyReadonlyArray1<'_, i64>| -> PyResult<Vec<usize>> {
+            let negative = |_| PyValueError::new_err("a sparse matrix has a negative index");
+            array.as_array().iter().map(|&i| usize::try_from(i).map_err(negative)).collect()
+        };
+        let values: Vec<f64> = self.3.as_array().to_vec();
+        SparseMatrix::from_csc(self.0, &index(&self.1)?, &index(&self.2)?, &values)
+            .map_err(|error| exception(py, &error))
+    }
+}
+
+/// An interface as `flexbody.model` hands it on: name, nodes, coupling, reference point.
+type GivenInterface = (String, Vec<i64>, Option<String>, Option<[f64; 3]>);
+
+/// The coupling of that name.
+pub fn coupling(name: Option<&str>) -> PyResult<Option<Coupling>> {
+    let all = [Coupling::Rigid, Coupling::Averaging, Coupling::Free];
+    let Some(name) = name else { return Ok(None) };
+    one_of("coupling", name, all.map(|coupling| (coupling.name(), coupling))).map(Some)
+}
+
+/// The choice that is called `name`.
+pub fn one_of<T, const N: usize>(what: &str, name: &str, choices: [(&str, T); N]) -> PyResult<T> {
+    let known = choices.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
+    let found = choices.into_iter().find(|(known, _)| *known == name);
+    let unknown = || PyValueError::new_err(format!("{what} is `{name}`, expected one of {known}"));
+    found.map(|(_, choice)| choice).ok_or_else(unknown)
+}
+
+/// Damping as `flexbody.model` hands it on.
+#[derive(FromPyObject)]
+pub enum Damping<'py> {
+    /// One ratio for every mode.
+    Ratio(f64),
+    /// alpha and beta of D = alpha M + beta K.
+    Rayleigh(f64, f64),
+    /// D.
+    Matrix(Compressed<'py>),
+}
+
+fn damped(py: Python<'_>, builder: ModelBuilder, damping: &Damping<'_>) -> PyResult<ModelBuilder> {
+    Ok(match damping {
+        Damping::Ratio(ratio) => builder.damping_ratio(*ratio),
+        Damping::Rayleigh(alpha, beta) => builder.rayleigh_damping(*alpha, *beta),
+        Damping::Matrix(matrix) => builder.damping_matrix(matrix.matrix(py)?),
+    })
+}
+
+/// What is asked of a conversion, by names.
+#[allow(clippy::too_many_arguments)] // the keywords of a Python function
+fn convert_options(
+    modes: Option<usize>,
+    max_frequency: Option<f64>,
+    basis: &str,
+    accuracy: &str,
+    frame: &str,
+    comparators: bool,
+) -> PyResult<ConvertOptions> {
+    let mut options = ConvertOptions::default();
+    if modes.is_some() && max_frequency.is_some() {
+        return Err(PyValueError::new_err("give `modes` or `max_frequency`, not both"));
+    }
+    if let Some(count) = modes {
+        options = options.modes(count);
+    }
+    if let Some(hertz) = max_frequency {
+        if !(hertz > 0.0 && hertz.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "max_frequency is {hertz}, expected a positive number"
+            )));
+        }
+        options = options.below_hz(hertz);
+    }
+    if !comparators {
+        options = options.without_comparators();
+    }
+    let bases = [
+        ("free", Basis::Free),
+        ("craig-bampton", Basis::CraigBampton),
+        ("craig-chang", Basis::CraigChang),
+        ("scene", Basis::Scene),
+    ];
+    let accuracies =
+        [("fast", Accuracy::Fast), ("standard", Accuracy::Standard), ("certified", Accuracy::Certified)];
+    let frames = [("principal", Frame::Principal), ("com", Frame::CentreOfMass), ("model", Frame::Model)];
+    Ok(options
+        .basis(one_of("basis", basis, bases)?)
+        .accuracy(one_of("accuracy", accuracy, accuracies)?)
+        .frame(one_of("frame", frame, frames)?))
+}
+
+impl Model {
+    fn told(py: Python<'_>, inner: flexbody::Model) -> PyResult<Self> {
+        warn(py, inner.diagnostics())?;
+        Ok(Self { inner: Arc::new(inner) })
+    }
+}
+
+#[pymethods]
+impl Model {
+    /// Makes a model of arrays; `flexbody.model` prepares them.
+    #[staticmethod]
+    #[pyo3(name = "_assembled")]
+    #[pyo3(signature = (name, stiffness, mass, node_ids, positions, *, plane, dofs, interfaces, units, damping, residual_vectors, allow_implausible))]
+    #[allow(clippy::too_many_arguments)] // the keywords of a Python function
+    fn assembled<'py>(
+        py: Python<'py>,
+        name: String,
+        stiffness: Compressed<'py>,
+        mass: Compressed<'py>,
+        node_ids: PyReadonlyArray1<'py, i64>,
+        positions: Bound<'py, PyArray2<f64>>,
+        plane: bool,
+        dofs: Option<PyReadonlyArray2<'py, i64>>,
+        interfaces: Vec<GivenInterface>,
+        units: Option<[String; 3]>,
+        damping: Option<Damping<'py>>,
+        residual_vectors: (bool, bool),
+        allow_implausible: bool,
+    ) -> PyResult<Self> {
+        let (stiffness, mass) = (stiffness.matrix(py)?, mass.matrix(py)?);
+        let positions = rows_of_three(&positions, "nodes")?;
+        let mut builder = flexbody::Model::builder(name, stiffness, mass)
+            .nodes(node_ids.as_array().to_vec(), positions)
+            .residual_vectors(residual_vectors.0, residual_vectors.1);
+        if plane {
+            builder = builder.plane();
+        }
+        if let Some(labels) = dofs {
+            // The caller has checked the directions; others are refused with the model.
+            let label = |row: ArrayView1<'_, i64>| (row[0], u8::try_from(row[1]).unwrap_or(u8::MAX));
+            builder = builder.dofs(labels.as_array().rows().into_iter().map(label).collect::<Vec<_>>());
+        }
+        for (name, nodes, how, reference) in interfaces {
+            builder = match (coupling(how.as_deref())?, reference) {
+                (None, None) => builder.interface(name, nodes),
+                (how, reference) => {
+                    builder.coupled_interface(name, nodes, how.unwrap_or(Coupling::Averaging), reference)
+                }
+            };
+        }
+        if let Some([length, mass, time]) = &units {
+            builder = builder.units(length, mass, time).map_err(|error| exception(py, &error))?;
+        }
+        if let Some(damping) = &damping {
+            builder = damped(py, builder, damping)?;
+        }
+        if allow_implausible {
+            builder = builder.allow_implausible();
+        }
+        Self::told(py, run(py, move |_| builder.build())?)
+    }
+
+    /// Reads the model of a manifest, or of the job of an FE program; `flexbody.read_model` calls it.
+    #[staticmethod]
+    #[pyo3(name = "_read")]
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        program: Option<String>,
+        units: Option<[String; 3]>,
+        sets: Vec<(String, String, Option<String>)>,
+    ) -> PyResult<Self> {
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            if program.is_some() || units.is_some() || !sets.is_empty() {
+                let message = "a manifest states program, units and interfaces itself";
+                return Err(PyValueError::new_err(message));
+            }
+            return Self::told(py, run(py, move |_| flexbody::Model::read(path))?);
+        }
+        let couplings: Vec<Option<Coupling>> =
+            sets.iter().map(|(_, _, how)| coupling(how.as_deref())).collect::<PyResult<_>>()?;
+        let read = run(py, move |_| {
+            let sets: Vec<_> = sets
+                .iter()
+                .zip(&couplings)
+                .map(|((name, set, _), how)| (name.as_str(), set.as_str(), *how))
+                .collect();
+            let units = units.as_ref().map(|units| units.each_ref().map(String::as_str));
+            flexbody::Model::read_job(path, program.as_deref(), units, &sets)
+        })?;
+        Self::told(py, read)
+    }
+
+    /// Name.
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    /// Number of degrees of freedom N: rows of K and M.
+    #[getter]
+    fn n_dofs(&self) -> usize {
+        self.inner.n_dofs()
+    }
+
+    /// Node numbers (n).
+    #[getter]
+    fn node_ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_slice(py, self.inner.node_ids())
+    }
+
+    /// Positions of the nodes in model axes (n x 3). Unit: length.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        crate::arrays::triples(py, self.inner.positions())
+    }
+
+    /// Warnings and notes of reading and checking, as a tuple of `Diagnostic`.
+    #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        diagnostics(py, self.inner.diagnostics())
+    }
+
+    /// Computes modes and invariants, as `flexbody.convert` does.
+    ///
+    /// With a `scene` (a `Scene`, the path of a scene file, or a list of load cases) the body has the terms
+    /// and modes alone that the scene needs; `Body.terms` says why.
+    ///
+    /// Raises InputError, NumericalError or ResourceError.
+    #[pyo3(signature = (*, modes=None, max_frequency=None, basis="free", accuracy="standard", frame="principal", comparators=true, scene=None))]
+    #[allow(clippy::too_many_arguments)] // the keywords of a Python function
+    fn convert(
+        &self,
+        py: Python<'_>,
+        modes: Option<usize>,
+        max_frequency: Option<f64>,
+        basis: &str,
+        accuracy: &str,
+        frame: &str,
+        comparators: bool,
+        scene: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Body> {
+        let options = convert_options(modes, max_frequency, basis, accuracy, frame, comparators)?;
+        let model = Arc::clone(&self.inner);
+        let (body, mut found): (flexbody::FlexBody, Vec<Diagnostic>) = match scene {
+            None => {
+                let made = run(py, move |listener| model.convert_heard(&options, listener))?;
+                (made.body, made.diagnostics)
+            }
+            Some(scene) => {
+                let cases = cases_of(py, scene)?;
+                let (made, selection) =
+                    run(py, move |listener| model.convert_for_cases_heard(&cases, &options, listener))?;
+                (made.body, [made.diagnostics, selection.diagnostics().to_vec()].concat())
+            }
+        };
+        warn(py, &found)?;
+        // What was said about the model was warned of when it was made.
+        found.splice(0..0, self.inner.diagnostics().iter().cloned());
+        Ok(Body::new(body, found))
+    }
+
+    /// Measures what accuracy costs in a scene: candidate bodies beside a reference, as `flexbody.trade`.
+    #[pyo3(signature = (scene, *, modes=20, repeat=3, reference="full"))]
+    fn trade(
+        &self,
+        py: Python<'_>,
+        scene: &Bound<'_, PyAny>,
+        modes: usize,
+        repeat: usize,
+        reference: &str,
+    ) -> PyResult<Trade> {
+        let (scene, options) = (Scene::one(py, scene)?, trade_options(modes, repeat, reference)?);
+        let model = Arc::clone(&self.inner);
+        Trade::told(py, run(py, move |listener| model.trade(&scene, &options, listener))?)
+    }
+
+    fn __repr__(&self) -> String {
+        let (nodes, rows) = (self.inner.node_ids().len(), self.inner.n_dofs());
+        format!("<flexbody.Model {:?}: {nodes} nodes, {rows} degrees of freedom>", self.inner.name())
+    }
+}

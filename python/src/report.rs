@@ -1,0 +1,29 @@
+//! Reports in the forms that Python asks for.
+
+use crate::model::one_of;
+use flexbody::ReportFormat;
+use pyo3::prelude::*;
+
+/// A report as a dict of its JSON, or as a text in one of its formats.
+pub fn report<'py>(
+    py: Python<'py>,
+    form: &str,
+    render: impl FnOnce(ReportFormat) -> String,
+) -> PyResult<Bound<'py, PyAny>> {
+    let forms = [
+        ("dict", ReportFormat::Json),
+        ("json", ReportFormat::Json),
+        ("text", ReportFormat::Text),
+        ("html", ReportFormat::Html),
+    ];
+    let text = render(one_of("form", form, forms)?);
+    if form == "dict" {
+        return loads(py, &text);
+    }
+    Ok(text.into_pyobject(py)?.into_any())
+}
+
+/// A JSON text as objects of Python.
+pub fn loads<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
+    py.import("json")?.call_method1("loads", (json,))
+}

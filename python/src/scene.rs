@@ -1,0 +1,320 @@
+//! Scenes, what bodies do in them, and what they need for that.
+
+use crate::arrays::{Kept, shaped, triples, vector};
+use crate::errors::{diagnostics, warn};
+use crate::report::report;
+use crate::work::brief;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use std::path::PathBuf;
+
+/// What a body is to do: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).
+///
+/// Scene(path, case=None) reads a scene file, of one with load cases the one that is named.
+#[pyclass(frozen, module = "flexbody")]
+pub struct Scene {
+    inner: flexbody::Scene,
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (path, case=None))]
+    fn new(py: Python<'_>, path: PathBuf, case: Option<String>) -> PyResult<Self> {
+        let inner = brief(py, || match &case {
+            Some(case) => flexbody::Scene::read_case(&path, case),
+            None => flexbody::Scene::read(&path),
+        })?;
+        Ok(Self { inner })
+    }
+
+    /// All load cases of a scene file, in its order; of a file without cases that is one scene.
+    #[staticmethod]
+    fn cases(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Scene>> {
+        let cases = brief(py, || flexbody::Scene::read_cases(&path))?;
+        Ok(cases.into_iter().map(|inner| Self { inner }).collect())
+    }
+
+    /// Name; of a load case that of the scene, a colon and its own.
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<flexbody.Scene {:?}>", self.inner.name())
+    }
+}
+
+impl Scene {
+    /// The one scene that a caller names: a `Scene`, or the path of a file without load cases.
+    pub fn one(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
+        if let Ok(scene) = given.cast::<Self>() {
+            return Ok(scene.get().inner.clone());
+        }
+        let path: PathBuf = given.extract()?;
+        brief(py, || flexbody::Scene::read(&path))
+    }
+}
+
+/// The load cases that a caller names: a `Scene`, a list of them, or the path of a file.
+pub fn cases_of(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<Vec<flexbody::Scene>> {
+    if let Ok(scene) = given.cast::<Scene>() {
+        return Ok(vec![scene.get().inner.clone()]);
+    }
+    if let Ok(scenes) = given.extract::<Vec<Bound<'_, Scene>>>() {
+        if scenes.is_empty() {
+            return Err(pyo3::exceptions::PyValueError::new_err("there is no load case"));
+        }
+        return Ok(scenes.iter().map(|scene| scene.get().inner.clone()).collect());
+    }
+    let path: PathBuf = given.extract()?;
+    brief(py, || flexbody::Scene::read_cases(&path))
+}
+
+/// Which terms and modes a body needs in a scene.
+#[pyclass(frozen, module = "flexbody")]
+pub struct Selection {
+    inner: flexbody::Selection,
+}
+
+impl Selection {
+    pub fn told(py: Python<'_>, inner: flexbody::Selection) -> PyResult<Self> {
+        warn(py, inner.diagnostics())?;
+        Ok(Self { inner })
+    }
+}
+
+#[pymethods]
+impl Selection {
+    /// The modes that are kept, from 0.
+    #[getter]
+    fn modes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.inner.modes().iter().map(|&mode| mode as i64))
+    }
+
+    /// The groups of terms of the kinetic energy: list of (name, whether it is kept, reason).
+    #[getter]
+    fn groups(&self) -> Vec<(&str, bool, &str)> {
+        self.inner.groups()
+    }
+
+    /// Whether the tolerances of the scene hold, as far as they were measured.
+    #[getter]
+    fn holds(&self) -> bool {
+        self.inner.holds()
+    }
+
+    /// Warnings and notes, as a tuple of `Diagnostic`.
+    #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        diagnostics(py, self.inner.diagnostics())
+    }
+
+    /// The report of `flexbody select`: a dict with all numbers, or "json", "text", "html" as a str.
+    #[pyo3(signature = (form="dict"))]
+    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+        report(py, form, |format| self.inner.report(format))
+    }
+
+    fn __repr__(&self) -> String {
+        let kept: Vec<&str> =
+            self.inner.groups().iter().filter(|group| group.1).map(|group| group.0).collect();
+        format!("<flexbody.Selection: {} modes, groups {}>", self.inner.modes().len(), kept.join(", "))
+    }
+}
+
+/// The motion of a body in a scene, at nt instants, in the units of the body.
+///
+/// The frame that it is told by has its origin at the centre of mass of the undeformed body, or at the
+/// reference point of what carries it, and the axes of the model, which turn with the body.
+#[pyclass(frozen, module = "flexbody")]
+pub struct Motion {
+    inner: flexbody::Motion,
+    kept: Kept,
+}
+
+impl Motion {
+    pub fn told(py: Python<'_>, inner: flexbody::Motion) -> PyResult<Self> {
+        warn(py, inner.diagnostics())?;
+        Ok(Self { inner, kept: Kept::default() })
+    }
+
+    /// An array with a row for each instant.
+    fn rows<'py, R: AsRef<[f64]>>(
+        &self,
+        py: Python<'py>,
+        name: &'static str,
+        row: impl Fn(usize) -> R,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, name, || {
+            let instants = self.inner.times().len();
+            let all: Vec<f64> = (0..instants).flat_map(|instant| row(instant).as_ref().to_vec()).collect();
+            let width = all.len() / instants.max(1);
+            shaped(py, all, [instants, width])
+        })
+    }
+
+    /// An array with a number for each instant.
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        name: &'static str,
+        number: impl Fn(usize) -> f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, name, || {
+            let all: Vec<f64> = (0..self.inner.times().len()).map(number).collect();
+            Ok(vector(py, &all))
+        })
+    }
+}
+
+#[pymethods]
+impl Motion {
+    /// Instants (nt). Unit: time.
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, "time", || Ok(vector(py, self.inner.times())))
+    }
+
+    /// q (nt x nf): modal coordinates. Unit: sqrt(mass) length.
+    #[getter]
+    fn modal_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "modal_coordinates", |instant| self.inner.modal_coordinates(instant).to_vec())
+    }
+
+    /// dq/dt (nt x nf).
+    #[getter]
+    fn modal_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "modal_velocities", |instant| self.inner.modal_velocities(instant).to_vec())
+    }
+
+    /// Place of the origin of the frame, world axes (nt x 3). Unit: length.
+    #[getter]
+    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "origin", |instant| <[f64; 3]>::from(self.inner.origin(instant)))
+    }
+
+    /// Velocity of the origin, world axes (nt x 3). Unit: length/time.
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "velocity", |instant| <[f64; 3]>::from(self.inner.velocity(instant)))
+    }
+
+    /// Attitude of the frame (nt x 4): Euler parameters of unit length, the cosine of half the angle first.
+    #[getter]
+    fn attitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "attitude", |instant| self.inner.attitude(instant))
+    }
+
+    /// Angular velocity of the frame along its axes (nt x 3). Unit: 1/time.
+    #[getter]
+    fn angular_velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "angular_velocity", |instant| <[f64; 3]>::from(self.inner.angular_velocity(instant)))
+    }
+
+    /// Kinetic energy (nt).
+    #[getter]
+    fn kinetic_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "kinetic_energy", |instant| self.inner.kinetic_energy(instant))
+    }
+
+    /// Elastic energy (nt).
+    #[getter]
+    fn elastic_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "elastic_energy", |instant| self.inner.elastic_energy(instant))
+    }
+
+    /// Work of forces, damping and prescribed motion since the start (nt).
+    #[getter]
+    fn work<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, "work", |instant| self.inner.work(instant))
+    }
+
+    /// Linear momentum, world axes (nt x 3).
+    #[getter]
+    fn linear_momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "linear_momentum", |instant| <[f64; 3]>::from(self.inner.linear_momentum(instant)))
+    }
+
+    /// Angular momentum about where the origin was at the start, world axes (nt x 3).
+    #[getter]
+    fn angular_momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, "angular_momentum", |instant| <[f64; 3]>::from(self.inner.angular_momentum(instant)))
+    }
+
+    /// Force and torque about the origin that prescribed motion takes, along the axes of the frame (nt x 6);
+    /// None where nothing is prescribed.
+    #[getter]
+    fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        if self.inner.times().is_empty() || self.inner.reaction(0).is_none() {
+            return Ok(None);
+        }
+        let row = |instant| {
+            let (force, torque) = self.inner.reaction(instant).unwrap_or_default();
+            [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+        };
+        self.rows(py, "reactions", row).map(Some)
+    }
+
+    /// Paths of the watched points: dict of name to PointPath, arrays (nt x 3) of place, deflection, velocity
+    /// and acceleration.
+    #[getter]
+    fn paths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (class, all) = (py.import("flexbody._types")?.getattr("PointPath")?, PyDict::new(py));
+        for path in self.inner.paths() {
+            let [place, deflection, velocity, acceleration] =
+                [&path.place, &path.deflection, &path.velocity, &path.acceleration]
+                    .map(|rows| triples(py, rows));
+            all.set_item(path.name, class.call1((place?, deflection?, velocity?, acceleration?))?)?;
+        }
+        Ok(all)
+    }
+
+    /// The largest deflection of any node, also between the instants. Unit: length.
+    #[getter]
+    fn largest_deflection(&self) -> f64 {
+        self.inner.largest_deflection()
+    }
+
+    /// How far energy less work, linear and angular momentum less their impulses drifted, relative to the
+    /// largest of the motion: (energy, linear, angular).
+    #[getter]
+    fn drift(&self) -> (f64, f64, f64) {
+        let [energy, linear, angular] = self.inner.drift();
+        (energy, linear, angular)
+    }
+
+    /// Steps of the integration.
+    #[getter]
+    fn steps(&self) -> u64 {
+        self.inner.steps()
+    }
+
+    /// Warnings and notes, as a tuple of `Diagnostic`.
+    #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        diagnostics(py, self.inner.diagnostics())
+    }
+
+    /// Writes the motion to an HDF5 file as `flexbody simulate -o` does: it appears whole or not at all.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        brief(py, || self.inner.write(&path))
+    }
+
+    /// The report of `flexbody simulate`: a dict with all numbers, or "json", "text", "html" as a str.
+    #[pyo3(signature = (form="dict"))]
+    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+        report(py, form, |format| self.inner.report(format))
+    }
+
+    /// The table of `flexbody simulate --csv`, as a str.
+    fn csv(&self) -> String {
+        self.inner.csv()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<flexbody.Motion: {} instants, {} steps>", self.inner.times().len(), self.inner.steps())
+    }
+}

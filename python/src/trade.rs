@@ -1,0 +1,85 @@
+//! What accuracy costs in a scene.
+
+use crate::body::Body;
+use crate::errors::{diagnostics, exception, warn};
+use crate::model::one_of;
+use crate::report::report;
+use flexbody::TradeOptions;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+/// Candidate bodies for a scene, measured against a reference, and the best of them.
+#[pyclass(frozen, module = "flexbody")]
+pub struct Trade {
+    inner: flexbody::Trade,
+}
+
+/// What is asked of a study; `reference` is `full` or `nodal`.
+pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOptions> {
+    let options = TradeOptions::default().modes(modes).repeat(repeat);
+    let nodal = one_of("reference", reference, [("full", false), ("nodal", true)])?;
+    Ok(if nodal { options.against_all_nodes() } else { options })
+}
+
+impl Trade {
+    pub fn told(py: Python<'_>, inner: flexbody::Trade) -> PyResult<Self> {
+        warn(py, inner.diagnostics())?;
+        Ok(Self { inner })
+    }
+}
+
+#[pymethods]
+impl Trade {
+    /// The candidates, a dict each with what `flexbody trade` says of it: source, kind, modes, groups,
+    /// errors, worst error over its tolerance, multiplications, bytes, seconds. The first is the reference.
+    #[getter]
+    fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        report(py, "dict", |format| self.inner.report(format))?.get_item("rows")
+    }
+
+    /// The candidate to take, from 0; None where none holds the tolerances or is as cheap as allowed.
+    #[getter]
+    fn recommended(&self) -> Option<usize> {
+        self.inner.recommended()
+    }
+
+    /// The candidates, from 0, that no other is cheaper than and as accurate as, ascending in cost.
+    #[getter]
+    fn front(&self) -> Vec<usize> {
+        self.inner.front().to_vec()
+    }
+
+    /// Whether there is a candidate to take, and what it was measured against can be trusted.
+    #[getter]
+    fn holds(&self) -> bool {
+        self.inner.holds()
+    }
+
+    /// Warnings and notes, as a tuple of `Diagnostic`.
+    #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        diagnostics(py, self.inner.diagnostics())
+    }
+
+    /// The body of a candidate, from 0.
+    fn body(&self, py: Python<'_>, candidate: usize) -> PyResult<Body> {
+        let body = self.inner.body(candidate).map_err(|error| exception(py, &error))?;
+        Ok(Body::new(body, Vec::new()))
+    }
+
+    /// The report of `flexbody trade`: a dict with all numbers, or "json", "text", "html" as a str.
+    #[pyo3(signature = (form="dict"))]
+    fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
+        report(py, form, |format| self.inner.report(format))
+    }
+
+    /// The table of `flexbody trade --csv`, as a str.
+    fn csv(&self) -> String {
+        self.inner.csv()
+    }
+
+    fn __repr__(&self) -> String {
+        let taken = self.inner.recommended().map_or_else(|| "none".to_owned(), |row| row.to_string());
+        format!("<flexbody.Trade: {} candidates, take {taken}>", self.inner.candidates())
+    }
+}

@@ -1,0 +1,58 @@
+//! Long work: on a thread of its own, without the lock of the interpreter, and stopped by Ctrl-C.
+
+use crate::errors::{bug, exception};
+use flexbody::{Listener, Result};
+use pyo3::prelude::*;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
+/// How often signals are looked at.
+const INTERVAL: Duration = Duration::from_millis(50);
+
+/// Stack of the thread, as that of the program.
+const STACK: usize = 8 << 20;
+
+/// Does `work` on a thread of its own, while other threads of Python go on.
+///
+/// Where Python has an exception for a signal (KeyboardInterrupt), the caller gets it at once. The work hears
+/// of it by its listener and ends at its next step; it holds nothing of Python.
+pub fn run<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(Listener<'_>) -> Result<T> + Send + 'static,
+) -> PyResult<T> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let (send, mut receive) = sync_channel(1);
+    let told = Arc::clone(&stopped);
+    let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
+    worker.spawn(move || {
+        let listener = |_: flexbody::Progress<'_>| match told.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        // Nobody hears of the outcome when the caller was interrupted.
+        let _ = send.send(catch_unwind(AssertUnwindSafe(|| work(&listener))));
+    })?;
+    loop {
+        let outcome;
+        (outcome, receive) = py.detach(move || (receive.recv_timeout(INTERVAL), receive));
+        match outcome {
+            Ok(Ok(done)) => return done.map_err(|error| exception(py, &error)),
+            Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => return Err(bug(py)),
+            Err(RecvTimeoutError::Timeout) => py.check_signals().inspect_err(|_| {
+                stopped.store(true, Ordering::Relaxed);
+            })?,
+        }
+    }
+}
+
+/// Does short work, such as reading and writing a file, without the lock of the interpreter.
+pub fn brief<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
+    match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
+        Ok(done) => done.map_err(|error| exception(py, &error)),
+        Err(_) => Err(bug(py)),
+    }
+}

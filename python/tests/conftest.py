@@ -1,0 +1,65 @@
+"""Models of the fixtures as a Python code has them: matrices of scipy and arrays of numpy."""
+
+from __future__ import annotations
+
+import gzip
+import tomllib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+
+import flexbody
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+MODELS = FIXTURES / "models"
+SCENES = FIXTURES / "scenes"
+
+
+class Given(NamedTuple):
+    """A model as matrices and arrays."""
+
+    stiffness: Any
+    mass: Any
+    nodes: np.ndarray
+    node_ids: np.ndarray
+    dofs: np.ndarray | None
+    units: tuple[str, str, str]
+
+    def model(self, **keywords: Any) -> flexbody.Model:
+        keywords = {"node_ids": self.node_ids, "dofs": self.dofs, "units": self.units, **keywords}
+        return flexbody.model(self.stiffness, self.mass, self.nodes, **keywords)
+
+
+def given(name: str) -> Given:
+    folder = MODELS / name
+
+    def matrix(stem: str) -> Any:
+        with gzip.open(folder / f"{stem}.mtx.gz") as file:
+            return scipy.sparse.csc_array(scipy.io.mmread(file))
+
+    nodes = np.loadtxt(folder / "nodes.csv", delimiter=",", skiprows=1, ndmin=2)
+    labels = folder / "dofs.csv"
+    dofs = np.loadtxt(labels, delimiter=",", skiprows=1, dtype=np.int64) if labels.exists() else None
+    stated = tomllib.loads((folder / "model.toml").read_text())["model"]["units"]
+    units = (stated["length"], stated["mass"], stated["time"])
+    return Given(matrix("K"), matrix("M"), nodes[:, 1:], nodes[:, 0].astype(np.int64), dofs, units)
+
+
+@pytest.fixture(scope="session")
+def cube() -> Given:
+    return given("cube_hex8")
+
+
+@pytest.fixture(scope="session")
+def bracket() -> Given:
+    return given("bracket_hex20")
+
+
+@pytest.fixture(scope="session")
+def bracket_body() -> flexbody.Body:
+    """In the frame that scenes are told in: at the centre of mass, along the axes of the model."""
+    return flexbody.convert(MODELS / "bracket_hex20" / "model.toml", modes=6, frame="com")

@@ -1,0 +1,223 @@
+"""From matrices to bodies: what goes in, what comes out, and what is refused."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+import scipy.sparse
+from conftest import MODELS, Given, given
+
+import flexbody
+
+
+def in_model(body: flexbody.Body, given: Given) -> np.ndarray:
+    """Psi (N x nf) by the rows of the matrices, along the axes of the model."""
+    shapes = body.shapes @ body.axes.T
+    place = {int(node): at for at, node in enumerate(body.node_ids)}
+    assert given.dofs is not None
+    rows = [shapes[:, place[int(node)], direction - 1] for node, direction in given.dofs]
+    return np.array(rows)
+
+
+def test_five_lines_make_a_body(cube: Given) -> None:
+    K, M, nodes = cube.stiffness, cube.mass, cube.nodes
+    body = flexbody.convert(K, M, nodes, node_ids=cube.node_ids, dofs=cube.dofs, units=("m", "kg", "s"), modes=8)
+    assert (body.n_modes, body.n_nodes, body.n_dofs) == (8, len(nodes), K.shape[0])
+    assert body.units == ("m", "kg", "s")
+    assert body.proved_complete is not None and body.proved_complete >= 8
+
+
+def test_modes_are_those_of_the_matrices(bracket: Given) -> None:
+    body = bracket.model().convert(modes=10)
+    psi = in_model(body, bracket)
+    np.testing.assert_allclose(psi.T @ (bracket.mass @ psi), np.eye(10), atol=1e-10)
+    strain = psi.T @ (bracket.stiffness @ psi)
+    np.testing.assert_allclose(strain, np.diag(body.eigenvalues), atol=1e-9 * body.eigenvalues[-1])
+    np.testing.assert_allclose(body.frequencies_hz, np.sqrt(body.eigenvalues) / (2 * np.pi), rtol=1e-14)
+    np.testing.assert_allclose(body.modal_mass, np.eye(10), atol=1e-10)
+    assert all(identity.holds for identity in body.identities())
+
+
+def test_inertia_is_that_of_the_matrices(bracket: Given) -> None:
+    body = bracket.model().convert(modes=4)
+    assert bracket.dofs is not None
+    place = dict(zip(bracket.node_ids.tolist(), bracket.nodes, strict=True))
+    arms = np.array([place[int(node)] for node, _ in bracket.dofs]) - body.origin
+    axis = np.array([direction - 1 for _, direction in bracket.dofs])
+    move = np.eye(3)[axis]
+    np.testing.assert_allclose(body.mass, move[:, 0] @ (bracket.mass @ move[:, 0]), rtol=1e-12)
+    # Unit rotations about the axes of the body, along those of the model.
+    turn = np.array([np.cross(body.axes[:, k], arms)[np.arange(len(axis)), axis] for k in range(3)]).T
+    np.testing.assert_allclose(body.I0, turn.T @ (bracket.mass @ turn), atol=1e-11 * np.max(body.I0))
+
+
+def test_the_kind_of_matrix_does_not_matter(cube: Given) -> None:
+    first = cube.model().convert(modes=8)
+    shuffled = scipy.sparse.coo_matrix(cube.stiffness)
+    order = np.random.default_rng(1).permutation(shuffled.nnz)
+    halves = [0.5 * shuffled.data[order]] * 2
+    twice = scipy.sparse.coo_array(
+        (np.concatenate(halves), (np.tile(shuffled.row[order], 2), np.tile(shuffled.col[order], 2))), shuffled.shape
+    )
+    for stiffness in (cube.stiffness.tocsr(), scipy.sparse.csr_matrix(cube.stiffness), twice, cube.stiffness.toarray()):
+        assert cube._replace(stiffness=stiffness).model().convert(modes=8) == first
+
+
+def test_callers_keep_their_matrices(cube: Given) -> None:
+    stiffness = cube.stiffness.copy()
+    column = slice(stiffness.indptr[0], stiffness.indptr[1])
+    stiffness.indices[column] = stiffness.indices[column][::-1]
+    stiffness.data[column] = stiffness.data[column][::-1]
+    stiffness.has_sorted_indices = False
+    before = stiffness.indices.copy()
+    assert cube._replace(stiffness=stiffness).model().convert(modes=8) == cube.model().convert(modes=8)
+    np.testing.assert_array_equal(stiffness.indices, before)
+
+
+def test_files_and_memory_give_the_same_numbers(bracket: Given) -> None:
+    read = flexbody.convert(MODELS / "bracket_hex20" / "model.toml", modes=6)
+    made = bracket.model().convert(modes=6)
+    for name in ("eigenvalues", "shapes", "I0", "W0", "W1", "W2", "W3", "C1", "C2", "axes", "origin", "positions"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(made, name), err_msg=name)
+    assert [role for role, _, _ in read.sources] == ["manifest", "stiffness", "mass", "nodes", "dofs"]
+    assert made.sources == [] and made.settings["modes"] == 6
+
+
+def test_arrays_are_made_once_and_read_only(cube: Given) -> None:
+    body = cube.model().convert(modes=8)
+    assert body.W2 is body.W2 and body.W2 is not None and body.W2.shape == (24, 24)
+    assert body.shapes.shape == (8, body.n_nodes, 3) and body.positions.shape == (body.n_nodes, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        body.shapes[0, 0, 0] = 1.0
+    assert body.rotations is None and body.interface_coordinates is None
+
+
+def test_plane_models_and_rotations() -> None:
+    plane = given("plane_frame")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", flexbody.FlexbodyWarning)
+        flat = plane._replace(nodes=plane.nodes[:, :2]).model().convert(modes=5)
+    assert flat.dimension == 2 and flat.equations_of_motion().n_rigid == 3
+    beams = given("frame_beams")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", flexbody.FlexbodyWarning)
+        labelled = beams.model().convert(modes=5)
+    assert labelled.rotations is not None and labelled.rotations.shape == labelled.shapes.shape
+
+
+def test_interfaces_and_craig_bampton(bracket: Given) -> None:
+    ends = {"low": bracket.node_ids[:9], "high": (bracket.node_ids[-9:].tolist(), "rigid", bracket.nodes[-1])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", flexbody.FlexbodyWarning)
+        body = bracket.model(interfaces=ends).convert(modes=4, basis="craig-bampton")
+    low, high = body.interfaces["low"], body.interfaces["high"]
+    assert (low.coupling, high.coupling) == ("averaging", "rigid")
+    np.testing.assert_array_equal(np.sort(low.node_ids), np.sort(bracket.node_ids[:9]))
+    np.testing.assert_allclose(body.origin + body.axes @ high.reference, bracket.nodes[-1], atol=1e-12 * 100)
+    own = body.interface_coordinates
+    assert own is not None and len(own.names) == 12 + 4 == own.stiffness.shape[0]
+    np.testing.assert_allclose(own.of_modes.T @ own.mass @ own.of_modes, np.eye(body.n_modes), atol=1e-8)
+
+
+def test_damping(cube: Given) -> None:
+    ratio = cube.model(damping=0.02).convert(modes=8)
+    np.testing.assert_allclose(ratio.damping_ratios, 0.02)
+    rayleigh = cube.model(damping=(0.0, 1e-9)).convert(modes=8)
+    np.testing.assert_allclose(np.diag(rayleigh.damping), 1e-9 * rayleigh.eigenvalues, rtol=1e-9)
+    matrix = cube.model(damping=1e-9 * cube.stiffness).convert(modes=8)
+    np.testing.assert_allclose(matrix.damping, rayleigh.damping, atol=1e-8 * rayleigh.damping.max())
+
+
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_one_triangle_is_refused(cube: Given, side: str) -> None:
+    half = scipy.sparse.triu(cube.stiffness) if side == "upper" else scipy.sparse.tril(cube.stiffness)
+    with pytest.raises(ValueError, match=f"stiffness has its {side} triangle only"):
+        cube._replace(stiffness=half).model()
+
+
+def test_errors_carry_codes(cube: Given) -> None:
+    wrong = cube.stiffness.copy().tolil()
+    wrong[0, 1] = 2.0 * wrong[0, 1] + 1.0
+    with pytest.raises(flexbody.InputError) as caught:
+        cube._replace(stiffness=wrong.tocsc()).model()
+    error = caught.value
+    assert isinstance(error, flexbody.FlexbodyError) and isinstance(error, ValueError)
+    assert error.exit_code == 2 and error.codes == ("FB307",)
+    first = error.diagnostics[0]
+    assert first.severity == "error" and first.message and first.help and "FB307" in str(error)
+
+    for keywords, code in [
+        ({"units": ("mm", "stone", "s")}, "FB202"),
+        ({"interfaces": {"end": [999999]}}, "FB209"),
+        ({"damping": 2.0}, None),
+    ]:
+        with pytest.raises(flexbody.InputError) as caught:
+            cube.model(**keywords)
+        assert code is None or code in caught.value.codes
+    infinite = cube.mass.copy()
+    infinite.data[3] = np.nan
+    with pytest.raises(flexbody.InputError) as caught:
+        cube._replace(mass=infinite).model()
+    assert "FB306" in caught.value.codes
+
+
+def test_supports_in_the_matrix_are_refused(cube: Given) -> None:
+    held = cube.stiffness.copy().tolil()
+    for row in range(6):
+        held[row, row] *= 10.0
+    with pytest.raises(flexbody.FlexbodyError) as caught:
+        cube._replace(stiffness=held.tocsc()).model().convert(modes=2)
+    assert caught.value.codes
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"nodes": np.zeros((4, 4))}, "expected n x 3"),
+        ({"nodes": np.zeros(3)}, "expected n x 3"),
+        ({"node_ids": [1, 2]}, "node_ids have the shape"),
+        ({"dofs": [[1, 2, 3]]}, "expected N x 2"),
+        ({"dofs": [[1, 7]]}, "direction that is not 1 to 6"),
+        ({"dofs": 5}, "expected 2, 3 or 6"),
+        ({"units": ("mm", "t")}, "expected three"),
+        ({"interfaces": {"end": ([1], "glued")}}, "coupling is `glued`"),
+        ({"residual_vectors": "wind"}, "'interfaces', 'centrifugal'"),
+    ],
+)
+def test_wrong_arguments(cube: Given, change: dict[str, object], message: str) -> None:
+    keywords = {"node_ids": cube.node_ids, "dofs": cube.dofs, "nodes": cube.nodes} | change
+    with pytest.raises(ValueError, match=message):
+        flexbody.model(cube.stiffness, cube.mass, **keywords)
+
+
+def test_wrong_options(cube: Given) -> None:
+    model = cube.model()
+    for keywords, message in [
+        ({"basis": "rayleigh"}, "basis is `rayleigh`"),
+        ({"accuracy": "best"}, "accuracy is `best`"),
+        ({"frame": "mine"}, "frame is `mine`"),
+        ({"modes": 3, "max_frequency": 10.0}, "not both"),
+        ({"max_frequency": -1.0}, "positive"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            model.convert(**keywords)
+    with pytest.raises(TypeError, match="K, M and nodes"):
+        flexbody.convert(cube.stiffness, cube.mass)
+    with pytest.raises(TypeError, match="real numbers"):
+        flexbody.model(cube.stiffness * 1j, cube.mass, cube.nodes)
+    with pytest.raises(ValueError, match="square"):
+        flexbody.model(cube.stiffness[:, :-1], cube.mass, cube.nodes)
+
+
+@pytest.mark.filterwarnings("ignore::flexbody.FlexbodyWarning")
+def test_jobs_of_fe_programs() -> None:
+    folder = MODELS.parent / "small" / "calculix"
+    model = flexbody.read_model(folder / "job.inp", units=("m", "kg", "s"))
+    assert model.n_dofs > 0 and model.positions.shape == (len(model.node_ids), 3)
+    with pytest.raises(flexbody.InputError) as caught:
+        flexbody.read_model(folder / "nothing.inp")
+    assert caught.value.codes
+    with pytest.raises(ValueError, match="manifest states"):
+        flexbody.read_model(MODELS / "cube_hex8" / "model.toml", units=("m", "kg", "s"))

@@ -1,0 +1,101 @@
+"""Files: the same bytes from Python, the command and the program of the crate."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import FIXTURES, MODELS, Given
+
+import flexbody
+
+MANIFEST = MODELS / "bracket_hex20" / "model.toml"
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def program() -> str | None:
+    """The program of the crate, where it was built."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", FIXTURES.parent / "target"))
+    built = [target / profile / "flexbody" for profile in ("release", "debug")]
+    named = os.environ.get("FLEXBODY_PROGRAM")
+    return named or next((str(path) for path in built if path.exists()), None)
+
+
+def test_what_was_written_is_read(cube: Given, tmp_path: Path) -> None:
+    body = cube.model(damping=0.01, interfaces={"end": cube.node_ids[:5]}).convert(modes=8)
+    body.write(tmp_path / "cube.flex.h5")
+    read = flexbody.read(tmp_path / "cube.flex.h5")
+    assert read == body and read != cube.model(damping=0.02).convert(modes=8)
+    assert repr(read).startswith("<flexbody.Body 'model': ") or "model" in repr(read)
+    assert list(read.interfaces) == ["end"]
+
+
+def test_the_same_bytes_from_python_and_the_command(tmp_path: Path) -> None:
+    flexbody.convert(MANIFEST, modes=6).write(tmp_path / "python.flex.h5")
+    words = ["convert", str(MANIFEST), "--modes", "6", "--quiet", "-o"]
+    subprocess.run([sys.executable, "-m", "flexbody", *words, tmp_path / "module.flex.h5"], check=True)
+    assert digest(tmp_path / "python.flex.h5") == digest(tmp_path / "module.flex.h5")
+    command = shutil.which("flexbody", path=str(Path(sys.executable).parent))
+    if command:
+        subprocess.run([command, *words, tmp_path / "command.flex.h5"], check=True)
+        assert digest(tmp_path / "command.flex.h5") == digest(tmp_path / "module.flex.h5")
+    if (own := program()) is None:
+        pytest.skip("the program of the crate is not built")
+    subprocess.run([own, *words, tmp_path / "program.flex.h5"], check=True)
+    assert digest(tmp_path / "python.flex.h5") == digest(tmp_path / "program.flex.h5")
+
+
+@pytest.mark.filterwarnings("ignore::flexbody.FlexbodyWarning")
+def test_every_format_is_written(bracket_body: flexbody.Body, tmp_path: Path) -> None:
+    assert {"exudyn", "sid", "mbdyn", "npz"} <= set(flexbody.export_formats())
+    bracket_body.write(tmp_path / "body.flex.h5")
+    # Those two need a Craig-Bampton body.
+    for name in flexbody.export_formats().keys() - {"chrono", "simscape"}:
+        (tmp_path / "own").mkdir(exist_ok=True)
+        said = bracket_body.export(name, tmp_path / "own" / "body.out")
+        assert all(one.severity in ("warning", "note") for one in said), name
+        assert (tmp_path / "own" / "body.out").stat().st_size > 0
+        words = ["export", tmp_path / "body.flex.h5", "--to", name, "--allow-loss", "--quiet", "-o"]
+        (tmp_path / "other").mkdir(exist_ok=True)
+        subprocess.run([sys.executable, "-m", "flexbody", *words, tmp_path / "other" / "body.out"], check=True)
+        files = sorted(path.name for path in (tmp_path / "own").iterdir())
+        assert files == sorted(path.name for path in (tmp_path / "other").iterdir())
+        for file in files:
+            assert digest(tmp_path / "own" / file) == digest(tmp_path / "other" / file), (name, file)
+        shutil.rmtree(tmp_path / "own")
+        shutil.rmtree(tmp_path / "other")
+
+
+def test_losses_are_warned_of(bracket_body: flexbody.Body, tmp_path: Path) -> None:
+    with pytest.warns(flexbody.FlexbodyWarning) as caught:
+        said = bracket_body.export("openradioss", tmp_path / "body.rad")
+    first = caught[0]
+    assert isinstance(first.message, flexbody.FlexbodyWarning) and first.message.diagnostic in said
+    assert first.message.diagnostic.code == "FB721"
+    # In the name of this file, not of the package.
+    assert first.filename == __file__
+
+
+def test_files_that_cannot_be(cube: Given, tmp_path: Path) -> None:
+    body = cube.model().convert(modes=8)
+    with pytest.raises(flexbody.InputError) as caught:
+        body.write(tmp_path / "no folder" / "body.flex.h5")
+    assert caught.value.codes == ("FB105",)
+    with pytest.raises(flexbody.InputError) as caught:
+        body.export("msc", tmp_path / "x")
+    assert caught.value.codes == ("FB801",)
+    with pytest.raises(flexbody.InputError):
+        flexbody.read(tmp_path / "none.flex.h5")
+    (tmp_path / "text.flex.h5").write_text("no HDF5")
+    with pytest.raises(flexbody.FlexbodyError):
+        flexbody.read(tmp_path / "text.flex.h5")
+    with pytest.raises(TypeError):
+        flexbody.read(3)  # type: ignore[arg-type]

@@ -1,0 +1,54 @@
+"""What a scene needs of a body, and what accuracy costs there."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+from conftest import MODELS
+
+import flexbody
+
+pytestmark = pytest.mark.filterwarnings("ignore::flexbody.FlexbodyWarning")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("scene") / "spin.toml"
+    path.write_text(
+        "[run]\nduration = 0.004\noutputs = 20\n[initial]\nangular_velocity = [10, 200, 5]\n"
+        "[tolerance]\ndeflection = 0.05\nattitude = 0.01\n"
+    )
+    return path
+
+
+def test_selection(bracket_body: flexbody.Body, scene: Path) -> None:
+    selection = bracket_body.select(scene)
+    assert set(selection.modes) <= set(range(6)) and selection.holds
+    assert {name for name, _, _ in selection.groups} == {"W1", "W2", "W3"} and selection.report()["scene"] == "spin"
+    assert selection.report("text") and selection.report("json").startswith("{")
+    with pytest.raises(ValueError, match="form is `pdf`"):
+        selection.report("pdf")  # type: ignore[call-overload]
+
+
+def test_a_body_made_for_a_scene(scene: Path) -> None:
+    model = flexbody.read_model(MODELS / "bracket_hex20" / "model.toml")
+    body = model.convert(modes=6, scene=flexbody.Scene(scene))
+    assert len(body.terms) > 0 and all(isinstance(kept, bool) for _, kept, _ in body.terms)
+    again = flexbody.convert(model, modes=6, scene=[flexbody.Scene(scene)])
+    assert again == body
+
+
+def test_trade(bracket_body: flexbody.Body, scene: Path, tmp_path: Path) -> None:
+    trade = bracket_body.trade(flexbody.Scene(scene), repeat=1)
+    assert len(trade.candidates) > 3 and trade.recommended is not None and trade.holds
+    assert trade.recommended in trade.front
+    taken = trade.body(trade.recommended)
+    assert taken.n_modes == trade.candidates[trade.recommended]["modes"]
+    assert trade.report()["rows"] == trade.candidates and trade.csv().count("\n") > 3
+    with pytest.raises(flexbody.InputError):
+        trade.body(10_000)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "flexbody.Trade" in repr(trade)

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Builds the wheel of the Python package into target/wheels, and tests it in an empty virtual environment. Arguments go to
+# `maturin build`: `--zig` for a wheel that older systems load as well.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+# shellcheck source=scripts/cmake.sh
+source scripts/cmake.sh
+
+python="${PYTHON:-python3}"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+wheels="${FLEXBODY_WHEELS:-$PWD/target/wheels}"
+rm -f "$wheels"/flexbody-*.whl
+
+"$python" -m venv "$work/build"
+"$work/build/bin/pip" install --quiet --disable-pip-version-check 'maturin[zig]>=1.9,<2'
+(cd python && PATH="$work/build/bin:$PATH" maturin build --release --locked --out "$wheels" "$@")
+wheel="$(ls "$wheels"/flexbody-*.whl)"
+echo "wheel: $wheel, $(du -h "$wheel" | cut -f1)"
+
+"$python" -m venv "$work/empty"
+"$work/empty/bin/pip" install --quiet --disable-pip-version-check 'numpy>=1.23'
+seconds=$SECONDS
+"$work/empty/bin/pip" install --quiet --disable-pip-version-check "$wheel"
+echo "installed beside numpy in $((SECONDS - seconds)) s"
+"$work/empty/bin/flexbody" --version
+"$work/empty/bin/pip" install --quiet --disable-pip-version-check "$wheel[test]"
+# Not in the folder of the sources: what is tested is what was installed.
+"$work/empty/bin/python" -m pytest --quiet -p no:cacheprovider -c python/pyproject.toml --rootdir python "$PWD/python/tests"

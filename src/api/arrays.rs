@@ -1,0 +1,125 @@
+//! What else a body consists of: provenance, units, and the arrays beside the invariants.
+
+use super::matrix::shown;
+use super::{FlexBody, Matrix};
+use crate::body::flex_body::MassStructure;
+use nalgebra::Matrix3;
+
+/// A file that a body was made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SourceFile {
+    /// `manifest`, `stiffness`, `mass`, `nodes`, `dofs`, `interface`, `scene`, `history`, ...
+    pub role: String,
+    /// File name without folders.
+    pub name: String,
+    /// SHA-256 of its bytes, in lowercase hex.
+    pub sha256: String,
+}
+
+/// What the stress under a unit load adds to the stiffness.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct GeometricStiffness {
+    /// The load: `spin_xx`, `acceleration_x`, `force_z_tip` (interface `tip`), ...
+    pub load: String,
+    /// Psi' K_geo Psi (nf x nf). Unit: 1/time^2 over that of the load.
+    pub matrix: Matrix,
+}
+
+impl FlexBody {
+    /// Name of the model.
+    pub fn name(&self) -> &str {
+        &self.0.source().name
+    }
+
+    /// Units of length, mass and time, as they were stated: `"mm"`, `"t"`, `"s"`, or factors to SI.
+    pub fn units(&self) -> [&str; 3] {
+        let units = self.0.units();
+        [units.length.name(), units.mass.name(), units.time.name()]
+    }
+
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    pub fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+
+    /// Number of matrix rows of the model; 0 where it is not known.
+    pub fn n_dofs(&self) -> usize {
+        self.0.source().n_dofs
+    }
+
+    /// The files that the body was made of; none of matrices in memory.
+    pub fn source_files(&self) -> Vec<SourceFile> {
+        let files = self.0.source().files.iter();
+        files
+            .map(|file| SourceFile {
+                role: file.role.clone(),
+                name: file.name.clone(),
+                sha256: file.sha256.clone(),
+            })
+            .collect()
+    }
+
+    /// Settings of the conversion that can change the result, as a JSON object.
+    pub fn settings_json(&self) -> String {
+        self.0.source().settings.to_string()
+    }
+
+    /// Whether every 3 x 3 block of M between nodes is a multiple of the identity (`rotation-invariant`), and
+    /// M is `diagonal` besides, or neither (`general`).
+    pub fn mass_structure(&self) -> &'static str {
+        match self.0.source().mass_structure {
+            MassStructure::RotationInvariant => "rotation-invariant",
+            MassStructure::Diagonal => "diagonal",
+            MassStructure::General => "general",
+        }
+    }
+
+    /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) of the modes (nf).
+    pub fn residuals(&self) -> &[f64] {
+        &self.0.modes().residual
+    }
+
+    /// Where each mode comes from: `free mode`, `imported shape`, ...; empty where it is not known.
+    pub fn mode_origins(&self) -> &[String] {
+        &self.0.modes().provenance
+    }
+
+    /// Rotations of the nodes in the modes (3n x nf), zero at nodes without; `None` of models of
+    /// displacements. Unit: 1/(length sqrt(mass)).
+    pub fn rotations(&self) -> Option<Matrix> {
+        self.0.modes().rotation.as_ref().map(|rotation| shown(rotation.as_ref()))
+    }
+
+    /// D (nf x nf): the modal damping; diag(2 zeta_j omega_j) where ratios are all that is known. Unit:
+    /// 1/time.
+    pub fn damping(&self) -> Matrix {
+        shown(self.0.damping().as_ref())
+    }
+
+    /// J = sum m x x' (3 x 3), about the origin of the body frame. Unit: mass length^2.
+    pub fn second_moment(&self) -> Matrix3<f64> {
+        self.0.invariants().second_moment()
+    }
+
+    /// W0 (3 x 3nf): the part of linear momentum that is linear in angular velocity and modal coordinates.
+    pub fn w0(&self) -> Matrix {
+        shown(self.0.invariants().w0().as_ref())
+    }
+
+    /// Geometric stiffness of unit loads along the axes of the body frame; what is not here is zero or not
+    /// known.
+    pub fn geometric_stiffness(&self) -> Vec<GeometricStiffness> {
+        let all = self.0.geometric_stiffness().iter();
+        all.map(|one| GeometricStiffness { load: one.load.label(), matrix: shown(one.matrix.as_ref()) })
+            .collect()
+    }
+
+    /// What was decided about the groups of the kinetic energy: name, whether it is kept, why. Empty where
+    /// nobody asked, and then all are kept.
+    pub fn terms(&self) -> Vec<(&'static str, bool, &str)> {
+        let terms = self.0.terms().iter();
+        terms.map(|term| (term.group.name(), term.kept, term.reason.as_str())).collect()
+    }
+}

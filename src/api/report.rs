@@ -1,0 +1,58 @@
+//! Reports, as the commands write them.
+
+use super::{FlexBody, Motion, Selection};
+use crate::report::{self, Facts, RunData, SelectionFacts, SimulationFacts, simulation_csv};
+
+/// Formats of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ReportFormat {
+    /// For programs; the schemas are in `schemas/`. Floats round-trip.
+    Json,
+    /// For a terminal: at most 80 columns.
+    Text,
+    /// For people: one page with its plots, which loads nothing from elsewhere.
+    Html,
+}
+
+impl ReportFormat {
+    pub(super) fn inner(self) -> report::Format {
+        match self {
+            Self::Json => report::Format::Json,
+            Self::Text => report::Format::Text,
+            Self::Html => report::Format::Html,
+        }
+    }
+}
+
+/// What a report says of the run: the `diagnostics`, and nothing about times and memory.
+pub(super) fn run(diagnostics: &[crate::base::diagnostic::Diagnostic]) -> RunData {
+    RunData { diagnostics: diagnostics.to_vec(), ..RunData::default() }
+}
+
+impl FlexBody {
+    /// The report of `flexbody inspect`.
+    pub fn report(&self, format: ReportFormat) -> String {
+        report::render(&Facts::new(&self.0, &RunData::default()), format.inner())
+    }
+}
+
+impl Selection {
+    /// The report of `flexbody select`.
+    pub fn report(&self, format: ReportFormat) -> String {
+        SelectionFacts::new(&self.0, &run(self.diagnostics())).render(format.inner())
+    }
+}
+
+impl Motion {
+    /// The report of `flexbody simulate`.
+    pub fn report(&self, format: ReportFormat) -> String {
+        let run = run(self.diagnostics());
+        SimulationFacts::new(&self.recording, &self.units, &run).render(format.inner())
+    }
+
+    /// The table of `flexbody simulate --csv`: a line for each instant.
+    pub fn csv(&self) -> String {
+        simulation_csv(&self.recording)
+    }
+}

@@ -1,0 +1,42 @@
+//! `flexbody completions` and `flexbody man`: what shells and `man` read, from the definition of the
+//! arguments.
+
+use super::arguments::{Arguments, CompletionsArguments, ManArguments};
+use super::outcome::Outcome;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use clap::CommandFactory;
+
+const PROGRAM: &str = "flexbody";
+
+pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Outcome> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), PROGRAM, &mut script);
+    printed(script)
+}
+
+pub(super) fn man(arguments: &ManArguments) -> Result<Outcome> {
+    // Gives the commands the options that all of them have.
+    let mut program = Arguments::command();
+    program.build();
+    let page = match &arguments.command {
+        None => clap_mangen::Man::new(program),
+        Some(name) => {
+            let found = program.find_subcommand(name).ok_or_else(|| {
+                let message = format!("`{name}` is no command");
+                Diagnostic::new(Code::Usage, message).with_help("flexbody --help lists the commands")
+            })?;
+            clap_mangen::Man::new(found.clone())
+        }
+    };
+    let mut text = Vec::new();
+    page.render(&mut text).map_err(|error| Diagnostic::new(Code::OutputUnwritable, error.to_string()))?;
+    printed(text)
+}
+
+/// What is printed as it is.
+fn printed(text: Vec<u8>) -> Result<Outcome> {
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let json = serde_json::json!({ "text": text }).to_string();
+    Ok(Outcome { text, json, diagnostics: Vec::new(), passed: true })
+}

@@ -1,0 +1,76 @@
+//! `flexbody doctor`: what the program is made of and what it finds here.
+
+use super::outcome::Outcome;
+use super::resources::{address_space_limit, memory_left, use_threads};
+use crate::base::error::Result;
+use crate::base::hdf5_file::library_version;
+use crate::base::provenance::generator;
+use crate::numerics::linalg::instruction_set;
+use serde::Serialize;
+
+/// What the program finds.
+#[derive(Debug, Serialize)]
+struct Findings {
+    program: String,
+    /// System and processor family that it was built for.
+    built_for: String,
+    hdf5: String,
+    hdf5_from: &'static str,
+    /// Instructions that sums and products use here; results do not depend on them.
+    instructions: &'static str,
+    processors: usize,
+    threads: usize,
+    /// `None`: the system does not tell.
+    memory_left_bytes: Option<u64>,
+    /// `None`: no limit, or the system does not tell.
+    address_space_limit_bytes: Option<u64>,
+    temporary_folder: String,
+    temporary_folder_is_writable: bool,
+}
+
+impl Findings {
+    fn new() -> Self {
+        let folder = std::env::temp_dir();
+        Self {
+            program: generator(),
+            built_for: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            hdf5: library_version(),
+            hdf5_from: if cfg!(feature = "bundled-hdf5") { "built in" } else { "of the system" },
+            instructions: instruction_set(),
+            processors: std::thread::available_parallelism().map_or(1, usize::from),
+            threads: use_threads(None),
+            memory_left_bytes: memory_left(None),
+            address_space_limit_bytes: address_space_limit(),
+            temporary_folder_is_writable: tempfile::tempfile_in(&folder).is_ok(),
+            temporary_folder: folder.display().to_string(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let gigabytes = |bytes: Option<u64>, none: &str| {
+            bytes.map_or_else(|| none.to_owned(), |bytes| format!("{:.1} GB", bytes as f64 * 1e-9))
+        };
+        let writable = if self.temporary_folder_is_writable { "" } else { ", NOT WRITABLE" };
+        let lines = [
+            ("program", format!("{}, {}", self.program, self.built_for)),
+            ("HDF5", format!("{}, {}", self.hdf5, self.hdf5_from)),
+            ("processors", format!("{}, instructions {}", self.processors, self.instructions)),
+            ("threads", self.threads.to_string()),
+            ("memory", gigabytes(self.memory_left_bytes, "not told by the system")),
+            ("limit", gigabytes(self.address_space_limit_bytes, "none on address space")),
+            ("temporary", format!("{}{writable}", self.temporary_folder)),
+        ];
+        lines.iter().map(|(label, text)| format!("{label:12}{text}\n")).collect()
+    }
+}
+
+pub(super) fn run() -> Result<Outcome> {
+    let findings = Findings::new();
+    let json = serde_json::to_string_pretty(&findings).expect("plain numbers and texts");
+    Ok(Outcome {
+        text: findings.text(),
+        json,
+        diagnostics: Vec::new(),
+        passed: findings.temporary_folder_is_writable,
+    })
+}

@@ -1,0 +1,327 @@
+//! Jobs of Nastran: a deck (.bdf, .dat, .nas), or a punch file with the grids of a superelement, and the
+//! matrices in it or beside it: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
+
+mod axes;
+mod bulk;
+mod rows;
+mod sets;
+mod systems;
+
+use super::{Found, JobModel, JobReader, both, missing, siblings};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::input::bulk_cards::is_bulk_data;
+use crate::input::bytes::InputFile;
+use crate::input::dmig::{Dmigs, Point};
+use crate::input::nastran_names::pair;
+use crate::input::output4;
+use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
+use crate::numerics::linalg::CscMatrix;
+use axes::Turn;
+use bulk::Bulk;
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use systems::Systems;
+
+/// The reader of Nastran jobs.
+pub(super) struct Nastran;
+
+const HELP: &str = "write them with PARAM,EXTOUT,DMIGPCH, EXTSEOUT(DMIGPCH), or OUTPUT4 KGG,MGG";
+
+/// Unit vectors along the rows of a node.
+type Axes = [[f64; 3]; 3];
+
+impl JobReader for Nastran {
+    fn name(&self) -> &'static str {
+        "nastran"
+    }
+
+    fn needs(&self) -> &'static str {
+        "job.bdf with DMIG cards, or with job.pch or job.op4 beside it"
+    }
+
+    fn recognises(&self, path: &Path) -> bool {
+        InputFile::open(path).is_ok_and(|file| is_bulk_data(file.bytes()))
+    }
+
+    fn read(&self, path: &Path) -> Found<JobModel> {
+        let bulk = Bulk::read(path)?;
+        if bulk.grids.is_empty() {
+            let diagnostic = Diagnostic::new(Code::DeckSyntax, "the deck has no GRID").in_file(path);
+            return Err(vec![diagnostic.with_help("give the deck, or the punch file that has the grids")]);
+        }
+        let (nodes, axes) = places(&bulk)?;
+        let matrices = Matrices::of(&bulk, path, &axes)?;
+        let mut diagnostics = told(&bulk, path);
+        let matrices = matrices.turned(&axes)?.without_empty_rows(&mut diagnostics);
+        matrices.refuse_modal(&bulk)?;
+        if bulk.is_condensed() {
+            diagnostics.push(matrices.condensed(&bulk));
+        }
+        let sets = bulk.sets.of(&bulk.grids);
+        let mut files: Vec<(&'static str, PathBuf)> =
+            bulk.files.iter().map(|path| ("deck", path.clone())).collect();
+        files.extend(matrices.files.iter().map(|path| ("matrices", path.clone())));
+        let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
+        let elements = Elements::default();
+        Ok(JobModel { stiffness, mass, nodes, dofs, sets, elements, files, diagnostics })
+    }
+}
+
+/// Places of the grids in the basic system, and the axes of the rows of those that stand along others.
+fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
+    const SHOWN: usize = 5;
+    let mut systems = Systems::new(&bulk.systems, &bulk.grids);
+    let (mut nodes, mut axes, mut bad) = (Nodes::default(), HashMap::new(), Vec::new());
+    for (&id, grid) in &bulk.grids {
+        let found = systems.position(grid).and_then(|x| Ok((x, systems.axes(grid, x)?)));
+        match found {
+            Ok((x, own)) => {
+                nodes.ids.push(id);
+                nodes.positions.push(x);
+                if grid.axes.is_some_and(|system| system != 0) {
+                    axes.insert(id, own);
+                }
+            }
+            Err(diagnostic) if bad.len() < SHOWN => bad.push(match diagnostic.file() {
+                None => diagnostic
+                    .about(format!("grid {id}"))
+                    .in_file(&bulk.card_files[grid.file])
+                    .at_line(grid.line),
+                Some(_) => diagnostic,
+            }),
+            Err(_) => {}
+        }
+    }
+    bad.dedup();
+    if bad.is_empty() { Ok((nodes, axes)) } else { Err(bad) }
+}
+
+/// What the deck says that a user should know.
+fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    if bulk.has_elements && !bulk.coupled_mass {
+        let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";
+        found.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
+    }
+    if let Some((path, line, count)) = &bulk.supports {
+        let message = format!("{count} cards support the body");
+        found.push(Diagnostic::new(Code::DeckSupports, message).in_file(path).at_line(*line));
+    }
+    found
+}
+
+/// K and M with the labels of their rows.
+struct Matrices {
+    stiffness: RawMatrix,
+    mass: RawMatrix,
+    labels: Vec<DofLabel>,
+    /// Files beside the deck that they were read from.
+    files: Vec<PathBuf>,
+}
+
+impl Matrices {
+    /// The matrices of the deck, else those of the files beside it: either of punch files or of OUTPUT4.
+    fn of(bulk: &Bulk, path: &Path, axes: &HashMap<i64, Axes>) -> Found<Self> {
+        let names = bulk.dmigs.names();
+        // Beside elements they are a part of the model that its own matrices contain.
+        if !names.is_empty() && !bulk.has_elements {
+            let pair = pair(&names).map_err(|pairs| no_pair(&names, &pairs, path))?;
+            return Self::of_dmigs(&bulk.dmigs, pair, Vec::new(), axes);
+        }
+        // A file of the name of the deck, else those whose names go on.
+        let with = |extension: &str| {
+            let beside = siblings(path).filter(|(rest, file)| rest.ends_with(extension) && file != path);
+            let mut files: Vec<(String, PathBuf)> = beside.collect();
+            files.sort();
+            if files.iter().any(|(rest, _)| rest == extension) {
+                files.retain(|(rest, _)| rest == extension);
+            }
+            files.into_iter().map(|(_, file)| file).collect::<Vec<PathBuf>>()
+        };
+        let (punches, outputs) = (with(".pch"), with(".op4"));
+        if punches.is_empty() && outputs.is_empty() {
+            return Err(vec![missing(path, "beside the deck a file of matrices (job.pch, job.op4)", HELP)]);
+        }
+        let punched = Dmigs::of(&punches)?;
+        let outputs = Outputs::of(outputs)?;
+        match (pair(&punched.names()), pair(&outputs.names)) {
+            (Ok(pair), Err(_)) => Self::of_dmigs(&punched, pair, punches, axes),
+            (Err(_), Ok(pair)) => outputs.matrices(bulk, pair),
+            (punch_pair, output_pair) => {
+                let names = [punched.names(), outputs.names].concat();
+                let shift = punched.names().len();
+                let shifted = |(k, m): (usize, usize)| (k + shift, m + shift);
+                let mut pairs = punch_pair.map_or_else(|pairs| pairs, |pair| vec![pair]);
+                let others = output_pair.map_or_else(|pairs| pairs, |pair| vec![pair]);
+                pairs.extend(others.into_iter().map(shifted));
+                Err(no_pair(&names, &pairs, path))
+            }
+        }
+    }
+
+    fn of_dmigs(
+        dmigs: &Dmigs,
+        (k, m): (usize, usize),
+        files: Vec<PathBuf>,
+        axes: &HashMap<i64, Axes>,
+    ) -> Found<Self> {
+        let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
+        // Rows that are turned together have to be there, also where they are zero.
+        let turned: Vec<Point> = points.iter().filter(|(id, _)| axes.contains_key(id)).copied().collect();
+        for (id, component) in turned {
+            let first = if component > 3 { 4 } else { 1 };
+            points.extend((first..first + 3).map(|component| (id, component)));
+        }
+        let points: Vec<Point> = points.into_iter().collect();
+        let matrix = |at| dmigs.matrix(at, &points).map_err(|diagnostic| vec![diagnostic]);
+        let (stiffness, mass) = both(matrix(k), matrix(m))?;
+        let labels = points.into_iter().map(rows::label).collect();
+        Ok(Self { stiffness, mass, labels, files })
+    }
+
+    /// With all rows along the axes of the basic system.
+    fn turned(self, axes: &HashMap<i64, Axes>) -> Found<Self> {
+        if !self.labels.iter().any(|label| axes.contains_key(&label.node)) {
+            return Ok(self);
+        }
+        let turn = Turn::new(&self.labels, axes).map_err(|node| {
+            let message = format!(
+                "rows of grid {node} stand along the axes of its CD, but some of its directions are missing"
+            );
+            vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.stiffness.path)]
+        })?;
+        let turned = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+        let (stiffness, mass) = both(turned(self.stiffness), turned(self.mass))?;
+        Ok(Self { stiffness, mass, ..self })
+    }
+
+    /// Without the rows that are empty in both matrices: rotations of solids, and all rows of points that
+    /// nothing is fixed to.
+    fn without_empty_rows(self, found: &mut Vec<Diagnostic>) -> Self {
+        let Self { stiffness, mass, labels, files } = self;
+        let is_filled =
+            |row: usize| [&stiffness, &mass].iter().any(|own| !own.matrix.column(row).0.is_empty());
+        let filled: Vec<bool> = (0..labels.len()).map(is_filled).collect();
+        let rows = || labels.iter().zip(&filled);
+        let moving: HashSet<i64> =
+            rows().filter(|(_, filled)| **filled).map(|(label, _)| label.node).collect();
+        // A displacement without stiffness and mass is a mistake where the node has others.
+        let keeps = |(label, filled): (&DofLabel, &bool)| {
+            *filled || label.direction <= 3 && moving.contains(&label.node)
+        };
+        let kept: Vec<usize> = (0..labels.len()).filter(|&row| keeps((&labels[row], &filled[row]))).collect();
+        if kept.len() == labels.len() {
+            return Self { stiffness, mass, labels, files };
+        }
+        let turning = rows().filter(|(label, filled)| !**filled && moving.contains(&label.node)).count();
+        let left_out = labels.len() - kept.len();
+        let message = format!(
+            "{left_out} rows without stiffness and mass are left out: {turning} rotations, {} of points that nothing is fixed to",
+            left_out - turning
+        );
+        found.push(Diagnostic::new(Code::RowsEmpty, message).in_file(&stiffness.path));
+        let [stiffness, mass] = [stiffness, mass].map(|raw| principal(raw, &kept));
+        Self { stiffness, mass, labels: kept.iter().map(|&row| labels[row]).collect(), files }
+    }
+
+    /// FB111 for modal coordinates: rows of scalar points with mass. What they move, and so how the inertia
+    /// changes with them, is not in K and M.
+    fn refuse_modal(&self, bulk: &Bulk) -> Found<()> {
+        let is_modal = |(row, label): (usize, &DofLabel)| {
+            !bulk.grids.contains_key(&label.node)
+                && bulk.scalars.contains(&label.node)
+                && !self.mass.matrix.column(row).0.is_empty()
+        };
+        let modal = self.labels.iter().enumerate().filter(|own| is_modal(*own)).count();
+        if modal == 0 {
+            return Ok(());
+        }
+        let message = format!(
+            "{modal} scalar points have mass: modal coordinates, whose shapes are not in the matrices"
+        );
+        let help = "give K and M of all grids, and the modes by --basis craig-bampton or --basis imported; or condense to grids alone (no QSET, SPOINT)";
+        let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.mass.path);
+        Err(vec![diagnostic.with_help(help)])
+    }
+
+    /// FB119: what is exact of a body of condensed matrices.
+    fn condensed(&self, bulk: &Bulk) -> Diagnostic {
+        let named = self.labels.iter().map(|label| label.node);
+        let grids: HashSet<i64> = named.filter(|node| bulk.grids.contains_key(node)).collect();
+        let message = format!(
+            "the matrices are condensed to {} grids: mass, I0, C1, C2 and frequencies are those of the condensed model, W0 to W3 know only how these grids move",
+            grids.len()
+        );
+        Diagnostic::new(Code::JobCondensed, message).in_file(&self.stiffness.path)
+    }
+}
+
+/// Some rows, ascending, and the same columns of a matrix that has no entries elsewhere.
+fn principal(raw: RawMatrix, kept: &[usize]) -> RawMatrix {
+    let mut local = vec![u32::MAX; raw.matrix.n_rows()];
+    kept.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);
+    let mut col_ptr = vec![0];
+    let (mut row_idx, mut values) = (Vec::new(), Vec::new());
+    for &column in kept {
+        let (rows, own) = raw.matrix.column(column);
+        row_idx.extend(rows.iter().map(|&row| local[row as usize]));
+        values.extend_from_slice(own);
+        col_ptr.push(row_idx.len());
+    }
+    let matrix = CscMatrix::from_parts(kept.len(), kept.len(), col_ptr, row_idx, values);
+    RawMatrix { matrix, ..raw }
+}
+
+/// The OUTPUT4 files beside a deck.
+struct Outputs {
+    files: Vec<InputFile>,
+    names: Vec<String>,
+    /// File of each name, and which of its matrices it is.
+    places: Vec<(usize, usize)>,
+}
+
+impl Outputs {
+    fn of(paths: Vec<PathBuf>) -> Found<Self> {
+        let mut all = Self { files: Vec::new(), names: Vec::new(), places: Vec::new() };
+        for path in paths {
+            let file = InputFile::open(&path).map_err(|diagnostic| vec![diagnostic])?;
+            let names = output4::names(&file).map_err(|diagnostic| vec![diagnostic.in_file(&path)])?;
+            all.places.extend((0..names.len()).map(|at| (all.files.len(), at)));
+            all.names.extend(names);
+            all.files.push(file);
+        }
+        Ok(all)
+    }
+
+    fn matrices(&self, bulk: &Bulk, (k, m): (usize, usize)) -> Found<Matrices> {
+        let matrix = |name: usize| {
+            let (file, at) = self.places[name];
+            let file = &self.files[file];
+            output4::matrix(file, at).map_err(|diagnostic| vec![diagnostic.in_file(file.path())])
+        };
+        let (stiffness, mass) = both(matrix(k), matrix(m))?;
+        let [rows, others] = [&stiffness, &mass].map(|own| own.matrix.n_cols());
+        if rows != others {
+            let message = format!("{} has {rows} rows, {} has {others}", self.names[k], self.names[m]);
+            return Err(vec![Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&mass.path)]);
+        }
+        let points = rows::points(bulk, rows, &self.names[k], &stiffness.path);
+        let labels = points.map_err(|diagnostic| vec![diagnostic])?.into_iter().map(rows::label).collect();
+        let mut files = vec![stiffness.path.clone()];
+        files.extend((mass.path != stiffness.path).then(|| mass.path.clone()));
+        Ok(Matrices { stiffness, mass, labels, files })
+    }
+}
+
+/// FB109 where there is no pair of matrices, FB111 where there are several.
+fn no_pair(names: &[String], pairs: &[(usize, usize)], path: &Path) -> Vec<Diagnostic> {
+    if pairs.is_empty() {
+        let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let what = format!("a stiffness and a mass matrix (names that begin with K and M; found: {found})");
+        return vec![missing(path, &what, HELP)];
+    }
+    let all: Vec<String> = pairs.iter().map(|&(k, m)| format!("{} and {}", names[k], names[m])).collect();
+    let help = "leave one stiffness and one mass matrix beside the deck";
+    let message = format!("{} pairs of matrices stand to choose from: {}", pairs.len(), all.join("; "));
+    vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help)]
+}

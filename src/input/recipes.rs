@@ -1,0 +1,86 @@
+//! How FE programs are made to write their matrices: the lines of the deck, the run, the command that goes on
+//! from there. `docs/fe_programs.md` shows the same lines.
+
+/// The way from a deck of one FE program to a flexible body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Recipe {
+    /// Name of the program.
+    pub program: &'static str,
+    /// What is done one after the other.
+    pub steps: &'static [Step],
+    /// What the model must be.
+    pub mind: &'static str,
+}
+
+/// Lines and where they belong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Step {
+    /// Where, in a few words.
+    pub place: &'static str,
+    /// The lines, without a newline behind the last.
+    pub lines: &'static str,
+}
+
+/// Every recipe.
+pub const RECIPES: &[Recipe] = &[CALCULIX, ABAQUS, ANSYS, NASTRAN];
+
+const CALCULIX: Recipe = Recipe {
+    program: "calculix",
+    steps: &[
+        Step {
+            place: "In job.inp, below the model and instead of its steps",
+            lines: "*STEP\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n1\n*END STEP",
+        },
+        Step { place: "Run, which writes job.sti, job.mas and job.dof", lines: "ccx -i job" },
+        Step { place: "Convert", lines: "flexbody convert job.inp --units mm,t,s -o body.flex.h5" },
+    ],
+    mind: "solid elements, no *BOUNDARY and no contact; --interface NAME=SET,rigid for the node sets where joints act",
+};
+
+const ABAQUS: Recipe = Recipe {
+    program: "abaqus",
+    steps: &[
+        Step {
+            place: "In job.inp, below the model and instead of its steps",
+            lines: "*STEP\n*MATRIX GENERATE, STIFFNESS, MASS\n*MATRIX OUTPUT, STIFFNESS, MASS, FORMAT=MATRIX INPUT\n*END STEP",
+        },
+        Step {
+            place: "Run, which writes job_STIF1.mtx and job_MASS1.mtx",
+            lines: "abaqus job=job interactive",
+        },
+        Step { place: "Convert", lines: "flexbody convert job.inp --units mm,t,s -o body.flex.h5" },
+    ],
+    mind: "no *BOUNDARY and no contact; quadratic elements, since C3D4 and C3D8 have a lumped mass",
+};
+
+const ANSYS: Recipe = Recipe {
+    program: "ansys",
+    steps: &[
+        Step {
+            place: "Behind the model: its nodes, and the assembled matrices in file.full without a solution",
+            lines: "/PREP7\nLUMPM,OFF\nCDWRITE,DB,part,cdb\nFINISH\n/SOLU\nANTYPE,MODAL\nMODOPT,LANB,1\nWRFULL,1\nSOLVE\nFINISH",
+        },
+        Step {
+            place: "Then the matrices and the nodes of their rows as text",
+            lines: "*SMAT,K,D,IMPORT,FULL,file.full,STIFF\n*SMAT,M,D,IMPORT,FULL,file.full,MASS\n*VEC,B,I,IMPORT,FULL,file.full,BACK\n*EXPORT,K,MMF,K.mtx\n*EXPORT,M,MMF,M.mtx\n*EXPORT,B,MMF,mapping.txt",
+        },
+        Step {
+            place: "Convert",
+            lines: "flexbody convert --stiffness K.mtx --mass M.mtx --nodes part.cdb --dofs mapping.txt --units mm,t,s -o body.flex.h5",
+        },
+    ],
+    mind: "no supports (D), no contact and no constraint equations (CE, CP); file.full has the name of the job",
+};
+
+const NASTRAN: Recipe = Recipe {
+    program: "nastran",
+    steps: &[
+        Step {
+            place: "In job.bdf below BEGIN BULK, for SOL 103 without METHOD and SPC",
+            lines: "PARAM,COUPMASS,1\nPARAM,EXTOUT,DMIGPCH\nASET1,123456,1,THRU,9999",
+        },
+        Step { place: "Run, which writes the matrices to job.pch", lines: "nastran job.bdf" },
+        Step { place: "Convert", lines: "flexbody convert job.bdf --units mm,t,s -o body.flex.h5" },
+    ],
+    mind: "no SPC, no MPC and no rigid elements; the matrices have ten digits",
+};

@@ -1,0 +1,176 @@
+//! Elements by their nodes: what a part can be drawn by. Nothing here enters the mechanics, which are in the
+//! matrices.
+
+use std::collections::BTreeMap;
+
+/// What an element looks like, whatever it does. Corner nodes come first, then one node for each edge of the
+/// shape in the order of its edges, or none of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ElementShape {
+    /// Two ends.
+    Line,
+    /// Three corners.
+    Triangle,
+    /// Four corners.
+    Quadrilateral,
+    /// Four corners.
+    Tetrahedron,
+    /// A base of four corners, and the apex.
+    Pyramid,
+    /// A triangle and the one above it.
+    Wedge,
+    /// A quadrilateral and the one above it.
+    Hexahedron,
+}
+
+impl ElementShape {
+    /// Number of corners.
+    pub fn corners(self) -> usize {
+        match self {
+            Self::Line => 2,
+            Self::Triangle => 3,
+            Self::Quadrilateral | Self::Tetrahedron => 4,
+            Self::Pyramid => 5,
+            Self::Wedge => 6,
+            Self::Hexahedron => 8,
+        }
+    }
+
+    /// The corners that each edge joins.
+    pub fn edges(self) -> &'static [[usize; 2]] {
+        match self {
+            Self::Line => &[[0, 1]],
+            Self::Triangle => &[[0, 1], [1, 2], [2, 0]],
+            Self::Quadrilateral => &[[0, 1], [1, 2], [2, 3], [3, 0]],
+            Self::Tetrahedron => &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
+            Self::Pyramid => &[[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]],
+            Self::Wedge => &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
+            Self::Hexahedron => &[
+                [0, 1],
+                [1, 2],
+                [2, 3],
+                [3, 0],
+                [4, 5],
+                [5, 6],
+                [6, 7],
+                [7, 4],
+                [0, 4],
+                [1, 5],
+                [2, 6],
+                [3, 7],
+            ],
+        }
+    }
+
+    /// The corners of each face, counterclockwise seen from outside; a shell is a face by itself, a line has
+    /// none.
+    pub fn faces(self) -> &'static [&'static [usize]] {
+        match self {
+            Self::Line => &[],
+            Self::Triangle => &[&[0, 1, 2]],
+            Self::Quadrilateral => &[&[0, 1, 2, 3]],
+            Self::Tetrahedron => &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[2, 0, 3]],
+            Self::Pyramid => &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
+            Self::Wedge => &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]],
+            Self::Hexahedron => {
+                &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]]
+            }
+        }
+    }
+
+    /// Whether it fills a volume.
+    pub fn is_solid(self) -> bool {
+        matches!(self, Self::Tetrahedron | Self::Pyramid | Self::Wedge | Self::Hexahedron)
+    }
+
+    /// Place of the node in the middle of the edge between two corners, behind the corners.
+    pub(super) fn middle(self, a: usize, b: usize) -> Option<usize> {
+        let at = self.edges().iter().position(|&[c, d]| [c, d] == [a, b] || [d, c] == [a, b])?;
+        Some(self.corners() + at)
+    }
+}
+
+/// Elements of a model in the order of their file, by node numbers, and what was left out.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Elements {
+    /// Shape, and the end of its nodes in `nodes`.
+    ends: Vec<(ElementShape, usize)>,
+    nodes: Vec<i64>,
+    left_out: BTreeMap<String, usize>,
+}
+
+impl Elements {
+    /// Adds an element: nodes beyond corners and the middles of edges (those of faces) are not taken, and
+    /// where there are not the middles of all edges, none is. An element with fewer nodes than corners is
+    /// left out as one of its `kind`.
+    pub fn add(&mut self, kind: &str, shape: ElementShape, nodes: &[i64]) {
+        let (corners, all) = (shape.corners(), shape.corners() + shape.edges().len());
+        let taken = if nodes.len() >= all { all } else { corners };
+        match nodes.get(..taken) {
+            Some(nodes) => {
+                self.nodes.extend_from_slice(nodes);
+                self.ends.push((shape, self.nodes.len()));
+            }
+            None => self.leave_out(kind, 1),
+        }
+    }
+
+    /// Tells of `count` elements of a kind that cannot be drawn.
+    pub fn leave_out(&mut self, kind: &str, count: usize) {
+        *self.left_out.entry(kind.to_owned()).or_default() += count;
+    }
+
+    /// Number of elements that can be drawn.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// Shape and node numbers of each.
+    pub fn iter(&self) -> impl Iterator<Item = (ElementShape, &[i64])> {
+        let starts = std::iter::once(0).chain(self.ends.iter().map(|(_, end)| *end));
+        starts.zip(&self.ends).map(|(start, &(shape, end))| (shape, &self.nodes[start..end]))
+    }
+
+    /// Kinds that cannot be drawn and how many elements there are of each, by name.
+    pub fn left_out(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.left_out.iter().map(|(kind, count)| (kind.as_str(), *count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ElementShape::{Hexahedron, Pyramid, Tetrahedron, Wedge};
+    use super::*;
+
+    /// Every edge of a solid is passed by two faces, once in each direction: the faces close the solid and
+    /// all look the same way.
+    #[test]
+    fn faces_close_every_solid() {
+        for shape in [Tetrahedron, Pyramid, Wedge, Hexahedron] {
+            let steps = |face: &&'static [usize]| {
+                (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]]).collect::<Vec<_>>()
+            };
+            let passed: Vec<[usize; 2]> = shape.faces().iter().flat_map(steps).collect();
+            assert_eq!(passed.len(), 2 * shape.edges().len(), "{shape:?}");
+            for &[a, b] in shape.edges() {
+                assert!(passed.contains(&[a, b]) && passed.contains(&[b, a]), "{shape:?} {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn short_elements_are_left_out_and_middles_come_all_or_none() {
+        let mut elements = Elements::default();
+        elements.add("C3D4", Tetrahedron, &[1, 2, 3]);
+        elements.add("C3D10", Tetrahedron, &[1, 2, 3, 4, 5, 6]);
+        elements.add("C3D10", Tetrahedron, &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+        let read: Vec<usize> = elements.iter().map(|(_, nodes)| nodes.len()).collect();
+        assert_eq!(read, [4, 10]);
+        assert_eq!(elements.left_out().collect::<Vec<_>>(), [("C3D4", 1)]);
+    }
+}

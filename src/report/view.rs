@@ -1,0 +1,270 @@
+//! The page that shows a body in motion: one file with everything in it, drawn by WebGL. What is drawn is
+//! decided and computed here; the script of the page turns it.
+
+mod arrays;
+mod drawing;
+mod motion;
+
+use super::Format;
+use super::completeness::is_static;
+use super::facts::UnitFacts;
+use super::mass_properties::{centre_of_mass, inertia_about_com};
+use super::numbers::{bytes, counted, plain, significant};
+use super::render::json;
+use crate::base::error::Result;
+use crate::base::provenance;
+use crate::body::flex_body::{FlexBody, Interface};
+use crate::body::invariants::principal_axes;
+use crate::formats::flex_body_file::RecordedMotion;
+use arrays::{Packed, script};
+use drawing::Drawing;
+use motion::ShownMotion;
+use serde::Serialize;
+
+const PAGE: &str = include_str!("view/page.html");
+const STYLE: &str = include_str!("view/view.css");
+const SCRIPT: &str = include_str!("view/view.js");
+
+/// Room for positions, shapes and mesh in a page, in bytes: with the motion of a simulation and the script a
+/// page stays below 10 MB.
+const ROOM: usize = 7_000_000;
+
+/// What a page shows, computed.
+#[derive(Debug, Clone)]
+pub struct View {
+    facts: ViewFacts,
+    page: String,
+}
+
+/// What was put into a page, for the terminal and for programs.
+#[derive(Debug, Clone, Serialize)]
+struct ViewFacts {
+    model: String,
+    modes: usize,
+    /// `surface`, `lines` or `points`.
+    drawn: &'static str,
+    nodes: usize,
+    drawn_nodes: usize,
+    triangles: usize,
+    edges: usize,
+    /// Half a step of the 16-bit positions. Unit: length.
+    position_error: f64,
+    /// Half a step of the 16-bit shapes, relative to the largest component of each mode.
+    shape_error: f64,
+    /// Instants of the simulation that the page has; none without one.
+    instants: Option<usize>,
+    bytes: usize,
+}
+
+impl View {
+    /// The page about `body`, with at most so many `triangles`, or as many as keep it below 10 MB; with the
+    /// motion of a simulation instead of its modes, where there is one.
+    ///
+    /// # Errors
+    /// FB735 for the motion of another body; those of [`FlexBody::carried`].
+    pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
+        let staged = motion.map(|motion| motion::staged(body, motion)).transpose()?;
+        let body = staged.as_ref().unwrap_or(body);
+        let drawing = Drawing::new(body, triangles, ROOM);
+        let shown = motion.map(|motion| ShownMotion::new(motion, body));
+        let mut arrays = drawing.arrays();
+        arrays.extend(shown.iter().flat_map(ShownMotion::arrays));
+        let data = PageData::new(body, &drawing, shown.as_ref());
+        let mut facts = ViewFacts {
+            model: body.source().name.clone(),
+            modes: body.n_modes(),
+            drawn: drawing.kind(),
+            nodes: body.n_nodes(),
+            drawn_nodes: drawing.vertices(),
+            triangles: drawing.triangles(),
+            edges: drawing.edges(),
+            position_error: drawing.position_error(),
+            shape_error: drawing::HALF_STEP,
+            instants: shown.as_ref().map(ShownMotion::instants),
+            bytes: 0,
+        };
+        let page = page(&facts.model, &data, &arrays);
+        facts.bytes = page.len();
+        Ok(Self { facts, page })
+    }
+
+    /// The page.
+    pub fn html(&self) -> &str {
+        &self.page
+    }
+
+    /// What was drawn.
+    pub fn render(&self, format: Format) -> String {
+        match format {
+            Format::Json => json(&self.facts),
+            Format::Html => self.page.clone(),
+            Format::Text => self.facts.text(),
+        }
+    }
+}
+
+impl ViewFacts {
+    fn text(&self) -> String {
+        let what = match self.drawn {
+            "surface" => format!("{} of the surface", counted(self.triangles, "triangle")),
+            "lines" => counted(self.edges, "line"),
+            _ => "points".to_owned(),
+        };
+        let moving = match self.instants {
+            Some(instants) => format!("a simulation of {}", counted(instants, "instant")),
+            None => counted(self.modes, "mode"),
+        };
+        format!(
+            "{}: {what} on {} of {}, {moving}, {}\n",
+            plain(&self.model),
+            self.drawn_nodes,
+            counted(self.nodes, "node"),
+            bytes(self.bytes as u64)
+        )
+    }
+}
+
+/// The texts and few numbers of a page, as its script reads them. Places are in model axes.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct PageData<'a> {
+    name: String,
+    generator: String,
+    units: UnitFacts,
+    terms: Vec<(&'static str, String)>,
+    vertices: usize,
+    centre: [f64; 3],
+    half: f64,
+    radius: f64,
+    modes: Vec<PageMode>,
+    interfaces: Vec<PageInterface>,
+    centre_of_mass: [f64; 3],
+    /// Principal axes, moments ascending.
+    principal: [[f64; 3]; 3],
+    motion: Option<&'a ShownMotion>,
+}
+
+#[derive(Serialize)]
+struct PageMode {
+    label: String,
+    kind: String,
+    /// Largest component of the shape at a drawn node: what 32767 stands for.
+    scale: f64,
+    /// Largest displacement of a drawn node.
+    largest: f64,
+}
+
+#[derive(Serialize)]
+struct PageInterface {
+    name: String,
+    reference: Option<[f64; 3]>,
+    /// Drawn nodes of the interface.
+    nodes: Vec<u32>,
+    /// Displacement of the reference point in each mode, three numbers each.
+    motion: Vec<f64>,
+}
+
+impl<'a> PageData<'a> {
+    fn new(body: &FlexBody, drawing: &Drawing<'_>, motion: Option<&'a ShownMotion>) -> Self {
+        let (frame, invariants) = (body.frame(), body.invariants());
+        let axes = frame.axes * principal_axes(&inertia_about_com(invariants));
+        Self {
+            name: plain(&body.source().name),
+            generator: provenance::generator(),
+            units: UnitFacts::new(body.units()),
+            terms: terms(body, drawing, motion),
+            vertices: drawing.vertices(),
+            centre: drawing.centre(),
+            half: drawing.half(),
+            radius: drawing.radius(),
+            modes: (0..body.n_modes()).map(|j| mode(body, drawing, j)).collect(),
+            interfaces: interfaces(body, drawing),
+            centre_of_mass: frame.to_model(centre_of_mass(invariants).into()),
+            principal: [0, 1, 2].map(|k| axes.column(k).into_owned().into()),
+            motion,
+        }
+    }
+}
+
+fn mode(body: &FlexBody, drawing: &Drawing<'_>, j: usize) -> PageMode {
+    let hertz = significant(body.frequencies_hz()[j], 5);
+    let origin = body.modes().provenance.get(j).map_or("mode", String::as_str);
+    let (label, kind) = match is_static(origin) {
+        true => (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz")),
+        false => (format!("{}: {hertz} Hz", j + 1), origin.to_owned()),
+    };
+    PageMode {
+        label: plain(&label),
+        kind: plain(&kind),
+        scale: drawing.scale(j),
+        largest: drawing.largest(j),
+    }
+}
+
+fn interfaces(body: &FlexBody, drawing: &Drawing<'_>) -> Vec<PageInterface> {
+    let axes = &body.frame().axes;
+    let rotation = body.modes().rotation.as_ref().map(|rotation| rotation.as_ref());
+    let one = |interface: &Interface| {
+        let rows = interface.rows(body.nodes(), body.modes().shape.as_ref(), rotation, body.dimension());
+        let turned = rows.as_ref().map(|rows| drawing::turned(axes, rows.translation.as_ref()));
+        PageInterface {
+            name: plain(&interface.name),
+            reference: interface.reference.map(|x| body.frame().to_model(x)),
+            nodes: interface.nodes.iter().filter_map(|&node| drawing.vertex(node)).collect(),
+            motion: turned.unwrap_or_else(|| vec![0.0; 3 * body.n_modes()]),
+        }
+    };
+    body.interfaces().iter().map(one).collect()
+}
+
+/// What the page says of the body.
+fn terms(
+    body: &FlexBody,
+    drawing: &Drawing<'_>,
+    motion: Option<&ShownMotion>,
+) -> Vec<(&'static str, String)> {
+    let units = UnitFacts::new(body.units());
+    let drawn = match drawing.vertices() {
+        all if all == body.n_nodes() => format!("all {}", counted(all, "node")),
+        some => format!("{some} of {}", counted(body.n_nodes(), "node")),
+    };
+    let mut terms = vec![
+        ("Mass", format!("{} {}", significant(body.invariants().mass(), 6), units.mass())),
+        ("Drawn", drawn),
+        ("Surface", drawing.in_words()),
+        (
+            "Rounded",
+            format!(
+                "places to {} {}, shapes to 1/65534 of the largest of each mode",
+                significant(drawing.position_error(), 2),
+                units.length()
+            ),
+        ),
+    ];
+    if let Some(motion) = motion {
+        terms.push(("Scene", plain(motion.scene())));
+        terms.push(("Instants", motion.in_words()));
+    }
+    terms
+}
+
+/// The whole page.
+fn page(title: &str, data: &PageData<'_>, arrays: &[Packed]) -> String {
+    let facts = serde_json::to_string(data).expect("structs of numbers and texts are valid JSON");
+    // No text of the data ends the element that it stands in.
+    let facts = facts.replace('<', "\\u003c");
+    let title = super::markup::escape(title);
+    let arrays: String = arrays.iter().map(script).collect();
+    let parts =
+        [("STYLE", STYLE), ("SCRIPT", SCRIPT), ("TITLE", &title), ("FACTS", &facts), ("ARRAYS", &arrays)];
+    let mut page =
+        String::with_capacity(PAGE.len() + STYLE.len() + SCRIPT.len() + facts.len() + arrays.len());
+    let mut rest = PAGE;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, behind) = after.split_once("}}").unwrap_or((after, ""));
+        page.push_str(before);
+        page.push_str(parts.iter().find(|(own, _)| *own == name).map_or("", |(_, text)| text));
+        rest = behind;
+    }
+    page + rest
+}

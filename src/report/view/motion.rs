@@ -1,0 +1,116 @@
+//! The motion of a simulation, as a page plays it.
+
+use super::arrays::Packed;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::body::flex_body::FlexBody;
+use crate::formats::flex_body_file::RecordedMotion;
+use crate::report::numbers::counted;
+use serde::Serialize;
+
+/// Numbers of all instants that a page has at the most.
+const MOST: usize = 400_000;
+
+/// Instants of a motion.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct ShownMotion {
+    scene: String,
+    /// Origin of the frame in model coordinates.
+    origin_in_model: [f64; 3],
+    /// Largest deflection. Unit: length.
+    largest: f64,
+    /// Middle of the box around the path of the origin, and how far the path goes from there.
+    middle: [f64; 3],
+    reach: f64,
+    #[serde(skip)]
+    written: usize,
+    #[serde(skip)]
+    time: Vec<f64>,
+    #[serde(skip)]
+    q: Vec<f64>,
+    #[serde(skip)]
+    origins: Vec<f64>,
+    #[serde(skip)]
+    attitudes: Vec<f64>,
+}
+
+/// The body as the motion has it: carried by what carried it.
+///
+/// # Errors
+/// FB735 for the motion of another body; those of [`FlexBody::carried`].
+pub(super) fn staged(body: &FlexBody, motion: &RecordedMotion) -> Result<FlexBody> {
+    let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
+    if motion.body != body.source().name {
+        return foreign(format!("motion of `{}`, the body is `{}`", motion.body, body.source().name));
+    }
+    if motion.modes != body.n_modes() {
+        return foreign(format!("motion of {} modes, the body has {}", motion.modes, body.n_modes()));
+    }
+    match &motion.carrier {
+        Some(carrier) => body.carried(carrier),
+        None => Ok(body.clone()),
+    }
+}
+
+impl ShownMotion {
+    /// The instants of a motion, or some at equal steps with the first and the last.
+    pub fn new(motion: &RecordedMotion, body: &FlexBody) -> Self {
+        let written = motion.time.len();
+        let most = (MOST / (8 + motion.modes)).max(2);
+        let count = written.min(most);
+        let chosen: Vec<usize> = match count {
+            0 | 1 => (0..count).collect(),
+            _ => (0..count).map(|i| i * (written - 1) / (count - 1)).collect(),
+        };
+        let some = |of: &[f64], width: usize| -> Vec<f64> {
+            chosen.iter().flat_map(|&i| &of[i * width..(i + 1) * width]).copied().collect()
+        };
+        let origins = some(&motion.origins, 3);
+        let bound = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
+            origins.iter().skip(k).step_by(3).copied().fold(start, pick)
+        };
+        let middle = [0, 1, 2]
+            .map(|k| 0.5 * (bound(k, f64::min, f64::INFINITY) + bound(k, f64::max, f64::NEG_INFINITY)));
+        let middle = middle.map(|x| if x.is_finite() { x } else { 0.0 });
+        let distance = |x: &[f64; 3]| (0..3).map(|k| (x[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
+        let reach = origins.as_chunks::<3>().0.iter().map(distance).fold(0.0, f64::max);
+        Self {
+            scene: motion.scene.clone(),
+            origin_in_model: motion.origin_in_model,
+            largest: motion.largest_deflection * body.extent_in_model(),
+            middle,
+            reach,
+            written,
+            time: some(&motion.time, 1),
+            q: some(&motion.q, motion.modes),
+            attitudes: some(&motion.attitudes, 4),
+            origins,
+        }
+    }
+
+    pub fn arrays(&self) -> Vec<Packed> {
+        vec![
+            Packed::f32("times", &self.time),
+            Packed::f32("q", &self.q),
+            Packed::f32("origins", &self.origins),
+            Packed::f32("attitudes", &self.attitudes),
+        ]
+    }
+
+    pub fn instants(&self) -> usize {
+        self.time.len()
+    }
+
+    pub fn scene(&self) -> &str {
+        &self.scene
+    }
+
+    /// `2000 of 100000 instants`.
+    pub fn in_words(&self) -> String {
+        match self.written == self.time.len() {
+            true => self.written.to_string(),
+            false => format!("{} of {}", self.time.len(), counted(self.written, "instant")),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! The library as a program that uses it sees it: listeners, interfaces, reports, motions, trade studies, jobs.
+
+use crate::support::program::fixtures;
+use flexbody::{
+    Basis, Code, ConvertOptions, Coupling, ExitCode, FlexBody, Model, Progress, ReportFormat, Scene,
+    SparseMatrix, TradeOptions,
+};
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+fn bracket() -> Model {
+    Model::read(fixtures().join("models/bracket_hex20/model.toml")).expect("a model of the fixtures")
+}
+
+fn body() -> FlexBody {
+    bracket().convert(&ConvertOptions::default().modes(6)).expect("a body").body
+}
+
+/// A short spin with tolerances, and its folder.
+fn spin() -> (tempfile::TempDir, Scene) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("spin.toml");
+    let text = "[run]\nduration = 0.004\noutputs = 20\n[initial]\nangular_velocity = [10, 200, 5]\n[[watch]]\ninterface = \"bolt_wall\"\n\
+                [tolerance]\ndeflection = 0.05\nattitude = 0.01\n";
+    std::fs::write(&path, text).expect("a file");
+    let scene = Scene::read(&path).expect("a scene");
+    (folder, scene)
+}
+
+#[test]
+fn a_listener_hears_the_phases_and_stops_the_work_anywhere() {
+    let (model, options) = (bracket(), ConvertOptions::default().modes(6));
+    let phases = Mutex::new(Vec::new());
+    let events = AtomicUsize::new(0);
+    let listen = |progress: Progress<'_>| {
+        events.fetch_add(1, Ordering::Relaxed);
+        if let Progress::Phase(name) = progress {
+            phases.lock().expect("no panic").push(name.to_owned());
+        }
+        ControlFlow::Continue(())
+    };
+    let whole = model.convert_heard(&options, &listen).expect("a body").body;
+    let (phases, events) = (phases.into_inner().expect("no panic"), events.into_inner());
+    for name in ["factorisation", "modes", "invariants"] {
+        assert!(phases.iter().any(|phase| phase == name), "{name} in {phases:?}");
+    }
+    for last in [0, 1, events / 2, events - 1] {
+        let heard = AtomicUsize::new(0);
+        let stop = |_: Progress<'_>| match heard.fetch_add(1, Ordering::Relaxed) {
+            before if before < last => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        };
+        let error = model.convert_heard(&options, &stop).expect_err("stopped");
+        assert!(error.has(Code::Stopped) && error.exit_code() == ExitCode::Interrupted, "{last}: {error}");
+        assert_eq!(heard.into_inner(), last + 1, "nothing is heard after the end");
+    }
+    assert_eq!(model.convert(&options).expect("a body").body, whole);
+}
+
+#[test]
+fn every_long_work_can_be_stopped() {
+    let (body, (_folder, scene)) = (body(), spin());
+    let stop = |_: Progress<'_>| ControlFlow::Break(());
+    let cases = std::slice::from_ref(&scene);
+    let options = ConvertOptions::default().modes(6);
+    let outcomes = [
+        body.simulate_heard(&scene, &stop).map(|_| ()),
+        body.select_for_cases_heard(cases, &stop).map(|_| ()),
+        body.trade(&scene, &TradeOptions::default(), &stop).map(|_| ()),
+        bracket().convert_for_cases_heard(cases, &options, &stop).map(|_| ()),
+    ];
+    for (at, outcome) in outcomes.into_iter().enumerate() {
+        assert!(outcome.is_err_and(|error| error.has(Code::Stopped)), "{at}");
+    }
+}
+
+#[test]
+fn interfaces_have_their_nodes_and_what_the_modes_do_there() {
+    let body = bracket()
+        .convert(&ConvertOptions::default().modes(4).basis(Basis::CraigBampton))
+        .expect("a body")
+        .body;
+    let interfaces = body.interfaces();
+    assert_eq!(interfaces.len(), 2);
+    for interface in &interfaces {
+        assert!(interface.node_ids.iter().all(|id| body.node_ids().contains(id)));
+        let point = body.interface_point(&interface.name).expect("a reference point");
+        let rows = interface.translation.as_ref().expect("a reference point");
+        for j in 0..body.n_modes() {
+            let mut q = vec![0.0; body.n_modes()];
+            q[j] = 1.0;
+            let moved = point.deflection(&q);
+            assert!((0..3).all(|k| (moved[k] - rows[(k, j)]).abs() <= 1e-12 * rows[(k, j)].abs().max(1.0)));
+        }
+    }
+    let own = body.interface_coordinates().expect("a Craig-Bampton body");
+    assert_eq!((own.names.len(), own.of_modes.columns()), (own.stiffness.rows(), body.n_modes()));
+    assert!(self::body().interface_coordinates().is_none());
+}
+
+#[test]
+fn what_a_builder_states_is_checked_and_kept() {
+    let name = |folder: &str| fixtures().join("models").join(folder).join("model.toml");
+    // A plane model is one of matrices in memory too.
+    let square =
+        |triplets: &[(usize, usize, f64)]| SparseMatrix::from_triplets(4, triplets).expect("a matrix");
+    let stiffness = square(&[(0, 0, 1.0), (2, 2, 1.0), (0, 2, -1.0), (2, 0, -1.0)]);
+    let mass = square(&[(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, 1.0)]);
+    let plane = Model::builder("bar", stiffness.clone(), mass.clone())
+        .nodes(vec![1, 2], vec![[0.0; 3], [1.0, 0.0, 0.0]])
+        .plane()
+        .coupled_interface("end", vec![2], Coupling::Free, None)
+        .rayleigh_damping(0.1, 0.0)
+        .build()
+        .expect("a bar in the plane");
+    let body = plane.convert(&ConvertOptions::default().modes(1)).expect("a body").body;
+    assert_eq!((body.dimension(), body.equations_of_motion().n_rigid(), body.n_dofs()), (2, 3, 4));
+    // K = [1 -1; -1 1], m = 1: lambda = 2, and D = alpha M.
+    assert!((body.eigenvalues()[0] - 2.0).abs() < 1e-12 && (body.damping()[(0, 0)] - 0.1).abs() < 1e-12);
+    assert_eq!(body.interfaces()[0].coupling, Some(Coupling::Free));
+    let refused = Model::builder("bar", stiffness, mass)
+        .nodes(vec![1, 2], vec![[0.0; 3], [1.0, 0.0, 0.0]])
+        .plane()
+        .damping_matrix(SparseMatrix::from_triplets(2, &[(0, 0, 1.0), (1, 1, 1.0)]).expect("a matrix"))
+        .build();
+    assert!(refused.is_err(), "a damping matrix of another size");
+    let read = Model::read(name("cube_hex8")).expect("a model");
+    let cube = read.convert(&ConvertOptions::default().modes(6)).expect("a body").body;
+    assert_eq!(cube.source_files()[0].role, "manifest");
+    assert_eq!(cube.source_files()[0].sha256.len(), 64);
+    assert!(cube.settings_json().contains("\"modes\":6"));
+    assert_eq!(cube.units(), ["m", "kg", "s"]);
+    assert_eq!(cube.mass_structure(), "rotation-invariant");
+}
+
+#[test]
+fn jobs_of_fe_programs_are_read() {
+    let deck = fixtures().join("small/calculix/job.inp");
+    let model = Model::read_job(&deck, None, Some(["m", "kg", "s"]), &[]).expect("a job");
+    assert!(model.n_dofs() > 0);
+    let wrong = Model::read_job(&deck, None, None, &[("end", "NO SUCH SET", Some(Coupling::Rigid))]);
+    assert!(wrong.expect_err("no set").has(Code::NodeSetUnknown));
+}
+
+#[test]
+fn motions_selections_and_studies_tell_their_numbers() {
+    let (body, (folder, scene)) = (body(), spin());
+    let motion = body.simulate(&scene).expect("a motion");
+    let last = motion.times().len() - 1;
+    assert_eq!((last, motion.modal_velocities(last).len()), (20, 6));
+    let length: f64 = motion.attitude(last).iter().map(|p| p * p).sum();
+    assert!((length - 1.0).abs() < 1e-12 && motion.reaction(last).is_none());
+    // Nothing acts on the body.
+    assert!(motion.drift().iter().all(|drift| *drift < 1e-6) && motion.work(last).abs() < 1e-12);
+    let path = &motion.paths()[0];
+    assert_eq!((path.name.as_str(), path.place.len()), ("interface bolt_wall", 21));
+    let deflected =
+        path.deflection.iter().map(|d| d.iter().map(|v| v * v).sum::<f64>().sqrt()).fold(0.0, f64::max);
+    assert!(deflected > 0.0 && deflected <= motion.largest_deflection() * 1.001, "a length, not a ratio");
+    motion.write(folder.path().join("motion.h5")).expect("a file");
+    assert!(motion.csv().lines().count() > 21);
+
+    let selection = body.select(&scene).expect("a selection");
+    let trade = body
+        .trade(&scene, &TradeOptions::default().repeat(1), &|_| ControlFlow::Continue(()))
+        .expect("a study");
+    assert!(trade.holds() && trade.front().contains(&trade.recommended().expect("a candidate")));
+    assert_eq!(trade.body(0).expect("the whole body").n_modes(), 6);
+    assert!(trade.body(trade.candidates()).expect_err("no candidate").has(Code::Usage));
+    let nodal =
+        body.trade(&scene, &TradeOptions::default().against_all_nodes(), &|_| ControlFlow::Continue(()));
+    assert!(nodal.expect_err("no matrices").has(Code::Usage));
+    for (json, scene) in [
+        (selection.report(ReportFormat::Json), "spin"),
+        (motion.report(ReportFormat::Json), "spin"),
+        (trade.report(ReportFormat::Json), "spin"),
+    ] {
+        let report: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        assert_eq!(report["scene"], scene);
+    }
+    assert!(body.report(ReportFormat::Html).contains("<html"));
+}

@@ -1,0 +1,248 @@
+//! The page of `flexbody view`: what it holds, and that a browser draws it.
+
+use crate::support::file_bodies::{Random, parts};
+use crate::support::program::{fixtures, flexbody};
+use flexbody::body::flex_body::{FlexBody, SurfaceMesh};
+use flexbody::formats::flex_body_file::{self, read_simulation};
+use flexbody::report::View;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// Runs `flexbody`, which must succeed, and gives what it prints.
+fn done(folder: &Path, line: &str) -> String {
+    let run = flexbody(folder, &line.split_whitespace().collect::<Vec<_>>());
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(run.status.success(), "{line}: {}{}", text(&run.stdout), text(&run.stderr));
+    text(&run.stdout)
+}
+
+/// A folder with the body of the block of `fixtures/small/abaqus_labels`, as `body.flex.h5`.
+fn block(options: &str) -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let job = fixtures().join("small/abaqus_labels/job.inp");
+    let job = job.to_str().expect("a path in UTF-8");
+    let interface = "--interface left=Left,rigid";
+    done(
+        folder.path(),
+        &format!("convert {job} --units m,kg,s --modes 4 {interface} -o body.flex.h5 {options}"),
+    );
+    folder
+}
+
+/// Static responses to loads at the interface, in the basis beside the free modes.
+const WITH_RESIDUAL_VECTORS: &str = "--residual-vectors interfaces";
+
+/// The element of a page with this identity.
+fn element(page: &str, id: &str) -> String {
+    let (_, after) = page.split_once(&format!("id=\"{id}\">")).unwrap_or_else(|| panic!("no {id}"));
+    after.split_once("</script>").expect("an end").0.to_owned()
+}
+
+#[test]
+fn the_page_has_everything_in_it() {
+    let folder = block(WITH_RESIDUAL_VECTORS);
+    let said: Value =
+        serde_json::from_str(&done(folder.path(), "view body.flex.h5 -o view.html --json")).expect("JSON");
+    let facts = &said["results"];
+    assert_eq!((facts["drawn"].as_str(), facts["triangles"].as_u64()), (Some("surface"), Some(20)));
+    let page = fs::read_to_string(folder.path().join("view.html")).expect("a page");
+    assert_eq!(facts["bytes"].as_u64(), Some(page.len() as u64));
+    // Nothing is loaded from elsewhere.
+    for mark in ["http:", "https:", "src=", "@import", "url(", "{{"] {
+        assert!(!page.contains(mark), "{mark}");
+    }
+    let data: Value = serde_json::from_str(&element(&page, "data")).expect("JSON");
+    let modes = data["modes"].as_array().expect("modes");
+    assert_eq!(modes.len() as u64, facts["modes"].as_u64().expect("a count"));
+    let statics =
+        modes.iter().filter(|mode| mode["kind"].as_str().expect("a text").starts_with("residual vector"));
+    assert!(statics.count() > 0, "residual vectors are named as such");
+    assert_eq!(data["interfaces"][0]["name"], "left");
+    assert_eq!(data["interfaces"][0]["nodes"].as_array().map(Vec::len), Some(4));
+    // Four letters of base64 for three bytes: six for each node and place, and for each node and mode.
+    let nodes = facts["drawn_nodes"].as_u64().expect("a count") as usize;
+    assert_eq!(element(&page, "data-positions").len(), (6 * nodes).div_ceil(3) * 4);
+    assert_eq!(element(&page, "data-shapes").len(), (6 * nodes * modes.len()).div_ceil(3) * 4);
+    assert_eq!(element(&page, "data-triangles").len(), 20 * 6 / 3 * 4);
+}
+
+/// The same body without a surface is drawn as points; fewer triangles can be asked for; the same command
+/// writes the same page.
+#[test]
+fn pages_draw_what_there_is() {
+    let points = block("--no-mesh");
+    let said = done(points.path(), "view body.flex.h5 -o view.html");
+    assert!(said.contains("points on 12 of 12 nodes"), "{said}");
+    let folder = block("");
+    let said = done(folder.path(), "view body.flex.h5 -o few.html --triangles 12");
+    assert!(said.contains("triangles of the surface on "), "{said}");
+    for name in ["a.html", "b.html"] {
+        done(folder.path(), &format!("view body.flex.h5 -o {name}"));
+    }
+    let [a, b] = ["a.html", "b.html"].map(|name| fs::read(folder.path().join(name)).expect("a page"));
+    assert!(a == b);
+}
+
+/// A simulation is played by its own body only.
+#[test]
+fn simulations_are_played_by_their_body() {
+    let folder = block("");
+    let scene = "[initial]\nangular_velocity = [0, 0, 50]\n[run]\nduration = 0.01\noutputs = 20\n";
+    fs::write(folder.path().join("spin.toml"), scene).expect("written");
+    done(folder.path(), "simulate body.flex.h5 --scene spin.toml -o spin.h5");
+    let said = done(folder.path(), "view body.flex.h5 --simulation spin.h5 -o spin.html");
+    assert!(said.contains("a simulation of 21 instants"), "{said}");
+    let page = fs::read_to_string(folder.path().join("spin.html")).expect("a page");
+    assert_eq!(element(&page, "data-times").len(), (4 * 21usize).div_ceil(3) * 4);
+    // Colours go up to the largest deflection, which may lie between the instants.
+    let body = flex_body_file::read(folder.path().join("body.flex.h5")).expect("a body");
+    let motion = flex_body_file::read_simulation(folder.path().join("spin.h5")).expect("a motion");
+    let shape = &body.modes().shape;
+    let deflection = |q: &[f64], node: usize| {
+        let along = |k: usize| q.iter().enumerate().map(|(j, q)| q * shape[(3 * node + k, j)]).sum::<f64>();
+        (0..3).map(|k| along(k).powi(2)).sum::<f64>().sqrt()
+    };
+    let instants = motion.q.chunks(motion.modes);
+    let seen =
+        instants.flat_map(|q| (0..body.n_nodes()).map(move |node| deflection(q, node))).fold(0.0, f64::max);
+    let data: Value = serde_json::from_str(&element(&page, "data")).expect("JSON");
+    let largest = data["motion"]["largest"].as_f64().expect("a number");
+    assert!((0.999 * seen..2.0 * seen).contains(&largest), "{largest} {seen}");
+    let other = block(WITH_RESIDUAL_VECTORS);
+    fs::copy(folder.path().join("spin.h5"), other.path().join("spin.h5")).expect("copied");
+    for (line, part) in [
+        ("view body.flex.h5 --simulation spin.h5 -o view.html", "error[FB735]"),
+        ("view body.flex.h5 --simulation body.flex.h5 -o view.html", "error[FB734]"),
+    ] {
+        let run = flexbody(other.path(), &line.split_whitespace().collect::<Vec<_>>());
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.code() == Some(2) && said.contains(part), "{line}: {said}");
+        assert!(!other.path().join("view.html").exists());
+    }
+}
+
+/// Whatever is wrong with a file of a simulation, it is refused or read.
+#[test]
+fn damaged_simulations_are_no_panic() {
+    let folder = block("");
+    fs::write(folder.path().join("spin.toml"), "[run]\nduration = 0.001\noutputs = 2\n").expect("written");
+    done(folder.path(), "simulate body.flex.h5 --scene spin.toml -o spin.h5");
+    let whole = fs::read(folder.path().join("spin.h5")).expect("a file");
+    let path = folder.path().join("damaged.h5");
+    for k in 0..300usize {
+        let mut bytes = whole.clone();
+        // A fixed sequence of places, spread over the file.
+        let at = k * 7919 % whole.len();
+        match k % 3 {
+            0 => bytes.truncate(at),
+            1 => bytes[at] ^= 0xff,
+            _ => bytes[at..(at + 8).min(whole.len())].fill(0xff),
+        }
+        fs::write(&path, bytes).expect("written");
+        // Either is well.
+        let _ = read_simulation(&path);
+    }
+}
+
+/// A body that hangs from an interface is drawn as it is carried.
+#[test]
+fn carried_bodies_are_drawn_as_they_are_carried() {
+    let folder = block("");
+    let scene =
+        "gravity = [0, 0, -9.81]\n[carried]\ninterface = \"left\"\n[run]\nduration = 0.001\noutputs = 4\n";
+    fs::write(folder.path().join("hang.toml"), scene).expect("written");
+    done(folder.path(), "simulate body.flex.h5 --scene hang.toml -o hang.h5");
+    done(folder.path(), "view body.flex.h5 --simulation hang.h5 -o hang.html");
+    let page = fs::read_to_string(folder.path().join("hang.html")).expect("a page");
+    let data: Value = serde_json::from_str(&element(&page, "data")).expect("JSON");
+    // The interface rests in the frame of the scene.
+    let motion = data["interfaces"][0]["motion"].as_array().expect("numbers");
+    let largest =
+        data["modes"].as_array().expect("modes").iter().map(|m| m["largest"].as_f64().expect("a number"));
+    let largest = largest.fold(0.0, f64::max);
+    assert!(motion.iter().all(|x| x.as_f64().expect("a number").abs() < 1e-9 * largest), "{motion:?}");
+}
+
+/// A plate of 100,000 nodes with 20 modes: thinned to what a page has room for.
+#[test]
+fn a_hundred_thousand_nodes_fit_into_a_page() {
+    let (rows, columns) = (250usize, 400usize);
+    let mut parts = parts(Random::new(3), rows * columns, 20, 0, 0);
+    let at = |i: usize, j: usize| (i * columns + j) as u32;
+    let place = |k: usize| [(k / columns) as f64, (k % columns) as f64, 0.0];
+    parts.nodes.positions = (0..rows * columns).map(place).collect();
+    let cells = (0..rows - 1).flat_map(|i| (0..columns - 1).map(move |j| (i, j)));
+    let halves = |(i, j): (usize, usize)| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles: Vec<[u32; 3]> = cells.flat_map(halves).collect();
+    parts.mesh = SurfaceMesh::new(triangles, Vec::new(), rows * columns).ok();
+    let body = FlexBody::new(parts).expect("a body");
+    let view = View::new(&body, None, None).expect("a page");
+    assert!((5_000_000..10_000_000).contains(&view.html().len()), "{}", view.html().len());
+}
+
+/// A browser of this machine.
+fn browser() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+    std::env::split_paths(&path)
+        .flat_map(|folder| names.map(|name| folder.join(name)))
+        .find(|file| file.is_file())
+}
+
+/// What the browser makes of a page: its document and what it says, or with a file of a picture that.
+fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String, String) {
+    let own = tempfile::tempdir().expect("a folder");
+    let usual = "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic \
+        --no-first-run --disable-background-networking --disable-component-update --disable-sync --enable-logging=stderr";
+    let run = Command::new(browser)
+        .args(usual.split_whitespace())
+        .arg(format!("--user-data-dir={}", own.path().display()))
+        .args(options)
+        .arg(format!("file://{}{asked}", page.display()))
+        .stdin(Stdio::null())
+        .output()
+        .expect("the browser runs");
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+    (text(run.stdout), text(run.stderr))
+}
+
+/// The page draws without complaint, and two instants of a mode look different; one looks the same twice.
+#[test]
+fn a_browser_draws_the_page() {
+    let Some(browser) = browser() else {
+        eprintln!("no Chromium on the PATH: the page is not drawn");
+        return;
+    };
+    let folder = block("");
+    done(folder.path(), "view body.flex.h5 -o view.html");
+    let page = folder.path().join("view.html");
+    let (document, said) = browse(&browser, &page, "#mode=2&phase=0.25", &["--dump-dom"]);
+    assert!(!said.contains("CONSOLE"), "{said}");
+    assert!(
+        document.contains("data-drawn=\"surface\"") && document.contains("data-mode=\"2\""),
+        "{document}"
+    );
+    assert!(!document.contains("data-failed"), "{document}");
+    let scene = "[initial]\nangular_velocity = [0, 0, 50]\n[run]\nduration = 0.01\noutputs = 20\n";
+    fs::write(folder.path().join("spin.toml"), scene).expect("written");
+    done(folder.path(), "simulate body.flex.h5 --scene spin.toml -o spin.h5");
+    done(folder.path(), "view body.flex.h5 --simulation spin.h5 -o spin.html");
+    let (document, said) = browse(&browser, &folder.path().join("spin.html"), "#time=0.005", &["--dump-dom"]);
+    assert!(!said.contains("CONSOLE"), "{said}");
+    assert!(document.contains("<output id=\"now\">0.005 s</output>"), "{document}");
+    let picture = |name: &str, asked: &str| {
+        let file = folder.path().join(name);
+        let shot = format!("--screenshot={}", file.display());
+        browse(&browser, &page, asked, &[&shot, "--window-size=800,600"]);
+        fs::read(file).expect("a picture")
+    };
+    let up = picture("up.png", "#mode=1&phase=0.25");
+    assert!(up != picture("down.png", "#mode=1&phase=0.75"), "the body moves");
+    assert!(up == picture("again.png", "#mode=1&phase=0.25"), "the same instant looks the same");
+}
