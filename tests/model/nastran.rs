@@ -5,7 +5,7 @@ use crate::support::program::fixtures;
 use flexbody::base::diagnostic::{Code, Severity};
 use flexbody::base::error::Error;
 use flexbody::input::{MatrixLocation, MatrixRole, ModelFiles, read_matrix, read_model};
-use flexbody::model::RawModel;
+use flexbody::model::{FeModel, RawModel};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -185,6 +185,26 @@ fn rows_of_output4_have_to_be_those_of_a_set() {
 }
 
 /// A scalar point with mass is a modal coordinate: nobody knows what it moves.
+/// A string of K that begins one row too low reaches rows of rotations, which nothing else has: they count as
+/// rows of the model, whose matrices are then not symmetric.
+#[test]
+fn entries_of_one_side_alone_are_refused() {
+    let place = tempfile::tempdir().expect("a folder");
+    for name in ["job.bdf", "job.op4"] {
+        let mut bytes = fs::read(main_file("nastran_op4").with_file_name(name)).expect("a file");
+        if name == "job.op4" {
+            // Length 7 and row 25 of a string.
+            let string = [0, 0, 0, 7, 0, 0, 0, 25];
+            let at = bytes.windows(8).position(|own| own == string).expect("a string");
+            bytes[at + 7] = 26;
+        }
+        fs::write(place.path().join(name), bytes).expect("written");
+    }
+    let files = ModelFiles::from_job(place.path().join("job.bdf"), None, vec![], None).expect("files");
+    let error = FeModel::from_raw(read_model(&files).expect("matrices")).expect_err("one side");
+    assert!(error.diagnostics().iter().any(|own| own.code() == Code::MatrixAsymmetric), "{error}");
+}
+
 #[test]
 fn modal_coordinates_without_shapes_are_refused() {
     let (_folder, path) = changed("nastran_superelement", |_, text| {

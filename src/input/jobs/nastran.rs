@@ -199,9 +199,7 @@ impl Matrices {
     /// nothing is fixed to.
     fn without_empty_rows(self, found: &mut Vec<Diagnostic>) -> Self {
         let Self { stiffness, mass, labels, files } = self;
-        let is_filled =
-            |row: usize| [&stiffness, &mass].iter().any(|own| !own.matrix.column(row).0.is_empty());
-        let filled: Vec<bool> = (0..labels.len()).map(is_filled).collect();
+        let filled = filled_rows([&stiffness.matrix, &mass.matrix], labels.len());
         let rows = || labels.iter().zip(&filled);
         let moving: HashSet<i64> =
             rows().filter(|(_, filled)| **filled).map(|(label, _)| label.node).collect();
@@ -254,6 +252,20 @@ impl Matrices {
         );
         Diagnostic::new(Code::JobCondensed, message).in_file(&self.stiffness.path)
     }
+}
+
+/// Which rows have an entry, in their row or their column, in one of the matrices. Both count: whether the
+/// matrices are symmetric is checked later, with the model.
+fn filled_rows(matrices: [&CscMatrix; 2], n: usize) -> Vec<bool> {
+    let mut filled = vec![false; n];
+    for matrix in matrices {
+        for column in 0..n {
+            let (rows, _) = matrix.column(column);
+            filled[column] |= !rows.is_empty();
+            rows.iter().for_each(|&row| filled[row as usize] = true);
+        }
+    }
+    filled
 }
 
 /// Some rows, ascending, and the same columns of a matrix that has no entries elsewhere.

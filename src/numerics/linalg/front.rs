@@ -34,6 +34,11 @@ pub trait Real:
 {
     /// Unit roundoff.
     const ROUNDOFF: f64;
+    /// Entries of a factor below this count as zero, beside a diagonal of about one: products of larger ones
+    /// stay above the smallest normal number. Numbers below that are up to a hundred times slower on some
+    /// processors, and the factor of a mass matrix decays to them within a few elements. Zero where no factor
+    /// comes near.
+    const NEGLIGIBLE: f64;
     /// Rounded from double precision.
     fn of(x: f64) -> Self;
     /// In double precision.
@@ -42,6 +47,7 @@ pub trait Real:
 
 impl Real for f64 {
     const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+    const NEGLIGIBLE: f64 = 0.0;
     fn of(x: f64) -> Self {
         x
     }
@@ -52,6 +58,7 @@ impl Real for f64 {
 
 impl Real for f32 {
     const ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
+    const NEGLIGIBLE: f64 = 1e-18;
     fn of(x: f64) -> Self {
         x as f32
     }
@@ -239,6 +246,19 @@ pub(super) fn divide_rows<T: Real>(below: &mut [T], l: MatRef<'_, T>, unit: bool
     });
 }
 
+/// Sets entries below [`Real::NEGLIGIBLE`] to zero.
+fn drop_negligible<T: Real>(entries: &mut [T]) {
+    if T::NEGLIGIBLE == 0.0 {
+        return;
+    }
+    let (least, zero) = (T::of(T::NEGLIGIBLE), T::default());
+    for entry in entries {
+        if *entry < least && *entry > -least {
+            *entry = zero;
+        }
+    }
+}
+
 /// Cholesky of the columns `pivots` of a front; their contribution is subtracted from `rest`. `None` when a
 /// pivot is not positive.
 pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<T>) -> Option<()> {
@@ -268,7 +288,9 @@ pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<
             return None;
         }
         MatMut::from_row_major_slice_mut(square, width, width).copy_from_triangular_lower(&diagonal);
+        drop_negligible(below);
         divide_rows(below, diagonal.as_ref(), false);
+        drop_negligible(below);
         pivots.panels[p] = panel;
     }
     subtract_from_rest(pivots, pivots, rest);
