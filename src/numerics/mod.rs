@@ -4,3 +4,4 @@
 pub mod eigen;
 pub mod integration;
 pub mod linalg;
+pub mod multigrid;

@@ -10,7 +10,7 @@ use crate::base::error::Result;
 use crate::base::progress::Watch;
 use crate::model::{FeModel, centre_and_length};
 use crate::numerics::eigen::{
-    Accuracy, EigenProblem, EigenSolution, FactorChoice, Precision, Proof, Resume, Wanted, solve,
+    Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted, solve,
 };
 use crate::numerics::linalg::{Pencil, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{Mat, MatRef};
@@ -85,6 +85,12 @@ pub fn free_surface_resumed(
 pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
     let plan = solution.plan.filter(|_| settings.factor == FactorChoice::Auto)?;
     let message = match plan.precision {
+        _ if plan.multigrid == Multigrid::Used => {
+            "no factor: the modes are found by cycles over levels of groups of nodes, and corrected in double precision"
+        }
+        _ if plan.multigrid == Multigrid::Failed => {
+            "cycles over levels of groups of nodes do not converge for this model: factored instead"
+        }
         Precision::Single => "the factor is in single precision; the modes are corrected in double precision",
         Precision::Double if plan.single_failed => {
             "a single-precision factor is too poor for the conditioning of this model: factored in double precision"

@@ -25,6 +25,7 @@ mod span;
 mod start;
 mod static_response;
 mod unresisted;
+mod without_factor;
 mod zero_energy;
 
 pub use canonical::{canonical_basis, clusters};
@@ -33,7 +34,7 @@ pub use counters::Counters;
 pub use dynamic_response::dynamic_responses;
 pub use failure::EigenFailure;
 pub use noise::{energy_noise, rounding_residual};
-pub use plan::Plan;
+pub use plan::{Multigrid, Plan};
 pub use problem::EigenProblem;
 pub use refine::{relative_residual, residual_scale};
 pub use resume::{Resume, Save, Snapshot};

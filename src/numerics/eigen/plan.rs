@@ -2,7 +2,7 @@
 
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
-use super::settings::{Accuracy, EigenSettings, FactorChoice, Precision};
+use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
 use crate::numerics::linalg::{Analysis, Peaks};
 
 /// What was decided, and what it needs.
@@ -18,10 +18,53 @@ pub struct Plan {
     pub flops: f64,
     /// Whether single precision was tried first, in vain.
     pub single_failed: bool,
+    /// Whether the search goes without a factor.
+    pub multigrid: Multigrid,
     /// About how long the search takes on one processor, in seconds, without the factorisation.
     pub seconds: f64,
     /// Why completeness cannot be proved: bytes of the count, bytes there are.
     pub proof_too_large: Option<(u64, u64)>,
+}
+
+/// Whether a search solves by cycles over levels of groups of nodes instead of with a factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Multigrid {
+    /// A factor is cheaper, or was asked for.
+    Unsuited,
+    /// It does.
+    Used,
+    /// It was tried first, in vain.
+    Failed,
+}
+
+/// Operations of a factorisation, for each stored entry of K, from which on cycles over levels are faster:
+/// those of a compact solid of 80,000 rows. What is thin has less to factor, and more that no coarse level
+/// sees.
+const MULTIGRID_PAYS: f64 = 2.5e4;
+
+/// Modes up to which they are searched for without a factor: with more, the products of all pairs of vectors
+/// take longer than the solutions.
+const MULTIGRID_MODES: usize = 100;
+
+/// Bytes of all levels, and of what they are made from: for each stored entry of K, and for each row.
+const LEVEL_BYTES: (u64, u64) = (12, 400);
+
+/// Whether the search is to go without a factor.
+fn suits_multigrid(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    analysis: &Analysis,
+    wanted: usize,
+) -> bool {
+    let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
+    settings.accuracy == Accuracy::Fast
+        && settings.factor == FactorChoice::Auto
+        && settings.method == Method::Auto
+        && matches!(settings.wanted, Wanted::Lowest(_))
+        && problem.resume.start.is_none()
+        && matches!((problem.pencil.block(), problem.rigid.ncols()), (3, 6) | (2, 3))
+        && (1..=MULTIGRID_MODES).contains(&wanted)
+        && analysis.flops() > MULTIGRID_PAYS * entries
 }
 
 /// Operations per second that estimates of time assume: what one processor does of the mixed work of a
@@ -108,6 +151,52 @@ impl Plan {
         wanted: usize,
         dense: bool,
     ) -> Result<Self, EigenFailure> {
+        if !dense && suits_multigrid(problem, settings, analysis, wanted) {
+            return Self::without_factor(problem, settings, analysis, wanted);
+        }
+        Self::with_factor(problem, settings, analysis, wanted, dense)
+    }
+
+    /// The plan of a search by cycles over levels, with nothing counted.
+    fn without_factor(
+        problem: &EigenProblem<'_>,
+        settings: &EigenSettings,
+        analysis: &Analysis,
+        wanted: usize,
+    ) -> Result<Self, EigenFailure> {
+        let n = problem.pencil.n();
+        let entries = problem.pencil.stiffness().as_csc().nnz() as u64;
+        let levels = LEVEL_BYTES.0 * entries + LEVEL_BYTES.1 * n as u64;
+        let found = levels + vectors(problem, wanted, Precision::Single);
+        let bytes = resident(found.max(made_of_them(n, wanted)));
+        let available = settings.memory.unwrap_or(u64::MAX);
+        if bytes > available {
+            return Err(EigenFailure::Memory { bytes, available });
+        }
+        Ok(Self {
+            precision: Precision::Single,
+            bytes,
+            factor_bytes: 0,
+            flops: analysis.flops(),
+            // As a factor of the size of K.
+            seconds: seconds(n, wanted, entries, false),
+            single_failed: false,
+            multigrid: Multigrid::Used,
+            proof_too_large: None,
+        })
+    }
+
+    /// The plan of a search with a factor.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn with_factor(
+        problem: &EigenProblem<'_>,
+        settings: &EigenSettings,
+        analysis: &Analysis,
+        wanted: usize,
+        dense: bool,
+    ) -> Result<Self, EigenFailure> {
         let n = problem.pencil.n();
         let seconds = seconds(n, wanted, analysis.factor_len() as u64, dense);
         let peaks = analysis.peaks(rayon::current_num_threads());
@@ -143,6 +232,7 @@ impl Plan {
             flops: analysis.flops(),
             seconds,
             single_failed: false,
+            multigrid: Multigrid::Unsuited,
             proof_too_large,
         })
     }
@@ -166,6 +256,9 @@ impl Plan {
 
 impl std::fmt::Display for Plan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.multigrid == Multigrid::Used {
+            return write!(f, "no factor, cycles over groups of nodes, {} in all", gigabytes(self.bytes));
+        }
         let precision = if self.precision == Precision::Double { "double" } else { "single" };
         let (factor, all) = (gigabytes(self.factor_bytes), gigabytes(self.bytes));
         write!(

@@ -106,7 +106,7 @@ impl Span {
 
 /// A span of vectors that is corrected until its lowest Ritz pairs keep the tolerance, and the end of their
 /// cluster is seen.
-struct Correction<'a> {
+pub(super) struct Correction<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
     goal: &'a Goal,
@@ -131,8 +131,8 @@ struct Correction<'a> {
 }
 
 impl<'a> Correction<'a> {
-    /// Ritz pairs of the span of `x`.
-    fn begin(
+    /// Ritz pairs of the span of `x`, to be corrected by `factor`: anything that solves roughly.
+    pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         factor: &'a dyn Solve,
         goal: &'a Goal,
@@ -166,7 +166,7 @@ impl<'a> Correction<'a> {
     }
 
     /// The modes, and the eigenvalue after them.
-    fn run(mut self, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
+    pub(super) fn run(mut self, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
         for _ in 0..MAX_ROUNDS {
             let excess = self.excess(counters);
             self.converged = excess[..self.wanted].iter().filter(|e| **e <= 1.0).count();

@@ -8,7 +8,7 @@ use super::dense;
 use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
 use super::lanczos::{self, BLOCK, Goal};
-use super::plan::{Plan, gigabytes};
+use super::plan::{Multigrid, Plan, gigabytes};
 use super::problem::EigenProblem;
 use super::refine::{Refined, refine, residuals as residuals_of};
 use super::resume::Snapshot;
@@ -16,6 +16,7 @@ use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, 
 use super::single;
 use super::solution::{EigenSolution, EigenvalueBounds};
 use super::start::{first_shift, fitting_start};
+use super::without_factor;
 use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
@@ -224,8 +225,8 @@ struct Sparse<'a> {
 }
 
 impl Sparse<'_> {
-    /// Searches with the factor of the plan; from single precision back to double where it fails, if that
-    /// fits.
+    /// Searches by the plan. Where cycles over levels do not converge, with a factor; from single precision
+    /// back to double where that fails, if that fits.
     fn search(
         &mut self,
         wanted: usize,
@@ -236,22 +237,10 @@ impl Sparse<'_> {
         let Self { problem, analysis, .. } = *self;
         let tolerance = SEARCHED * self.settings.accuracy.residual();
         let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, block: BLOCK, rough: false, attempt };
-        let found = if self.plan.precision == Precision::Single {
-            match single::search(problem, analysis, &goal, watch, counters) {
-                Ok(found) => Some(found),
-                Err(failure) => {
-                    let double = match self.settings.factor {
-                        FactorChoice::Auto => Plan::in_double(problem, self.settings, analysis, wanted).ok(),
-                        FactorChoice::Always(_) => None,
-                    };
-                    let plan = double.ok_or_else(|| EigenFailure::SinglePrecision(Box::new(failure)))?;
-                    self.plan = Plan { single_failed: true, ..plan };
-                    None
-                }
-            }
-        } else {
-            None
-        };
+        let mut found = self.search_without_factor(&goal, watch, counters)?;
+        if found.is_none() {
+            found = self.search_in_single(&goal, watch, counters)?;
+        }
         let (refined, next, tau) = match found {
             Some(found) => found,
             None => search_in_double(problem, analysis, &goal, watch, counters)?,
@@ -260,7 +249,53 @@ impl Sparse<'_> {
         check_zero_energy(problem, &refined)?;
         Ok(Search { refined, next, tau })
     }
+
+    /// `None` where the plan has a factor, as it has after a search without one that failed.
+    fn search_without_factor(
+        &mut self,
+        goal: &Goal,
+        watch: Watch<'_>,
+        counters: &mut Counters,
+    ) -> Result<Option<Found>, EigenFailure> {
+        if self.plan.multigrid != Multigrid::Used {
+            return Ok(None);
+        }
+        if let Ok(found) = without_factor::search(self.problem, goal, watch, counters) {
+            return Ok(Some(found));
+        }
+        let plan = Plan::with_factor(self.problem, self.settings, self.analysis, goal.wanted, false)?;
+        self.plan = Plan { multigrid: Multigrid::Failed, ..plan };
+        watch(Event::Plan(&self.plan.to_string()));
+        Ok(None)
+    }
+
+    /// `None` where the plan is in double precision, as it is after a search in single that failed.
+    fn search_in_single(
+        &mut self,
+        goal: &Goal,
+        watch: Watch<'_>,
+        counters: &mut Counters,
+    ) -> Result<Option<Found>, EigenFailure> {
+        let Self { problem, settings, analysis, plan } = self;
+        if plan.precision == Precision::Double {
+            return Ok(None);
+        }
+        let failure = match single::search(problem, analysis, goal, watch, counters) {
+            Ok(found) => return Ok(Some(found)),
+            Err(failure) => failure,
+        };
+        let double = match settings.factor {
+            FactorChoice::Auto => Plan::in_double(problem, settings, analysis, goal.wanted).ok(),
+            FactorChoice::Always(_) => None,
+        };
+        let double = double.ok_or_else(|| EigenFailure::SinglePrecision(Box::new(failure)))?;
+        *plan = Plan { single_failed: true, multigrid: plan.multigrid, ..double };
+        Ok(None)
+    }
 }
+
+/// Modes, eigenvalues beyond them, and the shift.
+type Found = (Refined, Vec<f64>, f64);
 
 fn search_in_double(
     problem: &EigenProblem<'_>,
@@ -268,7 +303,7 @@ fn search_in_double(
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
+) -> Result<Found, EigenFailure> {
     let start = fitting_start(problem, goal.attempt);
     let search = |factor: &Cholesky<'_, f64>, start: Option<&Snapshot>, counters: &mut Counters| {
         match lanczos::lowest_modes(problem, factor, goal, start, watch, counters)? {

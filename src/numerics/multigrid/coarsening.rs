@@ -1,0 +1,315 @@
+//! From one level to the next coarser one: the motions of each group, smoothed, and P'AP.
+
+use super::aggregates::{Strong, aggregates};
+use super::blocks::{BlockMatrix, Entries};
+use rayon::prelude::*;
+
+/// Nodes, and groups, per parallel task.
+const NODES: usize = 256;
+const GROUPS: usize = 16;
+
+/// Part of its length below which a motion of a group depends on those before it.
+const DEPENDENT: f64 = 1e-5;
+
+/// Part of its diagonal entry below which a pivot of a node's own block counts as none.
+const NO_PIVOT: f64 = 1e-10;
+
+/// A block in double precision.
+type Block<const R: usize, const C: usize> = [[f64; C]; R];
+
+/// A symmetric matrix that a level is built from, block row by block row.
+pub(super) trait SymmetricBlocks<const B: usize>: Sync {
+    fn nodes(&self) -> usize;
+
+    /// Calls `take` with column and block of every entry of a row, ascending.
+    fn visit(&self, row: usize, take: impl FnMut(usize, &Block<B, B>));
+}
+
+impl<const B: usize> SymmetricBlocks<B> for BlockMatrix<B, B> {
+    fn nodes(&self) -> usize {
+        self.n_rows()
+    }
+
+    fn visit(&self, row: usize, mut take: impl FnMut(usize, &Block<B, B>)) {
+        self.row(row).for_each(|(column, block)| take(column, &wide(block)));
+    }
+}
+
+fn wide<const R: usize, const C: usize>(block: &[[f32; C]; R]) -> Block<R, C> {
+    block.map(|row| row.map(f64::from))
+}
+
+pub(super) fn narrow<const R: usize, const C: usize>(block: &Block<R, C>) -> [[f32; C]; R] {
+    block.map(|row| row.map(|value| value as f32))
+}
+
+/// Motions of each node: its rows in the columns of what costs next to no energy.
+pub(super) type Motions<const B: usize, const C: usize> = Vec<Block<B, C>>;
+
+/// The matrix in single precision.
+pub(super) fn stored<const B: usize>(a: &impl SymmetricBlocks<B>) -> BlockMatrix<B, B> {
+    let row = |node: usize| {
+        let mut row = Vec::new();
+        a.visit(node, |column, block| row.push((column as u32, narrow(block))));
+        row
+    };
+    BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
+}
+
+/// The block of each node on the diagonal.
+pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block<B, B>> {
+    let own = |node: usize| {
+        let mut own = [[0.0; B]; B];
+        a.visit(node, |column, block| {
+            if column == node {
+                own = *block;
+            }
+        });
+        own
+    };
+    (0..a.nodes()).into_par_iter().with_min_len(NODES).map(own).collect()
+}
+
+/// The inverse of a symmetric positive definite matrix, by its Cholesky factor; `None` of any other.
+pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
+    let mut l = [[0.0; B]; B];
+    for j in 0..B {
+        let pivot = a[j][j] - l[j][..j].iter().map(|x| x * x).sum::<f64>();
+        if pivot.is_nan() || pivot <= NO_PIVOT * a[j][j] {
+            return None;
+        }
+        l[j][j] = pivot.sqrt();
+        for i in j + 1..B {
+            let rest = a[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            l[i][j] = rest / l[j][j];
+        }
+    }
+    let mut lower = [[0.0; B]; B];
+    for j in 0..B {
+        lower[j][j] = 1.0 / l[j][j];
+        for i in j + 1..B {
+            let sum: f64 = (j..i).map(|k| l[i][k] * lower[k][j]).sum();
+            lower[i][j] = -sum / l[i][i];
+        }
+    }
+    let entry = |i: usize, j: usize| (i.max(j)..B).map(|k| lower[k][i] * lower[k][j]).sum();
+    Some(std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))))
+}
+
+/// Neighbours whose block is more than `least` of the blocks on the diagonal, in the Frobenius norm.
+pub(super) fn strong_couplings<const B: usize>(
+    a: &impl SymmetricBlocks<B>,
+    diagonal: &[Block<B, B>],
+    least: f64,
+) -> Strong {
+    let square = |block: &Block<B, B>| block.iter().flatten().map(|x| x * x).sum::<f64>();
+    let own: Vec<f64> = diagonal.iter().map(|block| square(block).sqrt()).collect();
+    let row = |node: usize| {
+        let mut row = Vec::new();
+        a.visit(node, |column, block| {
+            let strength = square(block) / (own[node] * own[column]);
+            if column != node && strength > least * least {
+                row.push((column as u32, strength as f32));
+            }
+        });
+        row
+    };
+    Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
+}
+
+/// The groups of a level, with an orthonormal basis of the motions of each.
+pub(super) struct Groups<const B: usize, const C: usize> {
+    pub count: usize,
+    /// Group of each node.
+    of_node: Vec<u32>,
+    /// Of each node, its rows of the basis of its group.
+    basis: Motions<B, C>,
+    /// The motions of the groups in these bases.
+    pub motions: Motions<C, C>,
+}
+
+impl<const B: usize, const C: usize> Groups<B, C> {
+    pub(super) fn new(strong: &Strong, motions: &Motions<B, C>) -> Self {
+        let (of_node, count) = aggregates(strong);
+        let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
+        of_node.iter().enumerate().for_each(|(node, &own)| members[own as usize].push(node as u32));
+        let found: Vec<(Motions<B, C>, Block<C, C>)> = members
+            .par_iter()
+            .with_min_len(GROUPS)
+            .map(|members| orthonormal(members.iter().map(|&node| motions[node as usize]).collect()))
+            .collect();
+        let mut basis = vec![[[0.0; C]; B]; of_node.len()];
+        for (members, (own, _)) in members.iter().zip(&found) {
+            members.iter().zip(own).for_each(|(&node, rows)| basis[node as usize] = *rows);
+        }
+        Self { count, of_node, basis, motions: found.into_iter().map(|(_, own)| own).collect() }
+    }
+
+    /// (1 - omega D^-1 A) times the basis of the groups.
+    pub(super) fn smoothed(
+        &self,
+        a: &impl SymmetricBlocks<B>,
+        inverse: &[Block<B, B>],
+        omega: f64,
+    ) -> BlockMatrix<B, C> {
+        let row = |sums: &mut Sums<B, C>, node: usize| {
+            a.visit(node, |column, block| {
+                add_product(sums.at(self.of_node[column]), block, &self.basis[column]);
+            });
+            sums.take(|column, force| {
+                let mut moved = [[0.0; C]; B];
+                add_product(&mut moved, &inverse[node], force);
+                let is_own = column == self.of_node[node];
+                let entry = |b: usize, c: usize| {
+                    let own = if is_own { self.basis[node][b][c] } else { 0.0 };
+                    (own - omega * moved[b][c]) as f32
+                };
+                std::array::from_fn(|b| std::array::from_fn(|c| entry(b, c)))
+            })
+        };
+        let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES);
+        BlockMatrix::from_rows(nodes.map_init(|| Sums::new(self.count), row).collect())
+    }
+}
+
+/// Motions of some nodes made orthonormal, by Gram-Schmidt taken twice, and the coefficients of the given ones
+/// in them. What depends on those before it becomes zero.
+fn orthonormal<const B: usize, const C: usize>(mut own: Motions<B, C>) -> (Motions<B, C>, Block<C, C>) {
+    let mut coefficients = [[0.0; C]; C];
+    let product = |own: &Motions<B, C>, i: usize, j: usize| -> f64 {
+        own.iter().flatten().map(|row| row[i] * row[j]).sum()
+    };
+    for j in 0..C {
+        let before = product(&own, j, j).sqrt();
+        for _ in 0..2 {
+            for i in 0..j {
+                let along = product(&own, i, j);
+                coefficients[i][j] += along;
+                own.iter_mut().flatten().for_each(|row| row[j] -= along * row[i]);
+            }
+        }
+        let length = product(&own, j, j).sqrt();
+        let is_new = length > DEPENDENT * before;
+        coefficients[j][j] = if is_new { length } else { 0.0 };
+        let scale = if is_new { 1.0 / length } else { 0.0 };
+        own.iter_mut().flatten().for_each(|row| row[j] *= scale);
+    }
+    (own, coefficients)
+}
+
+/// P'AP, by A P first. `empty` is what rows of it that nothing moves have on the diagonal.
+pub(super) fn galerkin<const B: usize, const C: usize>(
+    a: &impl SymmetricBlocks<B>,
+    p: &BlockMatrix<B, C>,
+    r: &BlockMatrix<C, B>,
+    empty: f32,
+) -> BlockMatrix<C, C> {
+    let count = r.n_rows();
+    let forces = |sums: &mut Sums<B, C>, node: usize| {
+        a.visit(node, |column, block| {
+            p.row(column).for_each(|(group, own)| add_product(sums.at(group as u32), block, &wide(own)));
+        });
+        sums.take(|_, sum| narrow(sum))
+    };
+    let nodes = (0..a.nodes()).into_par_iter().with_min_len(NODES);
+    let ap = BlockMatrix::from_rows(nodes.map_init(|| Sums::new(count), forces).collect());
+    let row = |sums: &mut Sums<C, C>, group: usize| {
+        for (node, motion) in r.row(group) {
+            for (other, force) in ap.row(node) {
+                add_product(sums.at(other as u32), &wide(motion), &wide(force));
+            }
+        }
+        sums.take(|column, sum| {
+            let mut block = narrow(sum);
+            for c in 0..C {
+                if column as usize == group && block[c][c] == 0.0 {
+                    block[c][c] = empty;
+                }
+            }
+            block
+        })
+    };
+    let groups = (0..count).into_par_iter().with_min_len(GROUPS);
+    BlockMatrix::from_rows(groups.map_init(|| Sums::new(count), row).collect())
+}
+
+/// c += a b.
+#[inline(always)]
+fn add_product<const R: usize, const S: usize, const C: usize>(
+    c: &mut Block<R, C>,
+    a: &Block<R, S>,
+    b: &Block<S, C>,
+) {
+    for i in 0..R {
+        for k in 0..S {
+            for j in 0..C {
+                c[i][j] += a[i][k] * b[k][j];
+            }
+        }
+    }
+}
+
+/// The blocks of a row while they are summed.
+struct Sums<const R: usize, const C: usize> {
+    /// Place of each column among the blocks, from 1; 0 of those that have none.
+    places: Vec<u32>,
+    blocks: Vec<(u32, Block<R, C>)>,
+}
+
+impl<const R: usize, const C: usize> Sums<R, C> {
+    fn new(columns: usize) -> Self {
+        Self { places: vec![0; columns], blocks: Vec::new() }
+    }
+
+    fn at(&mut self, column: u32) -> &mut Block<R, C> {
+        let place = &mut self.places[column as usize];
+        if *place == 0 {
+            self.blocks.push((column, [[0.0; C]; R]));
+            *place = self.blocks.len() as u32;
+        }
+        &mut self.blocks[*place as usize - 1].1
+    }
+
+    /// The entries that `of` makes of the sums, in ascending order; no sums are left.
+    fn take(&mut self, of: impl Fn(u32, &Block<R, C>) -> [[f32; C]; R]) -> Entries<R, C> {
+        self.blocks.iter().for_each(|(column, _)| self.places[*column as usize] = 0);
+        self.blocks.sort_unstable_by_key(|(column, _)| *column);
+        let entries = self.blocks.iter().map(|(column, sum)| (*column, of(*column, sum))).collect();
+        self.blocks.clear();
+        entries
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inverse_is_one_and_an_indefinite_block_has_none() {
+        let a = [[4.0, 1.0, -0.5], [1.0, 3.0, 0.25], [-0.5, 0.25, 2.0]];
+        let own = inverse(&a).expect("positive definite");
+        for i in 0..3 {
+            for j in 0..3 {
+                let entry: f64 = (0..3).map(|k| a[i][k] * own[k][j]).sum();
+                assert!((entry - f64::from(u8::from(i == j))).abs() < 1e-15, "({i}, {j}): {entry}");
+            }
+        }
+        assert_eq!(inverse(&[[1.0, 2.0], [2.0, 1.0]]), None);
+        assert_eq!(inverse(&[[1.0, f64::NAN], [f64::NAN, 1.0]]), None);
+    }
+
+    #[test]
+    fn motions_of_a_group_are_combinations_of_its_basis() {
+        // A translation, a rotation, and their sum, of three nodes on a line.
+        let motions: Motions<2, 3> =
+            (0..3).map(|k| [[1.0, 0.0, 1.0], [0.0, f64::from(k), f64::from(k)]]).collect();
+        let (basis, coefficients) = orthonormal(motions.clone());
+        assert_eq!(coefficients[2][2], 0.0, "the sum depends on the others");
+        for (given, own) in motions.iter().flatten().zip(basis.iter().flatten()) {
+            for j in 0..3 {
+                let combined: f64 = (0..3).map(|k| own[k] * coefficients[k][j]).sum();
+                assert!((combined - given[j]).abs() < 1e-14);
+            }
+        }
+    }
+}

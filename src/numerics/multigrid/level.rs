@@ -1,0 +1,83 @@
+//! A level: its smoother and the way to the next coarser one.
+
+use super::blocks::{BlockMatrix, Rows, WIDTH};
+use super::coarsening::{
+    Groups, Motions, SymmetricBlocks, diagonal, galerkin, inverse, narrow, stored, strong_couplings,
+};
+use super::smoother::Smoother;
+
+/// Factor of the smoothed prolongation beside the largest eigenvalue: the least energy of it.
+const PROLONGATION: f64 = 4.0 / 3.0;
+
+/// A level with blocks of `B` rows, above one whose groups have `C` motions.
+#[derive(Debug)]
+pub(super) struct Level<const B: usize, const C: usize> {
+    smoother: Smoother<B>,
+    p: BlockMatrix<B, C>,
+    r: BlockMatrix<C, B>,
+}
+
+/// What the next coarser level is made of.
+pub(super) struct Coarse<const C: usize> {
+    pub a: BlockMatrix<C, C>,
+    pub motions: Motions<C, C>,
+}
+
+impl<const B: usize, const C: usize> Level<B, C> {
+    /// From a matrix and the motions that cost next to no energy. Neighbours are strongly coupled from
+    /// `least_coupling` of the diagonal on. `None` where a node's own block is not positive definite, or the
+    /// next level would not be smaller.
+    pub(super) fn new(
+        matrix: &impl SymmetricBlocks<B>,
+        motions: &Motions<B, C>,
+        least_coupling: f64,
+    ) -> Option<(Self, Coarse<C>)> {
+        let diagonal = diagonal(matrix);
+        let inverse: Vec<[[f64; B]; B]> = diagonal.iter().map(inverse).collect::<Option<_>>()?;
+        let groups = Groups::new(&strong_couplings(matrix, &diagonal, least_coupling), motions);
+        if groups.count * C >= matrix.nodes() * B {
+            return None;
+        }
+        let smoother = Smoother::new(stored(matrix), inverse.iter().map(narrow).collect())?;
+        let p = groups.smoothed(matrix, &inverse, PROLONGATION / f64::from(smoother.largest));
+        let r = p.transposed(groups.count);
+        let a = galerkin(matrix, &p, &r, diagonal[0][0][0] as f32);
+        Some((Self { smoother, p, r }, Coarse { a, motions: groups.motions }))
+    }
+
+    pub(super) fn nodes(&self) -> usize {
+        self.smoother.nodes()
+    }
+
+    /// One symmetric cycle for A x = b: smoothing, the coarser levels by `solve_coarse`, smoothing.
+    pub(super) fn cycle(
+        &self,
+        b: &[Rows<B>],
+        solve_coarse: impl FnOnce(Vec<Rows<C>>) -> Vec<Rows<C>>,
+    ) -> Vec<Rows<B>> {
+        let mut x = self.smoother.from_zero(b);
+        let coarse = solve_coarse(self.restricted(&self.smoother.residual(b, &x)));
+        self.add_prolonged(&mut x, &coarse);
+        self.smoother.smooth(b, x)
+    }
+
+    /// P' x.
+    pub(super) fn restricted(&self, x: &[Rows<B>]) -> Vec<Rows<C>> {
+        let mut coarse = vec![[[0.0; WIDTH]; C]; self.r.n_rows()];
+        self.r.apply(x, &mut coarse, |_, y, rx| *y = *rx);
+        coarse
+    }
+
+    /// P y.
+    pub(super) fn prolonged(&self, coarse: &[Rows<C>]) -> Vec<Rows<B>> {
+        let mut x = vec![[[0.0; WIDTH]; B]; self.nodes()];
+        self.add_prolonged(&mut x, coarse);
+        x
+    }
+
+    fn add_prolonged(&self, x: &mut [Rows<B>], coarse: &[Rows<C>]) {
+        self.p.apply(coarse, x, |_, x, px| {
+            x.iter_mut().flatten().zip(px.iter().flatten()).for_each(|(x, px)| *x += px);
+        });
+    }
+}

@@ -1,0 +1,12 @@
+//! Approximate solution with K + tau M without a factor of it: cycles of smoothed aggregation (Vanek, Mandel
+//! and Brezina, Computing 56 (1996) 179) whose coarser levels hold the rigid motions of groups of nodes.
+//! Single precision throughout; the same bits on any number of threads.
+
+mod aggregates;
+mod blocks;
+mod coarsening;
+mod hierarchy;
+mod level;
+mod smoother;
+
+pub use hierarchy::{Levels, levels};
