@@ -6,5 +6,6 @@ mod support;
 mod extremes;
 mod integration;
 mod memory;
+mod multigrid;
 mod single_precision;
 mod work_counters;

@@ -37,17 +37,16 @@ pub enum Multigrid {
     Failed,
 }
 
-/// Operations of a factorisation, for each stored entry of K, from which on cycles over levels are faster:
-/// those of a compact solid of 80,000 rows. What is thin has less to factor, and more that no coarse level
-/// sees.
-const MULTIGRID_PAYS: f64 = 2.5e4;
-
 /// Modes up to which they are searched for without a factor: with more, the products of all pairs of vectors
 /// take longer than the solutions.
 const MULTIGRID_MODES: usize = 100;
 
 /// Bytes of all levels, and of what they are made from: for each stored entry of K, and for each row.
 const LEVEL_BYTES: (u64, u64) = (12, 400);
+
+/// How many times more a factor has to take before modes of [`Accuracy::Standard`] are searched for without one:
+/// their residuals take half as many cycles again.
+const MULTIGRID_PROVED: f64 = 3.0;
 
 /// Whether the search is to go without a factor.
 fn suits_multigrid(
@@ -56,15 +55,22 @@ fn suits_multigrid(
     analysis: &Analysis,
     wanted: usize,
 ) -> bool {
+    let pays = settings.multigrid_pays
+        * match settings.accuracy {
+            Accuracy::Fast => 1.0,
+            Accuracy::Standard => MULTIGRID_PROVED,
+            Accuracy::Certified => return false,
+        };
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
-    settings.accuracy == Accuracy::Fast
-        && settings.factor == FactorChoice::Auto
+    settings.factor == FactorChoice::Auto
         && settings.method == Method::Auto
         && matches!(settings.wanted, Wanted::Lowest(_))
+        // Cycles leave nothing to go on from before they are done.
         && problem.resume.start.is_none()
+        && problem.resume.save.is_none()
         && matches!((problem.pencil.block(), problem.rigid.ncols()), (3, 6) | (2, 3))
         && (1..=MULTIGRID_MODES).contains(&wanted)
-        && analysis.flops() > MULTIGRID_PAYS * entries
+        && analysis.flops() > pays * entries
 }
 
 /// Operations per second that estimates of time assume: what one processor does of the mixed work of a
@@ -138,6 +144,22 @@ fn count_bytes(problem: &EigenProblem<'_>, inertia: u64, modes: usize) -> u64 {
     8 * (inertia + (3 * modes * problem.pencil.n()) as u64)
 }
 
+/// Bytes of the count that proves completeness, none where there is no proof, and why it is left out. What
+/// the search solves with is given back before.
+fn proof(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    peaks: &Peaks,
+    wanted: usize,
+) -> (u64, Option<(u64, u64)>) {
+    if settings.accuracy == Accuracy::Fast {
+        return (0, None);
+    }
+    let count = count_bytes(problem, peaks.inertia, wanted);
+    let available = settings.memory.unwrap_or(u64::MAX);
+    (count, (resident(count) > available).then_some((resident(count), available)))
+}
+
 impl Plan {
     /// Decides for `wanted` modes, which the dense path looks for or an iterative search.
     ///
@@ -151,13 +173,16 @@ impl Plan {
         wanted: usize,
         dense: bool,
     ) -> Result<Self, EigenFailure> {
-        if !dense && suits_multigrid(problem, settings, analysis, wanted) {
-            return Self::without_factor(problem, settings, analysis, wanted);
+        if !dense
+            && suits_multigrid(problem, settings, analysis, wanted)
+            && let Ok(plan) = Self::without_factor(problem, settings, analysis, wanted)
+        {
+            return Ok(plan);
         }
         Self::with_factor(problem, settings, analysis, wanted, dense)
     }
 
-    /// The plan of a search by cycles over levels, with nothing counted.
+    /// The plan of a search by cycles over levels.
     fn without_factor(
         problem: &EigenProblem<'_>,
         settings: &EigenSettings,
@@ -168,21 +193,23 @@ impl Plan {
         let entries = problem.pencil.stiffness().as_csc().nnz() as u64;
         let levels = LEVEL_BYTES.0 * entries + LEVEL_BYTES.1 * n as u64;
         let found = levels + vectors(problem, wanted, Precision::Single);
-        let bytes = resident(found.max(made_of_them(n, wanted)));
+        let needed = found.max(made_of_them(n, wanted));
         let available = settings.memory.unwrap_or(u64::MAX);
-        if bytes > available {
-            return Err(EigenFailure::Memory { bytes, available });
+        if resident(needed) > available {
+            return Err(EigenFailure::Memory { bytes: resident(needed), available });
         }
+        let peaks = analysis.peaks(rayon::current_num_threads());
+        let (count, proof_too_large) = proof(problem, settings, &peaks, wanted);
         Ok(Self {
             precision: Precision::Single,
-            bytes,
+            bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
             factor_bytes: 0,
             flops: analysis.flops(),
-            // As a factor of the size of K.
+            // As with a factor of the size of K.
             seconds: seconds(n, wanted, entries, false),
             single_failed: false,
             multigrid: Multigrid::Used,
-            proof_too_large: None,
+            proof_too_large,
         })
     }
 
@@ -202,8 +229,7 @@ impl Plan {
         let peaks = analysis.peaks(rayon::current_num_threads());
         let available = settings.memory.unwrap_or(u64::MAX);
         let search = |precision: Precision| search_bytes(problem, &peaks, wanted, dense, precision);
-        // The factor is given back before the count.
-        let count = count_bytes(problem, peaks.inertia, wanted);
+        let (count, proof_too_large) = proof(problem, settings, &peaks, wanted);
         let certified = settings.accuracy == Accuracy::Certified;
         let precision = match settings.factor {
             _ if certified => Precision::Double,
@@ -215,7 +241,8 @@ impl Plan {
         let mut needed = search(precision);
         if certified {
             // The bounds factor a matrix of their own, beside the modes.
-            needed = needed.max(count) + 12 * problem.pencil.stiffness().as_csc().nnz() as u64;
+            needed = needed.max(count_bytes(problem, peaks.inertia, wanted))
+                + 12 * problem.pencil.stiffness().as_csc().nnz() as u64;
         }
         if resident(needed) > available {
             return Err(EigenFailure::Memory { bytes: resident(needed), available });
@@ -223,8 +250,6 @@ impl Plan {
         if settings.longest.is_some_and(|longest| seconds > longest) {
             return Err(EigenFailure::TooLong { wanted, seconds, bytes: resident(needed) });
         }
-        let count = if settings.accuracy == Accuracy::Fast { 0 } else { count };
-        let proof_too_large = (resident(count) > available).then_some((resident(count), available));
         Ok(Self {
             precision,
             bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),

@@ -34,7 +34,7 @@ const HANDED_OVER: f64 = 1e-4;
 const BEYOND: f64 = 1e-3;
 
 /// Corrections before single precision is given up.
-const MAX_ROUNDS: usize = 30;
+const MAX_ROUNDS: usize = 60;
 
 /// Rounds in a row that gain less than a factor of two before it is given up.
 const PATIENCE: usize = 6;
