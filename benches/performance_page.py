@@ -227,6 +227,24 @@ def growth_lines(r):
             "entries n^(4/3)); a slender block grows like a compact one only once its cross-section has many nodes.", "", *table(("", "block", "cube", "theory"), rows), ""]
 
 
+def tier_lines(tiers):
+    """What each `--accuracy` costs and gives."""
+    if not tiers:
+        return []
+    rows = []
+    for case, found in tiers.items():
+        for tier, own in found["tiers"].items():
+            errors = [f"{own[key]:.0e}" if key in own else "" for key in ("frequency", "invariant")]
+            way = "cycles" if own["without_factor"] else "factor"
+            proof = "proved" if own["completeness"].startswith("proved") else "not proved"
+            rows.append((case if tier == "fast" else "", f"`{tier}`", number(own["wall_s"]), number(own["cpu_s"]), number(own["memory_mb"]), way, f"{own['residual']:.0e}", proof, *errors))
+    first = next(iter(tiers.values()))
+    said = (f"Whole processes on two threads, from Matrix Market text to the file, in turns (`python3 benches/tiers.py`; {first['machine']['processor']}, commit {first['commit']}). Errors are "
+            "those beside the last tier of the case: the largest relative difference of a frequency, and of an invariant in the norms of `compare`.")
+    head = ("case", "`--accuracy`", "wall, s", "CPU, s", "memory, MB", "modes by", "residual", "completeness", "frequencies", "invariants")
+    return ["## Tiers", "", said, "", *table(head, rows), ""]
+
+
 def render(stored):
     r, machine = Results(stored), stored.get("machine", {})
     versions, loads = {}, []
@@ -240,7 +258,7 @@ def render(stored):
                   f"{min(loads, default=0)} to {max(loads, default=0)}.", "",
                   "Versions: " + ", ".join(f"{name} {version}" for name, version in sorted(versions.items())) + ".", "", "Measured by:", ""]
         lines += [f"* {when.replace('T', ' ')}, commit {session['commit']}: `{session['command']}`" for when, session in stored["sessions"].items()] + [""]
-    lines += target_lines(r) + ["## Cases", ""]
+    lines += target_lines(r) + tier_lines(stored.get("tiers")) + ["## Cases", ""]
     for case in r.cases:
         lines += case_lines(r, case)
     return "\n".join(lines + phase_lines(r) + floor_lines(r) + growth_lines(r)).rstrip() + "\n"

@@ -62,7 +62,7 @@ pub(super) fn search(
                 Search::Rough { vectors, wanted } => (vectors, wanted),
             },
         };
-        let corrected = Correction::begin(problem, factor, goal, vectors, wanted, watch, counters)?;
+        let corrected = Correction::begin(problem, factor, goal, vectors, (wanted, 1), watch, counters)?;
         corrected.run(counters).map(Attempt::Done)
     };
     let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
@@ -119,6 +119,9 @@ pub(super) struct Correction<'a> {
     /// The span keeps earlier corrections until it has twice this size: with them the last modes take half
     /// the columns.
     base: usize,
+    /// Columns that `factor` solves for in the time of one: the pairs above the wanted ones fill them up, and
+    /// the last ones converge sooner.
+    width: usize,
     /// Modes wanted, to the end of the cluster of the last one.
     wanted: usize,
     /// Those that keep the tolerance.
@@ -137,7 +140,7 @@ impl<'a> Correction<'a> {
         factor: &'a dyn Solve,
         goal: &'a Goal,
         mut x: Mat<f64>,
-        wanted: usize,
+        (wanted, width): (usize, usize),
         watch: Watch<'a>,
         counters: &mut Counters,
     ) -> Result<Self, EigenFailure> {
@@ -157,6 +160,7 @@ impl<'a> Correction<'a> {
             span,
             base: lambda.len(),
             lambda,
+            width,
             wanted,
             converged: 0,
             floors: Vec::new(),
@@ -176,10 +180,13 @@ impl<'a> Correction<'a> {
             if poor.is_empty() {
                 return self.hand_over(excess.len(), counters);
             }
+            let after = excess.len()..self.lambda.len();
             if !self.gains(largest(excess)) {
                 break;
             }
-            self.extend(&poor, counters)?;
+            let filled = poor.len().next_multiple_of(self.width) - poor.len();
+            let corrected: Vec<usize> = poor.into_iter().chain(after.take(filled)).collect();
+            self.extend(&corrected, counters)?;
         }
         Err(EigenFailure::NotConverged { converged: self.converged, wanted: self.wanted })
     }
@@ -227,8 +234,10 @@ impl<'a> Correction<'a> {
 
     /// Adds corrections of some pairs to the span, and takes its Ritz pairs.
     fn extend(&mut self, poor: &[usize], counters: &mut Counters) -> Result<(), EigenFailure> {
-        let Self { problem, factor, m_rigid, span, lambda, base, .. } = self;
-        let new = corrections(problem, *factor, span, poor, lambda, m_rigid.as_ref(), counters);
+        let Self { problem, factor, m_rigid, span, lambda, base, width, .. } = self;
+        // Ritz values count with what is left along the span; twice costs as much as a cycle.
+        let passes = if *width > 1 { 1 } else { 2 };
+        let new = corrections(problem, *factor, span, (poor, lambda), (m_rigid.as_ref(), passes), counters);
         // X' M X = I and X' K X = Lambda hold already.
         let ones = vec![1.0; lambda.len()];
         let gm = bordered(&ones, &products(&span.x, &new.mx), &products(&new.x, &new.mx));
@@ -258,14 +267,14 @@ fn bordered(a: &[f64], b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
     })
 }
 
-/// T (K x - lambda M x) for some Ritz pairs, M-orthogonal to the span and to the rigid modes.
+/// T (K x - lambda M x) for the chosen Ritz pairs, made M-orthogonal to the span and to the rigid modes in one
+/// pass or two.
 fn corrections(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
     span: &Span,
-    chosen: &[usize],
-    lambda: &[f64],
-    m_rigid: MatRef<'_, f64>,
+    (chosen, lambda): (&[usize], &[f64]),
+    (m_rigid, passes): (MatRef<'_, f64>, usize),
     counters: &mut Counters,
 ) -> Span {
     counters.solved_columns += chosen.len() as u64;
@@ -277,7 +286,7 @@ fn corrections(
         d.copy_from(r * faer::Scale(if size > 0.0 { size.recip() } else { 0.0 }));
     }
     factor.solve_in_place(d.as_mut());
-    for _ in 0..2 {
+    for _ in 0..passes {
         for (basis, m_basis) in [(problem.rigid, m_rigid), (span.x.as_ref(), span.mx.as_ref())] {
             let along = gram(m_basis, d.as_ref());
             subtract_combination(d.as_mut(), basis, along.as_ref());

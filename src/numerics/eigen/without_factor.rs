@@ -11,7 +11,7 @@ use super::single::Correction;
 use super::start::first_shift;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::Solve;
-use crate::numerics::multigrid::levels;
+use crate::numerics::multigrid::{WIDTH, levels};
 
 /// Vectors beside the wanted modes. Hexahedral cubes of 100,000 and 300,000 rows take 285 solved columns for
 /// 20 modes with 8 of them, 258 with 16, 233 with 24, and the least time with 16.
@@ -33,12 +33,13 @@ pub(super) fn search(
     let levels = levels(pencil, problem.rigid, tau).ok_or_else(unsuited)?;
     watch(Event::Phase("modes"));
     let count = goal.wanted + guards(goal.wanted);
-    let rough = levels.rough_modes(&pencil.mass_diagonal(), count).ok_or_else(unsuited)?;
+    let rough = levels.rough_modes(count).ok_or_else(unsuited)?;
     if rough.ncols() <= goal.wanted {
         return Err(unsuited());
     }
     let solver: &dyn Solve = &*levels;
-    let correction = Correction::begin(problem, solver, goal, rough, goal.wanted, watch, counters)?;
+    let sizes = (goal.wanted, WIDTH);
+    let correction = Correction::begin(problem, solver, goal, rough, sizes, watch, counters)?;
     let (modes, next) = correction.run(counters)?;
     Ok((modes, next, tau))
 }

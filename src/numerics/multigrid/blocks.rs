@@ -5,7 +5,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 /// Columns that are worked on together: one vector of eight numbers in single precision.
-pub(super) const WIDTH: usize = 8;
+pub const WIDTH: usize = 8;
 
 /// The rows of a node in [`WIDTH`] columns.
 pub(super) type Rows<const R: usize> = [[f32; WIDTH]; R];

@@ -15,7 +15,7 @@ const DEPENDENT: f64 = 1e-5;
 const NO_PIVOT: f64 = 1e-10;
 
 /// A block in double precision.
-type Block<const R: usize, const C: usize> = [[f64; C]; R];
+pub(super) type Block<const R: usize, const C: usize> = [[f64; C]; R];
 
 /// A symmetric matrix that a level is built from, block row by block row.
 pub(super) trait SymmetricBlocks<const B: usize>: Sync {
@@ -143,6 +143,18 @@ impl<const B: usize, const C: usize> Groups<B, C> {
             members.iter().zip(own).for_each(|(&node, rows)| basis[node as usize] = *rows);
         }
         Self { count, of_node, basis, motions: found.into_iter().map(|(_, own)| own).collect() }
+    }
+
+    /// The mass of each group, along its motions, from those of the nodes.
+    pub(super) fn masses(&self, nodes: &[Block<B, B>]) -> Vec<Block<C, C>> {
+        let mut masses = vec![[[0.0; C]; C]; self.count];
+        for ((&group, basis), mass) in self.of_node.iter().zip(&self.basis).zip(nodes) {
+            let mut moved = [[0.0; C]; B];
+            add_product(&mut moved, mass, basis);
+            let transposed = std::array::from_fn(|c| std::array::from_fn(|b| basis[b][c]));
+            add_product::<C, B, C>(&mut masses[group as usize], &transposed, &moved);
+        }
+        masses
     }
 
     /// (1 - omega D^-1 A) times the basis of the groups.

@@ -1,7 +1,7 @@
 //! All levels: the cycle through them, and rough modes from the coarsest.
 
 use super::blocks::{BlockMatrix, Rows, WIDTH};
-use super::coarsening::{Motions, SymmetricBlocks};
+use super::coarsening::{Block, Motions, SymmetricBlocks};
 use super::level::{Coarse, Level};
 use crate::numerics::linalg::{Pencil, Solve, dense_cholesky, gram, largest, solve_lower, solve_upper};
 use faer::prelude::ReborrowMut;
@@ -22,6 +22,9 @@ const STRONG_BELOW: f64 = 0.01;
 /// Inverse iterations that make the rough modes of the coarsest level.
 const ROUGH_ROUNDS: usize = 6;
 
+/// Inverse iterations, by cycles, that improve them on each finer level but the finest.
+const POLISHED: usize = 3;
+
 /// Nodes per parallel task.
 const NODES: usize = 1024;
 
@@ -30,10 +33,10 @@ pub trait Levels: Solve {
     /// Rows of every level, the finest first.
     fn rows(&self) -> Vec<usize>;
 
-    /// The lowest modes that the coarsest level has with the masses of the diagonal of M, as vectors of the
-    /// finest one (N x `count`, or as many columns as that level has rows): a start for a search. They are
-    /// not orthonormal. `None` where they are linearly dependent.
-    fn rough_modes(&self, mass_diagonal: &[f64], count: usize) -> Option<Mat<f64>>;
+    /// The lowest modes of the coarsest level with the diagonal of M, improved on the levels up to the finest,
+    /// as vectors of that (N x `count`, or as many columns as the coarsest level has rows): a start for a
+    /// search. They are not orthonormal. `None` where they are linearly dependent.
+    fn rough_modes(&self, count: usize) -> Option<Mat<f64>>;
 }
 
 /// The levels of K + tau M for the rigid modes of a body; `None` where there are none: nodes with rotations,
@@ -54,6 +57,8 @@ struct Hierarchy<const B: usize, const C: usize> {
     coarser: Vec<Level<C, C>>,
     /// Lower Cholesky factor of the matrix of the coarsest level.
     bottom: Mat<f64>,
+    /// Masses of its groups.
+    masses: Vec<Block<C, C>>,
     /// Largest diagonal entry of K: divided by it, numbers stay within single precision in any units.
     size: f64,
     tau: f64,
@@ -105,18 +110,27 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             return None;
         }
         let shifted = Shifted::<B> { pencil, tau, scale: 1.0 / size };
-        let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), STRONG)?;
+        // In units of their own: only their ratios matter, to rough modes.
+        let heaviest = largest(pencil.mass().diagonal());
+        let scaled = |mass: f64| {
+            let mut block = [[0.0; B]; B];
+            (0..B).for_each(|b| block[b][b] = mass / heaviest);
+            block
+        };
+        let masses = pencil.mass().diagonal().into_iter().map(scaled).collect();
+        let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, STRONG)?;
         let mut coarser = Vec::new();
         while next.a.n_rows() * C > BOTTOM {
             if coarser.len() == MOST_LEVELS {
                 return None;
             }
-            let Coarse { a, motions } = next;
-            let (level, after) = Level::new(&a, &motions, STRONG_BELOW)?;
+            let Coarse { a, motions, masses } = next;
+            let (level, after) = Level::new(&a, &motions, masses, STRONG_BELOW)?;
             coarser.push(level);
             next = after;
         }
-        Some(Self { fine, coarser, bottom: dense_cholesky(dense(&next.a))?, size, tau })
+        let bottom = dense_cholesky(dense(&next.a))?;
+        Some(Self { fine, coarser, bottom, masses: next.masses, size, tau })
     }
 
     /// One cycle for (K + tau M) / size x = b.
@@ -138,26 +152,22 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         solve_upper(&self.bottom, &solve_lower(&self.bottom, b))
     }
 
-    /// Vectors of the coarsest level as such of the finest.
-    fn on_finest(&self, x: MatRef<'_, f64>) -> Mat<f64> {
-        let mut out = Mat::zeros(self.fine.nodes() * B, x.ncols());
-        by_width(x, out.as_mut(), |part, out| {
-            let down = |rows: Vec<Rows<C>>, level: &Level<C, C>| level.prolonged(&rows);
-            let rows = self.coarser.iter().rev().fold(packed(part), down);
-            unpack(&self.fine.prolonged(&rows), out, 1.0);
-        });
-        out
-    }
-
-    /// The transpose of [`Self::on_finest`].
-    fn on_coarsest(&self, x: MatRef<'_, f64>) -> Mat<f64> {
-        let mut out = Mat::zeros(self.bottom.nrows(), x.ncols());
-        by_width(x, out.as_mut(), |part, out| {
-            let up = |rows: Vec<Rows<C>>, level: &Level<C, C>| level.restricted(&rows);
-            let rows = self.coarser.iter().fold(self.fine.restricted(&packed(part)), up);
-            unpack(&rows, out, 1.0);
-        });
-        out
+    /// The lowest modes of the coarsest level, by inverse iterations from random vectors.
+    fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
+        let n = self.bottom.nrows();
+        let noise = |k: usize| ((k.wrapping_mul(2_654_435_761) >> 9) & 0xffff) as f64 / 65536.0 - 0.5;
+        let mut x = Mat::from_fn(n, count.min(n), |i, j| noise(i * count + j));
+        for _ in 0..ROUGH_ROUNDS {
+            let product = |i: usize, j: usize| -> f64 {
+                let (group, own) = (i / C, &self.masses[i / C][i % C]);
+                (0..C).map(|c| own[c] * x[(group * C + c, j)]).sum()
+            };
+            let force = Mat::from_fn(n, x.ncols(), product);
+            let l = dense_cholesky(gram(x.as_ref(), force.as_ref()))?;
+            let orthonormal = solve_lower(&l, &force.transpose().to_owned()).transpose().to_owned();
+            x = unit_columns(self.inverse_of_bottom(&orthonormal));
+        }
+        Some(x)
     }
 }
 
@@ -179,22 +189,40 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
         [self.fine.nodes() * B].into_iter().chain(coarser).chain([self.bottom.nrows()]).collect()
     }
 
-    fn rough_modes(&self, mass_diagonal: &[f64], count: usize) -> Option<Mat<f64>> {
-        let n = self.bottom.nrows();
-        let count = count.min(n);
-        let noise = |k: usize| ((k.wrapping_mul(2_654_435_761) >> 9) & 0xffff) as f64 / 65536.0 - 0.5;
-        let mut x = Mat::from_fn(n, count, |i, j| noise(i * count + j));
-        for _ in 0..ROUGH_ROUNDS {
-            // x <- A^-1 M x, with M = P' D P and x made M-orthonormal.
-            let fine = self.on_finest(x.as_ref());
-            let moved = Mat::from_fn(fine.nrows(), count, |i, j| mass_diagonal[i] * fine[(i, j)]);
-            let l = dense_cholesky(gram(fine.as_ref(), moved.as_ref()))?;
-            let force = self.on_coarsest(moved.as_ref());
-            let orthonormal = solve_lower(&l, &force.transpose().to_owned()).transpose().to_owned();
-            x = self.inverse_of_bottom(&orthonormal);
+    fn rough_modes(&self, count: usize) -> Option<Mat<f64>> {
+        let mut x = self.bottom_modes(count)?;
+        for (at, level) in self.coarser.iter().enumerate().rev() {
+            let mut finer = Mat::zeros(level.nodes() * C, x.ncols());
+            by_width(x.as_ref(), finer.as_mut(), |part, out| {
+                unpack(&level.prolonged(&packed(part)), out, 1.0);
+            });
+            for _ in 0..POLISHED {
+                let before = unit_columns(finer);
+                finer = Mat::zeros(before.nrows(), before.ncols());
+                by_width(before.as_ref(), finer.as_mut(), |x, out| {
+                    let force = level.with_mass(&packed(x));
+                    unpack(&self.coarse_cycle(&self.coarser[at..], force), out, 1.0);
+                });
+            }
+            x = unit_columns(finer);
         }
-        Some(self.on_finest(x.as_ref()))
+        let mut fine = Mat::zeros(self.fine.nodes() * B, x.ncols());
+        by_width(x.as_ref(), fine.as_mut(), |part, out| {
+            unpack(&self.fine.prolonged(&packed(part)), out, 1.0);
+        });
+        Some(fine)
     }
+}
+
+/// Columns with a largest entry of one, which stays within single precision; columns of zeros stay so.
+fn unit_columns(mut x: Mat<f64>) -> Mat<f64> {
+    for mut column in x.col_iter_mut() {
+        let size = column.norm_max();
+        if size > 0.0 {
+            column *= faer::Scale(size.recip());
+        }
+    }
+    x
 }
 
 /// Rigid modes node by node, each with a largest entry of one.
@@ -249,5 +277,148 @@ fn unpack<const B: usize>(rows: &[Rows<B>], mut x: MatMut<'_, f64>, scale: f64) 
                 x[(node * B + b, w)] = scale * f64::from(row[w]);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::linalg::{CscMatrix, SymmetricMatrix, symmetric_eigen};
+
+    /// Points of unit mass on a grid, with springs between neighbours, across the cells too: rigid motion
+    /// costs nothing.
+    struct Lattice {
+        places: Vec<[f64; 3]>,
+        stiffness: SymmetricMatrix,
+        mass: SymmetricMatrix,
+    }
+
+    impl Lattice {
+        fn new(sides: [usize; 3]) -> Self {
+            let number = |p: [usize; 3]| p[0] + sides[0] * (p[1] + sides[1] * p[2]);
+            let points: Vec<[usize; 3]> = (0..sides.iter().product())
+                .map(|k| [k % sides[0], k / sides[0] % sides[1], k / sides[0] / sides[1]])
+                .collect();
+            let mut entries = Vec::new();
+            for &p in &points {
+                for step in 1..27 {
+                    let d = [step % 3, step / 3 % 3, step / 9].map(|s| s as i64 - 1);
+                    let other: [i64; 3] = std::array::from_fn(|k| p[k] as i64 + d[k]);
+                    let inside = (0..3).all(|k| (0..sides[k] as i64).contains(&other[k]));
+                    if d == [0; 3] || !inside {
+                        continue;
+                    }
+                    let (a, b) = (number(p), number(other.map(|x| x as usize)));
+                    let length2 = d.iter().map(|x| (x * x) as f64).sum::<f64>();
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            let k = (d[i] * d[j]) as f64 / length2;
+                            entries.push(((3 * a + i) as u32, (3 * a + j) as u32, k));
+                            entries.push(((3 * a + i) as u32, (3 * b + j) as u32, -k));
+                        }
+                    }
+                }
+            }
+            let n = points.len();
+            let ones: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
+            let symmetric = |size: usize, entries: &[(u32, u32, f64)]| {
+                SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(size, size, entries))
+            };
+            Self {
+                places: points.iter().map(|p| p.map(|x| x as f64)).collect(),
+                stiffness: symmetric(3 * n, &entries),
+                mass: symmetric(n, &ones),
+            }
+        }
+
+        fn pencil(&self) -> Pencil<'_> {
+            Pencil::new(&self.stiffness, &self.mass, 3)
+        }
+
+        fn rigid(&self) -> Mat<f64> {
+            let n = self.places.len() as f64;
+            let centre: [f64; 3] = std::array::from_fn(|k| self.places.iter().map(|p| p[k]).sum::<f64>() / n);
+            Mat::from_fn(3 * self.places.len(), 6, |row, column| {
+                let (i, x) = (row % 3, self.places[row / 3]);
+                if column < 3 {
+                    return f64::from(u8::from(i == column));
+                }
+                // e x (x - c) about axis e.
+                let axis = column - 3;
+                match (3 + i - axis) % 3 {
+                    1 => -(x[(axis + 2) % 3] - centre[(axis + 2) % 3]),
+                    2 => x[(axis + 1) % 3] - centre[(axis + 1) % 3],
+                    _ => 0.0,
+                }
+            })
+        }
+    }
+
+    fn noise(n: usize, columns: usize) -> Mat<f64> {
+        Mat::from_fn(n, columns, |i, j| ((i * 7919 + j * 104_729) % 1009) as f64 / 1009.0 - 0.5)
+    }
+
+    #[test]
+    fn a_cycle_is_symmetric_and_damps_every_error() {
+        let lattice = Lattice::new([20, 20, 20]);
+        let (pencil, tau) = (lattice.pencil(), 1e-3);
+        let levels = levels(&pencil, lattice.rigid().as_ref(), tau).expect("levels");
+        let rows = levels.rows();
+        assert!(rows.len() == 3 && rows.is_sorted_by(|a, b| a > &(4 * b)), "{rows:?}");
+        // Eight columns and two that leave most of a width empty.
+        let mut x = noise(pencil.n(), 10);
+        let mut solved = x.clone();
+        levels.solve_in_place(solved.as_mut());
+        let products = gram(x.as_ref(), solved.as_ref());
+        let size = products.norm_max();
+        for i in 0..10 {
+            for j in 0..i {
+                let off = (products[(i, j)] - products[(j, i)]).abs();
+                assert!(off < 1e-4 * size, "({i}, {j}): {off:e} of {size:e}");
+            }
+        }
+        // Errors e <- e - T A e in the norm of A.
+        let applied = |x: &Mat<f64>| {
+            pencil.apply_stiffness(x.as_ref()) + pencil.apply_mass(x.as_ref()) * faer::Scale(tau)
+        };
+        let mut before = f64::INFINITY;
+        for _ in 0..6 {
+            let force = applied(&x);
+            let energy = gram(x.as_ref(), force.as_ref())[(0, 0)].sqrt();
+            assert!(energy < 0.5 * before, "{energy:e} after {before:e}");
+            before = energy;
+            let mut moved = force;
+            levels.solve_in_place(moved.as_mut());
+            x -= moved;
+        }
+    }
+
+    #[test]
+    fn rough_modes_are_near_the_lowest() {
+        let lattice = Lattice::new([9, 8, 7]);
+        let pencil = lattice.pencil();
+        let levels = levels(&pencil, lattice.rigid().as_ref(), 1e-3).expect("levels");
+        let x = levels.rough_modes(12).expect("vectors");
+        let dense = Mat::from_fn(pencil.n(), pencil.n(), |i, j| lattice.stiffness.as_csc().get(i, j));
+        let exact = symmetric_eigen(dense.as_ref()).expect("eigenvalues").values;
+        let (gm, gk) =
+            (gram(x.as_ref(), x.as_ref()), gram(x.as_ref(), pencil.apply_stiffness(x.as_ref()).as_ref()));
+        let l = dense_cholesky(gm).expect("independent");
+        let half = solve_lower(&l, &gk);
+        let projected = solve_lower(&l, &half.transpose().to_owned());
+        let found = symmetric_eigen(projected.as_ref()).expect("eigenvalues").values;
+        for k in 6..12 {
+            assert!(found[k] < 1.5 * exact[k], "mode {k}: {} {}", found[k], exact[k]);
+        }
+    }
+
+    #[test]
+    fn models_without_levels_have_none() {
+        let lattice = Lattice::new([3, 3, 3]);
+        let (pencil, rigid) = (lattice.pencil(), lattice.rigid());
+        assert!(levels(&pencil, rigid.as_ref().subcols(0, 5), 1.0).is_none(), "five rigid modes");
+        let rows = Pencil::new(&lattice.stiffness, &lattice.stiffness, 1);
+        assert!(levels(&rows, rigid.as_ref(), 1.0).is_none(), "rows that belong to no node");
+        assert!(levels(&pencil, rigid.as_ref(), f64::NAN).is_none(), "no number");
     }
 }

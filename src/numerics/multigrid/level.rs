@@ -2,7 +2,7 @@
 
 use super::blocks::{BlockMatrix, Rows, WIDTH};
 use super::coarsening::{
-    Groups, Motions, SymmetricBlocks, diagonal, galerkin, inverse, narrow, stored, strong_couplings,
+    Block, Groups, Motions, SymmetricBlocks, diagonal, galerkin, inverse, narrow, stored, strong_couplings,
 };
 use super::smoother::Smoother;
 
@@ -15,12 +15,16 @@ pub(super) struct Level<const B: usize, const C: usize> {
     smoother: Smoother<B>,
     p: BlockMatrix<B, C>,
     r: BlockMatrix<C, B>,
+    /// Mass of each node.
+    masses: Vec<Block<B, B>>,
 }
 
 /// What the next coarser level is made of.
 pub(super) struct Coarse<const C: usize> {
     pub a: BlockMatrix<C, C>,
     pub motions: Motions<C, C>,
+    /// Masses of the groups along their motions, as far as these are not smoothed.
+    pub masses: Vec<Block<C, C>>,
 }
 
 impl<const B: usize, const C: usize> Level<B, C> {
@@ -30,6 +34,7 @@ impl<const B: usize, const C: usize> Level<B, C> {
     pub(super) fn new(
         matrix: &impl SymmetricBlocks<B>,
         motions: &Motions<B, C>,
+        masses: Vec<Block<B, B>>,
         least_coupling: f64,
     ) -> Option<(Self, Coarse<C>)> {
         let diagonal = diagonal(matrix);
@@ -42,7 +47,8 @@ impl<const B: usize, const C: usize> Level<B, C> {
         let p = groups.smoothed(matrix, &inverse, PROLONGATION / f64::from(smoother.largest));
         let r = p.transposed(groups.count);
         let a = galerkin(matrix, &p, &r, diagonal[0][0][0] as f32);
-        Some((Self { smoother, p, r }, Coarse { a, motions: groups.motions }))
+        let coarse = Coarse { a, masses: groups.masses(&masses), motions: groups.motions };
+        Some((Self { smoother, p, r, masses }, coarse))
     }
 
     pub(super) fn nodes(&self) -> usize {
@@ -59,6 +65,11 @@ impl<const B: usize, const C: usize> Level<B, C> {
         let coarse = solve_coarse(self.restricted(&self.smoother.residual(b, &x)));
         self.add_prolonged(&mut x, &coarse);
         self.smoother.smooth(b, x)
+    }
+
+    /// M x with the masses of the nodes.
+    pub(super) fn with_mass(&self, x: &[Rows<B>]) -> Vec<Rows<B>> {
+        x.iter().zip(&self.masses).map(|(x, mass)| mass_times(mass, x)).collect()
     }
 
     /// P' x.
@@ -80,4 +91,9 @@ impl<const B: usize, const C: usize> Level<B, C> {
             x.iter_mut().flatten().zip(px.iter().flatten()).for_each(|(x, px)| *x += px);
         });
     }
+}
+
+fn mass_times<const B: usize>(mass: &Block<B, B>, x: &Rows<B>) -> Rows<B> {
+    let entry = |b: usize, w: usize| (0..B).map(|k| mass[b][k] * f64::from(x[k][w])).sum::<f64>() as f32;
+    std::array::from_fn(|b| std::array::from_fn(|w| entry(b, w)))
 }

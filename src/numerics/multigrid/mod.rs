@@ -9,4 +9,5 @@ mod hierarchy;
 mod level;
 mod smoother;
 
+pub use blocks::WIDTH;
 pub use hierarchy::{Levels, levels};
