@@ -69,9 +69,14 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     });
     let Some((at, own)) = cheaper else { return first };
     let (output, error, allowed) = own.errors.decisive(&trade.tolerance);
-    let times = significant(error / allowed, 2);
+    let part = error / allowed;
+    let times = significant(part, 2);
+    let reference = match part <= 1.0 && trade.reserved > 0.0 {
+        true => format!(", beside the {} that the reference itself lacks", significant(trade.reserved, 2)),
+        false => String::new(),
+    };
     format!(
-        "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed",
+        "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed{reference}",
         names[at]
     )
 }

@@ -73,8 +73,13 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
         assert!(said(&found)[0].starts_with("no factor"), "{:?}", said(&found));
         let work = found.counters;
         assert_eq!((work.factorizations, work.factor_bytes), (0, 0), "{name}");
-        let each = work.solved_columns / 20;
-        assert!(each <= if matches!(kind, Kind::Tet10 | Kind::Hex20) { 30 } else { 18 }, "{name}: {work:?}");
+        // Elements of the second order take more.
+        let most = match kind {
+            Kind::Hex20 => 45,
+            Kind::Tet10 => 30,
+            _ => 18,
+        };
+        assert!(work.solved_columns <= 20 * most, "{name}: {work:?}");
     }
 }
 

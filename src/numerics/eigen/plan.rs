@@ -48,6 +48,9 @@ const LEVEL_BYTES: (u64, u64) = (12, 400);
 /// their residuals take half as many cycles again.
 const MULTIGRID_PROVED: f64 = 3.0;
 
+/// Entries in a row of K of linear hexahedra, nearly.
+const LINEAR_COUPLINGS: f64 = 64.0;
+
 /// Whether the search is to go without a factor.
 fn suits_multigrid(
     problem: &EigenProblem<'_>,
@@ -62,6 +65,8 @@ fn suits_multigrid(
             Accuracy::Certified => return false,
         };
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
+    // Elements of the second order couple more rows, and take as many more cycles.
+    let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_COUPLINGS)).max(1.0);
     settings.factor == FactorChoice::Auto
         && settings.method == Method::Auto
         && matches!(settings.wanted, Wanted::Lowest(_))
@@ -70,7 +75,7 @@ fn suits_multigrid(
         && problem.resume.save.is_none()
         && matches!((problem.pencil.block(), problem.rigid.ncols()), (3, 6) | (2, 3))
         && (1..=MULTIGRID_MODES).contains(&wanted)
-        && analysis.flops() > pays * entries
+        && analysis.flops() > pays * coupled * entries
 }
 
 /// Operations per second that estimates of time assume: what one processor does of the mixed work of a

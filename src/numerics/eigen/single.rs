@@ -21,6 +21,7 @@ use crate::numerics::linalg::{
     Analysis, Cholesky, Solve, add_combination, combine, gram, largest, subtract_combination,
 };
 use faer::{Mat, MatRef};
+use rayon::prelude::*;
 
 /// Columns per step of Lanczos: as many as the solves take together, since with single precision four cost
 /// the same.
@@ -204,7 +205,7 @@ impl<'a> Correction<'a> {
             let allowed = if j < self.wanted { goal.tolerance.max(self.floors[j]) } else { BEYOND };
             relative_residual(span.kx.col(j), span.mx.col(j), lambda[j]) / allowed
         };
-        (0..looked).map(excess).collect()
+        (0..looked).into_par_iter().map(excess).collect()
     }
 
     /// Keeps the search, and hands its modes out.
@@ -279,12 +280,13 @@ fn corrections(
 ) -> Span {
     counters.solved_columns += chosen.len() as u64;
     let mut d = Mat::zeros(span.x.nrows(), chosen.len());
-    for (mut d, &j) in d.col_iter_mut().zip(chosen) {
+    let columns: Vec<_> = d.col_iter_mut().zip(chosen).collect();
+    columns.into_par_iter().for_each(|(mut d, &j)| {
         let r = span.kx.col(j) - span.mx.col(j) * faer::Scale(lambda[j]);
         // Unit size: residuals near rounding would leave the range of single precision.
         let size = r.norm_max();
         d.copy_from(r * faer::Scale(if size > 0.0 { size.recip() } else { 0.0 }));
-    }
+    });
     factor.solve_in_place(d.as_mut());
     for _ in 0..passes {
         for (basis, m_basis) in [(problem.rigid, m_rigid), (span.x.as_ref(), span.mx.as_ref())] {

@@ -5,7 +5,7 @@ use super::coarsening::{Block, Motions, SymmetricBlocks};
 use super::level::{Coarse, Level};
 use crate::numerics::linalg::{Pencil, Solve, dense_cholesky, gram, largest, solve_lower, solve_upper};
 use faer::prelude::ReborrowMut;
-use faer::{Mat, MatMut, MatRef};
+use faer::{ColMut, Mat, MatMut, MatRef};
 use rayon::prelude::*;
 
 /// Rows up to which a level is solved with a dense factor.
@@ -270,14 +270,18 @@ fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
     (0..x.nrows() / B).into_par_iter().with_min_len(NODES).map(rows).collect()
 }
 
-fn unpack<const B: usize>(rows: &[Rows<B>], mut x: MatMut<'_, f64>, scale: f64) {
-    for w in 0..x.ncols() {
-        for (node, rows) in rows.iter().enumerate() {
-            for (b, row) in rows.iter().enumerate() {
-                x[(node * B + b, w)] = scale * f64::from(row[w]);
-            }
+fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {
+    let mut columns: Vec<&mut [f64]> = x.col_iter_mut().map(contiguous).collect();
+    columns.par_iter_mut().enumerate().for_each(|(w, column)| {
+        for (own, rows) in column.chunks_exact_mut(B).zip(rows) {
+            own.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
         }
-    }
+    });
+}
+
+/// A column as a slice: blocks are column-major.
+fn contiguous(column: ColMut<'_, f64>) -> &mut [f64] {
+    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
 }
 
 #[cfg(test)]
@@ -301,7 +305,7 @@ mod tests {
                 .collect();
             let mut entries = Vec::new();
             for &p in &points {
-                for step in 1..27 {
+                for step in 0..27 {
                     let d = [step % 3, step / 3 % 3, step / 9].map(|s| s as i64 - 1);
                     let other: [i64; 3] = std::array::from_fn(|k| p[k] as i64 + d[k]);
                     let inside = (0..3).all(|k| (0..sides[k] as i64).contains(&other[k]));

@@ -64,6 +64,8 @@ pub struct Trade {
     pub nodal: Option<NodalIntegration>,
     /// Tolerances of the scene.
     pub tolerance: Tolerance,
+    /// Part of them that the reference lacks of its model itself: candidates get the rest.
+    pub reserved: f64,
     /// Multiplications that the scene allows instead.
     pub allowed: Option<usize>,
     /// All candidates; the first is the whole body of the reference.
@@ -130,6 +132,7 @@ pub fn trade(
         reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
         nodal: nodal.as_ref().map(NodalReference::integration),
         tolerance: scene.requirements.tolerance,
+        reserved: settings.reserved,
         allowed,
         front: front(&rows),
         recommended: Recommendation::new(&rows, most, allowed),
