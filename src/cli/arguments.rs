@@ -443,7 +443,8 @@ pub struct ConvertArguments {
     /// Promise about the modes
     #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
     pub accuracy: AccuracyName,
-    /// Precision of the factor: auto takes f32 where f64 does not fit the memory or is slower
+    /// Precision of the factor: auto takes f32 where f64 does not fit the memory or is slower, none where the
+    /// body is large and compact
     #[arg(long, value_enum, default_value_t = FactorName::Auto)]
     pub factor: FactorName,
     /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits

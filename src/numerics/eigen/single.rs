@@ -18,7 +18,7 @@ use super::resume::Snapshot;
 use super::start::fitting_start;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{
-    Analysis, Cholesky, Solve, add_combination, combine, gram, largest, subtract_combination,
+    Analysis, Cholesky, Solve, add_combination, combine_into, gram, largest, subtract_combination,
 };
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -71,36 +71,72 @@ pub(super) fn search(
 }
 
 /// Vectors with their products.
-struct Span {
+struct Vectors {
     x: Mat<f64>,
     kx: Mat<f64>,
     mx: Mat<f64>,
 }
 
-impl Span {
+impl Vectors {
     fn new(problem: &EigenProblem<'_>, x: Mat<f64>, counters: &mut Counters) -> Self {
         counters.stiffness_columns += x.ncols() as u64;
         counters.mass_columns += x.ncols() as u64;
         let (kx, mx) = (problem.pencil.apply_stiffness(x.as_ref()), problem.pencil.apply_mass(x.as_ref()));
         Self { x, kx, mx }
     }
+}
 
-    /// Replaces the vectors by combinations of them.
-    fn combine(&mut self, coefficients: MatRef<'_, f64>) {
-        for mine in [&mut self.x, &mut self.kx, &mut self.mx] {
-            *mine = combine(mine.as_ref(), coefficients);
-        }
+/// Columns, with room for more.
+struct Columns {
+    room: Mat<f64>,
+    used: usize,
+}
+
+impl Columns {
+    fn as_ref(&self) -> MatRef<'_, f64> {
+        self.room.as_ref().subcols(0, self.used)
     }
 
-    /// Replaces the vectors by combinations of them and of others, `coefficients` first of its own, then of
-    /// the others.
-    fn combine_with(&mut self, other: &Self, coefficients: MatRef<'_, f64>) {
-        let (own, others) = coefficients.split_at_row(self.x.ncols());
-        for (mine, theirs) in [(&mut self.x, &other.x), (&mut self.kx, &other.kx), (&mut self.mx, &other.mx)]
-        {
-            let mut new = combine(mine.as_ref(), own);
-            add_combination(new.as_mut(), theirs.as_ref(), others);
-            *mine = new;
+    /// Replaces the columns by combinations of them and of others, `coefficients` first of its own, then of
+    /// the others. `spare` has the same room, and takes the place of what is replaced.
+    fn combine(&mut self, others: MatRef<'_, f64>, coefficients: MatRef<'_, f64>, spare: &mut Mat<f64>) {
+        let count = coefficients.ncols();
+        let (own, rest) = coefficients.split_at_row(self.used);
+        let mut new = spare.as_mut().subcols_mut(0, count);
+        combine_into(new.as_mut(), self.as_ref(), own);
+        add_combination(new, others, rest);
+        std::mem::swap(&mut self.room, spare);
+        self.used = count;
+    }
+}
+
+/// A span of vectors with their products. Its memory is taken once: as large a block that is taken anew comes
+/// page by page, each cleared by the system, which was a third of a search.
+struct Span {
+    x: Columns,
+    kx: Columns,
+    mx: Columns,
+    spare: Mat<f64>,
+}
+
+impl Span {
+    /// Combinations of vectors, with room for twice as many.
+    fn new(vectors: &Vectors, coefficients: MatRef<'_, f64>) -> Self {
+        let (n, used) = (vectors.x.nrows(), coefficients.ncols());
+        let combined = |own: &Mat<f64>| {
+            let mut room = Mat::zeros(n, 2 * used);
+            combine_into(room.as_mut().subcols_mut(0, used), own.as_ref(), coefficients);
+            Columns { room, used }
+        };
+        let [x, kx, mx] = [&vectors.x, &vectors.kx, &vectors.mx].map(combined);
+        Self { x, kx, mx, spare: Mat::zeros(n, 2 * used) }
+    }
+
+    /// Replaces the vectors by combinations of them and of others.
+    fn combine(&mut self, others: &Vectors, coefficients: MatRef<'_, f64>) {
+        let Self { x, kx, mx, spare } = self;
+        for (mine, theirs) in [(x, &others.x), (kx, &others.kx), (mx, &others.mx)] {
+            mine.combine(theirs.as_ref(), coefficients, spare);
         }
     }
 }
@@ -148,10 +184,11 @@ impl<'a> Correction<'a> {
         let m_rigid = problem.pencil.apply_mass(problem.rigid);
         let along = gram(m_rigid.as_ref(), x.as_ref());
         subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
-        let mut span = Span::new(problem, x, counters);
-        let (gm, gk) = (products(&span.x, &span.mx), products(&span.x, &span.kx));
+        let vectors = Vectors::new(problem, x, counters);
+        let gm = gram(vectors.x.as_ref(), vectors.mx.as_ref());
+        let gk = gram(vectors.x.as_ref(), vectors.kx.as_ref());
         let (lambda, coefficients) = small_ritz(gm, gk)?;
-        span.combine(coefficients.as_ref());
+        let span = Span::new(&vectors, coefficients.as_ref());
         Ok(Self {
             problem,
             factor,
@@ -201,9 +238,10 @@ impl<'a> Correction<'a> {
             let lowest = span.x.as_ref().subcols(0, looked);
             self.floors = residuals(problem, &lambda[..looked], lowest, counters).1;
         }
+        let (kx, mx) = (span.kx.as_ref(), span.mx.as_ref());
         let excess = |j: usize| {
             let allowed = if j < self.wanted { goal.tolerance.max(self.floors[j]) } else { BEYOND };
-            relative_residual(span.kx.col(j), span.mx.col(j), lambda[j]) / allowed
+            relative_residual(kx.col(j), mx.col(j), lambda[j]) / allowed
         };
         (0..looked).into_par_iter().map(excess).collect()
     }
@@ -215,7 +253,7 @@ impl<'a> Correction<'a> {
         problem.resume.save(|| Snapshot {
             shift: factor.shift(),
             eigenvalues: lambda.clone(),
-            basis: span.x.clone(),
+            basis: span.x.as_ref().to_owned(),
             coupling: Mat::zeros(0, lambda.len()),
             converged: wanted,
         });
@@ -241,19 +279,17 @@ impl<'a> Correction<'a> {
         let new = corrections(problem, *factor, span, (poor, lambda), (m_rigid.as_ref(), passes), counters);
         // X' M X = I and X' K X = Lambda hold already.
         let ones = vec![1.0; lambda.len()];
-        let gm = bordered(&ones, &products(&span.x, &new.mx), &products(&new.x, &new.mx));
-        let gk = bordered(lambda, &products(&span.x, &new.kx), &products(&new.x, &new.kx));
+        let bordered_by = |corner: &[f64], products: &Mat<f64>| {
+            let across = gram(span.x.as_ref(), products.as_ref());
+            bordered(corner, &across, &gram(new.x.as_ref(), products.as_ref()))
+        };
+        let (gm, gk) = (bordered_by(&ones, &new.mx), bordered_by(lambda, &new.kx));
         let (values, coefficients) = small_ritz(gm, gk)?;
         let kept = if values.len() <= 2 * *base { values.len() } else { *base };
-        span.combine_with(&new, coefficients.as_ref().subcols(0, kept));
+        span.combine(&new, coefficients.as_ref().subcols(0, kept));
         *lambda = values[..kept].to_vec();
         Ok(())
     }
-}
-
-/// X' Y.
-fn products(x: &Mat<f64>, y: &Mat<f64>) -> Mat<f64> {
-    gram(x.as_ref(), y.as_ref())
 }
 
 /// [diag(a), B; B', C].
@@ -277,22 +313,23 @@ fn corrections(
     (chosen, lambda): (&[usize], &[f64]),
     (m_rigid, passes): (MatRef<'_, f64>, usize),
     counters: &mut Counters,
-) -> Span {
+) -> Vectors {
     counters.solved_columns += chosen.len() as u64;
-    let mut d = Mat::zeros(span.x.nrows(), chosen.len());
+    let (x, kx, mx) = (span.x.as_ref(), span.kx.as_ref(), span.mx.as_ref());
+    let mut d = Mat::zeros(x.nrows(), chosen.len());
     let columns: Vec<_> = d.col_iter_mut().zip(chosen).collect();
     columns.into_par_iter().for_each(|(mut d, &j)| {
-        let r = span.kx.col(j) - span.mx.col(j) * faer::Scale(lambda[j]);
+        let r = kx.col(j) - mx.col(j) * faer::Scale(lambda[j]);
         // Unit size: residuals near rounding would leave the range of single precision.
         let size = r.norm_max();
         d.copy_from(r * faer::Scale(if size > 0.0 { size.recip() } else { 0.0 }));
     });
     factor.solve_in_place(d.as_mut());
     for _ in 0..passes {
-        for (basis, m_basis) in [(problem.rigid, m_rigid), (span.x.as_ref(), span.mx.as_ref())] {
+        for (basis, m_basis) in [(problem.rigid, m_rigid), (x, mx)] {
             let along = gram(m_basis, d.as_ref());
             subtract_combination(d.as_mut(), basis, along.as_ref());
         }
     }
-    Span::new(problem, d, counters)
+    Vectors::new(problem, d, counters)
 }

@@ -41,4 +41,6 @@ pub use pencil::Pencil;
 pub use product::{multiply, multiply_vector, sum_terms};
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
-pub use tall::{add_combination, column_products, combine, gram, side_by_side, subtract_combination};
+pub use tall::{
+    add_combination, column_products, combine, combine_into, gram, side_by_side, subtract_combination,
+};

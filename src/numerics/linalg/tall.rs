@@ -79,8 +79,16 @@ pub fn add_combination(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64
 /// When the shapes disagree.
 pub fn combine(v: MatRef<'_, f64>, h: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(v.nrows(), h.ncols());
-    add_product(out.as_mut(), Accum::Replace, v, h, 1.0);
+    combine_into(out.as_mut(), v, h);
     out
+}
+
+/// W = V H for tall V (n x m), W (n x k) and small H (m x k).
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn combine_into(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) {
+    add_product(w, Accum::Replace, v, h, 1.0);
 }
 
 /// The columns of all blocks, in their order.
