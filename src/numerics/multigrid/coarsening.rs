@@ -233,11 +233,8 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
         }
         sums.take(|column, sum| {
             let mut block = narrow(sum);
-            for c in 0..C {
-                if column as usize == group && block[c][c] == 0.0 {
-                    block[c][c] = empty;
-                }
-            }
+            let unmoved = |(c, row): &(usize, &mut [f32; C])| column as usize == group && row[*c] == 0.0;
+            block.iter_mut().enumerate().filter(unmoved).for_each(|(c, row)| row[c] = empty);
             block
         })
     };
@@ -300,11 +297,9 @@ mod tests {
     fn an_inverse_is_one_and_an_indefinite_block_has_none() {
         let a = [[4.0, 1.0, -0.5], [1.0, 3.0, 0.25], [-0.5, 0.25, 2.0]];
         let own = inverse(&a).expect("positive definite");
-        for i in 0..3 {
-            for j in 0..3 {
-                let entry: f64 = (0..3).map(|k| a[i][k] * own[k][j]).sum();
-                assert!((entry - f64::from(u8::from(i == j))).abs() < 1e-15, "({i}, {j}): {entry}");
-            }
+        for (i, j) in (0..9).map(|at| (at / 3, at % 3)) {
+            let entry: f64 = (0..3).map(|k| a[i][k] * own[k][j]).sum();
+            assert!((entry - f64::from(u8::from(i == j))).abs() < 1e-15, "({i}, {j}): {entry}");
         }
         assert_eq!(inverse(&[[1.0, 2.0], [2.0, 1.0]]), None);
         assert_eq!(inverse(&[[1.0, f64::NAN], [f64::NAN, 1.0]]), None);

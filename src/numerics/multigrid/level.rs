@@ -61,7 +61,7 @@ impl<const B: usize, const C: usize> Level<B, C> {
         b: &[Rows<B>],
         solve_coarse: impl FnOnce(Vec<Rows<C>>) -> Vec<Rows<C>>,
     ) -> Vec<Rows<B>> {
-        let mut x = self.smoother.from_zero(b);
+        let mut x = self.smoother.smoothed_from_zero(b);
         let coarse = solve_coarse(self.restricted(&self.smoother.residual(b, &x)));
         self.add_prolonged(&mut x, &coarse);
         self.smoother.smooth(b, x)

@@ -101,7 +101,7 @@ impl<const B: usize> Smoother<B> {
     }
 
     /// Two steps of the iteration for A x = b from x = 0.
-    pub(super) fn from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
+    pub(super) fn smoothed_from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
         let scale = self.steps().first;
         let first = |(node, b)| self.divided(node, b).map(|row| row.map(|value| scale * value));
         let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES).enumerate().map(first).collect();

@@ -180,7 +180,8 @@ impl Missed {
         (0..c.ncols()).map(|i| not_negative(0.5 * square(i)).sqrt()).collect()
     }
 
-    /// Errors relative to the motion of the body; `energies` are those of [`Missed::root_energies`].
+    /// Errors relative to the motion, in the elastic energy that of all nodes: what is missed is K-orthogonal
+    /// to the modes and adds to it. `energies` are those of [`Missed::root_energies`].
     fn errors(
         &self,
         view: &NodalView<'_>,
@@ -191,7 +192,8 @@ impl Missed {
         times: &[f64],
     ) -> OutputErrors {
         let c = &self.forces.amplitudes;
-        let stress = Peak::of(times, energies.iter().copied()).value / energy_scale(motion);
+        let missed = Peak::of(times, energies.iter().copied()).value;
+        let stress = missed / missed.hypot(energy_scale(motion));
         let moved = match watched {
             [] => {
                 let u = combine(self.responses.as_ref(), c.as_ref());
