@@ -186,7 +186,7 @@ impl Matrices {
         }
         let turn = Turn::new(&self.labels, axes).map_err(|node| {
             let message = format!(
-                "rows of grid {node} stand along the axes of its CD, but some of its directions are missing"
+                "rows of grid {node} stand along the axes of its CD, but not each of its directions is there once"
             );
             vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.stiffness.path)]
         })?;

@@ -26,7 +26,7 @@ impl Turn {
     /// From the labels of the rows and the unit vectors along the rows of some nodes.
     ///
     /// # Errors
-    /// A node that has some displacements, or some rotations, but not all of them.
+    /// A node that has some displacements, or some rotations, but not each of them once.
     pub(super) fn new(labels: &[DofLabel], axes: &HashMap<i64, Block>) -> Result<Self, i64> {
         let mut triples: HashMap<(i64, bool), [u32; 3]> = HashMap::new();
         for (row, label) in labels.iter().enumerate().filter(|(_, label)| axes.contains_key(&label.node)) {
@@ -45,6 +45,10 @@ impl Turn {
                 continue;
             };
             let rows = triples[&(label.node, label.direction > 3)];
+            // Two rows of one direction: component 0 of a grid counts as its first.
+            if !rows.contains(&(row as u32)) {
+                return Err(label.node);
+            }
             for (k, &row) in rows.iter().enumerate() {
                 *group_of.get_mut(row as usize).ok_or(label.node)? = (number, k as u8);
             }
@@ -110,6 +114,14 @@ mod tests {
     use super::*;
     use crate::numerics::linalg::CscMatrix;
     use std::path::PathBuf;
+
+    #[test]
+    fn a_direction_that_is_there_twice_is_refused() {
+        let labels: Vec<DofLabel> =
+            [1, 1, 2, 3].map(|direction| DofLabel { node: 7, direction }).into_iter().collect();
+        let axes = HashMap::from([(7, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])]);
+        assert_eq!(Turn::new(&labels, &axes).err(), Some(7));
+    }
 
     /// A spring along the first axis of two nodes whose axes differ, and a mass.
     #[test]
