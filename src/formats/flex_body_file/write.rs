@@ -107,11 +107,13 @@ fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5:
     match (item.kind, value) {
         (Kind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
             let short: Vec<f32> = values.into_iter().map(nearest_f32).collect();
-            return put_floats(place, item, view, &short).map(Some);
+            return put_numbers(place, item, view, &short).map(Some);
         }
-        (Kind::Floats(_), Value::Floats(values)) => return put_floats(place, item, view, &values).map(Some),
-        (Kind::Ints(_), Value::Ints(values)) => return put_whole(place, item, view, &values).map(Some),
-        (Kind::Indices(_), Value::Indices(values)) => return put_whole(place, item, view, &values).map(Some),
+        (Kind::Floats(_), Value::Floats(values)) => return put_numbers(place, item, view, &values).map(Some),
+        (Kind::Ints(_), Value::Ints(values)) => return put_numbers(place, item, view, &values).map(Some),
+        (Kind::Indices(_), Value::Indices(values)) => {
+            return put_numbers(place, item, view, &values).map(Some);
+        }
         (Kind::Text, Value::Text(text)) => put_text(place, item.name, &text)?,
         (Kind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v)?,
         (Kind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v)?,
@@ -123,21 +125,8 @@ fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5:
     Ok(None)
 }
 
-fn put_whole<T: hdf5::H5Type + Number>(
-    place: &hdf5::Group,
-    item: &Item,
-    view: &View<'_>,
-    values: &[T],
-) -> hdf5::Result<Fingerprint> {
-    let shape = item.dims(view);
-    let fingerprint = of_numbers(&shape, values);
-    let dataset = place.new_dataset::<T>().obj_track_times(false).shape(shape).create(item.name)?;
-    dataset.write_raw(values)?;
-    describe(&dataset, item, view)?;
-    Ok(fingerprint)
-}
-
-fn put_floats<T: hdf5::H5Type + Number>(
+/// Writes a dataset of numbers, and gives their fingerprint.
+fn put_numbers<T: hdf5::H5Type + Number>(
     place: &hdf5::Group,
     item: &Item,
     view: &View<'_>,

@@ -4,6 +4,7 @@ use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
 use crate::numerics::linalg::{Analysis, Peaks};
+use crate::numerics::multigrid::can_have_levels;
 
 /// What was decided, and what it needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +74,7 @@ fn suits_multigrid(
         // Cycles leave nothing to go on from before they are done.
         && problem.resume.start.is_none()
         && problem.resume.save.is_none()
-        && matches!((problem.pencil.block(), problem.rigid.ncols()), (3, 6) | (2, 3))
+        && can_have_levels(&problem.pencil, problem.rigid.ncols())
         && (1..=MULTIGRID_MODES).contains(&wanted)
         && analysis.flops() > pays * coupled * entries
 }
@@ -180,32 +181,31 @@ impl Plan {
     ) -> Result<Self, EigenFailure> {
         if !dense
             && suits_multigrid(problem, settings, analysis, wanted)
-            && let Ok(plan) = Self::without_factor(problem, settings, analysis, wanted)
+            && let Some(plan) = Self::without_factor(problem, settings, analysis, wanted)
         {
             return Ok(plan);
         }
         Self::with_factor(problem, settings, analysis, wanted, dense)
     }
 
-    /// The plan of a search by cycles over levels.
+    /// The plan of a search by cycles over levels; `None` where they do not fit.
     fn without_factor(
         problem: &EigenProblem<'_>,
         settings: &EigenSettings,
         analysis: &Analysis,
         wanted: usize,
-    ) -> Result<Self, EigenFailure> {
+    ) -> Option<Self> {
         let n = problem.pencil.n();
         let entries = problem.pencil.stiffness().as_csc().nnz() as u64;
         let levels = LEVEL_BYTES.0 * entries + LEVEL_BYTES.1 * n as u64;
         let found = levels + vectors(problem, wanted, Precision::Single);
         let needed = found.max(made_of_them(n, wanted));
-        let available = settings.memory.unwrap_or(u64::MAX);
-        if resident(needed) > available {
-            return Err(EigenFailure::Memory { bytes: resident(needed), available });
+        if settings.memory.is_some_and(|available| resident(needed) > available) {
+            return None;
         }
         let peaks = analysis.peaks(rayon::current_num_threads());
         let (count, proof_too_large) = proof(problem, settings, &peaks, wanted);
-        Ok(Self {
+        Some(Self {
             precision: Precision::Single,
             bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
             factor_bytes: 0,

@@ -10,6 +10,11 @@ pub const WIDTH: usize = 8;
 /// The rows of a node in [`WIDTH`] columns.
 pub(super) type Rows<const R: usize> = [[f32; WIDTH]; R];
 
+/// Pseudo-random numbers between -1/2 and 1/2: where iterations start.
+pub(super) fn noise(k: usize) -> f32 {
+    ((k.wrapping_mul(2_654_435_761) >> 9) & 0xffff) as f32 / 65536.0 - 0.5
+}
+
 /// The entries of a row: columns, ascending, with their blocks.
 pub(super) type Entries<const R: usize, const C: usize> = Vec<(u32, [[f32; C]; R])>;
 

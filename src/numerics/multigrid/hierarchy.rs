@@ -1,12 +1,13 @@
 //! All levels: the cycle through them, and rough modes from the coarsest.
 
-use super::blocks::{BlockMatrix, Rows, WIDTH};
+use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
 use super::level::{Coarse, Level};
 use crate::numerics::linalg::{Pencil, Solve, dense_cholesky, gram, largest, solve_lower, solve_upper};
 use faer::prelude::ReborrowMut;
 use faer::{ColMut, Mat, MatMut, MatRef};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows up to which a level is solved with a dense factor.
 const BOTTOM: usize = 1500;
@@ -30,13 +31,15 @@ const NODES: usize = 1024;
 
 /// A hierarchy of levels, of nodes of any size.
 pub trait Levels: Solve {
-    /// Rows of every level, the finest first.
-    fn rows(&self) -> Vec<usize>;
-
     /// The lowest modes of the coarsest level with the diagonal of M, improved on the levels up to the finest,
     /// as vectors of that (N x `count`, or as many columns as the coarsest level has rows): a start for a
     /// search. They are not orthonormal. `None` where they are linearly dependent.
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>>;
+}
+
+/// Whether nodes with so many rows, and a body with so many rigid modes, can have levels.
+pub fn can_have_levels(pencil: &Pencil<'_>, rigid_modes: usize) -> bool {
+    matches!((pencil.block(), rigid_modes), (3, 6) | (2, 3))
 }
 
 /// The levels of K + tau M for the rigid modes of a body; `None` where there are none: nodes with rotations,
@@ -155,8 +158,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
     /// The lowest modes of the coarsest level, by inverse iterations from random vectors.
     fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
         let n = self.bottom.nrows();
-        let noise = |k: usize| ((k.wrapping_mul(2_654_435_761) >> 9) & 0xffff) as f64 / 65536.0 - 0.5;
-        let mut x = Mat::from_fn(n, count.min(n), |i, j| noise(i * count + j));
+        let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
         for _ in 0..ROUGH_ROUNDS {
             let product = |i: usize, j: usize| -> f64 {
                 let (group, own) = (i / C, &self.masses[i / C][i % C]);
@@ -177,40 +179,26 @@ impl<const B: usize, const C: usize> Solve for Hierarchy<B, C> {
     }
 
     /// One cycle: roughly (K + tau M)^-1 X, for columns of about unit size.
-    fn solve_in_place(&self, x: MatMut<'_, f64>) {
-        let b = x.as_ref().to_owned();
-        by_width(b.as_ref(), x, |b, x| unpack(&self.cycle(&packed(b)), x, 1.0 / self.size));
+    fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
+        for columns in widths(x.ncols()) {
+            let mut part = x.rb_mut().subcols_mut(columns.start, columns.len());
+            let b = packed(part.as_ref());
+            unpack(&self.cycle(&b), part.rb_mut(), 1.0 / self.size);
+        }
     }
 }
 
 impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
-    fn rows(&self) -> Vec<usize> {
-        let coarser = self.coarser.iter().map(|level| level.nodes() * C);
-        [self.fine.nodes() * B].into_iter().chain(coarser).chain([self.bottom.nrows()]).collect()
-    }
-
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>> {
         let mut x = self.bottom_modes(count)?;
         for (at, level) in self.coarser.iter().enumerate().rev() {
-            let mut finer = Mat::zeros(level.nodes() * C, x.ncols());
-            by_width(x.as_ref(), finer.as_mut(), |part, out| {
-                unpack(&level.prolonged(&packed(part)), out, 1.0);
-            });
+            x = unit_columns(by_width(&x, level.nodes(), |x| level.prolonged(&x)));
             for _ in 0..POLISHED {
-                let before = unit_columns(finer);
-                finer = Mat::zeros(before.nrows(), before.ncols());
-                by_width(before.as_ref(), finer.as_mut(), |x, out| {
-                    let force = level.with_mass(&packed(x));
-                    unpack(&self.coarse_cycle(&self.coarser[at..], force), out, 1.0);
-                });
+                let improved = |x: Vec<Rows<C>>| self.coarse_cycle(&self.coarser[at..], level.with_mass(&x));
+                x = unit_columns(by_width(&x, level.nodes(), improved));
             }
-            x = unit_columns(finer);
         }
-        let mut fine = Mat::zeros(self.fine.nodes() * B, x.ncols());
-        by_width(x.as_ref(), fine.as_mut(), |part, out| {
-            unpack(&self.fine.prolonged(&packed(part)), out, 1.0);
-        });
-        Some(fine)
+        Some(by_width(&x, self.fine.nodes(), |x| self.fine.prolonged(&x)))
     }
 }
 
@@ -250,12 +238,23 @@ fn dense<const C: usize>(a: &BlockMatrix<C, C>) -> Mat<f64> {
     Mat::from_fn(n, n, |i, j| 0.5 * (dense[(i, j)] + dense[(j, i)]))
 }
 
-/// Calls `work` with up to [`WIDTH`] columns of x and of y at a time.
-fn by_width(x: MatRef<'_, f64>, mut y: MatMut<'_, f64>, work: impl Fn(MatRef<'_, f64>, MatMut<'_, f64>)) {
-    for first in (0..x.ncols()).step_by(WIDTH) {
-        let width = WIDTH.min(x.ncols() - first);
-        work(x.subcols(first, width), y.rb_mut().subcols_mut(first, width));
+/// What `work` makes of the columns of x, for `nodes` nodes.
+fn by_width<const R: usize, const S: usize>(
+    x: &Mat<f64>,
+    nodes: usize,
+    work: impl Fn(Vec<Rows<R>>) -> Vec<Rows<S>>,
+) -> Mat<f64> {
+    let mut y = Mat::zeros(nodes * S, x.ncols());
+    for columns in widths(x.ncols()) {
+        let made = work(packed(x.as_ref().subcols(columns.start, columns.len())));
+        unpack(&made, y.as_mut().subcols_mut(columns.start, columns.len()), 1.0);
     }
+    y
+}
+
+/// Columns that are worked on together.
+fn widths(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count).step_by(WIDTH).map(move |first| first..count.min(first + WIDTH))
 }
 
 /// Up to [`WIDTH`] columns, node by node; the missing ones are zero.
@@ -366,8 +365,10 @@ mod tests {
     fn a_cycle_is_symmetric_and_damps_every_error() {
         let lattice = Lattice::new([20, 20, 20]);
         let (pencil, tau) = (lattice.pencil(), 1e-3);
-        let levels = levels(&pencil, lattice.rigid().as_ref(), tau).expect("levels");
-        let rows = levels.rows();
+        let levels = Hierarchy::<3, 6>::new(&pencil, lattice.rigid().as_ref(), tau).expect("levels");
+        let coarser = levels.coarser.iter().map(|level| 6 * level.nodes());
+        let rows: Vec<usize> =
+            [3 * levels.fine.nodes()].into_iter().chain(coarser).chain([levels.bottom.nrows()]).collect();
         assert!(rows.len() == 3 && rows.is_sorted_by(|a, b| a > &(4 * b)), "{rows:?}");
         // Eight columns and two that leave most of a width empty.
         let mut x = noise(pencil.n(), 10);

@@ -10,4 +10,4 @@ mod level;
 mod smoother;
 
 pub use blocks::WIDTH;
-pub use hierarchy::{Levels, levels};
+pub use hierarchy::{Levels, can_have_levels, levels};

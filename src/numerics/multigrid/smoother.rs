@@ -1,7 +1,7 @@
 //! The matrix of a level and the Chebyshev iteration that damps what a coarser level cannot see (Adams,
 //! Brezina, Hu and Tuminaro, J. Comput. Phys. 188 (2003) 593), preconditioned by the blocks of the nodes.
 
-use super::blocks::{BlockMatrix, Rows, WIDTH};
+use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use crate::numerics::linalg::symmetric_eigen;
 use faer::Mat;
 use rayon::prelude::*;
@@ -55,7 +55,6 @@ impl<const B: usize> Smoother<B> {
     /// The largest eigenvalue of D^-1 A, nearly: Lanczos steps in the inner product of D, from a random vector
     /// in each column.
     fn largest_eigenvalue(&self) -> Option<f64> {
-        let noise = |k: usize| ((k.wrapping_mul(2_654_435_761) >> 9) & 0xffff) as f32 / 65536.0 - 0.5;
         let start = |node: usize| -> Rows<B> {
             std::array::from_fn(|b| std::array::from_fn(|w| noise((node * B + b) * WIDTH + w)))
         };
