@@ -85,8 +85,9 @@ def log(text):
     print(text, file=sys.stderr, flush=True)
 
 
-def measured(command, threads=None):
-    """Runs a command: its standard output, and user + system CPU seconds, wall seconds, peak resident MB of its process."""
+def measured(command, threads=None, allowed=(0,)):
+    """Runs a command: its standard output, and user + system CPU seconds, wall seconds, peak resident MB of its process. `allowed` are the exit codes that are no
+    failure."""
     env = dict(os.environ)
     for name, value in DEBIAN.items():
         env.setdefault(name, value)
@@ -101,7 +102,7 @@ def measured(command, threads=None):
         out.seek(0)
         err.seek(0)
         text, complaint = out.read().decode(), err.read().decode()
-    if process.returncode != 0:
+    if process.returncode not in allowed:
         raise RuntimeError(f"{' '.join(map(str, command))} ended with {process.returncode}\n{complaint[-2000:]}")
     return text, {"cpu_s": used.ru_utime + used.ru_stime, "wall_s": wall, "memory_mb": used.ru_maxrss * 1024 / 1e6}
 

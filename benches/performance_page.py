@@ -245,6 +245,18 @@ def tier_lines(tiers):
     return ["## Tiers", "", said, "", *table(head, rows), ""]
 
 
+def reader_lines(found):
+    """How fast the files of FE programs are read."""
+    if not found:
+        return []
+    rows = [(row["form"], number(row["dofs"]), number(row["files_mb"]), number(row["wall_s"]), number(row["cpu_s"]), number(row["files_mb"] / row["wall_s"]),
+             number(row["memory_mb"]), number(row["memory_mb"] / row["kept_mb"])) for row in found["rows"]]
+    said = (f"Files of FE programs for a cube, on two threads (`python3 benches/readers.py`; {found['machine']['processor']}, commit {found['commit']}, medians of {found['runs']}): "
+            "the whole process until its check of rigid motion, which one misplaced node fails. Memory is also given over that of K and M in compressed columns.")
+    head = ("form", "rows", "files, MB", "wall, s", "CPU, s", "MB/s", "memory, MB", "over K and M")
+    return ["## Readers", "", said, "", *table(head, rows), ""]
+
+
 def render(stored):
     r, machine = Results(stored), stored.get("machine", {})
     versions, loads = {}, []
@@ -258,7 +270,7 @@ def render(stored):
                   f"{min(loads, default=0)} to {max(loads, default=0)}.", "",
                   "Versions: " + ", ".join(f"{name} {version}" for name, version in sorted(versions.items())) + ".", "", "Measured by:", ""]
         lines += [f"* {when.replace('T', ' ')}, commit {session['commit']}: `{session['command']}`" for when, session in stored["sessions"].items()] + [""]
-    lines += target_lines(r) + tier_lines(stored.get("tiers")) + ["## Cases", ""]
+    lines += target_lines(r) + tier_lines(stored.get("tiers")) + reader_lines(stored.get("readers")) + ["## Cases", ""]
     for case in r.cases:
         lines += case_lines(r, case)
     return "\n".join(lines + phase_lines(r) + floor_lines(r) + growth_lines(r)).rstrip() + "\n"

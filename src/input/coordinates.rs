@@ -16,7 +16,7 @@ mod text;
 
 use line::BadLine;
 pub(in crate::input) use line::{Limits, real};
-pub(in crate::input) use text::Blocks;
+pub(in crate::input) use text::{Blocks, line_aligned};
 
 /// Number of bad lines that are reported one by one.
 const SHOWN: usize = 5;
@@ -88,7 +88,7 @@ impl Coordinates {
     }
 
     fn parse(&mut self, block: &[u8]) {
-        let pieces: Vec<&[u8]> = text::line_aligned(block).collect();
+        let pieces: Vec<&[u8]> = line_aligned(block).collect();
         let parsed: Vec<line::Piece> =
             pieces.into_par_iter().map(|piece| line::parse(piece, self.limits)).collect();
         for piece in parsed {

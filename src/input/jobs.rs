@@ -9,6 +9,7 @@ mod deck;
 mod deck_mesh;
 mod element_kinds;
 mod expanded;
+mod labelled_lines;
 mod nastran;
 
 use super::bytes::InputFile;
@@ -133,6 +134,14 @@ pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets, Element
     let elements = mesh.drawn();
     let (ids, positions) = mesh.nodes.into_iter().unzip();
     Ok((Nodes { ids, positions }, mesh.sets, elements))
+}
+
+/// The grids, sets and elements of a deck of Nastran.
+///
+/// # Errors
+/// FB101, FB106, FB110, FB111, FB205.
+pub(super) fn nodes_of_bulk(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
+    nastran::nodes_of_bulk(file.path())
 }
 
 /// Whether a path is that of a keyword deck, by its name.

@@ -40,6 +40,7 @@ mod series;
 mod shapes;
 mod table;
 mod tables;
+mod upright_order;
 mod walk;
 mod zstd_frames;
 

@@ -4,13 +4,15 @@ mod ansys_list;
 mod cdb;
 mod exodus;
 mod gmsh;
+mod vtk_cells;
 mod vtk_legacy;
 mod vtk_numbers;
 mod vtk_xml;
 mod xml_elements;
 
+use super::bulk_cards::is_bulk_data;
 use super::bytes::InputFile;
-use super::jobs::{NodeSets, nodes_of_deck};
+use super::jobs::{NodeSets, nodes_of_bulk, nodes_of_deck};
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{Elements, Nodes};
@@ -41,6 +43,7 @@ const FORMATS: &[Format] = &[
     Format { recognises: cdb::recognises, read: cdb::read },
     Format { recognises: is_deck, read: deck },
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
+    Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
 ];
 
 /// Number of bytes that formats are told by.
@@ -88,6 +91,10 @@ fn is_deck(head: &str) -> bool {
 
 fn deck(file: &InputFile) -> Found<NodeFile> {
     nodes_of_deck(file).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
+}
+
+fn bulk(file: &InputFile) -> Found<NodeFile> {
+    nodes_of_bulk(file).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
 }
 
 /// FB115 at a line.

@@ -5,7 +5,7 @@ use super::bytes::InputFile;
 use super::reader::{MatrixSource, Reader, is_hdf5};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::model::{Nodes, RawMatrix};
+use crate::model::{Elements, Nodes, RawMatrix};
 
 /// In the place of the HDF5 reader.
 pub(super) struct Hdf5;
@@ -37,7 +37,9 @@ pub(super) fn read_array(_: &InputFile, _: Option<&str>) -> std::result::Result<
 type NamedSets = Vec<(String, Vec<i64>)>;
 
 /// In the place of reading the nodes of an Exodus file.
-pub(super) fn read_exodus(_: &InputFile) -> std::result::Result<(Nodes, NamedSets), Vec<Diagnostic>> {
+pub(super) fn read_exodus(
+    _: &InputFile,
+) -> std::result::Result<(Nodes, NamedSets, Elements), Vec<Diagnostic>> {
     Err(vec![left_out()])
 }
 

@@ -301,6 +301,7 @@ fn static_responses_to_interface_loads_are_exact() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn free_frequencies_come_from_above_to_those_of_the_body() {
     for raw in models() {
         let (what, oracle) = (format!("{:?}", raw.interfaces), Dense::new(&raw));

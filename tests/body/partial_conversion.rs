@@ -46,6 +46,7 @@ fn models() -> [(FeModel, u64, u64); 4] {
 }
 
 #[test]
+#[ignore = "slow"]
 fn what_is_ruled_out_is_not_multiplied_and_the_rest_is_the_same() {
     for (model, rigid, all) in models() {
         let name = model.name();

@@ -291,6 +291,7 @@ fn all_fixtures() -> Vec<String> {
 }
 
 #[test]
+#[ignore = "slow"]
 fn every_fixture_body_moves_in_c_as_in_the_library() {
     for (at, name) in all_fixtures().iter().enumerate() {
         // The frame of the model has c, C1 and C2; numbers of modes with every rest of four and eight.
@@ -312,6 +313,7 @@ fn kinds() -> [FlexBody; 4] {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_body_without_some_terms_has_neither_their_numbers_nor_their_forces() {
     for body in kinds() {
         let full = exported(&body, "double", &Points::Some(Vec::new())).file.len();
@@ -352,6 +354,7 @@ fn laden(body: FlexBody, random: &mut Random) -> FlexBody {
 }
 
 #[test]
+#[ignore = "slow"]
 fn geometric_stiffness_damping_and_modes_of_any_mass_are_held() {
     let interfaces: Vec<FlexBody> =
         ["robot_link", "car_frame"].map(|name| fixture(name, 6, BodyFrame::Model)).into();
@@ -444,6 +447,7 @@ const OTHER_BODY: i32 = 6;
 const DAMAGED: i32 = 7;
 
 #[test]
+#[ignore = "slow"]
 fn other_and_damaged_files_are_refused() {
     let body = fixture("frame_beams", 6, BodyFrame::Model);
     let points = some_points(&body);

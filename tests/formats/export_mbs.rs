@@ -76,6 +76,7 @@ fn held(body: &FlexBody) -> Invariants {
 }
 
 #[test]
+#[ignore = "slow"]
 fn every_fixture_is_read_back_with_every_number() {
     for name in models() {
         for frame in [BodyFrame::Principal, BodyFrame::Model] {

@@ -266,6 +266,7 @@ fn is_solid(body: &FlexBody) -> bool {
 }
 
 #[test]
+#[ignore = "slow"]
 fn every_dialect_of_every_fixture_is_read_back_as_the_body() {
     for model in models() {
         let plain = fixture(&model, MODES, BodyFrame::Principal);
@@ -320,6 +321,7 @@ fn every_dialect_of_every_fixture_is_read_back_as_the_body() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn the_equations_of_the_file_are_those_of_the_body_to_first_order() {
     for model in models() {
         let own = fixture(&model, MODES, BodyFrame::Model);

@@ -75,6 +75,7 @@ fn difference(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
 }
 
 #[test]
+#[ignore = "slow"]
 fn what_is_written_comes_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let formats = readable();

@@ -72,6 +72,122 @@ fn decks_give_the_surface_of_their_solids() {
     }
 }
 
+/// Decks of Nastran: of a job, and as places of nodes for matrices from elsewhere.
+#[test]
+fn decks_of_nastran_give_the_surface_of_their_solids() {
+    let [a, b, c]: [f64; 3] = [0.2, 0.08, 0.06];
+    let deck = |name: &str| fixtures().join("small").join(name).join("job.bdf");
+    let job = read_model(
+        &ModelFiles::from_job(deck("nastran_op4"), None, Vec::new(), Some("m,kg,s")).expect("units"),
+    )
+    .expect("a job");
+    for raw in [job, read(&deck("nastran_op4"))] {
+        let mesh = raw.mesh.as_ref().expect("a surface");
+        assert_encloses(mesh, &raw.nodes, a * b * c, 2.0 * (a * b + b * c + c * a));
+        assert_eq!((mesh.triangles().len(), mesh.edges().len()), (20, 16));
+    }
+    let turned = with_nodes(&deck("nastran")).expect_err("rows along other axes");
+    assert_eq!(turned.diagnostics()[0].code(), Code::DeckUnsupported);
+}
+
+/// Elements of the second order with the middles of their edges where Nastran lists them: G13 to G16 of CHEXA
+/// (G10 to G12 of CPENTA) between the lower and the upper face. Wrong places would fold the faces.
+#[test]
+fn elements_of_nastran_have_their_middles_in_place() {
+    let cube: [[f64; 3]; 8] = [
+        [0., 0., 0.],
+        [2., 0., 0.],
+        [2., 2., 0.],
+        [0., 2., 0.],
+        [0., 0., 2.],
+        [2., 0., 2.],
+        [2., 2., 2.],
+        [0., 2., 2.],
+    ];
+    let edges_of_cube =
+        [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 5], [2, 6], [3, 7], [4, 5], [5, 6], [6, 7], [7, 4]];
+    let edges_of_wedge = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 4], [2, 5], [3, 4], [4, 5], [5, 3]];
+    let wedge = [cube[0], cube[1], cube[3], cube[4], cube[5], cube[7]];
+    for (name, corners, edges, volume, area) in [
+        ("CHEXA", &cube[..], &edges_of_cube[..], 8.0, 24.0),
+        ("CPENTA", &wedge[..], &edges_of_wedge[..], 4.0, 12.0 + 4.0 * 2f64.sqrt()),
+    ] {
+        let middles =
+            edges.iter().map(|&[i, j]| std::array::from_fn(|k| (corners[i][k] + corners[j][k]) / 2.0));
+        let places: Vec<[f64; 3]> = corners.iter().copied().chain(middles).collect();
+        let mut deck = String::from("BEGIN BULK\n");
+        for (id, [x, y, z]) in places.iter().enumerate() {
+            deck += &format!("GRID,{},,{x:?},{y:?},{z:?}\n", id + 1);
+        }
+        deck += &format!("{name},1,1");
+        for id in 1..=places.len() {
+            deck += if id % 8 == 7 { "\n" } else { "" };
+            deck += &format!(",{id}");
+        }
+        deck += "\nCBAR,2,1,1,2\nCELAS2,3,1.0,1,1\nCTRIAX6,4,1,1,2,3,4,5,6\nENDDATA\n";
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("deck.nas");
+        fs::write(&path, deck).expect("written");
+        let raw = read(&path);
+        let mesh = raw.mesh.as_ref().expect("a surface");
+        assert_encloses(mesh, &raw.nodes, volume, area);
+        let told: Vec<&str> = raw.diagnostics.iter().map(|d| d.message()).collect();
+        assert_eq!(told, ["elements that are not drawn: 1 of CTRIAX6"], "{name}");
+    }
+}
+
+/// Cells of VTK: a voxel, the wedges that fill a brick (with and without middles of edges), a pyramid, and a
+/// vertex, which is not drawn.
+#[test]
+fn meshes_of_vtk_give_the_surface_of_their_cells() {
+    let cube: [[f64; 3]; 8] = std::array::from_fn(|k| [(k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64]);
+    let wedge = [0, 2, 1, 4, 6, 5];
+    let middles = [[0, 2], [2, 1], [1, 0], [4, 6], [6, 5], [5, 4], [0, 4], [2, 6], [1, 5]];
+    let between = |[i, j]: [usize; 2]| std::array::from_fn(|k| (cube[i][k] + cube[j][k]) / 2.0);
+    let quadratic: Vec<[f64; 3]> = wedge.iter().map(|&k| cube[k]).chain(middles.map(between)).collect();
+    let pyramid = [cube[0], cube[1], cube[3], cube[2], cube[4]];
+    let root = 2f64.sqrt();
+    for (kind, points, volume, area) in [
+        (11, cube.to_vec(), 1.0, 6.0),
+        (13, quadratic[..6].to_vec(), 0.5, 3.0 + root),
+        (26, quadratic.clone(), 0.5, 3.0 + root),
+        (14, pyramid.to_vec(), 1.0 / 3.0, 2.0 + root),
+    ] {
+        let places: Vec<String> = points.iter().flatten().map(f64::to_string).collect();
+        let numbers: Vec<String> = (0..points.len()).map(|k| k.to_string()).collect();
+        let array = |name: &str, kind: &str, text: String| {
+            format!(
+                "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{}\" format=\"ascii\">{text}</DataArray>",
+                if name == "Points" { 3 } else { 1 }
+            )
+        };
+        let cells = array("connectivity", "Int64", format!("0 {}", numbers.join(" ")))
+            + &array("offsets", "Int64", format!("1 {}", points.len() + 1))
+            + &array("types", "UInt8", format!("1 {kind}"));
+        let text = format!(
+            "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\"><UnstructuredGrid><Piece NumberOfPoints=\"{}\" NumberOfCells=\"2\"><Points>{}</Points><Cells>{cells}</Cells></Piece></UnstructuredGrid></VTKFile>",
+            points.len(),
+            array("Points", "Float64", places.join(" ")),
+        );
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("mesh.vtu");
+        fs::write(&path, text).expect("written");
+        let raw = read(&path);
+        let mesh = raw.mesh.as_ref().unwrap_or_else(|| panic!("{kind}: a surface"));
+        assert_encloses(mesh, &raw.nodes, volume, area);
+    }
+}
+
+/// The tetrahedron of `fixtures/small` in a file of Exodus: four faces.
+#[test]
+fn meshes_of_exodus_give_the_surface_of_their_elements() {
+    let raw = read(&fixtures().join("small/meshes/tet4.exo"));
+    let mesh = raw.mesh.as_ref().expect("a surface");
+    assert_closed(mesh);
+    assert_eq!((mesh.triangles().len(), mesh.edges().len()), (4, 6));
+    assert!(volume_and_area(mesh.triangles(), &raw.nodes.positions).0 > 0.0);
+}
+
 /// Tetrahedra of the second order with the triangles of their faces beside them, which are not drawn twice.
 #[test]
 fn meshes_of_gmsh_give_the_surface_once() {

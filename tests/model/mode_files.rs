@@ -73,6 +73,17 @@ fn every_format_has_the_modes_of_the_free_body() {
     }
 }
 
+/// Words of 64 bits hold the modes to all digits: they are eigenvectors as they are.
+#[test]
+fn results_in_double_precision_are_eigenvectors() {
+    let model = model("modes");
+    let modes = read(&model, &file("block64.op2")).expect("modes");
+    assert_eq!((modes.matrix.ncols(), modes.digits), (10, 15));
+    let done = imported(&model, modes);
+    assert_eq!(codes(&done), [Code::ShapesRigid], "{:?}", done.diagnostics);
+    assert_are_free_modes(&model, &done, 1e-12);
+}
+
 /// Bricks with internal rows and a rigid body whose reference node turns: the file has the nodes of the
 /// bricks, and among these some that follow the rigid body and have no rows.
 #[test]
@@ -140,7 +151,7 @@ proptest! {
 
     #[test]
     fn damaged_files_of_modes_never_panic(
-        name in prop::sample::select(vec!["block.frd", "block.pch", "block.op2", "block.txt"]),
+        name in prop::sample::select(vec!["block.frd", "block.pch", "block.op2", "block64.op2", "block.txt"]),
         damages in proptest::collection::vec(damage(), 1..4),
     ) {
         let mut bytes = fs::read(file(name)).expect("a file");

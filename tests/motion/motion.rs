@@ -119,6 +119,7 @@ fn methods_converge_with_their_order_on_a_tumbling_body() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_free_body_keeps_momenta_to_rounding_and_its_energy_for_a_hundred_thousand_steps() {
     // Spatial, plane, and of a general mass whose frame is away from the centre of mass: there the method is
     // not symplectic.

@@ -329,6 +329,7 @@ fn projected_on_modes_they_are_the_reduced_equations() {
 
 /// Larger models that lie beside the project on some machines.
 #[test]
+#[ignore = "slow"]
 fn real_models_have_the_reduced_equations() {
     let root = std::env::var_os("FLEXBODY_SHARED")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);

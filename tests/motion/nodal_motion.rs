@@ -139,6 +139,7 @@ fn stretch(path: &Path) -> f64 {
 /// Solids, a body with nodal rotations, one with massless rows, plane bodies: with all modes the reduced
 /// equations are the nodal ones.
 #[test]
+#[ignore = "slow"]
 fn all_modes_move_as_the_nodes_do() {
     let raws = [
         ("hex8", soft_block(Kind::Hex8, [3, 2, 1]), 3.0),
@@ -183,6 +184,7 @@ fn between_frames(model: &FeModel, body: &FlexBody, conditions: &ReferenceCondit
 /// motions differ by the square of the deformation. Where M does not turn with the body, they differ by what
 /// M lacks.
 #[test]
+#[ignore = "slow"]
 fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
     let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
     let body = body_of(&model, 8);
@@ -249,6 +251,7 @@ fn drifts(
 
 /// Two hundred periods of the first mode.
 #[test]
+#[ignore = "slow"]
 fn long_motion_keeps_energy_and_momenta() {
     let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
     let body = body_of(&model, ALL);
@@ -308,6 +311,7 @@ impl Surroundings for Misprint {
 
 /// What modes lack falls with their number; what a misprint adds stays, with all modes.
 #[test]
+#[ignore = "slow"]
 fn truncation_and_misprints_show_against_the_nodes() {
     let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
     let whole = body_of(&model, ALL);
@@ -336,6 +340,7 @@ fn truncation_and_misprints_show_against_the_nodes() {
 
 /// Some thousand rows: the motion of a bracket of 20-node bricks, 2052 rows, is that of many modes.
 #[test]
+#[ignore = "slow"]
 fn a_real_model_runs() {
     let model = model_of(raw_fixture("bracket_hex20"));
     let body = body_of(&model, 60);

@@ -134,6 +134,7 @@ fn vectors_along_other_axes_say_the_same() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn selections_and_studies_do_not_know_the_frame() {
     let bodies = bodies();
     for (name, mut scene) in golden() {

@@ -44,6 +44,7 @@ fn table(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn scenes_of_the_fixtures_fit_their_schema_and_run() {
     let schema: Value =
         serde_json::from_str(include_str!("../../schemas/scene.schema.json")).expect("a schema");

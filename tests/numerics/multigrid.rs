@@ -65,6 +65,7 @@ fn said(found: &Conversion) -> Vec<&str> {
 }
 
 #[test]
+#[ignore = "slow"]
 fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
     for (kind, cells) in [(Kind::Hex8, 12), (Kind::Tet4, 9), (Kind::Tet10, 5), (Kind::Hex20, 6)] {
         let name = format!("{kind:?}");
@@ -84,6 +85,7 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn plane_bodies_and_bodies_with_arms_have_them_too() {
     let plane = check(rectangle(60, 40, 0.7, [1.0, 2.0])).expect("a sound model").model;
     let [_, found] = both("rectangle", &plane, 12);
@@ -96,6 +98,7 @@ fn plane_bodies_and_bodies_with_arms_have_them_too() {
 /// Materials whose stiffness differs by 1e4 and by 1e8, and one that hardly changes its volume: the modes of
 /// a factor, by whichever way.
 #[test]
+#[ignore = "slow"]
 fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
     let mesh = Mesh::block(Kind::Hex8, [10; 3], [0.1; 3]);
     for contrast in [1e4, 1e8] {
@@ -110,6 +113,7 @@ fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_thin_plate_is_factored_after_all_with_a_note() {
     let plate = steel(&Mesh::block(Kind::Hex8, [40, 30, 1], [1.0, 0.7, 1e-3]));
     let [factored, found] = both("plate", &plate, 10);
@@ -127,6 +131,7 @@ fn mechanisms_are_refused_as_with_a_factor() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn the_bits_do_not_depend_on_the_number_of_threads() {
     let model = cube(Kind::Hex8, 14);
     let bits = |threads: usize| {
@@ -144,6 +149,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
 
 /// Small bodies, guaranteed bounds and a factor that is asked for leave the cycles out.
 #[test]
+#[ignore = "slow"]
 fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
     let model = cube(Kind::Hex8, 10);
     let with = |accuracy: Accuracy, multigrid_pays: f64| {

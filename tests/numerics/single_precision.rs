@@ -59,6 +59,7 @@ fn said(found: &Conversion) -> Vec<&str> {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_single_precision_factor_gives_the_modes_and_invariants_of_a_double_one() {
     for (name, model) in models() {
         // Where conditioning defeats it, `auto` falls back; it does not on the models of the project.

@@ -33,6 +33,7 @@ fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> ModalBasis {
 }
 
 #[test]
+#[ignore = "slow"]
 fn work_is_what_it_was() {
     let mut table = format!(
         "{:<16}{:>6} {:<10}{:>8}{:>7}{:>6}{:>6}{:>10}{:>12}\n",
@@ -70,6 +71,7 @@ fn work_is_what_it_was() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn twenty_modes_take_at_most_six_solved_columns_each() {
     for name in MODELS {
         let found = modes(&model(name), 20, Accuracy::Standard).solution;

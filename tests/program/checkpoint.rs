@@ -58,6 +58,7 @@ fn assert_same(model: &FeModel, a: &ModalBasis, b: &ModalBasis) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn more_modes_cost_less_from_a_checkpoint_and_the_same_modes_nothing() {
     let model = model("connecting_rod");
     let (first, snapshots) = modes(&model, &settings(20, Method::Lanczos), None);
@@ -81,6 +82,7 @@ fn more_modes_cost_less_from_a_checkpoint_and_the_same_modes_nothing() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn an_interrupted_search_goes_on_where_it_was_saved() {
     let model = model("cube_hex8");
     let wanted = settings(40, Method::Lanczos);
@@ -178,6 +180,7 @@ fn refused(folder: &Path, model: &Path) -> (String, String) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn the_program_keeps_and_takes_up_a_checkpoint() {
     let folder = tempfile::tempdir().expect("a folder");
     let rod = manifest("connecting_rod");

@@ -144,6 +144,7 @@ fn jobs_of_fe_programs_are_read() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn motions_selections_and_studies_tell_their_numbers() {
     let (body, (folder, scene)) = (body(), spin());
     let motion = body.simulate(&scene).expect("a motion");

@@ -64,6 +64,7 @@ fn a_signal_during_convert_leaves_the_folder_as_it_was() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn an_interrupted_convert_goes_on_from_its_checkpoint() {
     let folder = tempfile::tempdir().expect("a folder");
     let (model, out) = (folder.path().join("model"), folder.path().join("out"));
@@ -108,6 +109,7 @@ fn small_convert(out: &Path) -> Command {
 
 /// Kills runs at times spread over their length; `FLEXBODY_KILLS` is the number of times for each signal.
 #[test]
+#[ignore = "slow"]
 fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else() {
     let kills: u32 = std::env::var("FLEXBODY_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(6);
     let folder = tempfile::tempdir().expect("a folder");

@@ -37,6 +37,7 @@ fn folder_with_body() -> tempfile::TempDir {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_limit_of_address_space_gives_a_result_or_exit_code_4() {
     let folder = folder_with_body();
     let model = fixture("cube_hex8");
@@ -77,6 +78,7 @@ fn a_limit_of_address_space_gives_a_result_or_exit_code_4() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_limit_of_file_size_is_a_short_disk_and_leaves_nothing() {
     let folder = folder_with_body();
     let model = fixture("cube_hex8");
@@ -105,6 +107,7 @@ fn a_limit_of_file_size_is_a_short_disk_and_leaves_nothing() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn few_open_files_give_a_message() {
     let folder = folder_with_body();
     let before = members(folder.path());

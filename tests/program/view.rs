@@ -214,6 +214,7 @@ fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String
 
 /// The page draws without complaint, and two instants of a mode look different; one looks the same twice.
 #[test]
+#[ignore = "slow"]
 fn a_browser_draws_the_page() {
     let Some(browser) = browser() else {
         eprintln!("no Chromium on the PATH: the page is not drawn");

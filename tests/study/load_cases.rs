@@ -225,6 +225,7 @@ fn reports_tell_every_case() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_body_is_made_for_all_cases_of_a_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();

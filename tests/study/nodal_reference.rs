@@ -237,6 +237,7 @@ fn errors_of_few(model: &FeModel, scene: &Scene) -> (Trace, OutputErrors) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn loads_at_interfaces_act_on_their_nodes() {
     for (what, raw, torques) in [
         ("solid", solid(), true),
@@ -253,6 +254,7 @@ fn loads_at_interfaces_act_on_their_nodes() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn spin_is_prescribed_with_the_centre_free_or_held() {
     for (what, raw) in [
         ("solid", solid()),
@@ -271,6 +273,7 @@ fn spin_is_prescribed_with_the_centre_free_or_held() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn ratios_damp_the_modes_on_the_nodes() {
     let scene = |size: &Size, scheme| {
         let mut scene =
@@ -340,6 +343,7 @@ fn a_node_carries_beams() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn settled_starts_have_the_static_deformation_of_the_nodes() {
     for (what, raw) in [("solid", solid()), ("beams", with_ends(star(BeamMass::Consistent)))] {
         for driven in [false, true] {
@@ -419,6 +423,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
+    #[ignore = "slow"]
     fn any_load_and_any_spin(
         (force, torque) in (prop::array::uniform3(-1.0f64..1.0), prop::array::uniform3(-1.0f64..1.0)),
         (axis, speed) in (prop::array::uniform3(-1.0f64..1.0), 0.0f64..0.4),

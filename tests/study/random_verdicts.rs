@@ -355,6 +355,7 @@ fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
 }
 
 #[test]
+#[ignore = "slow"]
 fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
     let asked = std::env::var("FLEXBODY_VERDICTS").ok().and_then(|count| count.parse().ok());
     let (mut outcomes, mut not_run) = (Vec::new(), Vec::new());

@@ -169,6 +169,7 @@ fn a_shock_is_no_reason_for_modes_without_end() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn shapes_of_the_motion_hold_the_tolerances_and_are_no_more_than_free_modes() {
     let model = model();
     let mut scene =

@@ -78,6 +78,7 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 #[test]
+#[ignore = "slow"]
 fn with_all_modes_the_reduced_body_answers_as_all_nodes_do() {
     // Damped and undamped, also at turning ends; 90 rows.
     for damping in [None, Some(Damping::Ratio(0.02)), Some(Damping::Rayleigh { alpha: 300.0, beta: 2e-7 })] {
@@ -325,6 +326,7 @@ fn places_that_are_not_there_are_refused() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn the_command_writes_what_its_schema_says() {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();

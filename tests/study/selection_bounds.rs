@@ -292,6 +292,7 @@ proptest! {
 
     /// The same about an axis that changes, along axes that turn or that are fixed in space.
     #[test]
+    #[ignore = "slow"]
     fn no_motion_about_a_changing_axis_breaks_a_bound(
         of in 0..3usize,
         bits in any::<u8>(),
@@ -386,6 +387,7 @@ fn broken_once(of: usize, bits: u8, doing: &Doing) {
 
 /// The Euler force between two instants that look at the motion was not seen.
 #[test]
+#[ignore = "slow"]
 fn a_spin_that_reverses_between_two_instants_counts() {
     let spin = Shape::Lines(vec![(0.458, 0.0464), (0.00222, -0.738)]);
     let doing = Doing { axis: [1.0, 0.0, 0.0], spin, rate: 0.329, periods: 7.24, outputs: 148, ..RESTING };
@@ -394,6 +396,7 @@ fn a_spin_that_reverses_between_two_instants_counts() {
 
 /// Errors were taken relative to another motion than the one that they are measured against.
 #[test]
+#[ignore = "slow"]
 fn errors_are_relative_to_the_motion_that_they_are_measured_against() {
     let pushes = vec![(0.439, [1.0, 0.0, 0.0], 0.996, Shape::Tone(6, 1.0, 4.13), false)];
     let doing = Doing {

@@ -68,7 +68,7 @@ fn whole_lines(block: &[u8], ends_file: bool) -> usize {
 }
 
 /// Cuts a block at line ends into pieces of about [`PIECE`] bytes.
-pub(super) fn line_aligned(block: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(in crate::input) fn line_aligned(block: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = block;
     std::iter::from_fn(move || {
         if rest.is_empty() {

@@ -1,11 +1,12 @@
-//! Nodes and node sets of Exodus II meshes in netCDF-4: `coordx`, `coordy`, `coordz` (or `coord`), `node_num_map`,
-//! `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`.
+//! Nodes, node sets and elements of Exodus II meshes in netCDF-4: `coordx`, `coordy`, `coordz` (or `coord`),
+//! `node_num_map`, `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`, `connect1`, ....
 
 use super::members::Members;
-use super::values::{Found, Numbers, Vector, names_of};
+use super::values::{Found, Numbers, Vector, names_of, text_of};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
-use crate::model::Nodes;
+use crate::input::upright_order::in_order_of_shape;
+use crate::model::{ElementShape, Elements, Nodes};
 use hdf5_metno::{File, Group};
 
 const HELP: &str = "give an Exodus mesh in netCDF-4, or a table with the columns node, x, y, z";
@@ -17,13 +18,13 @@ type NamedSets = Vec<(String, Vec<i64>)>;
 ///
 /// # Errors
 /// FB101 for a file that cannot be opened, FB115 for what is no such mesh.
-pub(in crate::input) fn read_exodus(file: &InputFile) -> Found<(Nodes, NamedSets)> {
+pub(in crate::input) fn read_exodus(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)> {
     let opened = File::open(file.path()).map_err(|e| {
         let message = format!("HDF5 file cannot be opened: {e}");
         vec![Diagnostic::new(Code::FileUnreadable, message).with_help("transfer or write the file again")]
     })?;
     let root = opened.group("/").map_err(|e| wrong(format!("file cannot be read: {e}")))?;
-    let mesh = Mesh { members: Members::of(&root), root };
+    let mesh = Mesh { members: Members::of(&root), root, bytes: file.bytes() };
     // What is wrong with a dataset is said of nodes here, not of matrices.
     mesh.read().map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
 }
@@ -32,13 +33,14 @@ fn wrong(message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).with_help(HELP)]
 }
 
-struct Mesh {
+struct Mesh<'f> {
     root: Group,
     members: Members,
+    bytes: &'f [u8],
 }
 
-impl Mesh {
-    fn read(&self) -> Found<(Nodes, NamedSets)> {
+impl Mesh<'_> {
+    fn read(&self) -> Found<(Nodes, NamedSets, Elements)> {
         let positions = self.positions()?;
         let ids = match self.has("node_num_map") {
             true => self.whole_numbers("node_num_map")?,
@@ -49,7 +51,8 @@ impl Mesh {
             return Err(wrong(message));
         }
         let sets = self.sets(&ids)?;
-        Ok((Nodes { ids, positions }, sets))
+        let elements = self.elements(&ids)?;
+        Ok((Nodes { ids, positions }, sets, elements))
     }
 
     fn has(&self, name: &str) -> bool {
@@ -94,6 +97,27 @@ impl Mesh {
         Ok(values.chunks(columns.max(1)).map(<[f64]>::to_vec).collect())
     }
 
+    /// The elements of all blocks, which list places from 1.
+    fn elements(&self, ids: &[i64]) -> Found<Elements> {
+        let mut elements = Elements::default();
+        for dataset in (1..).map(|k| format!("connect{k}")).take_while(|dataset| self.has(dataset)) {
+            let opened = Numbers::open(&self.root, &self.members, "", &dataset)?;
+            let kind = opened.dataset.attr("elem_type").ok();
+            let kind = kind.and_then(|kind| text_of(&kind, self.bytes)).unwrap_or_default();
+            let node = |place: &f64| match *place {
+                place if place >= 1.0 && place.fract() == 0.0 => ids.get(place as usize - 1).copied(),
+                _ => None,
+            };
+            for places in self.rows_of(&dataset)? {
+                let nodes: Option<Vec<i64>> = places.iter().map(node).collect();
+                let nodes =
+                    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))?;
+                add_element(&mut elements, &kind, &nodes);
+            }
+        }
+        Ok(elements)
+    }
+
     /// Node sets list places from 1. Without a name, or without names, a set is called by its number.
     fn sets(&self, ids: &[i64]) -> Found<NamedSets> {
         let names = match self.has("ns_names") {
@@ -119,4 +143,31 @@ impl Mesh {
         }
         Ok(sets)
     }
+}
+
+/// Adds an element of a type as Exodus names it (`HEX8`, `TETRA`, `SHELL4`); points are not drawn.
+fn add_element(elements: &mut Elements, kind: &str, nodes: &[i64]) {
+    let name = kind.to_ascii_uppercase();
+    let begins = |heads: &[&str]| heads.iter().any(|head| name.starts_with(head));
+    let shape = if begins(&["HEX"]) {
+        ElementShape::Hexahedron
+    } else if begins(&["TET"]) {
+        ElementShape::Tetrahedron
+    } else if begins(&["WEDGE", "PENTA"]) {
+        ElementShape::Wedge
+    } else if begins(&["PYR"]) {
+        ElementShape::Pyramid
+    } else if begins(&["TRI"]) || begins(&["SHELL"]) && [3, 6, 7].contains(&nodes.len()) {
+        ElementShape::Triangle
+    } else if begins(&["QUAD", "SHELL"]) {
+        ElementShape::Quadrilateral
+    } else if begins(&["BAR", "BEAM", "TRUSS", "EDGE"]) {
+        ElementShape::Line
+    } else {
+        if !begins(&["SPHERE", "CIRCLE"]) {
+            elements.leave_out(kind, 1);
+        }
+        return;
+    };
+    elements.add(kind, shape, &in_order_of_shape(shape, nodes));
 }

@@ -46,12 +46,10 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
     Ok(directions.iter().flat_map(label).collect())
 }
 
-/// FB112 where the matrix has other rows than the deck.
-pub(super) fn refuse_other(labels: usize, rows: usize, matrix: &Path) -> Option<Diagnostic> {
-    (labels != rows).then(|| {
-        let message = format!(
-            "matrix has {rows} rows, the elements of the deck give their nodes {labels} degrees of freedom"
-        );
-        Diagnostic::new(Code::DeckRows, message).in_file(matrix).with_help(HELP)
-    })
+/// FB112: the matrix has other rows than the deck.
+pub(super) fn other_rows(labels: usize, rows: usize, matrix: &Path) -> Diagnostic {
+    let message = format!(
+        "matrix has {rows} rows, the elements of the deck give their nodes {labels} degrees of freedom"
+    );
+    Diagnostic::new(Code::DeckRows, message).in_file(matrix).with_help(HELP)
 }

@@ -48,9 +48,9 @@ impl JobReader for Calculix {
         let labels = read_labels(&dof)?;
         let n = labels.len();
         let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
-        let (stiffness, mass) =
-            rayon::join(|| read(&sti, MatrixRole::Stiffness), || read(&mas, MatrixRole::Mass));
-        let (stiffness, mass) = both(stiffness, mass)?;
+        // One after the other: each is read by all threads, and the entries of only one are held.
+        let stiffness = read(&sti, MatrixRole::Stiffness);
+        let (stiffness, mass) = both(stiffness, read(&mas, MatrixRole::Mass))?;
         let (labels, added) = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
         let rotations = rotation_nodes(&deck)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {

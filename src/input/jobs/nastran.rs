@@ -3,11 +3,12 @@
 
 mod axes;
 mod bulk;
+mod elements;
 mod rows;
 mod sets;
 mod systems;
 
-use super::{Found, JobModel, JobReader, both, missing, siblings};
+use super::{Found, JobModel, JobReader, NodeSets, both, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::is_bulk_data;
 use crate::input::bytes::InputFile;
@@ -62,7 +63,8 @@ impl JobReader for Nastran {
             bulk.files.iter().map(|path| ("deck", path.clone())).collect();
         files.extend(matrices.files.iter().map(|path| ("matrices", path.clone())));
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
-        let elements = Elements::default();
+        // Condensed matrices leave no element all of its nodes.
+        let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
         Ok(JobModel { stiffness, mass, nodes, dofs, sets, elements, files, diagnostics })
     }
 }
@@ -96,6 +98,26 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
     if bad.is_empty() { Ok((nodes, axes)) } else { Err(bad) }
 }
 
+/// The grids, sets and elements of a deck whose matrices come from elsewhere.
+///
+/// # Errors
+/// Those of [`Bulk::read`], and FB111 where rows of grids stand along other axes than those of the basic
+/// system.
+pub(super) fn nodes_of_bulk(path: &Path) -> Found<(Nodes, NodeSets, Elements)> {
+    let bulk = Bulk::read(path)?;
+    let (nodes, axes) = places(&bulk)?;
+    if let Some(grid) = axes.keys().min() {
+        let message = format!(
+            "rows of {} grids stand along the axes of their CD, the first of them grid {grid}: matrices from elsewhere cannot be turned with them",
+            axes.len()
+        );
+        let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(path);
+        return Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")]);
+    }
+    let sets = bulk.sets.of(&bulk.grids);
+    Ok((nodes, sets, bulk.elements))
+}
+
 /// What the deck says that a user should know.
 fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
     let mut found = Vec::new();
@@ -104,7 +126,10 @@ fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
         found.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
     }
     if let Some((path, line, count)) = &bulk.supports {
-        let message = format!("{count} cards support the body");
+        let message = match count {
+            1 => "a card supports the body".to_owned(),
+            _ => format!("{count} cards support the body"),
+        };
         found.push(Diagnostic::new(Code::DeckSupports, message).in_file(path).at_line(*line));
     }
     found

@@ -1,11 +1,13 @@
-//! Meshes of VTK in XML (.vtu, .vtp, .vts): points, and arrays of zeros and ones at the points as sets.
+//! Meshes of VTK in XML (.vtu, .vtp, .vts): points, arrays of zeros and ones at the points as sets, and the cells
+//! of unstructured grids.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
+use super::vtk_cells::elements_of;
 use super::vtk_numbers::{Base64, NumberType, Packing, Unpacked};
 use super::xml_elements::{Element, elements};
 use super::{Found, NodeFile, refused};
 use crate::input::bytes::InputFile;
-use crate::model::Nodes;
+use crate::model::{Elements, Nodes};
 
 const HELP: &str = "write one mesh of points and cells (.vtu) in double precision, as it is or compressed by zlib, or give a table of nodes";
 
@@ -28,7 +30,8 @@ fn points_and_sets(bytes: &[u8]) -> Unpacked<NodeFile> {
         None => (0..positions.len() as i64).collect(),
     };
     let sets = mesh.sets(&ids)?;
-    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, ..NodeFile::default() })
+    let elements = mesh.cells(&ids)?;
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, elements })
 }
 
 fn is_list_of_whole_numbers(array: &Element<'_>) -> bool {
@@ -114,6 +117,15 @@ impl<'a> Mesh<'a> {
             }
         }
         Ok(sets)
+    }
+
+    /// The cells of an unstructured grid; other meshes name theirs otherwise and are not drawn.
+    fn cells(&self, ids: &[i64]) -> Unpacked<Elements> {
+        let array = |name: &str| self.arrays("Cells").find(|array| array.attribute("Name") == Some(name));
+        let all = [array("connectivity"), array("offsets"), array("types")];
+        let [Some(connectivity), Some(offsets), Some(types)] = all else { return Ok(Elements::default()) };
+        let [connectivity, offsets, types] = [connectivity, offsets, types].map(|own| self.numbers(own));
+        elements_of(&connectivity?, &offsets?, &types?, ids)
     }
 
     /// The arrays at the points with one whole number for each.

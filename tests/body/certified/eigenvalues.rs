@@ -237,6 +237,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, max_global_rejects: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
+    #[ignore = "slow"]
     fn random_bodies_are_enclosed(body in bodies(), wanted in 1usize..12, lanczos in any::<bool>()) {
         let method = if lanczos { Method::Lanczos } else { Method::Dense };
         let found = body.solve(Wanted::Lowest(wanted), method);

@@ -38,6 +38,7 @@ fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) ->
 }
 
 #[test]
+#[ignore = "slow"]
 fn estimates_and_bounds_enclose_the_frequencies_of_the_free_body() {
     let (mut least, mut most) = (1.0f64, 1.0f64);
     for raw in models() {
@@ -58,6 +59,7 @@ fn estimates_and_bounds_enclose_the_frequencies_of_the_free_body() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn the_frequencies_of_fixtures_are_told_as_well_as_free_modes_know_them() {
     for name in ["bracket_hex20", "connecting_rod"] {
         let manifest =

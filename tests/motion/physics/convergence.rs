@@ -55,6 +55,7 @@ fn rod_error(kind: Kind, n: i32) -> f64 {
 }
 
 #[test]
+#[ignore = "slow"]
 fn linear_hexahedra_converge_with_order_two() {
     let errors = [6, 12, 24].map(|n| lame_error(Kind::Hex8, n));
     assert!(errors[2] > 0.0 && errors[2] < 4e-3, "{errors:?}");
@@ -63,6 +64,7 @@ fn linear_hexahedra_converge_with_order_two() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn quadratic_hexahedra_converge_with_order_four() {
     let errors = [3, 6, 12].map(|n| lame_error(Kind::Hex20, n));
     let orders = orders(&errors);
@@ -71,6 +73,7 @@ fn quadratic_hexahedra_converge_with_order_four() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn quadratic_tetrahedra_converge_with_order_four() {
     // The split of hexahedra into tetrahedra has no mirror symmetry: free faces add a term of order five, so
     // the observed order approaches four linearly in the mesh width.
@@ -167,6 +170,7 @@ fn lumping_errors_of_linear_hexahedra_have_order_two() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn row_sum_errors_of_quadratic_tetrahedra_have_order_four() {
     let bodies = [4, 8].map(|s| block(Kind::Tet10, s));
     let smooth = bodies.each_ref().map(|body| lumped_errors(body, smooth_shapes(&body.nodes).as_ref()));

@@ -144,12 +144,14 @@ impl Mechanism {
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_double_pendulum_moves_as_in_exudyn() {
     let recorded: Recorded = serde_json::from_str(EXUDYN).expect("what the script writes");
     recorded.double_pendulum.check("double pendulum");
 }
 
 #[test]
+#[ignore = "slow"]
 fn a_slider_crank_moves_as_in_exudyn() {
     let recorded: Recorded = serde_json::from_str(EXUDYN).expect("what the script writes");
     recorded.slider_crank.check("slider-crank");

@@ -84,6 +84,7 @@ fn soft_joints_keep_six_low_modes_that_scale_with_their_stiffness() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn thin_plates_tell_their_noise() {
     // 1 m x 0.7 m x 1 mm: rounding of K alone leaves 1e-6 to 1e-4 in the lowest eigenvalues.
     for (kind, cells) in [(Kind::Hex8, [8, 6, 1]), (Kind::Tet10, [4, 3, 1])] {
@@ -110,6 +111,7 @@ fn thin_plates_tell_their_noise() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn twenty_six_nearly_equal_modes_are_all_found() {
     // Thirteen equal fingers on one bar, each with two first bending modes: clusters wider than any block.
     let mut cells = grid([25, 1, 1]);

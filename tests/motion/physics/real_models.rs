@@ -190,21 +190,25 @@ fn labelled(raw: &RawModel, body: &Body) -> Vec<(usize, usize, f64)> {
 }
 
 #[test]
+#[ignore = "slow"]
 fn own_bodies_agree_with_their_references() {
     own().iter().for_each(agrees_with_its_reference);
 }
 
 #[test]
+#[ignore = "slow"]
 fn shared_bodies_agree_with_their_references() {
     shared().iter().for_each(agrees_with_its_reference);
 }
 
 #[test]
+#[ignore = "slow"]
 fn own_bodies_obey_the_nodal_equations() {
     own().iter().for_each(obeys_the_nodal_equations);
 }
 
 #[test]
+#[ignore = "slow"]
 fn shared_bodies_obey_the_nodal_equations() {
     shared().iter().for_each(obeys_the_nodal_equations);
 }
@@ -239,6 +243,7 @@ fn shared_bodies_agree_with_the_row_sums_and_the_rank_of_their_references() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn cubes_keep_their_double_and_triple_eigenvalues() {
     for case in own().into_iter().chain(shared()).filter(|case| case.name.contains("cube")) {
         let body = proved(case.raw.clone(), case.eigenvalues.len(), Method::Auto);

@@ -61,6 +61,7 @@ fn one_element_of_every_kind_has_all_its_modes() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn dense_and_sparse_paths_agree_with_the_reference() {
     for (kind, cells, rule) in [
         (Kind::Hex8, [5, 3, 2], MassRule::Consistent),

@@ -1,5 +1,6 @@
 //! What the bulk data and the case control of a deck say: places, axes of rows, boundary, supports, sets.
 
+use super::elements;
 use super::sets::SetLines;
 use super::systems::{Definition, Grid, Kind, SystemCard};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -7,6 +8,7 @@ use crate::input::bulk_cards::{Card, Item, read_deck, whole};
 use crate::input::coordinates::excerpt;
 use crate::input::dmig::Dmigs;
 use crate::input::jobs::Found;
+use crate::model::Elements;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -41,6 +43,8 @@ pub(super) struct Bulk {
     /// PARAM,COUPMASS.
     pub coupled_mass: bool,
     pub has_elements: bool,
+    /// How they are drawn.
+    pub elements: Elements,
     /// An element has more than displacements.
     pub has_rotations: bool,
     /// SEQGP.
@@ -167,8 +171,8 @@ impl Bulk {
                 self.is_superelement = true;
                 Some(())
             }
-            name => {
-                self.element(name);
+            _ => {
+                self.element(card);
                 Some(())
             }
         };
@@ -284,11 +288,13 @@ impl Bulk {
         *count += 1;
     }
 
-    fn element(&mut self, name: &str) {
+    fn element(&mut self, card: &Card) {
+        let name = card.name.as_str();
         let is_element = name.starts_with('C') && !NO_ELEMENTS.iter().any(|head| name.starts_with(head));
         if is_element {
             self.has_elements = true;
             self.has_rotations |= !SOLIDS.contains(&name);
+            elements::add(card, &mut self.elements);
         }
     }
 }
