@@ -42,7 +42,7 @@ const COUNTS: f64 = 1e-3;
 
 /// What the distribution leaves open, in words.
 const REMAINS: &str = "\nAll estimates of the last 60 seeds below a third of the truth are of the plane frame, whose nodes have rotations, mostly after it was enriched; the cause has not been found. Carried bodies are not in the\n\
-    table, since nothing is estimated for them; nor are attitude and reactions. Before the inertia of what is lacking was counted, estimates of the stress were below half of the truth in 26 % of calm scenes (40 seeds, least 0.13), and one verdict missed its tolerance.\n";
+    table, since nothing is estimated for them; nor are reactions. Before the inertia of what is lacking was counted, estimates of the stress were below half of the truth in 26 % of calm scenes (40 seeds, least 0.13), and one verdict missed its tolerance.\n";
 
 /// How loads begin. A shock excites modes without end, which no number of responses follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -242,9 +242,13 @@ fn errors_beside(
 
 /// Effectivities of an estimate where the true errors count.
 fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64) -> Vec<(&'static str, f64)> {
-    let both =
-        [("deflection", estimated.deflection, found.deflection), ("stress", estimated.stress, found.stress)];
-    both.into_iter()
+    let outputs = [
+        ("attitude", Some(estimated.attitude), Some(found.attitude)),
+        ("deflection", estimated.deflection, found.deflection),
+        ("stress", estimated.stress, found.stress),
+    ];
+    outputs
+        .into_iter()
         .filter_map(|(name, estimated, found)| Some((name, estimated?, found?)))
         .filter(|(_, _, found)| *found > COUNTS * tolerance)
         .map(|(name, estimated, found)| (name, estimated / found))
@@ -312,7 +316,7 @@ fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
     );
     page.push_str("## Effectivity: the estimated error of a body over the true one\n\nOf bodies as they were first converted and as they were enriched, where the true error is more than a thousandth of the tolerance.\n\n| start | output | numbers | least | 5 % | median | 95 % | largest | below 1/2 |\n|---|---|---|---|---|---|---|---|---|\n");
     for start in [Start::Calm, Start::Shock] {
-        for output in ["deflection", "stress"] {
+        for output in ["attitude", "deflection", "stress"] {
             let of = outcomes.iter().filter(|one| one.start == start).flat_map(|one| &one.effectivity);
             let values: Vec<f64> = of.filter(|(name, _)| *name == output).map(|(_, value)| *value).collect();
             let (count, low) = (values.len(), values.iter().filter(|value| **value < 0.5).count());
@@ -385,7 +389,7 @@ fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
             assert!(!holds || worst <= 1.0, "{}: {worst}", one.what);
             let calm = one.start == Start::Calm;
             assert!(
-                !calm || one.effectivity.iter().all(|(_, value)| *value > 0.4),
+                !calm || one.effectivity.iter().all(|(name, value)| *name == "attitude" || *value > 0.4),
                 "{}: {:?}",
                 one.what,
                 one.effectivity

@@ -3,6 +3,7 @@
 use super::answered::answered;
 use super::compressed::{Compressed, principal};
 use super::residual::NodalView;
+use super::turning::Turning;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::free_static_responses;
@@ -35,10 +36,10 @@ pub struct ReferenceError {
     /// Number of modes of the body.
     pub modes: usize,
     /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the
-    /// equations of all nodes leave unbalanced along its motion. Nothing is estimated of attitude and
-    /// reaction.
+    /// equations of all nodes leave unbalanced along its motion, and how these turn a free body. Nothing is
+    /// estimated of reactions.
     pub errors: OutputErrors,
-    /// The larger of both over its tolerance.
+    /// The largest of them over its tolerance.
     pub worst: f64,
     /// When the estimate of the elastic energy is largest.
     pub time: f64,
@@ -105,11 +106,16 @@ impl Estimate {
         let times: Vec<f64> = (0..=INSTANTS).map(|i| duration * (i as f64 / INSTANTS as f64)).collect();
         let mut same_steps = scene.clone();
         same_steps.run.scheme = motion.scheme;
-        let residual = view.residual(&instants(body, &same_steps, &times)?);
+        let looked_at = instants(body, &same_steps, &times)?;
+        let residual = view.residual(&looked_at);
         let missed = Missed::new(&view, body, residual)?.moving(&view, &times, scene.initial.settled);
         let energies = missed.root_energies();
         let largest = (0..energies.len()).fold(0, |at, i| if energies[i] > energies[at] { i } else { at });
-        let errors = missed.errors(&view, body, &energies, &motion, &watched, &times);
+        let mut errors = missed.errors(&view, body, &energies, &motion, &watched, &times);
+        if scene.spin.is_none() {
+            let turning = Turning::new(&view, missed.responses.as_ref());
+            errors.attitude = Peak::of(&times, turning.angles(&looked_at, &missed.forces.amplitudes)).value;
+        }
         let tolerance = &scene.requirements.tolerance;
         let error = ReferenceError {
             modes: body.n_modes(),

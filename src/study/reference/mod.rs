@@ -7,6 +7,7 @@ mod enrich;
 mod estimate;
 mod motion_shapes;
 mod residual;
+mod turning;
 
 pub use enrich::{Enriched, EnrichedForCases, enrich, enrich_for_cases};
 pub use estimate::{PART_OF_REFERENCE, ReferenceError};

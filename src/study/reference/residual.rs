@@ -18,11 +18,11 @@ pub(super) struct NodalView<'m> {
     pub vectors: Mat<f64>,
     weighted: Mat<f64>,
     /// Rigid motions about the origin of the frame (N x 6, in the plane N x 3), axes of the model.
-    rigid: Mat<f64>,
+    pub rigid: Mat<f64>,
     /// Axes of the frame in the model.
-    axes: Matrix3<f64>,
+    pub axes: Matrix3<f64>,
     /// Nodal forces of unit forces and torques where each load of the scene acts (N x 6, in the plane N x 3).
-    loads: Vec<Mat<f64>>,
+    pub loads: Vec<Mat<f64>>,
 }
 
 impl<'m> NodalView<'m> {
