@@ -25,6 +25,7 @@ SHOWN = [
 COLUMNS = 82
 ADVANCE, LEADING, MARGIN, BAR = 8.4, 19, 18, 34  # pixels: column, line, border, title bar
 BACKGROUND, TITLE, TEXT, DIM, LABEL = "#1b1f27", "#2a303c", "#d8dee9", "#8f9bb3", "#88c0d0"
+GOOD, WARNING = "#a3be8c", "#ebcb8b"
 FONT = "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace"
 
 
@@ -41,7 +42,8 @@ def spans(line):
     if line in SHOWN:
         return [(0, line, TEXT)]
     label, text = line[:12].rstrip(), line[12:]
-    return [piece for piece in ((0, label, LABEL), (12, text, TEXT)) if piece[1].strip()]
+    tone = GOOD if label == "proved" else WARNING if "NEGATIVE" in text or label == "warnings" else LABEL
+    return [piece for piece in ((0, label, tone), (12, text, TEXT)) if piece[1].strip()]
 
 
 def piece(x, y, text, colour):

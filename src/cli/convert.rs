@@ -7,6 +7,7 @@ use super::outcome::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::select::asked_cases;
+use super::terminal::body_text;
 use super::watcher::Watcher;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -192,8 +193,11 @@ impl Job<'_> {
         // What is to be said is said with the body.
         let nothing = RunData::default();
         let decided = selection.as_ref().map(|selection| SelectionFacts::new(selection, &nothing));
-        let text = render(&facts, Format::Text)
-            + &decided.map_or_else(String::new, |facts| facts.render(Format::Text));
+        let text = body_text(&facts, arguments.verbose, arguments.printing)
+            + &decided.map_or_else(String::new, |decided| match arguments.verbose {
+                true => format!("\n{}", decided.render(Format::Text)),
+                false => format!("\n{}", decided.summary()),
+            });
         let outcome = Outcome { text, json: render(&facts, Format::Json), diagnostics, passed: true };
         let slots = std::iter::once(reserved.body).chain(reserved.reports).collect();
         Ok(Done { slots, outcome })

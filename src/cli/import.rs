@@ -3,6 +3,7 @@
 use super::arguments::{ConvertArguments, StorageName};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
+use super::terminal::body_text;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
@@ -43,6 +44,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
         slot.fill(render(&facts, format).as_bytes())?;
     }
     OutputSlot::commit_all(std::iter::once(slot).chain(reports))?;
-    let (text, json) = (render(&facts, Format::Text), render(&facts, Format::Json));
+    let text = body_text(&facts, arguments.verbose, arguments.printing);
+    let json = render(&facts, Format::Json);
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed: true })
 }

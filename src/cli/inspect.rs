@@ -2,6 +2,7 @@
 
 use super::arguments::InspectArguments;
 use super::outcome::Outcome;
+use super::terminal::body_text;
 use crate::base::error::Result;
 use crate::formats::flex_body_file;
 use crate::report::{Facts, Format, RunData, render};
@@ -18,6 +19,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
     }
     let (body, diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     let facts = Facts::new(&body, &RunData::default());
-    let (text, json) = (render(&facts, Format::Text), render(&facts, Format::Json));
+    let text = body_text(&facts, arguments.verbose, arguments.printing);
+    let json = render(&facts, Format::Json);
     Ok(Outcome { text, json, diagnostics, passed: true })
 }

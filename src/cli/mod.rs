@@ -20,6 +20,7 @@ mod resources;
 mod response;
 mod select;
 mod simulate;
+mod terminal;
 mod trade;
 mod view;
 mod watcher;

@@ -3,6 +3,7 @@
 use super::arguments::{Arguments, Command, Printing};
 use super::outcome::{Outcome, warnings};
 use super::resources::use_threads;
+use super::terminal::colours_of_stderr;
 use super::{
     audit, check, compare, completions, convert, doctor, export, inspect, recipe, response, select, simulate,
     trade, view,
@@ -141,11 +142,25 @@ fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
     if printing.json {
         return;
     }
+    let coloured = colours_of_stderr();
     let mut stderr = std::io::stderr().lock();
     for diagnostic in diagnostics.iter().filter(|d| !printing.quiet || d.severity() == Severity::Error) {
+        let told = diagnostic.to_string();
+        let told = if coloured { painted(diagnostic.severity(), &told) } else { told };
         // Nobody is left to tell when stderr is closed.
-        let _ = writeln!(stderr, "{diagnostic}");
+        let _ = writeln!(stderr, "{told}");
     }
+}
+
+/// A diagnostic with its severity and code in colour.
+fn painted(severity: Severity, told: &str) -> String {
+    let colour = match severity {
+        Severity::Error => "1;31",
+        Severity::Warning => "1;33",
+        Severity::Note => "36",
+    };
+    told.split_once(": ")
+        .map_or_else(|| told.to_owned(), |(head, rest)| format!("\u{1b}[{colour}m{head}\u{1b}[0m: {rest}"))
 }
 
 /// Prints to stdout; a reader that went away (`| head`) is not an error.

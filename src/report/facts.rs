@@ -132,6 +132,11 @@ impl InterfaceFacts {
         }
     }
 
+    /// Whether it deforms although it was declared rigid.
+    pub fn breaks_its_word(&self) -> bool {
+        self.coupling == Some("rigid") && self.deformation.is_some_and(|part| part > RIGID)
+    }
+
     /// `80 nodes, rigid`, `3 nodes, averaging, deforms by up to 12 %`.
     pub fn in_words(&self) -> String {
         let coupling = self.coupling.map_or(String::new(), |name| format!(", {name}"));
@@ -270,7 +275,7 @@ impl Facts {
             terms: TermFacts::of(body),
             completeness: Completeness::of(body),
             guarantee: GuaranteeFacts::of(body),
-            lumped: body.lumped().iter().map(LumpedFacts::of).collect(),
+            lumped: body.lumped().iter().map(|lumped| LumpedFacts::of(lumped, body.invariants())).collect(),
             lumped_modes,
             run: (known != RunData::default()).then(|| RunFacts::of(&known)),
             diagnostics: run.diagnostics.clone(),
@@ -324,10 +329,16 @@ impl ModelFacts {
     /// `21 nodes, 63 degrees of freedom, consistent mass`.
     pub fn size_in_words(&self) -> String {
         match self.n_dofs {
+            0 => self.nodes_in_words(),
+            _ => format!("{}, {}", self.nodes_in_words(), self.mass_in_words()),
+        }
+    }
+
+    /// `21 nodes, 63 degrees of freedom`.
+    pub fn nodes_in_words(&self) -> String {
+        match self.n_dofs {
             0 => format!("{} nodes or frames; mass as another program condensed it", self.n_nodes),
-            n_dofs => {
-                format!("{} nodes, {n_dofs} degrees of freedom, {}", self.n_nodes, self.mass_in_words())
-            }
+            n_dofs => format!("{} nodes, {n_dofs} degrees of freedom", self.n_nodes),
         }
     }
 
@@ -387,7 +398,7 @@ impl UnitFacts {
     }
 
     pub fn mass(&self) -> String {
-        named(&self.mass, "kg")
+        if self.mass == "tonne" { "t".to_owned() } else { named(&self.mass, "kg") }
     }
 
     pub fn length(&self) -> String {

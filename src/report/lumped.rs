@@ -1,8 +1,9 @@
 //! What the lumped masses would have cost, ready to be told.
 
+use super::lumped_effect::{LumpedEffect, in_words};
 use super::run_data::LumpedModes;
 use crate::body::flex_body::LumpedBody;
-use crate::body::invariants::ERROR_NORMS;
+use crate::body::invariants::{ERROR_NORMS, Invariants};
 use serde::{Serialize, Serializer};
 use std::collections::{HashMap, HashSet};
 
@@ -95,17 +96,30 @@ pub(super) struct LumpedFacts {
     pub scheme: String,
     pub mass: f64,
     pub negative_masses: usize,
+    #[serde(skip)]
+    pub effect: LumpedEffect,
     #[serde(flatten)]
     pub errors: Errors,
 }
 
 impl LumpedFacts {
-    pub fn of(lumped: &LumpedBody) -> Self {
+    pub fn of(lumped: &LumpedBody, exact: &Invariants) -> Self {
         Self {
             scheme: lumped.scheme.clone(),
             mass: lumped.invariants.mass(),
             negative_masses: lumped.negative_masses,
+            effect: LumpedEffect::of(exact, &lumped.invariants),
             errors: Errors::new(&lumped.comparison),
+        }
+    }
+
+    /// What is wrong with it; with `explained`, what the invariants of the modes are for.
+    pub fn in_words(&self, explained: bool) -> String {
+        let norms = &self.errors.worst_by_invariant;
+        let norms: Vec<(&str, f64)> = norms.iter().map(|n| (n.invariant.as_str(), n.value)).collect();
+        match norms.is_empty() && self.negative_masses == 0 {
+            true => "not compared".to_owned(),
+            false => in_words(self.negative_masses, &self.effect, &norms, explained),
         }
     }
 }

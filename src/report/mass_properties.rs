@@ -107,7 +107,8 @@ fn largest_product(inertia: &Matrix3<f64>) -> f64 {
     if products.iter().any(|p| p.is_nan()) { f64::NAN } else { products.into_iter().fold(0.0, f64::max) }
 }
 
-fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
+/// Ascending. Unit: mass length^2.
+pub(super) fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
     let mut moments: [f64; 3] = inertia.diagonal().into();
     // Not finite: the iteration would not end with anything better.
     let diagonal = largest_product(inertia) <= DIAGONAL;

@@ -20,6 +20,7 @@ mod identities;
 mod lacks;
 mod line_chart;
 mod lumped;
+mod lumped_effect;
 mod markup;
 mod mass_properties;
 mod numbers;
@@ -32,6 +33,7 @@ mod selection;
 mod selection_cases;
 mod selection_verdict;
 mod simulation;
+mod summary;
 mod term_facts;
 mod text;
 #[cfg(feature = "hdf5")]
@@ -52,6 +54,7 @@ pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
+pub use summary::summary;
 pub use term_facts::dropped_text;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};

@@ -274,13 +274,18 @@ impl<'a> SelectionFacts<'a> {
         format!("{} of {}: {}", self.modes.kept.len(), self.modes.of, self.modes.reason)
     }
 
-    fn text(&self) -> String {
+    /// The five lines of the verdict.
+    pub fn summary(&self) -> String {
         let mut page = Page(String::new());
         page.entry("Selection", &format!("{}: {}", self.scene, self.body));
         for (label, line) in self.verdict.lines() {
             page.entry(label, line);
         }
-        page.0.push_str("\nDetails\n");
+        page.0
+    }
+
+    fn text(&self) -> String {
+        let mut page = Page(self.summary() + "\nDetails\n");
         for term in &self.terms {
             page.entry(term.group, &Self::verdict(term));
         }

@@ -1,4 +1,4 @@
-//! The summary that an engineer reads in ten seconds.
+//! All that is known of a body, as text for a terminal.
 
 use super::Facts;
 use super::facts::RunFacts;
@@ -10,7 +10,7 @@ use crate::base::diagnostic::{Diagnostic, Severity};
 /// Columns of a terminal that every terminal has.
 const WIDTH: usize = 80;
 /// Columns of the labels.
-const LABEL: usize = 12;
+pub(super) const LABEL: usize = 12;
 /// Stands for a space at which a line must not end.
 const KEEP: &str = "\u{a0}";
 /// Lines that one entry may take: long names end in an ellipsis.
@@ -25,13 +25,17 @@ const NEGLIGIBLE: f64 = 1e-9;
 pub(super) fn render(facts: &Facts) -> String {
     let mut page = Page(String::new());
     heading(&mut page, facts);
+    page.gap();
     modes(&mut page, facts);
+    page.gap();
     lumped(&mut page, facts);
+    page.gap();
     if let Some(run) = &facts.run {
         timing(&mut page, run);
     }
     diagnostics_lines(&mut page, &facts.diagnostics);
-    page.0
+    page.0.truncate(page.0.trim_end().len());
+    page.0 + "\n"
 }
 
 /// Lines of a label and its text.
@@ -40,17 +44,15 @@ pub(super) struct Page(pub String);
 impl Page {
     /// Adds a text under a label, wrapped at spaces.
     pub fn entry(&mut self, label: &str, text: &str) {
-        let mut lines = wrapped(text, WIDTH - LABEL);
-        if lines.len() > LINES {
-            lines.truncate(LINES);
-            if let Some(last) = lines.last_mut() {
-                *last = last.chars().take(WIDTH - LABEL - 2).collect::<String>() + " …";
-            }
+        for line in entry_lines(label, text, LINES) {
+            self.0.push_str(&line);
+            self.0.push('\n');
         }
-        for (i, line) in lines.iter().enumerate() {
-            let label = if i == 0 { label } else { "" };
-            let padded = format!("{label:LABEL$}{line}").replace(KEEP, " ");
-            self.0.push_str(padded.trim_end());
+    }
+
+    /// Adds an empty line between two groups of entries.
+    fn gap(&mut self) {
+        if !self.0.is_empty() && !self.0.ends_with("\n\n") {
             self.0.push('\n');
         }
     }
@@ -64,6 +66,22 @@ impl Page {
             self.entry("", &format!("and {} more", items.len() - LISTED));
         }
     }
+}
+
+/// The lines of a text under a label, `most` at the most.
+pub(super) fn entry_lines(label: &str, text: &str, most: usize) -> Vec<String> {
+    let mut lines = wrapped(text, WIDTH - LABEL);
+    if lines.len() > most {
+        lines.truncate(most);
+        if let Some(last) = lines.last_mut() {
+            *last = last.chars().take(WIDTH - LABEL - 2).collect::<String>() + " …";
+        }
+    }
+    let labels = std::iter::once(label).chain(std::iter::repeat(""));
+    let line = |(label, line): (&str, String)| {
+        format!("{label:LABEL$}{line}").replace(KEEP, " ").trim_end().to_owned()
+    };
+    labels.zip(lines).map(line).collect()
 }
 
 /// Lines of at most `width` characters; words that are longer are broken.
@@ -92,13 +110,13 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-fn triple(values: &[f64; 3], unit: &str) -> String {
+pub(super) fn triple(values: &[f64; 3], unit: &str) -> String {
     let [x, y, z] = values.map(|v| significant(v, 6));
     format!("{x}, {y}, {z} {unit}")
 }
 
 /// Three coordinates; what is rounding compared with `size` is zero.
-fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
+pub(super) fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
     triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
 }
 
@@ -207,7 +225,7 @@ fn errors(errors: &Errors) -> String {
     if told.is_empty() { "no error above 1e-9".to_owned() } else { format!("errors {}", told.join(", ")) }
 }
 
-fn own_modes(lumped: &LumpedModesFacts) -> String {
+pub(super) fn own_modes(lumped: &LumpedModesFacts) -> String {
     if !lumped.done {
         return format!("not done: {}", plain(&lumped.remark));
     }

@@ -443,8 +443,10 @@ fn inspect_tells_what_the_file_holds() {
     let converted = done(folder.path(), "convert model.toml -o b.h5 --modes 9 --json").results();
     let text = done(folder.path(), "inspect b.h5").out;
     assert!(text.contains("45 nodes, 135 degrees of freedom, consistent mass"), "{text}");
-    assert!(text.contains("9 flexible") && text.contains("proved: 9 flexible + 6 rigid modes"), "{text}");
-    assert!(!text.contains("wall"), "{text}");
+    assert!(text.contains("9 flexible") && text.contains("proved      9 flexible + 6 rigid modes"), "{text}");
+    assert!(!text.contains("wall") && !text.contains("frequency"), "{text}");
+    let all = done(folder.path(), "inspect b.h5 --verbose").out;
+    assert!(all.contains("proved: 9 flexible + 6 rigid modes") && all.contains("\nfrequency"), "{all}");
     let json = done(folder.path(), "inspect b.h5 --json").results();
     for key in ["model", "body", "modes", "completeness", "lumped"] {
         assert_eq!(json[key], converted[key], "{key}");
@@ -452,6 +454,17 @@ fn inspect_tells_what_the_file_holds() {
     assert_eq!(json["run"], Value::Null);
     let structure = done(folder.path(), "inspect b.h5 --structure").json().to_string();
     assert!(structure.contains("shape") && structure.contains("W2"), "{structure}");
+}
+
+#[test]
+fn the_summary_says_what_is_approximate() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = crate::support::program::fixtures().join("models/plane_frame/model.toml");
+    let line = format!("convert {} -o b.h5 --modes 4 --storage f32", model.display());
+    let text = done(folder.path(), &line).out;
+    for part in ["PLANE model", "take the rotations of nodes as small", "rounded to 32-bit floats"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
 }
 
 /// Error norms of one scheme of a report.
@@ -537,7 +550,9 @@ fn fast_accuracy_says_not_proved_everywhere() {
     assert!(done(folder.path(), "inspect b.h5").out.contains("NOT PROVED"));
     assert_eq!(done(folder.path(), "inspect b.h5 --json").results()["completeness"]["proved"], false);
     let proved = done(folder.path(), "convert model.toml -o c.h5");
-    assert!(proved.out.contains("proved: 20 flexible + 6 rigid modes") && !proved.err.contains("FB507"));
+    assert!(
+        proved.out.contains("\nproved      20 flexible + 6 rigid modes") && !proved.err.contains("FB507")
+    );
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use crate::support::report_bodies::{engine_mount, run_data};
 use flexbody::base::diagnostic::{Code, Diagnostic};
-use flexbody::body::flex_body::{FlexBody, Guarantee, Parts};
+use flexbody::body::flex_body::{FlexBody, Guarantee, MassStructure, Parts, Storage};
 use flexbody::body::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, identities};
+use flexbody::model::{BodyNumber, Coupling};
 use flexbody::report::{
-    Facts, Format, LumpedModes, RunData, diagnostics_json, identities_json, identities_text, render,
+    Facts, Format, LumpedModes, RunData, diagnostics_json, identities_json, identities_text, render, summary,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -52,6 +53,7 @@ fn golden(name: &str, found: &str) {
 #[test]
 fn the_three_formats_are_these_bytes() {
     let facts = Facts::new(&engine_mount(), &run_data());
+    golden("summary.txt", &summary(&facts, false));
     golden("report.txt", &render(&facts, Format::Text));
     golden("report.json", &render(&facts, Format::Json));
     golden("report.html", &render(&facts, Format::Html));
@@ -127,19 +129,58 @@ proptest! {
         let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).unwrap();
         let errors: Vec<_> = schema().iter_errors(&json).map(|e| e.to_string()).collect();
         prop_assert!(errors.is_empty(), "{errors:?}");
-        let text = render(&facts, Format::Text);
-        for line in text.lines() {
-            prop_assert!(line.chars().count() <= 80, "{line}");
-            prop_assert!(!line.contains(|c: char| c.is_control()), "{line:?}");
+        for text in [render(&facts, Format::Text), summary(&facts, false)] {
+            for line in text.lines() {
+                prop_assert!(line.chars().count() <= 80, "{line}");
+                prop_assert!(!line.contains(|c: char| c.is_control()), "{line:?}");
+            }
         }
         well_formed(&render(&facts, Format::Html));
     }
 }
 
+/// Warnings and interfaces take lines of their own.
 #[test]
-fn the_summary_of_a_usual_run_fits_a_screen() {
-    let text = text(&engine_mount(), &run_data());
-    assert!(text.lines().count() <= 30, "{text}");
+fn the_summary_of_a_usual_body_is_read_in_seconds() {
+    let body = changed(|parts| parts.interfaces.clear());
+    let run = RunData { diagnostics: Vec::new(), ..run_data() };
+    let told = summary(&Facts::new(&body, &run), false);
+    let lines = told.lines().filter(|line| !line.is_empty()).count();
+    assert!(lines <= 14 && told.lines().count() <= 18, "{told}");
+}
+
+/// What limits the use of a body is never left to the report.
+#[test]
+fn the_summary_keeps_what_the_body_cannot_do() {
+    let told = |change: &dyn Fn(&mut Parts)| {
+        let text = summary(&Facts::new(&changed(change), &RunData::default()), false);
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let has = |change: &dyn Fn(&mut Parts), part: &str| {
+        let told = told(change);
+        assert!(told.contains(part), "{part}: {told}");
+    };
+    has(&|_| {}, "row sums: 312 NEGATIVE masses, smallest inertia 100 % too large, W2 31 % off");
+    has(&|p| p.certificate.proved_modes = None, "NOT PROVED");
+    has(&|p| p.units = flexbody::base::units::UnitSystem::default(), "m, kg, s assumed, none stated");
+    has(&|p| p.source.mass_structure = MassStructure::Diagonal, "DIAGONAL mass");
+    has(&|p| p.storage = Storage::F32, "rounded to 32-bit floats");
+    has(&|p| p.source.number = Some(BodyNumber { number: 1, of: 2 }), "body 1 of 2");
+    has(&|p| p.interfaces[0].coupling = Some(Coupling::Rigid), "rigid but DEFORMS");
+    let warned = summary(&Facts::new(&engine_mount(), &run_data()), false);
+    assert!(line(&warned, "warnings").contains("FB510 rigid modes reach"), "{warned}");
+}
+
+#[test]
+fn colours_are_in_the_summary_where_they_are_asked_for_alone() {
+    let facts = Facts::new(&changed(|p| p.certificate.proved_modes = None), &run_data());
+    let (plain, coloured) = (summary(&facts, false), summary(&facts, true));
+    assert!(!plain.contains('\u{1b}') && coloured.contains("\u{1b}[31mNOT PROVED"), "{coloured}");
+    let mut without = String::new();
+    for (i, piece) in coloured.split("\u{1b}[").enumerate() {
+        without.push_str(if i == 0 { piece } else { piece.split_once('m').expect("a code ends").1 });
+    }
+    assert_eq!(without, plain, "colours change nothing else");
 }
 
 #[test]
