@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Draws docs/images/view.png: the page that `flexbody view` makes of the connecting rod of the fixtures, in Chromium.
+"""Draws docs/images/view.png and report.png: the pages that `flexbody view` and `convert --report` make of the connecting rod of the
+fixtures, in Chromium.
 
     cargo build --release --locked && python3 docs/images/make_view.py
 
@@ -19,14 +20,14 @@ MODEL = ROOT / "fixtures/models/connecting_rod"
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
 OPTIONS = (
     "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
-    "--disable-background-networking --disable-component-update --disable-sync --window-size=1200,720"
+    "--disable-background-networking --disable-component-update --disable-sync --hide-scrollbars"
 ).split()
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--program", default=ROOT / "target/release/flexbody")
-    parser.add_argument("--output", default=ROOT / "docs/images/view.png")
+    parser.add_argument("--folder", type=Path, default=ROOT / "docs/images")
     parser.add_argument("--mode", default=1)
     arguments = parser.parse_args()
     browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
@@ -43,11 +44,12 @@ def main():
         def run(*words):
             subprocess.run([arguments.program, *words], cwd=place, check=True, capture_output=True)
 
-        run("convert", "model.toml", "-o", "rod.flex.h5")
-        run("view", "rod.flex.h5", "-o", "rod.html")
-        page = f"file://{place}/rod.html#mode={arguments.mode}&phase=0.25"
-        shot = [f"--screenshot={Path(arguments.output).resolve()}", f"--user-data-dir={place}/browser"]
-        subprocess.run([browser, *OPTIONS, *shot, page], check=True, capture_output=True)
+        run("convert", "model.toml", "-o", "rod.flex.h5", "--report", "report.html")
+        run("view", "rod.flex.h5", "-o", "view.html")
+        for name, size in (("view", "1200,720"), ("report", "1200,890")):
+            page = f"file://{place}/{name}.html#mode={arguments.mode}&phase=0.25"
+            shot = [f"--screenshot={(arguments.folder / name).resolve()}.png", f"--user-data-dir={place}/browser"]
+            subprocess.run([browser, *OPTIONS, f"--window-size={size}", *shot, page], check=True, capture_output=True)
 
 
 if __name__ == "__main__":

@@ -511,6 +511,9 @@ pub struct InspectArguments {
     /// Print groups, datasets, shapes and attributes as JSON instead (schemas/flexbody-file.schema.json)
     #[arg(long)]
     pub structure: bool,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE", conflicts_with = "structure")]
+    pub report: Vec<PathBuf>,
     /// Print all that is known of the body instead of a summary
     #[arg(short, long)]
     pub verbose: bool,

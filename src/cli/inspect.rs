@@ -1,9 +1,11 @@
 //! `flexbody inspect`.
 
 use super::arguments::InspectArguments;
-use super::outcome::Outcome;
+use super::outcome::{Outcome, refuse_warnings};
+use super::places::{format_of, refuse_replacing};
 use super::terminal::body_text;
 use crate::base::error::Result;
+use crate::base::output::OutputSlot;
 use crate::formats::flex_body_file;
 use crate::report::{Facts, Format, RunData, render};
 
@@ -17,8 +19,21 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
             passed: true,
         });
     }
+    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    refuse_replacing(std::iter::once(&arguments.body), arguments.report.iter())?;
+    let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let (body, diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
     let facts = Facts::new(&body, &RunData::default());
+    if !reports.is_empty() {
+        refuse_warnings(arguments.printing, &diagnostics)?;
+        // A report says what was found in the file as well.
+        let found = RunData { diagnostics: diagnostics.clone(), ..RunData::default() };
+        let facts = Facts::new(&body, &found);
+        for (slot, format) in reports.iter().zip(formats) {
+            slot.fill(render(&facts, format).as_bytes())?;
+        }
+        OutputSlot::commit_all(reports)?;
+    }
     let text = body_text(&facts, arguments.verbose, arguments.printing);
     let json = render(&facts, Format::Json);
     Ok(Outcome { text, json, diagnostics, passed: true })

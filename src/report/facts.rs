@@ -25,7 +25,10 @@ const MINOR: u32 = 5;
 /// Numbers are in the units of the model, frequencies in hertz, times in seconds. A number that is not finite
 /// is `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Facts {
+pub struct Facts<'b> {
+    /// What is drawn of it is computed where a page needs it.
+    #[serde(skip)]
+    pub(super) flex_body: &'b FlexBody,
     format: &'static str,
     format_major: u32,
     format_minor: u32,
@@ -244,14 +247,15 @@ fn as_map<S: Serializer>(pairs: &[(String, u64)], serializer: S) -> Result<S::Ok
     serializer.collect_map(pairs.iter().map(|(name, value)| (name, value)))
 }
 
-impl Facts {
+impl<'b> Facts<'b> {
     /// Collects the facts of `body` and of the `run` that made it; [`RunData::default`] for a body whose run
     /// is not known (read from a file).
-    pub fn new(body: &FlexBody, run: &RunData) -> Self {
+    pub fn new(body: &'b FlexBody, run: &RunData) -> Self {
         let frequency_hz = body.frequencies_hz();
         let lumped_modes = run.lumped_modes.iter().map(|l| LumpedModesFacts::of(l, &frequency_hz)).collect();
         let known = RunData { diagnostics: Vec::new(), lumped_modes: Vec::new(), ..run.clone() };
         Self {
+            flex_body: body,
             format: "flexbody-report",
             format_major: MAJOR,
             format_minor: MINOR,

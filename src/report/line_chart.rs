@@ -1,6 +1,6 @@
 //! Quantities over time as lines: inline SVG, readable without colour.
 
-use super::markup::escape;
+use super::markup::{escape, printed};
 use super::numbers::significant;
 
 /// Places on the drawing, in its own units.
@@ -30,7 +30,7 @@ pub(super) fn line_chart(title: &str, time: &[f64], lines: &[Line], time_unit: &
     let title = escape(title);
     let mut svg = format!(
         "<figure><figcaption>{title} [{}]</figcaption>\n<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title} over time\">\n",
-        escape(unit)
+        printed(unit)
     );
     scales.draw_levels(&mut svg);
     scales.draw_times(&mut svg, time_unit);

@@ -2,7 +2,7 @@
 //! what its modes take part in.
 
 use super::mass_properties::{centre_of_mass, inertia_about_com, principal_moments};
-use super::numbers::{counted, significant};
+use super::numbers::significant;
 use crate::body::invariants::Invariants;
 
 /// Errors up to this are rounding.
@@ -31,8 +31,9 @@ impl LumpedEffect {
         }
     }
 
-    /// The largest change, where it is no rounding: `smallest moment of inertia 1.4 % too large`.
-    fn in_words(&self, of_inertia: &str) -> Option<String> {
+    /// The largest change, where it is no rounding: `smallest inertia +1.4 %`, or
+    /// `smallest principal moment of inertia 1.4 % too large`.
+    fn in_words(&self, explained: bool) -> Option<String> {
         let all = [
             ("mass", self.mass),
             ("centre", self.centre),
@@ -44,7 +45,11 @@ impl LumpedEffect {
         Some(match what {
             "mass" => format!("mass {}", off(change)),
             "centre" => format!("centre of mass off by {} of the radius of gyration", rough(change)),
-            which => format!("{which} {of_inertia} {}", off(change)),
+            which if explained => format!("{which} principal moment of inertia {}", off(change)),
+            which if change.is_nan() => format!("{which} inertia not known"),
+            which => {
+                format!("{which} inertia {}{}", if change > 0.0 { "+" } else { "-" }, rough(change.abs()))
+            }
         })
     }
 }
@@ -96,7 +101,7 @@ pub(super) fn meaning(invariant: &str) -> &'static str {
 }
 
 /// All that is wrong with lumped masses, worst first where it is not physical at all: `410 NEGATIVE masses,
-/// smallest inertia 1.4 % too large, W2 8 % off`; with `explained`, what W2 is for.
+/// smallest inertia +1.4 %, W2 8 % off`; with `explained`, what W2 is for.
 ///
 /// `norms` are the worst ones by the name of their invariant.
 pub(super) fn in_words(
@@ -106,11 +111,12 @@ pub(super) fn in_words(
     explained: bool,
 ) -> String {
     let mut found = Vec::new();
-    if negative_masses > 0 {
-        let noun = if negative_masses == 1 { "NEGATIVE mass" } else { "NEGATIVE masse" };
-        found.push(counted(negative_masses, noun));
+    match negative_masses {
+        0 => {}
+        1 => found.push("1 NEGATIVE mass".to_owned()),
+        count => found.push(format!("{count} NEGATIVE masses")),
     }
-    found.extend(effect.in_words(if explained { "principal moment of inertia" } else { "inertia" }));
+    found.extend(effect.in_words(explained));
     let modal = norms.iter().copied().filter(|(invariant, _)| !meaning(invariant).is_empty());
     if let Some((invariant, error)) = modal.reduce(worse).filter(|(_, error)| is_error(*error)) {
         let name = invariant.replace('_', " ");
@@ -130,7 +136,7 @@ mod tests {
         let norms = [("I0", 0.9), ("W1", 0.02), ("W2", 0.0823)];
         assert_eq!(
             in_words(410, &effect, &norms, false),
-            "410 NEGATIVE masses, smallest inertia 1.4 % too large, W2 8.2 % off"
+            "410 NEGATIVE masses, smallest inertia +1.4 %, W2 8.2 % off"
         );
         assert!(in_words(1, &effect, &norms, true).starts_with("1 NEGATIVE mass, "));
         let none = LumpedEffect { mass: 0.0, moments: [0.0; 3], centre: 0.0 };

@@ -5,13 +5,36 @@ use crate::base::diagnostic::{Diagnostic, Severity};
 
 const STYLE: &str = include_str!("report.css");
 
+/// Opens what is folded before a page is printed.
+const UNFOLD: &str = "<script>addEventListener(\"beforeprint\", () => document.querySelectorAll(\"details\").forEach((fold) => (fold.open = true)));</script>\n";
+
+/// What a page is about.
+pub(super) struct Page<'a> {
+    pub name: &'a str,
+    pub kind: &'a str,
+    pub generator: &'a str,
+}
+
+impl Page<'_> {
+    /// The whole page; `content` and `scripts` are markup, `style` is for this page alone.
+    pub fn with(&self, style: &str, content: &str, scripts: &str) -> String {
+        let (name, generator) = (escape(self.name), escape(self.generator));
+        let (kind, lower) = (self.kind, self.kind.to_lowercase());
+        // A page may run what it brings, and load nothing.
+        let unfold = if content.contains("<details>") { UNFOLD } else { "" };
+        let policy = match scripts.is_empty() && unfold.is_empty() {
+            true => "",
+            false => "; script-src 'unsafe-inline'",
+        };
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'{policy}\">\n<title>{name}: {lower}</title>\n<style>\n{STYLE}{style}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p class=\"quiet\">{kind}, {generator}</p>\n</header>\n<main>\n{content}</main>\n{scripts}{unfold}</body>\n</html>\n"
+        )
+    }
+}
+
 /// A whole page about `name`; `content` is markup.
 pub(super) fn page(name: &str, kind: &str, generator: &str, content: &str) -> String {
-    let (name, generator) = (escape(name), escape(generator));
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name}: {}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p class=\"quiet\">{kind}, {generator}</p>\n</header>\n<main>\n{content}</main>\n</body>\n</html>\n",
-        kind.to_lowercase()
-    )
+    Page { name, kind, generator }.with("", content, "")
 }
 
 /// Text for element content and quoted attributes.
@@ -30,16 +53,37 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A heading.
+/// A text with units as they are printed: the 2 of `t mm^2` raised.
+pub(super) fn printed(text: &str) -> String {
+    escape(text).replace("^2", "\u{b2}").replace("^3", "\u{b3}")
+}
+
+/// A fragment as a sentence begins.
+pub(super) fn sentence(fragment: &str) -> String {
+    let mut characters = fragment.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
+}
+
+/// What is folded under a line until it is asked for, or printed; `content` is markup.
+pub(super) fn fold(html: &mut String, summary: &str, content: &str) {
+    html.push_str(&format!("<details>\n<summary>{summary}</summary>\n{content}</details>\n"));
+}
+
+/// A heading; `title` is markup.
 pub(super) fn section(html: &mut String, title: &str) {
     html.push_str(&format!("<h2>{title}</h2>\n"));
 }
 
 /// A list of terms; the values are markup.
 pub(super) fn terms<'a>(html: &mut String, items: impl IntoIterator<Item = (&'a str, String)>) {
+    terms_in_markup(html, items.into_iter().map(|(term, value)| (escape(term), value)));
+}
+
+/// A list of terms that are markup, as their values.
+pub(super) fn terms_in_markup(html: &mut String, items: impl IntoIterator<Item = (String, String)>) {
     html.push_str("<dl>\n");
     for (term, value) in items {
-        html.push_str(&format!("<dt>{}</dt><dd>{value}</dd>\n", escape(term)));
+        html.push_str(&format!("<dt>{term}</dt><dd>{value}</dd>\n"));
     }
     html.push_str("</dl>\n");
 }

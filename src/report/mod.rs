@@ -14,8 +14,13 @@ mod errors_in_words;
 mod facts;
 mod frequency_chart;
 mod geometric_stiffness;
+mod glossary;
 mod guarantee;
+mod heat_map;
 mod html;
+mod html_body;
+mod html_lumped;
+mod html_modes;
 mod identities;
 mod lacks;
 mod line_chart;
@@ -25,6 +30,7 @@ mod markup;
 mod mass_properties;
 mod numbers;
 mod output;
+mod picture;
 mod render;
 mod response;
 mod run_data;
@@ -40,6 +46,7 @@ mod text;
 mod trade;
 #[cfg(feature = "hdf5")]
 mod trade_verdict;
+mod unit_names;
 #[cfg(feature = "hdf5")]
 mod view;
 

@@ -11,7 +11,7 @@ pub enum Format {
     Json,
     /// For a terminal: at most 80 columns.
     Text,
-    /// For people and archives: one file, no scripts, nothing loaded from elsewhere.
+    /// For people and archives: one file, nothing loaded from elsewhere, readable without scripts.
     Html,
 }
 
@@ -34,7 +34,7 @@ pub(super) fn json(facts: &impl Serialize) -> String {
 }
 
 /// Writes the facts, ending with a line break.
-pub fn render(facts: &Facts, format: Format) -> String {
+pub fn render(facts: &Facts<'_>, format: Format) -> String {
     match format {
         Format::Json => json(facts),
         Format::Text => text::render(facts),

@@ -3,7 +3,7 @@
 use super::Format;
 use super::facts::UnitFacts;
 use super::line_chart::{Line, STYLES, line_chart};
-use super::markup::{diagnostics_table, escape, page, section, terms};
+use super::markup::{diagnostics_table, escape, page, printed, section, terms};
 use super::numbers::{counted, significant};
 use super::render::json;
 use super::run_data::RunData;
@@ -191,16 +191,6 @@ impl<'a> SimulationFacts<'a> {
         }
     }
 
-    fn unit(&self, mass: i32, length: i32, time: i32) -> String {
-        let powers = [(self.units.mass(), mass), (self.units.length(), length), (self.units.time(), time)];
-        let factor = |(name, power): (String, i32)| match power {
-            0 => None,
-            1 => Some(name),
-            p => Some(format!("{name}^{p}")),
-        };
-        powers.into_iter().filter_map(factor).collect::<Vec<_>>().join(" ")
-    }
-
     fn method_in_words(&self) -> String {
         match self.method {
             MethodFacts::Adaptive { order, tolerance } => {
@@ -222,7 +212,7 @@ impl<'a> SimulationFacts<'a> {
     }
 
     fn energy_in_words(&self, energy: &EnergyFacts) -> String {
-        let unit = self.unit(1, 2, -2);
+        let unit = self.units.energy();
         format!(
             "kinetic {} + elastic {} {unit}",
             significant(energy.kinetic, 6),
@@ -233,7 +223,7 @@ impl<'a> SimulationFacts<'a> {
     fn gravity_in_words(&self) -> Option<String> {
         let [x, y, z] = self.gravity?.map(|g| significant(g, 6));
         let turned = if self.largest_spin > 0.0 { " at the start" } else { "" };
-        Some(format!("{x}, {y}, {z} {} along the axes of the model{turned}", self.unit(0, 1, -2)))
+        Some(format!("{x}, {y}, {z} {} along the axes of the model{turned}", self.units.acceleration()))
     }
 
     fn spin_in_words(&self) -> String {
@@ -247,10 +237,10 @@ impl<'a> SimulationFacts<'a> {
 
     /// What carries the body, and what that and the reference conditions have to bear.
     fn support_in_words(&self) -> Vec<(&'static str, String)> {
-        let torque = |value: f64| format!("{} {}", significant(value, 5), self.unit(1, 2, -2));
+        let torque = |value: f64| format!("{} {}", significant(value, 5), self.units.torque());
         let mut words = Vec::from_iter(self.carried_in_words().map(|carried| ("Carried", carried)));
         if let Some(ReactionFacts { largest_force, largest_torque }) = self.reaction {
-            let force = format!("{} {}", significant(largest_force, 5), self.unit(1, 1, -2));
+            let force = format!("{} {}", significant(largest_force, 5), self.units.force());
             let torque = torque(largest_torque);
             words.push(("Reaction", format!("force at most {force}, torque at most {torque}")));
         }
@@ -285,7 +275,7 @@ impl<'a> SimulationFacts<'a> {
         page.entry("", &format!("{} at the end", self.energy_in_words(&self.last)));
         if self.last.work != 0.0 {
             let work = significant(self.last.work, 6);
-            page.entry("", &format!("work of loads and damping {work} {}", self.unit(1, 2, -2)));
+            page.entry("", &format!("work of loads and damping {work} {}", self.units.energy()));
         }
         page.entry(
             "Drift",
@@ -337,7 +327,6 @@ impl<'a> SimulationFacts<'a> {
             self.work_in_words()
         );
         section(&mut html, "Motion");
-        let units = |mass, length, time| escape(&self.unit(mass, length, time));
         let mut items = vec![
             ("Body", escape(self.body)),
             (
@@ -349,9 +338,12 @@ impl<'a> SimulationFacts<'a> {
                     counted(self.instants, "instant")
                 ),
             ),
-            ("Energy at the start", escape(&self.energy_in_words(&self.first))),
-            ("Energy at the end", escape(&self.energy_in_words(&self.last))),
-            ("Work of loads and damping", format!("{} {}", significant(self.last.work, 6), units(1, 2, -2))),
+            ("Energy at the start", printed(&self.energy_in_words(&self.first))),
+            ("Energy at the end", printed(&self.energy_in_words(&self.last))),
+            (
+                "Work of loads and damping",
+                format!("{} {}", significant(self.last.work, 6), printed(&self.units.energy())),
+            ),
             ("Largest spin", escape(&self.spin_in_words())),
             (
                 "Largest deflection",
@@ -361,8 +353,8 @@ impl<'a> SimulationFacts<'a> {
                 ),
             ),
         ];
-        items.extend(self.gravity_in_words().map(|gravity| ("Gravity", escape(&gravity))));
-        items.extend(self.support_in_words().into_iter().map(|(what, words)| (what, escape(&words))));
+        items.extend(self.gravity_in_words().map(|gravity| ("Gravity", printed(&gravity))));
+        items.extend(self.support_in_words().into_iter().map(|(what, words)| (what, printed(&words))));
         for point in &self.points {
             let [x, y, z] = point.last_place.map(|v| significant(v, 6));
             items.push((
@@ -391,7 +383,7 @@ impl<'a> SimulationFacts<'a> {
         let components = |vectors: &[Vector3<f64>]| -> Vec<Line> {
             (0..3).map(|k| line(["x", "y", "z"][k], vectors.iter().map(|v| v[k]).collect())).collect()
         };
-        let energy = self.unit(1, 2, -2);
+        let energy = self.units.energy();
         let along = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
         let internal = vec![
             line("kinetic, no flight", along(|b| b.kinetic - b.flight)),
@@ -406,21 +398,21 @@ impl<'a> SimulationFacts<'a> {
         chart(
             "Angular velocity, axes of the model",
             components(&omega),
-            format!("rad {}^-1", self.units.time()),
+            format!("rad/{}", self.units.time()),
         );
         chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
         for path in paths {
             let title = format!("Deflection of {}, axes of the model", path.name);
             chart(&title, components(&path.deflection), self.units.length().clone());
             let title = format!("Acceleration of {}, world axes", path.name);
-            chart(&title, components(&path.acceleration), self.unit(0, 1, -2));
+            chart(&title, components(&path.acceleration), self.units.acceleration());
         }
         if let Some(reactions) = reactions {
             let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
             chart(
                 "Torque of the prescribed motion, axes of the model",
                 components(&torques),
-                self.unit(1, 2, -2),
+                self.units.torque(),
             );
         }
     }

@@ -13,7 +13,7 @@ use crate::base::diagnostic::Severity;
 const LISTED: usize = 4;
 
 /// The summary, with labels in colour where a terminal is to show them.
-pub fn summary(facts: &Facts, coloured: bool) -> String {
+pub fn summary(facts: &Facts<'_>, coloured: bool) -> String {
     let mut summary = Summary { text: String::new(), coloured };
     body(&mut summary, facts);
     summary.gap();
@@ -100,7 +100,7 @@ impl Summary {
     }
 }
 
-fn body(summary: &mut Summary, facts: &Facts) {
+fn body(summary: &mut Summary, facts: &Facts<'_>) {
     let model = &facts.model;
     let number = model.body.as_ref().map_or(String::new(), |b| format!(", body {} of {}", b.number, b.of));
     let tone = if model.units.stated { Tone::Title } else { Tone::Warning };
@@ -136,7 +136,7 @@ fn interface(interface: &InterfaceFacts) -> String {
     format!("{}: {}{coupling}{bends}", plain(&interface.name), counted(interface.n_nodes, "node"))
 }
 
-fn mass_properties(summary: &mut Summary, facts: &Facts) {
+fn mass_properties(summary: &mut Summary, facts: &Facts<'_>) {
     let (body, units) = (&facts.body, &facts.model.units);
     let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
     let centre = coordinates(&body.centre_of_mass, size, &units.length());
@@ -146,7 +146,7 @@ fn mass_properties(summary: &mut Summary, facts: &Facts) {
     summary.entry(Tone::Plain, "inertia", &format!("{inertia} (principal)"), 2);
 }
 
-fn modes(summary: &mut Summary, facts: &Facts) {
+fn modes(summary: &mut Summary, facts: &Facts<'_>) {
     let (modes, completeness) = (&facts.modes, &facts.completeness);
     let range = match modes.frequency_hz.as_slice() {
         [] => String::new(),
@@ -173,7 +173,7 @@ fn modes(summary: &mut Summary, facts: &Facts) {
 }
 
 /// What the body does not hold, or holds only so far.
-fn limits(summary: &mut Summary, facts: &Facts) {
+fn limits(summary: &mut Summary, facts: &Facts<'_>) {
     if let Some(damping) = &facts.modes.damping {
         summary.entry(Tone::Plain, "damping", &damping.in_words(), 2);
     }
@@ -184,7 +184,7 @@ fn limits(summary: &mut Summary, facts: &Facts) {
     summary.list("left out", &dropped, |term| (Tone::Warning, term.in_words()));
 }
 
-fn lumped(summary: &mut Summary, facts: &Facts) {
+fn lumped(summary: &mut Summary, facts: &Facts<'_>) {
     summary.list("lumped", &facts.lumped, |lumped| {
         let tone = if lumped.negative_masses > 0 { Tone::Warning } else { Tone::Plain };
         (tone, format!("{}: {}", plain(scheme_in_words(&lumped.scheme)), lumped.in_words(false)))
@@ -195,7 +195,7 @@ fn lumped(summary: &mut Summary, facts: &Facts) {
 }
 
 /// Errors and warnings; notes stand on stderr and in the report.
-fn diagnostics(summary: &mut Summary, facts: &Facts) {
+fn diagnostics(summary: &mut Summary, facts: &Facts<'_>) {
     for (severity, label, tone) in
         [(Severity::Error, "errors", Tone::Bad), (Severity::Warning, "warnings", Tone::Warning)]
     {

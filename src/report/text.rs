@@ -22,7 +22,7 @@ const LISTED: usize = 6;
 /// Errors up to this are rounding.
 const NEGLIGIBLE: f64 = 1e-9;
 
-pub(super) fn render(facts: &Facts) -> String {
+pub(super) fn render(facts: &Facts<'_>) -> String {
     let mut page = Page(String::new());
     heading(&mut page, facts);
     page.gap();
@@ -120,7 +120,7 @@ pub(super) fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
     triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
 }
 
-fn heading(page: &mut Page, facts: &Facts) {
+fn heading(page: &mut Page, facts: &Facts<'_>) {
     let (model, body) = (&facts.model, &facts.body);
     let units = &model.units;
     page.entry("body", &format!("{} ({})", plain(&model.name), units.in_words()));
@@ -147,7 +147,7 @@ fn heading(page: &mut Page, facts: &Facts) {
     page.list("interface", &model.interfaces, |i| format!("{}: {}", plain(&i.name), i.in_words()));
 }
 
-fn modes(page: &mut Page, facts: &Facts) {
+fn modes(page: &mut Page, facts: &Facts<'_>) {
     let modes = &facts.modes;
     let hz = &modes.frequency_hz;
     let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
@@ -198,7 +198,7 @@ fn modes(page: &mut Page, facts: &Facts) {
     page.entry("noise", &format!("rigid modes at {noise} of the first eigenvalue; K R {residual}"));
 }
 
-fn lumped(page: &mut Page, facts: &Facts) {
+fn lumped(page: &mut Page, facts: &Facts<'_>) {
     page.list("lumped", &facts.lumped, |l| {
         let negative = match l.negative_masses {
             0 => String::new(),

@@ -1,29 +1,21 @@
 //! The page that shows a body in motion: one file with everything in it, drawn by WebGL. What is drawn is
 //! decided and computed here; the script of the page turns it.
 
-mod arrays;
-mod drawing;
 mod motion;
 
 use super::Format;
-use super::completeness::is_static;
 use super::facts::UnitFacts;
-use super::mass_properties::{centre_of_mass, inertia_about_com};
 use super::numbers::{bytes, counted, plain, significant};
+use super::picture::{Drawing, HALF_STEP, Packed, SCRIPT, ShownBody, script};
 use super::render::json;
 use crate::base::error::Result;
-use crate::base::provenance;
-use crate::body::flex_body::{FlexBody, Interface};
-use crate::body::invariants::principal_axes;
+use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file::RecordedMotion;
-use arrays::{Packed, script};
-use drawing::Drawing;
 use motion::ShownMotion;
 use serde::Serialize;
 
 const PAGE: &str = include_str!("view/page.html");
 const STYLE: &str = include_str!("view/view.css");
-const SCRIPT: &str = include_str!("view/view.js");
 
 /// Room for positions, shapes and mesh in a page, in bytes: with the motion of a simulation and the script a
 /// page stays below 10 MB.
@@ -65,11 +57,12 @@ impl View {
     pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
         let staged = motion.map(|motion| motion::staged(body, motion)).transpose()?;
         let body = staged.as_ref().unwrap_or(body);
-        let drawing = Drawing::new(body, triangles, ROOM);
+        let drawing = Drawing::new(body, triangles, ROOM, usize::MAX);
         let shown = motion.map(|motion| ShownMotion::new(motion, body));
         let mut arrays = drawing.arrays();
         arrays.extend(shown.iter().flat_map(ShownMotion::arrays));
-        let data = PageData::new(body, &drawing, shown.as_ref());
+        let told = terms(body, &drawing, shown.as_ref());
+        let data = ShownBody::new(body, &drawing, told, shown.as_ref());
         let mut facts = ViewFacts {
             model: body.source().name.clone(),
             modes: body.n_modes(),
@@ -79,7 +72,7 @@ impl View {
             triangles: drawing.triangles(),
             edges: drawing.edges(),
             position_error: drawing.position_error(),
-            shape_error: drawing::HALF_STEP,
+            shape_error: HALF_STEP,
             instants: shown.as_ref().map(ShownMotion::instants),
             bytes: 0,
         };
@@ -124,99 +117,6 @@ impl ViewFacts {
     }
 }
 
-/// The texts and few numbers of a page, as its script reads them. Places are in model axes.
-#[derive(Serialize)]
-#[serde(rename_all = "camelCase")]
-struct PageData<'a> {
-    name: String,
-    generator: String,
-    units: UnitFacts,
-    terms: Vec<(&'static str, String)>,
-    vertices: usize,
-    centre: [f64; 3],
-    half: f64,
-    radius: f64,
-    modes: Vec<PageMode>,
-    interfaces: Vec<PageInterface>,
-    centre_of_mass: [f64; 3],
-    /// Principal axes, moments ascending.
-    principal: [[f64; 3]; 3],
-    motion: Option<&'a ShownMotion>,
-}
-
-#[derive(Serialize)]
-struct PageMode {
-    label: String,
-    kind: String,
-    /// Largest component of the shape at a drawn node: what 32767 stands for.
-    scale: f64,
-    /// Largest displacement of a drawn node.
-    largest: f64,
-}
-
-#[derive(Serialize)]
-struct PageInterface {
-    name: String,
-    reference: Option<[f64; 3]>,
-    /// Drawn nodes of the interface.
-    nodes: Vec<u32>,
-    /// Displacement of the reference point in each mode, three numbers each.
-    motion: Vec<f64>,
-}
-
-impl<'a> PageData<'a> {
-    fn new(body: &FlexBody, drawing: &Drawing<'_>, motion: Option<&'a ShownMotion>) -> Self {
-        let (frame, invariants) = (body.frame(), body.invariants());
-        let axes = frame.axes * principal_axes(&inertia_about_com(invariants));
-        Self {
-            name: plain(&body.source().name),
-            generator: provenance::generator(),
-            units: UnitFacts::new(body.units()),
-            terms: terms(body, drawing, motion),
-            vertices: drawing.vertices(),
-            centre: drawing.centre(),
-            half: drawing.half(),
-            radius: drawing.radius(),
-            modes: (0..body.n_modes()).map(|j| mode(body, drawing, j)).collect(),
-            interfaces: interfaces(body, drawing),
-            centre_of_mass: frame.to_model(centre_of_mass(invariants).into()),
-            principal: [0, 1, 2].map(|k| axes.column(k).into_owned().into()),
-            motion,
-        }
-    }
-}
-
-fn mode(body: &FlexBody, drawing: &Drawing<'_>, j: usize) -> PageMode {
-    let hertz = significant(body.frequencies_hz()[j], 5);
-    let origin = body.modes().provenance.get(j).map_or("mode", String::as_str);
-    let (label, kind) = match is_static(origin) {
-        true => (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz")),
-        false => (format!("{}: {hertz} Hz", j + 1), origin.to_owned()),
-    };
-    PageMode {
-        label: plain(&label),
-        kind: plain(&kind),
-        scale: drawing.scale(j),
-        largest: drawing.largest(j),
-    }
-}
-
-fn interfaces(body: &FlexBody, drawing: &Drawing<'_>) -> Vec<PageInterface> {
-    let axes = &body.frame().axes;
-    let rotation = body.modes().rotation.as_ref().map(|rotation| rotation.as_ref());
-    let one = |interface: &Interface| {
-        let rows = interface.rows(body.nodes(), body.modes().shape.as_ref(), rotation, body.dimension());
-        let turned = rows.as_ref().map(|rows| drawing::turned(axes, rows.translation.as_ref()));
-        PageInterface {
-            name: plain(&interface.name),
-            reference: interface.reference.map(|x| body.frame().to_model(x)),
-            nodes: interface.nodes.iter().filter_map(|&node| drawing.vertex(node)).collect(),
-            motion: turned.unwrap_or_else(|| vec![0.0; 3 * body.n_modes()]),
-        }
-    };
-    body.interfaces().iter().map(one).collect()
-}
-
 /// What the page says of the body.
 fn terms(
     body: &FlexBody,
@@ -249,10 +149,8 @@ fn terms(
 }
 
 /// The whole page.
-fn page(title: &str, data: &PageData<'_>, arrays: &[Packed]) -> String {
-    let facts = serde_json::to_string(data).expect("structs of numbers and texts are valid JSON");
-    // No text of the data ends the element that it stands in.
-    let facts = facts.replace('<', "\\u003c");
+fn page(title: &str, data: &ShownBody<'_, ShownMotion>, arrays: &[Packed]) -> String {
+    let facts = data.json();
     let title = super::markup::escape(title);
     let arrays: String = arrays.iter().map(script).collect();
     let parts =

@@ -414,7 +414,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     assert!(!said.contains("FB54"), "{said}");
     let text = fs::read_to_string(place.join("motion.txt")).expect("a report");
     assert!(text.contains("interface bolt_base; natural frequencies"), "{text}");
-    assert!(text.contains("0, 0, -9810 mm s^-2 along the axes of the model"), "{text}");
+    assert!(text.contains("0, 0, -9810 mm/s^2 along the axes of the model"), "{text}");
 
     let manifest = read_manifest(place.join("model.toml")).expect("a manifest");
     let raw = read_model(&manifest).expect("a model");

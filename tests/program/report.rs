@@ -52,11 +52,14 @@ fn golden(name: &str, found: &str) {
 
 #[test]
 fn the_three_formats_are_these_bytes() {
-    let facts = Facts::new(&engine_mount(), &run_data());
+    let body = engine_mount();
+    let facts = Facts::new(&body, &run_data());
     golden("summary.txt", &summary(&facts, false));
     golden("report.txt", &render(&facts, Format::Text));
     golden("report.json", &render(&facts, Format::Json));
-    golden("report.html", &render(&facts, Format::Html));
+    let (page, scripts) = without_scripts(&render(&facts, Format::Html));
+    assert!(scripts.iter().any(|script| script.contains("getContext(\"webgl2\"")), "the body is drawn");
+    golden("report.html", &page);
 }
 
 #[test]
@@ -160,7 +163,7 @@ fn the_summary_keeps_what_the_body_cannot_do() {
         let told = told(change);
         assert!(told.contains(part), "{part}: {told}");
     };
-    has(&|_| {}, "row sums: 312 NEGATIVE masses, smallest inertia 100 % too large, W2 31 % off");
+    has(&|_| {}, "row sums: 312 NEGATIVE masses, smallest inertia +100 %, W2 31 % off");
     has(&|p| p.certificate.proved_modes = None, "NOT PROVED");
     has(&|p| p.units = flexbody::base::units::UnitSystem::default(), "m, kg, s assumed, none stated");
     has(&|p| p.source.mass_structure = MassStructure::Diagonal, "DIAGONAL mass");
@@ -173,7 +176,8 @@ fn the_summary_keeps_what_the_body_cannot_do() {
 
 #[test]
 fn colours_are_in_the_summary_where_they_are_asked_for_alone() {
-    let facts = Facts::new(&changed(|p| p.certificate.proved_modes = None), &run_data());
+    let body = changed(|p| p.certificate.proved_modes = None);
+    let facts = Facts::new(&body, &run_data());
     let (plain, coloured) = (summary(&facts, false), summary(&facts, true));
     assert!(!plain.contains('\u{1b}') && coloured.contains("\u{1b}[31mNOT PROVED"), "{coloured}");
     let mut without = String::new();
@@ -378,7 +382,11 @@ fn names_cannot_inject_markup_or_terminal_codes() {
     let facts = Facts::new(&body, &run);
     let html = render(&facts, Format::Html);
     well_formed(&html);
-    assert!(!html.contains("<script") && !html.contains('\u{1b}') && html.contains("&lt;script&gt;"));
+    let (page, scripts) = without_scripts(&html);
+    assert!(!html.contains("<script>alert") && !html.contains('\u{1b}') && page.contains("&lt;script&gt;"));
+    assert!(!page.contains("alert('x')"), "texts are escaped");
+    let data = scripts.iter().find(|script| script.starts_with('{')).expect("what the script is told");
+    assert!(data.contains("\\u003cscript>alert") && !data.contains('<'), "{data}");
     assert!(!render(&facts, Format::Text).contains('\u{1b}'));
     assert!(schema().is_valid(&serde_json::from_str(&render(&facts, Format::Json)).unwrap()));
 }
@@ -386,9 +394,34 @@ fn names_cannot_inject_markup_or_terminal_codes() {
 #[test]
 fn the_page_loads_nothing() {
     let html = render(&Facts::new(&engine_mount(), &run_data()), Format::Html);
-    for outside in ["http:", "https:", "src=", "href=", "url(", "@import", "<script", "<link", "onload"] {
+    for outside in ["http:", "https:", "src=", "href=", "url(", "@import", "<link", "onload", "{{"] {
         assert!(!html.contains(outside), "{outside}");
     }
+    assert!(html.contains("default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"));
+}
+
+/// Everything but the turning and moving is there without scripts: a picture, words and numbers.
+#[test]
+fn the_page_is_whole_without_scripts() {
+    let body = engine_mount();
+    let (page, _) = without_scripts(&render(&Facts::new(&body, &run_data()), Format::Html));
+    for part in [
+        "<svg class=\"still\"",
+        "812.5",
+        "kg m\u{b2}",
+        "<span class=\"error\">312 NEGATIVE masses</span>, smallest principal moment of inertia 100 % too large",
+        "the centrifugal forces on the modes (W2) 31 % off",
+        "<summary>All error norms</summary>",
+        "<abbr title=\"The invariant (3 n x 3 n)",
+        "Heat map of W3",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // A cell for every entry that is not zero: only the diagonal of W2 of this body.
+    assert_eq!(page.matches("<title>mode 1: 0.67</title>").count(), 1);
+    assert!(!page.contains("<title>modes "), "no entry of two modes");
+    let frequencies = body.frequencies_hz().len();
+    assert!(page.matches("<tr><th scope=\"row\">").count() > frequencies);
 }
 
 #[test]
@@ -424,8 +457,22 @@ fn identities_and_diagnostics_are_told_as_they_are() {
     assert_eq!(found["diagnostics"][0]["code"], "FB510");
 }
 
+/// A page whose scripts are empty, and what was in them.
+fn without_scripts(html: &str) -> (String, Vec<String>) {
+    let (mut page, mut scripts, mut rest) = (String::new(), Vec::new(), html);
+    while let Some(start) = rest.find("<script") {
+        let inside = start + rest[start..].find('>').expect("tag ends") + 1;
+        let end = inside + rest[inside..].find("</script>").expect("script ends");
+        page.push_str(&rest[..inside]);
+        scripts.push(rest[inside..end].to_owned());
+        rest = &rest[end..];
+    }
+    (page + rest, scripts)
+}
+
 /// Every element is closed in order, and every `<` and `&` is markup.
 fn well_formed(html: &str) {
+    let (html, _) = without_scripts(html);
     let style = html.find("<style>").unwrap()..html.find("</style>").unwrap();
     let mut rest = html.replacen(&html[style.start + 7..style.end], "", 1);
     let mut open: Vec<String> = Vec::new();

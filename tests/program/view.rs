@@ -4,7 +4,7 @@ use crate::support::file_bodies::{Random, parts};
 use crate::support::program::{fixtures, flexbody};
 use flexbody::body::flex_body::{FlexBody, SurfaceMesh};
 use flexbody::formats::flex_body_file::{self, read_simulation};
-use flexbody::report::View;
+use flexbody::report::{Facts, Format, RunData, View, render};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -184,6 +184,8 @@ fn a_hundred_thousand_nodes_fit_into_a_page() {
     let body = FlexBody::new(parts).expect("a body");
     let view = View::new(&body, None, None).expect("a page");
     assert!((5_000_000..10_000_000).contains(&view.html().len()), "{}", view.html().len());
+    let report = render(&Facts::new(&body, &RunData::default()), Format::Html).len();
+    assert!((1_500_000..4_000_000).contains(&report), "{report}");
 }
 
 /// A browser of this machine.
@@ -210,6 +212,32 @@ fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String
         .expect("the browser runs");
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
     (text(run.stdout), text(run.stderr))
+}
+
+/// A report draws its body without complaint, whether the run or the file wrote it.
+#[test]
+fn a_browser_draws_the_body_of_a_report() {
+    let Some(browser) = browser() else {
+        eprintln!("no Chromium on the PATH: the report is not drawn");
+        return;
+    };
+    let folder = block("--report run.html");
+    done(folder.path(), "inspect body.flex.h5 --report file.html");
+    for name in ["run.html", "file.html"] {
+        let page = folder.path().join(name);
+        let (document, said) = browse(&browser, &page, "#mode=2&phase=0.25", &["--dump-dom"]);
+        assert!(!said.contains("CONSOLE"), "{said}");
+        for part in ["data-live", "data-drawn=\"surface\"", "data-mode=\"2\"", "<option value=\"3\">4: "] {
+            assert!(document.contains(part), "{part}: {document}");
+        }
+        assert!(!document.contains("data-failed="), "{document}");
+    }
+    // What is drawn of the file is what is drawn of the run.
+    let [run, file] =
+        ["run.html", "file.html"].map(|name| fs::read_to_string(folder.path().join(name)).expect("a report"));
+    for id in ["data", "data-positions", "data-shapes", "data-triangles"] {
+        assert_eq!(element(&run, id), element(&file, id), "{id}");
+    }
 }
 
 /// The page draws without complaint, and two instants of a mode look different; one looks the same twice.

@@ -1,11 +1,11 @@
 //! The motion of a simulation, as a page plays it.
 
-use super::arrays::Packed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file::RecordedMotion;
 use crate::report::numbers::counted;
+use crate::report::picture::Packed;
 use serde::Serialize;
 
 /// Numbers of all instants that a page has at the most.

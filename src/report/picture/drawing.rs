@@ -7,7 +7,7 @@ use faer::MatRef;
 use nalgebra::{Matrix3, Vector3};
 
 /// Half a step of 16-bit numbers, relative to the largest.
-pub(super) const HALF_STEP: f64 = 0.5 / STEPS;
+pub(in crate::report) const HALF_STEP: f64 = 0.5 / STEPS;
 /// Steps of 16-bit numbers from zero to the largest.
 const STEPS: f64 = 32767.0;
 
@@ -15,7 +15,7 @@ const STEPS: f64 = 32767.0;
 const LEAST: usize = 300;
 
 /// Nodes and lines of a page.
-pub(super) struct Drawing<'b> {
+pub(in crate::report) struct Drawing<'b> {
     body: &'b FlexBody,
     mesh: Option<SurfaceMesh>,
     /// Nodes that are drawn, ascending.
@@ -31,11 +31,13 @@ pub(super) struct Drawing<'b> {
 }
 
 impl<'b> Drawing<'b> {
-    /// The surface of at most so many `triangles` or, without a number, what `room` bytes of text hold.
-    pub fn new(body: &'b FlexBody, triangles: Option<usize>, room: usize) -> Self {
+    /// The surface of at most so many `triangles` or, without a number, what `room` bytes of text hold, with
+    /// the first `modes` at the most.
+    pub fn new(body: &'b FlexBody, triangles: Option<usize>, room: usize, modes: usize) -> Self {
+        let modes = modes.min(body.n_modes());
         // Six bytes for the place and for each shape, and two triangles for each node; four letters for three
         // bytes.
-        let most = (room / (8 + 8 * body.n_modes() + 32)).max(LEAST);
+        let most = (room / (8 + 8 * modes + 32)).max(LEAST);
         let positions = &body.nodes().positions;
         let mesh = body.mesh().and_then(|mesh| mesh.decimated(positions, triangles.unwrap_or(2 * most)));
         let nodes = match &mesh {
@@ -59,7 +61,7 @@ impl<'b> Drawing<'b> {
             half: (0.5 * (high - low)).amax(),
             sizes: Vec::new(),
         };
-        own.sizes = (0..body.n_modes()).map(|j| own.size(j)).collect();
+        own.sizes = (0..modes).map(|j| own.size(j)).collect();
         own
     }
 
@@ -99,6 +101,36 @@ impl<'b> Drawing<'b> {
             arrays.extend(parts.map(|(name, nodes)| Packed::indices(name, self.nodes.len(), &own(nodes))));
         }
         arrays
+    }
+
+    /// How many modes it moves in.
+    pub fn modes(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// Places of the vertices in model coordinates.
+    pub fn places(&self) -> &[[f64; 3]] {
+        &self.places
+    }
+
+    /// Vertices of every triangle.
+    pub fn triangle_corners(&self) -> Vec<[u32; 3]> {
+        let triangles = self.mesh.iter().flat_map(SurfaceMesh::triangles);
+        triangles.filter_map(|nodes| self.vertices_of(nodes)).collect()
+    }
+
+    /// Vertices of every edge.
+    pub fn edge_ends(&self) -> Vec<[u32; 2]> {
+        let edges = self.mesh.iter().flat_map(SurfaceMesh::edges);
+        edges.filter_map(|nodes| self.vertices_of(nodes)).collect()
+    }
+
+    fn vertices_of<const N: usize>(&self, nodes: &[u32; N]) -> Option<[u32; N]> {
+        let mut own = [0; N];
+        for (vertex, &node) in own.iter_mut().zip(nodes) {
+            *vertex = self.vertex(node as usize)?;
+        }
+        Some(own)
     }
 
     /// The vertex of the page that draws a node of the body.

@@ -2,7 +2,7 @@
 
 /// A named array.
 #[derive(Debug, Clone)]
-pub(super) struct Packed {
+pub(in crate::report) struct Packed {
     name: &'static str,
     base64: String,
 }
@@ -33,7 +33,7 @@ impl Packed {
 }
 
 /// The element that holds an array.
-pub(super) fn script(array: &Packed) -> String {
+pub(in crate::report) fn script(array: &Packed) -> String {
     format!("<script type=\"text/plain\" id=\"data-{}\">{}</script>\n", array.name, array.base64)
 }
 

@@ -2,6 +2,10 @@
 // Draws the body of this page with WebGL 2. All numbers are in the page: texts as JSON, arrays in base64.
 (() => {
 const byId = (id) => document.getElementById(id);
+// A report has fewer controls than a page of its own.
+const on = (id, event, act) => byId(id) && byId(id).addEventListener(event, act);
+const isChecked = (id) => Boolean(byId(id) && byId(id).checked);
+const say = (id, text) => byId(id) && (byId(id).textContent = text);
 const facts = JSON.parse(byId("data").textContent);
 const canvas = byId("canvas");
 
@@ -46,12 +50,13 @@ const ofEuler = ([w, x, y, z]) => [
 const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 
 // What is shown, and from where.
-const START = () => ({ view: product(turn(0, -1.12), turn(2, -0.6)), zoom: 1, pan: [0, 0] });
+const START = () => ({ view: facts.plane ? turn(0, -0.35) : product(turn(0, -1.12), turn(2, -0.6)), zoom: Number(canvas.dataset.zoom || 1), pan: [0, 0] });
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 const state = { ...START(), mode: 0, phase: 0.25, time: 0, playing: !still, factor: 1, speed: 1, last: 0 };
 
 const gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true });
 if (!gl) return fail("This browser has no WebGL 2, which draws the body. Another browser, or hardware acceleration in its settings, may have it.");
+document.documentElement.dataset.live = "";
 const VERTEX = `#version 300 es
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 displacement;
@@ -220,9 +225,9 @@ function draw() {
     showInstant(now);
     model = now.axes;
     const away = times(model, sum(facts.centre, motion.originInModel, -1));
-    const target = byId("follow").checked ? sum(now.origin, times(model, sum(facts.centre, motion.originInModel, -1))) : motion.middle;
+    const target = isChecked("follow") ? sum(now.origin, times(model, sum(facts.centre, motion.originInModel, -1))) : motion.middle;
     shift = sum(sum(now.origin, away), target, -1);
-    if (!byId("follow").checked) reach += motion.reach;
+    if (!isChecked("follow")) reach += motion.reach;
     amplitude = state.factor;
     share = motion.largest > 0 ? 1 / motion.largest : 0;
   } else {
@@ -247,7 +252,7 @@ function draw() {
     gl.uniform1i(uniform.coloured, program.coloured ? 1 : 0);
     gl.uniform1i(uniform.lit, program.lit ? 1 : 0);
   };
-  const component = Number(byId("colours").value), coloured = component >= 0;
+  const component = byId("colours") ? Number(byId("colours").value) : 0, coloured = component >= 0;
   const elements = (kind, own) => {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, own.buffer);
     gl.drawElements(kind, own.count, own.type, 0);
@@ -260,17 +265,17 @@ function draw() {
     elements(gl.TRIANGLES, drawn.triangles);
     gl.disable(gl.POLYGON_OFFSET_FILL);
   } else {
-    set({ coloured, dot: vertices > 5000 ? 2 : 4, plain: [...colour.part, 1] });
+    set({ coloured, dot: vertices > 5000 ? 2 : vertices > 200 ? 4 : 7, plain: [...colour.part, 1] });
     gl.drawArrays(gl.POINTS, 0, vertices);
   }
-  if (byId("lines").checked && drawn.triangles.count) {
+  if (isChecked("lines") && drawn.triangles.count) {
     drawn.lines = drawn.lines || allLines();
     set({ plain: [...colour.edge, 0.35] });
     elements(gl.LINES, drawn.lines);
   }
   set({ plain: [...colour.edge, 1], coloured: coloured && !drawn.triangles.count });
   elements(gl.LINES, drawn.edges);
-  if (byId("outline").checked) {
+  if (isChecked("outline")) {
     set({ plain: [...colour.rest, 0.75], amplitude: 0 });
     if (drawn.edges.count) elements(gl.LINES, drawn.edges);
     else if (!drawn.triangles.count) gl.drawArrays(gl.POINTS, 0, vertices);
@@ -288,12 +293,12 @@ function draw() {
     set({ size: 1, amplitude: 0, ...options });
     gl.drawArrays(options.points ? gl.POINTS : gl.LINES, 0, points.length);
   };
-  if (byId("interfaces").checked && drawn.held.count) {
+  if (isChecked("interfaces") && drawn.held.count) {
     set({ plain: [...colour.mark, 1], dot: 3.5 });
     elements(gl.POINTS, drawn.held);
   }
   gl.disable(gl.DEPTH_TEST);
-  if (byId("interfaces").checked) {
+  if (isChecked("interfaces")) {
     for (const one of facts.interfaces.filter((one) => one.reference)) {
       const moved = [0, 1, 2].map((k) => motion ? now.q.reduce((s, q, j) => s + q * one.motion[3 * j + k], 0) : one.motion[3 * state.mode + k]);
       const place = sum(sum(one.reference, facts.centre, -1), moved, amplitude);
@@ -301,7 +306,7 @@ function draw() {
       label(one.name, seen(place), colour.mark);
     }
   }
-  if (byId("axes").checked) {
+  if (isChecked("axes")) {
     const centre = sum(facts.centreOfMass, facts.centre, -1);
     facts.principal.forEach((axis, k) => {
       const end = sum(centre, axis, 0.75 * facts.radius);
@@ -324,7 +329,7 @@ function draw() {
 }
 
 // Time goes on, or a frame is wanted.
-let asked = false;
+let asked = false, inView = true;
 function ask() {
   if (!asked) asked = true, requestAnimationFrame(frame);
 }
@@ -338,7 +343,7 @@ function frame(clock) {
       if (length > 0) state.time = start + (state.time - start + passed * state.speed * length / 8) % length;
       showTime();
     } else state.phase = (state.phase + passed * state.speed / 1.6) % 1;
-    ask();
+    if (inView) ask();
   }
   draw();
 }
@@ -412,6 +417,8 @@ canvas.addEventListener("pointermove", (event) => {
 });
 canvas.addEventListener("contextmenu", (event) => event.preventDefault());
 canvas.addEventListener("wheel", (event) => {
+  // In a report the wheel moves the page until the body is asked for.
+  if (canvas.dataset.keys && document.activeElement !== canvas) return;
   event.preventDefault();
   zoom(Math.exp(-0.0015 * event.deltaY * (event.deltaMode ? 30 : 1)));
 }, { passive: false });
@@ -421,7 +428,7 @@ const KEYS = {
   "+": () => zoom(1.15), "=": () => zoom(1.15), "-": () => zoom(1 / 1.15), "0": reset, n: () => step(1), p: () => step(-1), " ": () => play(!state.playing),
   ArrowLeft: () => rotate(-0.1, 0), ArrowRight: () => rotate(0.1, 0), ArrowUp: () => rotate(0, -0.1), ArrowDown: () => rotate(0, 0.1),
 };
-document.addEventListener("keydown", (event) => {
+(canvas.dataset.keys ? canvas : document).addEventListener("keydown", (event) => {
   const control = event.target.closest("select, input, button");
   if (event.ctrlKey || event.altKey || event.metaKey || !KEYS[event.key]) return;
   if (control && (control.tagName === "SELECT" || event.key.startsWith("Arrow") || event.key === " ")) return;
@@ -430,25 +437,25 @@ document.addEventListener("keydown", (event) => {
 });
 
 // Controls.
-byId("name").textContent = facts.name;
-byId("generator").textContent = facts.generator;
-for (const [term, text] of facts.terms) {
+say("name", facts.name);
+say("generator", facts.generator);
+for (const [term, text] of byId("facts") ? facts.terms : []) {
   byId("facts").appendChild(document.createElement("dt")).textContent = term;
   byId("facts").appendChild(document.createElement("dd")).textContent = text;
 }
 modes.forEach((mode, j) => byId("mode").add(new Option(mode.label, j)));
-byId("mode").addEventListener("change", (event) => choose(Number(event.target.value)));
-byId("previous").addEventListener("click", () => step(-1));
-byId("next").addEventListener("click", () => step(1));
-byId("play").addEventListener("click", () => play(!state.playing));
-byId("reset").addEventListener("click", reset);
-byId("amplitude").addEventListener("input", (event) => setAmplitude(Number(event.target.value)));
-byId("speed").addEventListener("input", (event) => setSpeed(Number(event.target.value)));
+on("mode", "change", (event) => choose(Number(event.target.value)));
+on("previous", "click", () => step(-1));
+on("next", "click", () => step(1));
+on("play", "click", () => play(!state.playing));
+on("reset", "click", reset);
+on("amplitude", "input", (event) => setAmplitude(Number(event.target.value)));
+on("speed", "input", (event) => setSpeed(Number(event.target.value)));
 function setSpeed(value) {
   state.speed = 2 ** value;
-  byId("pace").textContent = `${short(state.speed)} \u00d7`;
+  say("pace", `${short(state.speed)} \u00d7`);
 }
-for (const id of ["colours", "outline", "lines", "interfaces", "axes", "follow"]) byId(id).addEventListener("change", ask);
+for (const id of ["colours", "outline", "lines", "interfaces", "axes", "follow"]) on(id, "change", ask);
 byId("lines").closest("label").hidden = !triangles.length;
 byId("interfaces").closest("label").hidden = !facts.interfaces.length;
 const bar = Array.from({ length: 11 }, (_, k) => {
@@ -480,6 +487,11 @@ readColours();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (readColours(), ask()));
 // Before the frame is shown that has the new size.
 new ResizeObserver(draw).observe(canvas);
+// What is scrolled away stands still.
+new IntersectionObserver((entries) => {
+  inView = entries[entries.length - 1].isIntersecting;
+  if (inView) ask();
+}).observe(canvas);
 setSpeed(0);
 setAmplitude(number("amplitude") ?? (motion ? 0 : 1));
 choose(Math.max(0, (number("mode") ?? 1) - 1) % modes.length);

@@ -1,0 +1,74 @@
+//! Words of a report that not every reader knows, explained where they stand and at the end.
+
+use super::markup::{escape, section};
+
+/// Words and what they mean.
+const WORDS: [(&str, &str); 14] = [
+    (
+        "principal moments of inertia",
+        "Moments of inertia about the three axes through the centre of mass for which all products of inertia vanish.",
+    ),
+    (
+        "radius of gyration",
+        "The distance from an axis at which the whole mass would have the same moment of inertia: sqrt(I / m).",
+    ),
+    ("free-surface mode", "A natural mode of the body with nothing held."),
+    (
+        "completeness",
+        "That no mode is missing between those that were found: the number of negative pivots of K - sigma M counts all modes below the frequency of sigma (Sylvester's law of inertia).",
+    ),
+    (
+        "residual",
+        "How far a mode is from being an eigenvector: |K psi - lambda M psi| relative to |K psi| + |lambda M psi|.",
+    ),
+    (
+        "residual vector",
+        "What the static response to a load has outside the modes, kept as one more shape of the body. It is no natural mode, and its frequency is no resonance.",
+    ),
+    ("fixed-interface mode", "A natural mode with all interfaces held, as Craig-Bampton bodies have them."),
+    (
+        "interface",
+        "A named set of nodes that a joint or a load acts on; its coupling says how its reference point follows them.",
+    ),
+    (
+        "W1",
+        "The invariant (3 x 3 n) by which the inertia follows the deflection to first order: I = I0 + W1 Q + Q' W2 Q.",
+    ),
+    (
+        "W2",
+        "The invariant (3 n x 3 n) of the inertia to second order in the deflection; it makes the centrifugal forces on the deflected body.",
+    ),
+    ("W3", "The invariant (3 n x n) of the Coriolis and Euler forces between the modes."),
+    ("lumped mass", "Mass put on the nodes as points, instead of the mass matrix of the elements."),
+    ("geometric stiffness", "What preload, such as the centrifugal force of a spin, adds to the stiffness."),
+    ("I0", "The inertia of the undeformed body about the origin of its frame."),
+];
+
+/// A word with its explanation; a word that has none stays as it is.
+pub(super) fn word(word: &str) -> String {
+    let meaning = WORDS.iter().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning);
+    explained(word, meaning.unwrap_or(""))
+}
+
+/// Another form of a known word, `W2 (n)` or a plural.
+pub(super) fn word_as(known: &str, shown: &str) -> String {
+    let meaning = WORDS.iter().find(|(word, _)| *word == known).map(|(_, meaning)| *meaning);
+    explained(shown, meaning.unwrap_or(""))
+}
+
+fn explained(shown: &str, meaning: &str) -> String {
+    match meaning {
+        "" => escape(shown),
+        meaning => format!("<abbr title=\"{}\">{}</abbr>", escape(meaning), escape(shown)),
+    }
+}
+
+/// All words at the end, for those who cannot point at one.
+pub(super) fn glossary(html: &mut String) {
+    section(html, "Words");
+    html.push_str("<details>\n<summary>What the words of this report mean</summary>\n<dl>\n");
+    for (word, meaning) in WORDS {
+        html.push_str(&format!("<dt>{}</dt><dd>{}</dd>\n", escape(word), escape(meaning)));
+    }
+    html.push_str("</dl>\n</details>\n");
+}
