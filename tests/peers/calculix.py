@@ -5,6 +5,7 @@ import itertools
 import os
 import re
 import subprocess
+import sys
 
 from common import ROOT, Absent, Row, body_of, program
 
@@ -141,4 +142,19 @@ def from_cad(flexbody, folder, version):
         mass = file["invariants/mass"][0]
     volume = 60 * 40 * 8 + 42 * 40 * 8 - 8 * math.pi * (2 * 4**2 + 8**2)
     error = abs(mass / (volume * 7.85e-9) - 1)
-    return [Row(f"Gmsh, CalculiX {version}", "C3D10", "examples/from_cad: mass of the bracket beside its geometry", error, 1e-3)]
+    rows = [Row(f"Gmsh, CalculiX {version}", "C3D10", "examples/from_cad: mass of the bracket beside its geometry", error, 1e-3)]
+    return [*rows, *tutorial(place, version, environment)]
+
+
+def tutorial(place, version, environment):
+    """docs/tutorial.md to its end: the bracket on a shaker, in Exudyn."""
+    try:
+        import exudyn
+    except ImportError:
+        print("  not found: Python module exudyn: the tutorial is run up to there")
+        return []
+    done = subprocess.run([ROOT / "examples/from_cad/tutorial.sh", place], check=True, capture_output=True, text=True, env=dict(environment, PYTHON=sys.executable))
+    found = re.search(r"([0-9.]+) Hz in Exudyn, ([0-9.]+) Hz", done.stdout)
+    error = abs(float(found[1]) / float(found[2]) - 1)
+    what = "docs/tutorial.md: frequency of the bracket on its bolts with an instrument, beside that of K and M"
+    return [Row(f"Gmsh, CalculiX {version}, Exudyn {exudyn.__version__}", "C3D10", what, error, 2e-4)]
