@@ -75,7 +75,11 @@ impl Program {
     fn new(body: &FlexBody, dialect: &str, flags: &[&str], states: &[Vec<f64>]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
-        let options = ExportOptions { dialect: Some(dialect.to_owned()), points: Points::Some(Vec::new()) };
+        let options = ExportOptions {
+            dialect: Some(dialect.to_owned()),
+            points: Points::Some(Vec::new()),
+            ..ExportOptions::default()
+        };
         let format = find_format("embedded").expect("registered");
         let exported = format.write(body, &options).expect("exports");
         std::fs::write(path("body.h"), &exported.beside[0].1).expect("writable");

@@ -10,6 +10,7 @@ use crate::base::progress::Event;
 use crate::body::flex_body;
 use crate::body::verification::own_identities;
 use crate::formats::export::ExportOptions;
+use crate::formats::flex_body_file::RecordedMotion;
 use crate::formats::{FORMATS, export, find_format};
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use crate::motion::scene::{Point, body_point, simulate};
@@ -64,9 +65,29 @@ impl FlexBody {
     /// FB801 for a format that is not known; FB720 when no file of this format can be made of the body; FB104
     /// and FB602 when it cannot be written.
     pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
-        let (exported, lost) = export(&self.0, find_format(format)?, &ExportOptions::default(), true)?;
+        self.export_as(format, path.as_ref(), ExportOptions::default())
+    }
+
+    /// Writes a picture of the body in motion (`vtk`, `gltf`), in the same way.
+    ///
+    /// # Errors
+    /// Those of [`FlexBody::export`]; FB801 for a format that shows no motion, FB735 for the motion of another
+    /// body.
+    pub fn export_motion(
+        &self,
+        format: &str,
+        motion: &Motion,
+        path: impl AsRef<Path>,
+    ) -> Result<Vec<Diagnostic>> {
+        let motion = Some(RecordedMotion::of(&motion.recording));
+        self.export_as(format, path.as_ref(), ExportOptions { motion, ..ExportOptions::default() })
+    }
+
+    fn export_as(&self, format: &str, path: &Path, options: ExportOptions) -> Result<Vec<Diagnostic>> {
+        let options = ExportOptions { name: Some(path.to_owned()), ..options };
+        let (exported, told) = export(&self.0, find_format(format)?, &options, true)?;
         OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
-        Ok(lost)
+        Ok(told)
     }
 
     /// Formats that [`FlexBody::export`] writes: the name of each, and the programs that read it.

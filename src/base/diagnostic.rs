@@ -228,6 +228,7 @@ codes! {
     ExportLoses = "FB720", Error, BadInput, "format cannot hold all of the body", "--allow-loss writes the file without it";
     ExportLost = "FB721", Warning, Done, "file that was written lacks a part of the body", "nothing to do if the simulation does not need it";
     ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "set what the message names in the program's input";
+    ExportPicture = "FB723", Note, Done, "file is a picture of the body", "give multibody programs another format: docs/export.md lists them";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
     ForeignIncomplete = "FB731", Error, BadInput, "file lacks what a body is made of", "write the file anew with the missing part";
     ForeignChanged = "FB732", Note, Done, "modes of the file are no free-surface modes: rigid motion was taken out of them", "nothing to do: the body is the same, its coordinates are others";

@@ -70,7 +70,7 @@ pub enum Command {
     View(ViewArguments),
     /// Write a body in the format of another program
     #[command(
-        after_help = "Examples:\n  flexbody export rod.flex.h5 --to exudyn -o rod.hdf5\n  flexbody export rod.flex.h5 --to sid --dialect py-sid --points interfaces -o rod.SID_FEM"
+        after_help = "Examples:\n  flexbody export rod.flex.h5 --to exudyn -o rod.hdf5\n  flexbody export rod.flex.h5 --to sid --dialect py-sid --points interfaces -o rod.SID_FEM\n  flexbody export rod.flex.h5 --to gltf -o rod.glb"
     )]
     Export(ExportArguments),
     /// Say how an FE program is made to write its matrices: the lines of the deck, and the command that goes
@@ -132,6 +132,12 @@ pub struct ExportArguments {
     /// [default: the interfaces where the format has frames and the body interfaces, else all nodes]
     #[arg(long, value_name = "POINTS")]
     pub points: Option<String>,
+    /// With --to vtk or gltf: modes to show, the first N [default: vtk all, gltf 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub modes: Option<u32>,
+    /// With --to vtk (.pvd) or gltf: the motion to show instead of modes, as `simulate -o` has written it
+    #[arg(long, value_name = "MOTION.h5", conflicts_with = "to_units")]
+    pub simulation: Option<PathBuf>,
     /// Units to write in [default: those of the body]
     #[arg(long, value_name = "L,M,T")]
     pub to_units: Option<String>,

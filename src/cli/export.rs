@@ -7,9 +7,10 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::formats::export::{ExportOptions, Exported, Points};
-use crate::formats::flex_body_file;
+use crate::formats::flex_body_file::{self, read_simulation};
 use crate::formats::{export, find_format};
 use crate::input::parse_units;
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
@@ -18,10 +19,13 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let options = ExportOptions {
         dialect: arguments.dialect.clone().or(level),
         points: arguments.points.as_deref().map_or(Ok(Points::Usual), points)?,
+        modes: arguments.modes.map(|modes| modes as usize),
+        motion: arguments.simulation.as_ref().map(read_simulation).transpose()?,
+        name: Some(arguments.output.clone()),
     };
     let units = arguments.to_units.as_deref().map(parse_units).transpose()?;
-    let inputs = [&arguments.body];
-    refuse_replacing(inputs.into_iter(), std::iter::once(&arguments.output))?;
+    let inputs = || std::iter::once(&arguments.body).chain(&arguments.simulation);
+    refuse_replacing(inputs(), std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
     let (mut body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
@@ -29,13 +33,14 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         body = body.in_units(&units)?;
     }
     let (exported, losses) = export(&body, format, &options, arguments.allow_loss)
-        .map_err(|error| error.in_file(&arguments.body))?;
+        .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;
     diagnostics.extend(losses);
     refuse_warnings(arguments.printing, &diagnostics)?;
-    let place_and_size =
-        |(ending, bytes): &(&str, Vec<u8>)| (Exported::place_beside(&arguments.output, ending), bytes.len());
+    let place_and_size = |(ending, bytes): &(Cow<'_, str>, Vec<u8>)| {
+        (Exported::place_beside(&arguments.output, ending), bytes.len())
+    };
     let beside: Vec<(PathBuf, usize)> = exported.beside.iter().map(place_and_size).collect();
-    let taken: Vec<&PathBuf> = inputs.into_iter().chain(std::iter::once(&arguments.output)).collect();
+    let taken: Vec<&PathBuf> = inputs().chain(std::iter::once(&arguments.output)).collect();
     refuse_replacing(taken.into_iter(), beside.iter().map(|(path, _)| path))?;
     OutputSlot::commit_all(exported.fill(slot)?)?;
     let written = [vec![(arguments.output.clone(), exported.file.len())], beside].concat();
@@ -46,13 +51,18 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let file = |(path, size): &(PathBuf, usize)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
     let files: serde_json::Value = written.iter().map(file).collect();
     let json = serde_json::json!({ "format": format.name(), "files": files });
-    Ok(Outcome {
-        text: written.iter().map(line).collect(),
-        json: format!("{json:#}"),
-        diagnostics,
-        passed: true,
-    })
+    let told = if written.len() > MOST_LINES { 1 } else { written.len() };
+    let (told, others) = written.split_at(told);
+    let mut text: String = told.iter().map(line).collect();
+    if let Some((first, _)) = others.first() {
+        let size: usize = others.iter().map(|(_, size)| size).sum();
+        text += &format!("{} and others, {} files, {size} bytes\n", first.display(), others.len());
+    }
+    Ok(Outcome { text, json: format!("{json:#}"), diagnostics, passed: true })
 }
+
+/// Of more files than these the first is told, and what the others are together.
+const MOST_LINES: usize = 8;
 
 /// `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
 fn points(text: &str) -> Result<Points> {

@@ -51,9 +51,11 @@ impl ExportFormat for Chrono {
             let name = name.replace('"', "\"\"");
             writeln!(table, "\"{name}\",{x:e},{y:e},{z:e}").expect("writing to a String cannot fail");
         }
-        let mut beside =
-            vec![("M.mtx", matrix(told.mass, 0.0)), ("K.mtx", matrix(told.stiffness, stiffness))];
-        beside.extend(told.damping.as_ref().map(|damping| ("R.mtx", matrix(damping, 0.0))));
+        let mut beside = vec![
+            ("M.mtx".into(), matrix(told.mass, 0.0)),
+            ("K.mtx".into(), matrix(told.stiffness, stiffness)),
+        ];
+        beside.extend(told.damping.as_ref().map(|damping| ("R.mtx".into(), matrix(damping, 0.0))));
         Ok(Exported { file: table.into_bytes(), beside })
     }
 }

@@ -9,6 +9,7 @@ pub mod export;
 #[cfg(feature = "hdf5")]
 mod exudyn;
 pub mod flex_body_file;
+mod gltf;
 pub mod import;
 mod json;
 mod mbdyn;
@@ -16,10 +17,12 @@ mod mbdyn;
 mod mbsim;
 mod npz;
 mod openradioss;
+mod picture;
 mod registry;
 mod sid;
 #[cfg(feature = "hdf5")]
 mod simscape;
+mod vtk;
 
 pub use embedded::embedded_markdown;
 pub use registry::{FORMATS, IMPORT_FORMATS, export, find_format, find_import_format, recognise};

@@ -1,7 +1,9 @@
 //! Every format of other programs: those that are written, and those that are read.
 
 use super::export::{ExportFormat, ExportOptions, Exported, Points};
+use super::gltf::Gltf;
 use super::import::ImportFormat;
+use super::vtk::Vtk;
 use super::{adams, chrono, embedded, json, mbdyn, npz, openradioss, sid};
 #[cfg(feature = "hdf5")]
 use super::{exudyn, mbsim, simscape};
@@ -9,6 +11,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::flex_body::FlexBody;
 use crate::input::InputFile;
+use std::borrow::Cow;
 
 /// Every format, in the order of the documentation.
 pub const FORMATS: &[&dyn ExportFormat] = &[
@@ -26,6 +29,8 @@ pub const FORMATS: &[&dyn ExportFormat] = &[
     &npz::Npz,
     &json::Json,
     &embedded::Embedded,
+    &Vtk,
+    &Gltf,
 ];
 
 /// The format of that name.
@@ -41,12 +46,12 @@ pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
 }
 
 /// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every
-/// setting that its program needs.
+/// setting that its program needs and for what a picture leaves out.
 ///
 /// # Errors
 /// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
 /// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of
-/// [`ExportFormat::write`].
+/// [`RecordedMotion::staged`](super::flex_body_file::RecordedMotion::staged) and of [`ExportFormat::write`].
 pub fn export(
     body: &FlexBody,
     format: &dyn ExportFormat,
@@ -54,6 +59,11 @@ pub fn export(
     allow_loss: bool,
 ) -> Result<(Exported, Vec<Diagnostic>)> {
     check_options(body, format, options)?;
+    let body = match &options.motion {
+        Some(motion) => Cow::Owned(motion.staged(body)?),
+        None => Cow::Borrowed(body),
+    };
+    let body = body.as_ref();
     let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
     let losses: Vec<Diagnostic> = format
         .losses(body, options)
@@ -64,8 +74,10 @@ pub fn export(
         return Err(Error::new(losses));
     }
     let needs = format.needs(body, options).into_iter().map(|need| Diagnostic::new(Code::ExportNeeds, need));
+    let left =
+        format.leaves_out(body, options).into_iter().map(|what| Diagnostic::new(Code::ExportPicture, what));
     let exported = format.write(body, options)?;
-    Ok((exported, losses.into_iter().chain(needs).collect()))
+    Ok((exported, losses.into_iter().chain(needs).chain(left).collect()))
 }
 
 fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {
@@ -81,6 +93,14 @@ fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOpt
     }
     if options.points != Points::Usual && !format.has_points() {
         return refuse(format!("{name} has all nodes or none"), "leave --points out".to_owned());
+    }
+    if (options.modes.is_some() || options.motion.is_some()) && !format.is_picture() {
+        let help = "leave --modes and --simulation out, or take vtk or gltf".to_owned();
+        return refuse(format!("{name} has all modes of the body, and no motion"), help);
+    }
+    if let Some(modes) = options.modes.filter(|modes| *modes > body.n_modes()) {
+        let help = format!("--modes {} at the most", body.n_modes());
+        return refuse(format!("the body has {} modes, not {modes}", body.n_modes()), help);
     }
     if options.points.of_interfaces() && body.interfaces().is_empty() {
         return refuse("the body has no interfaces".to_owned(), "--points nodes, or node numbers".to_owned());

@@ -2,7 +2,7 @@
 
 use super::craig_bampton;
 use super::numbers::{counted, plain, significant};
-use crate::body::flex_body::FlexBody;
+use crate::body::flex_body::{FlexBody, is_static};
 
 /// The certificate of a body, judged.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -53,17 +53,9 @@ impl Completeness {
     }
 }
 
-/// Kinds of shapes that are no modes of the free body and do not claim to be.
-const STATIC: [&str; 4] = ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
-
 /// How many modes of the body are static shapes.
 fn static_shapes(body: &FlexBody) -> usize {
     body.modes().provenance.iter().filter(|origin| is_static(origin)).count()
-}
-
-/// Whether a mode of this origin is a static shape.
-pub(super) fn is_static(origin: &str) -> bool {
-    STATIC.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
 }
 
 /// Verdict about shapes of which nothing is to be proved.

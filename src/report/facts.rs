@@ -1,6 +1,6 @@
 //! The facts of a body and of the run that made it, computed once; every format renders these.
 
-use super::completeness::{Completeness, is_static};
+use super::completeness::Completeness;
 use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{GeometricStiffnessFacts, softening_hz};
 use super::guarantee::GuaranteeFacts;
@@ -12,7 +12,7 @@ use super::term_facts::TermFacts;
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::{self, SourceFile};
 use crate::base::units::UnitSystem;
-use crate::body::flex_body::{FlexBody, Interface, MassStructure, Truncation};
+use crate::body::flex_body::{FlexBody, Interface, MassStructure, Truncation, is_static};
 use crate::body::invariants::GENERAL_REMARK;
 use serde::{Serialize, Serializer};
 

@@ -55,7 +55,7 @@ impl View {
     /// # Errors
     /// FB735 for the motion of another body; those of [`FlexBody::carried`].
     pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
-        let staged = motion.map(|motion| motion::staged(body, motion)).transpose()?;
+        let staged = motion.map(|motion| motion.staged(body)).transpose()?;
         let body = staged.as_ref().unwrap_or(body);
         let drawing = Drawing::new(body, triangles, ROOM, usize::MAX);
         let shown = motion.map(|motion| ShownMotion::new(motion, body));

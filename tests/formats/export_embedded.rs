@@ -38,7 +38,11 @@ struct Compiled {
 }
 
 fn exported(body: &FlexBody, dialect: &str, points: &Points) -> Exported {
-    let options = ExportOptions { dialect: Some(dialect.to_owned()), points: points.clone() };
+    let options = ExportOptions {
+        dialect: Some(dialect.to_owned()),
+        points: points.clone(),
+        ..ExportOptions::default()
+    };
     let format = find_format("embedded").expect("registered");
     let (exported, losses) = export(body, format, &options, false).expect("exports");
     assert!(losses.is_empty());
@@ -63,7 +67,8 @@ impl Compiled {
     fn in_language(exported: Exported, language: &[&str], flags: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
-        let [("h", header)] = &exported.beside[..] else { panic!("a header beside the file") };
+        let [(ending, header)] = &exported.beside[..] else { panic!("a header beside the file") };
+        assert_eq!(ending, "h");
         std::fs::write(path("body.h"), header).expect("writable");
         std::fs::write(path("body.bin"), &exported.file).expect("writable");
         // The name of a type that the header defines has the prefix of all names.

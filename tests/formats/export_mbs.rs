@@ -24,7 +24,11 @@ const FORMATS: [(&str, &str); 4] =
     [("exudyn", ""), ("mbdyn", "level19"), ("mbdyn", "level13"), ("mbsim", "")];
 
 fn options(dialect: &str, points: Points) -> ExportOptions {
-    ExportOptions { dialect: (!dialect.is_empty()).then(|| dialect.to_owned()), points }
+    ExportOptions {
+        dialect: (!dialect.is_empty()).then(|| dialect.to_owned()),
+        points,
+        ..ExportOptions::default()
+    }
 }
 
 /// The file, and what it lost.

@@ -43,7 +43,7 @@ fn strained(model: &str, random: &mut Random) -> FlexBody {
 }
 
 fn dialect(name: &str) -> ExportOptions {
-    ExportOptions { dialect: Some(name.to_owned()), points: Points::Usual }
+    ExportOptions { dialect: Some(name.to_owned()), ..ExportOptions::default() }
 }
 
 fn text(body: &FlexBody, options: &ExportOptions) -> String {
@@ -414,7 +414,7 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
     for (points, count) in
         [(Points::Usual, 2), (Points::Nodes, body.n_nodes()), (Points::Some(vec![some]), 1)]
     {
-        let options = ExportOptions { dialect: None, points: points.clone() };
+        let options = ExportOptions { points: points.clone(), ..ExportOptions::default() };
         let losses = sid().losses(&body, &options);
         // Forces at the tip need its reference point.
         assert_eq!(losses.is_empty(), points == Points::Usual, "{losses:?}");

@@ -10,7 +10,7 @@ use flexbody::base::provenance::SourceFile;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
-use flexbody::formats::export::{ExportOptions, Points};
+use flexbody::formats::export::ExportOptions;
 use flexbody::formats::import::{ImportedFile, audit, import_body};
 use flexbody::formats::{export, find_format};
 use flexbody::formats::{find_import_format, recognise};
@@ -32,7 +32,7 @@ static BLOCK: LazyLock<(FeModel, FlexBody)> = LazyLock::new(|| {
 });
 
 fn exported(format: &str, dialect: Option<&str>) -> Vec<u8> {
-    let options = ExportOptions { dialect: dialect.map(str::to_owned), points: Points::Usual };
+    let options = ExportOptions { dialect: dialect.map(str::to_owned), ..ExportOptions::default() };
     export(&BLOCK.1, find_format(format).expect("a format"), &options, true).expect("written").0.file
 }
 

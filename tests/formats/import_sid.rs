@@ -24,7 +24,11 @@ static FILES: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     let points = Points::Some(body.nodes().ids.iter().step_by(97).copied().collect());
     let sid = find_format("sid").expect("a format");
     let write = |name: &&'static str| {
-        let options = ExportOptions { dialect: Some((*name).to_owned()), points: points.clone() };
+        let options = ExportOptions {
+            dialect: Some((*name).to_owned()),
+            points: points.clone(),
+            ..ExportOptions::default()
+        };
         let (exported, losses) = export(&body, sid, &options, false).expect("nothing is lost");
         assert!(losses.is_empty());
         (*name, String::from_utf8(exported.file).expect("text"))

@@ -7,6 +7,7 @@ mod exchange_command;
 mod export_arrays;
 mod export_embedded;
 mod export_mbs;
+mod export_pictures;
 mod export_sid;
 mod import_body;
 mod import_mbs;

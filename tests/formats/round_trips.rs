@@ -46,7 +46,7 @@ fn readable() -> Vec<(&'static dyn ExportFormat, &'static dyn ImportFormat, Opti
 
 fn written(body: &FlexBody, format: &dyn ExportFormat, dialect: Option<&str>, folder: &Path) -> InputFile {
     let points = if format.has_points() { Points::Nodes } else { Points::Usual };
-    let options = ExportOptions { dialect: dialect.map(str::to_owned), points };
+    let options = ExportOptions { dialect: dialect.map(str::to_owned), points, ..ExportOptions::default() };
     let (exported, _) = export(body, format, &options, true).expect("written");
     let (again, _) = export(body, format, &options, true).expect("written");
     assert!(exported == again, "equal bodies give equal bytes");

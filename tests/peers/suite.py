@@ -3,7 +3,7 @@
 
     python3 tests/peers/suite.py --install --write
 
-installs Exudyn, welib, open FE codes, h5py and scipy by pip into target/peers, Octave, GetFEM, FEniCSx and an ARM compiler by apt-get (as root; else it says the command), runs every
+installs Exudyn, welib, open FE codes, h5py, scipy and readers of pictures by pip and npm into target/peers, Octave, GetFEM, FEniCSx and an ARM compiler by apt-get (as root; else it says the command), runs every
 peer with target/release/flexbody and writes the table of docs/export.md and that of docs/formats/embedded.md. Some minutes. Without options it runs what is
 installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
 FEMBEAM (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
@@ -24,7 +24,8 @@ import common
 from common import ROOT, Absent, Row
 
 VENV = ROOT / "target/peers"
-PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "pyNastran==1.4.1", "welib==4.2.0", "h5py", "numpy", "scipy", "scikit-fem==12.0.2", "ngsolve==6.2.2608", "mfem==4.10.0.1"]
+PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "pyNastran==1.4.1", "welib==4.2.0", "h5py", "numpy", "scipy", "scikit-fem==12.0.2", "ngsolve==6.2.2608", "mfem==4.10.0.1", "pyvista", "meshio", "trimesh", "pygltflib"]
+NPM = ["gltf-validator@2.0.0-dev.3.10"]
 APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "calculix-ccx"]
 # Packages of modules for Debian's own Python.
 APT_MODULES = {"python3-getfem": "getfem", "python3-dolfinx-real": "dolfinx"}
@@ -92,6 +93,10 @@ PEERS = [
     ("scipy's integrator", "scipy_spin.rows", True),
     ("compilers", "compilers.rows", True),
     ("ARM compiler", "suite.arm_table", True),
+    ("VTK", "pictures.vtk", True),
+    ("meshio", "pictures.meshio", True),
+    ("trimesh, pygltflib", "pictures.gltf", True),
+    ("validator of glTF", "pictures.validator", True),
     ("CalculiX", "suite.calculix", True),
     ("open FE codes", "suite.recipes", True),
     ("pyNastran, pyYeti", "suite.nastran", True),
@@ -148,6 +153,8 @@ def install():
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
     subprocess.run([python, "-m", "pip", "install", "--quiet", *PIP], check=True)
+    if shutil.which("npm"):
+        subprocess.run(["npm", "install", "--silent", "--prefix", VENV, *NPM], check=False)
     missing = [name for name, tool in zip(APT, ["octave-cli", "g++", "arm-none-eabi-gcc", "arm-none-eabi-gcc", "ccx"]) if not shutil.which(tool)]
     debian = "/usr/bin/python3"
     missing += [name for name, module in APT_MODULES.items() if subprocess.run([debian, "-c", f"import {module}"], capture_output=True).returncode]

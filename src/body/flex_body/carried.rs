@@ -37,7 +37,6 @@ pub enum Carrier {
     Node(i64),
 }
 
-#[cfg(feature = "hdf5")]
 impl Carrier {
     /// The carrier that files of simulations name: `interface NAME` or `node 17`.
     pub(crate) fn from_words(words: &str) -> Option<Self> {

@@ -24,6 +24,7 @@ pub use fixed_interface::FixedInterface;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+    is_static,
 };
 pub use storage::Storage;
 pub use terms::TermDecision;

@@ -71,6 +71,14 @@ pub struct Modes {
     pub internal: Option<InternalRows>,
 }
 
+/// Kinds of shapes that are no modes of the free body and do not claim to be.
+const STATIC: [&str; 4] = ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
+
+/// Whether a mode of this origin ([`Modes::provenance`]) is a static shape.
+pub fn is_static(origin: &str) -> bool {
+    STATIC.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
+}
+
 /// Rows of the modes that belong to no node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InternalRows {

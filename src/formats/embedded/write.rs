@@ -52,7 +52,7 @@ impl ExportFormat for Embedded {
         let content = Content::new(body, &options.points, precision)?;
         let (file, places) = bytes(body, &content, precision)?;
         let header = header(body, &content, &places, precision, file.len());
-        Ok(Exported { file, beside: vec![("h", header.into_bytes())] })
+        Ok(Exported { file, beside: vec![("h".into(), header.into_bytes())] })
     }
 }
 

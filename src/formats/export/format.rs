@@ -3,6 +3,8 @@
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::body::flex_body::FlexBody;
+use crate::formats::flex_body_file::RecordedMotion;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// A format that other programs read.
@@ -23,6 +25,12 @@ pub trait ExportFormat: Sync {
         false
     }
 
+    /// Whether the file is a picture of the body: it has modes that can be chosen, plays motions, and nobody
+    /// computes with it.
+    fn is_picture(&self) -> bool {
+        false
+    }
+
     /// What this format cannot hold of `body` with these options: fragments of sentences with the facts, in
     /// the order of importance. What concerns the origin of the numbers only (certificate, lumped
     /// comparators, provenance) is in no format and is not told.
@@ -34,7 +42,13 @@ pub trait ExportFormat: Sync {
         Vec::new()
     }
 
-    /// The file. Called with options that the format has.
+    /// What a picture leaves out of the body, with these options. Sentences without a full stop.
+    fn leaves_out(&self, _body: &FlexBody, _options: &ExportOptions) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The file. Called with options that the format has, and of a picture of a motion with the body as the
+    /// motion has it.
     ///
     /// # Errors
     /// [`ExportLoses`](Code::ExportLoses) for a body of which no file of this format can be made.
@@ -48,6 +62,12 @@ pub struct ExportOptions {
     pub dialect: Option<String>,
     /// Which places of the body the file has.
     pub points: Points,
+    /// Of a picture: how many modes it has, the first ones; none: as many as are usual.
+    pub modes: Option<usize>,
+    /// Of a picture: the motion that it shows instead of modes.
+    pub motion: Option<RecordedMotion>,
+    /// Name of the file, for formats whose file names those beside it.
+    pub name: Option<PathBuf>,
 }
 
 /// Which places of the body a file has.
@@ -89,7 +109,7 @@ pub struct Exported {
     /// Further files, each with the ending that takes the place of the extension of the file: `M.mtx` stands
     /// for a file `body.M.mtx` beside `body.csv`, `_exudyn.py` for a file `body_exudyn.py` beside
     /// `body.hdf5`.
-    pub beside: Vec<(&'static str, Vec<u8>)>,
+    pub beside: Vec<(Cow<'static, str>, Vec<u8>)>,
 }
 
 impl Exported {

@@ -53,7 +53,7 @@ impl ExportFormat for Exudyn {
         let file = hdf5_bytes(&entries(body, &mesh))?;
         let script = (!mesh.interfaces.is_empty())
             .then(|| (interfaces::SCRIPT_NAME, interfaces::SCRIPT.as_bytes().to_vec()));
-        Ok(Exported { file, beside: script.into_iter().collect() })
+        Ok(Exported { file, beside: script.into_iter().map(|(name, text)| (name.into(), text)).collect() })
     }
 }
 

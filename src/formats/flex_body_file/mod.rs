@@ -17,6 +17,7 @@ mod item;
 mod names;
 #[cfg(feature = "hdf5")]
 mod read;
+mod recorded_motion;
 #[cfg(feature = "hdf5")]
 mod scan;
 mod schema;
@@ -37,10 +38,11 @@ pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
 pub use document::{format_markdown, format_schema};
 #[cfg(feature = "hdf5")]
 pub use read::{read, read_with_notes, validate};
+pub use recorded_motion::RecordedMotion;
 #[cfg(feature = "hdf5")]
 pub use simulation::fill_simulation;
 #[cfg(feature = "hdf5")]
-pub use simulation_read::{RecordedMotion, read_simulation};
+pub use simulation_read::read_simulation;
 #[cfg(feature = "hdf5")]
 pub use structure::structure;
 #[cfg(feature = "hdf5")]

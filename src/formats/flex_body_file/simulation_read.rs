@@ -1,5 +1,6 @@
 //! Reads the file of a simulation as far as pictures need it: how the frame and the modes move.
 
+use super::recorded_motion::RecordedMotion;
 use super::simulation::{FORMAT, VERSION};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -7,33 +8,6 @@ use crate::base::hdf5_file::{self as hdf5_file, Stored, dataset, elements, open_
 use crate::body::flex_body::Carrier;
 use hdf5_metno as hdf5;
 use std::path::Path;
-
-/// The motion of a body as its file has it: T instants, in the frame of the scene, whose axes are those of the
-/// model.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecordedMotion {
-    /// Name of the scene.
-    pub scene: String,
-    /// Name of the body's model.
-    pub body: String,
-    /// What carries the body.
-    pub carrier: Option<Carrier>,
-    /// Origin of the frame in model coordinates.
-    pub origin_in_model: [f64; 3],
-    /// Instants (T).
-    pub time: Vec<f64>,
-    /// Number of modes nf.
-    pub modes: usize,
-    /// Modal coordinates (T x nf).
-    pub q: Vec<f64>,
-    /// Origin of the frame in the world (T x 3).
-    pub origins: Vec<f64>,
-    /// Euler parameters from the axes of the frame to those of the world (T x 4).
-    pub attitudes: Vec<f64>,
-    /// Largest deflection of a node from the undeformed body, also between the instants, relative to the largest
-    /// extent of the body along an axis of the model.
-    pub largest_deflection: f64,
-}
 
 /// Reads the motion that `flexbody simulate` wrote to `path`.
 ///

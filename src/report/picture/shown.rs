@@ -2,9 +2,8 @@
 
 use super::drawing::{Drawing, turned};
 use crate::base::provenance;
-use crate::body::flex_body::{FlexBody, Interface};
+use crate::body::flex_body::{FlexBody, Interface, is_static};
 use crate::body::invariants::principal_axes;
-use crate::report::completeness::is_static;
 use crate::report::facts::UnitFacts;
 use crate::report::mass_properties::{centre_of_mass, inertia_about_com};
 use crate::report::numbers::{plain, significant};

@@ -1,7 +1,5 @@
 //! The motion of a simulation, as a page plays it.
 
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file::RecordedMotion;
 use crate::report::numbers::counted;
@@ -35,34 +33,11 @@ pub(super) struct ShownMotion {
     attitudes: Vec<f64>,
 }
 
-/// The body as the motion has it: carried by what carried it.
-///
-/// # Errors
-/// FB735 for the motion of another body; those of [`FlexBody::carried`].
-pub(super) fn staged(body: &FlexBody, motion: &RecordedMotion) -> Result<FlexBody> {
-    let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
-    if motion.body != body.source().name {
-        return foreign(format!("motion of `{}`, the body is `{}`", motion.body, body.source().name));
-    }
-    if motion.modes != body.n_modes() {
-        return foreign(format!("motion of {} modes, the body has {}", motion.modes, body.n_modes()));
-    }
-    match &motion.carrier {
-        Some(carrier) => body.carried(carrier),
-        None => Ok(body.clone()),
-    }
-}
-
 impl ShownMotion {
     /// The instants of a motion, or some at equal steps with the first and the last.
     pub fn new(motion: &RecordedMotion, body: &FlexBody) -> Self {
         let written = motion.time.len();
-        let most = (MOST / (8 + motion.modes)).max(2);
-        let count = written.min(most);
-        let chosen: Vec<usize> = match count {
-            0 | 1 => (0..count).collect(),
-            _ => (0..count).map(|i| i * (written - 1) / (count - 1)).collect(),
-        };
+        let chosen = motion.some_instants(MOST / (8 + motion.modes));
         let some = |of: &[f64], width: usize| -> Vec<f64> {
             chosen.iter().flat_map(|&i| &of[i * width..(i + 1) * width]).copied().collect()
         };

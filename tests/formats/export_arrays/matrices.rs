@@ -198,7 +198,7 @@ fn chrono_has_the_same_matrices_filled_up_to_whole_nodes() {
         let files: BTreeMap<&str, DMatrix<f64>> = done
             .beside
             .iter()
-            .map(|(extension, bytes)| (*extension, of_rows(&matrix_market(bytes))))
+            .map(|(extension, bytes)| (extension.as_ref(), of_rows(&matrix_market(bytes))))
             .collect();
         let size = body.coordinates().expect("jointed").names.len();
         let all = files["M.mtx"].nrows();
