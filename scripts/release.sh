@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# Builds what is released, checks it, and puts it into a folder:
+#
+#     scripts/release.sh [--no-wheel] [FOLDER]          # target/release-files without one
+#
+#   flexbody-VERSION-x86_64-linux.tar.gz    the program, static: it runs on every Linux of this processor, whatever its C library
+#   flexbody-VERSION-*.whl                  the Python package (scripts/wheel.sh --zig)
+#   flexbody-VERSION.cdx.json               bill of materials (CycloneDX); -python: that of the wheel
+#   SHA256SUMS
+#
+# Needed: what the build needs (README.md), the Rust target x86_64-unknown-linux-musl (rustup adds it) and a C compiler for musl
+# (musl-tools of Debian and Ubuntu, musl-gcc of Fedora, or MUSL_CC=compiler). FLEXBODY=program is an ordinary build of the same
+# sources to compare with, which is then not built. docs/releases.md says what else belongs to a release: that ./.ci/run passes.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+# shellcheck source=scripts/cmake.sh
+source scripts/cmake.sh
+
+wheel=yes
+if [ "${1:-}" = --no-wheel ]; then
+    wheel=no
+    shift
+fi
+out="${1:-target/release-files}"
+target=x86_64-unknown-linux-musl
+version="$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)"
+built="${CARGO_TARGET_DIR:-target}"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+
+fail() {
+    echo "error: $1" >&2
+    echo "  help: $2" >&2
+    exit 1
+}
+
+step() { echo "== $1"; }
+
+step "what is needed"
+compiler="${MUSL_CC:-$(command -v x86_64-linux-musl-gcc || command -v musl-gcc || true)}"
+[ -n "$compiler" ] || fail "no C compiler for musl: HDF5, METIS and mimalloc are C" "apt-get install musl-tools, or MUSL_CC=compiler"
+for tool in readelf sha256sum python3; do
+    command -v "$tool" >/dev/null || fail "$tool is not there" "install it (binutils, coreutils, python3)"
+done
+if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
+    command -v rustup >/dev/null || fail "the Rust target $target is not installed" "install it as the rest of Rust was installed"
+    rustup target add "$target"
+fi
+
+step "build"
+[ -n "${FLEXBODY:-}" ] || cargo build --release --locked
+# The two usual compilers are found without being told.
+[ -z "${MUSL_CC:-}" ] || export CC_x86_64_unknown_linux_musl="$MUSL_CC"
+cargo build --release --locked --target "$target"
+ordinary="$(realpath "${FLEXBODY:-$built/release/flexbody}")"
+static="$(realpath "$built/$target/release/flexbody")"
+
+step "the program stands alone"
+if readelf --dynamic --wide "$static" | grep NEEDED || readelf --program-headers --wide "$static" | grep INTERP; then
+    fail "$static needs the libraries above" "build all C code for musl: look for a compiler that is not $compiler"
+fi
+# ldd knows such files too; it exits with 1 for some of them.
+(ldd "$static" 2>&1 || true) | sed 's/^/   ldd: /'
+"$static" --version
+# Without anything from outside: no environment, and no file but its own.
+env -i "$static" doctor | sed 's/^/   /'
+
+step "its results are those of the ordinary build"
+for model in connecting_rod bracket_hex20 frame_beams; do
+    for program in ordinary static; do
+        "${!program}" convert "fixtures/models/$model/model.toml" --modes 20 --quiet -o "$work/$model.$program.flex.h5"
+    done
+    # The digits that are promised.
+    "$static" compare "$work/$model.ordinary.flex.h5" "$work/$model.static.flex.h5" --quiet >/dev/null
+    "$static" check "$work/$model.ordinary.flex.h5" --quiet >/dev/null
+    "$ordinary" check "$work/$model.static.flex.h5" --quiet >/dev/null
+    if cmp --silent "$work/$model.ordinary.flex.h5" "$work/$model.static.flex.h5"; then
+        echo "   $model: the same bytes"
+    else
+        # METIS takes rand() of the C library, and principal axes its hypot(): docs/releases.md.
+        echo "   $model: the same body, not to the last bit"
+    fi
+done
+
+step "licences and bill of materials"
+mkdir -p "$out"
+rm -f "$out"/flexbody-* "$out/SHA256SUMS"
+name="flexbody-$version-x86_64-linux"
+mkdir "$work/$name"
+python3 scripts/sbom.py --target "$target" --sbom "$out/flexbody-$version.cdx.json" --licences "$work/$name/LICENCES-OF-DEPENDENCIES.txt"
+
+step "archive"
+cp "$static" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE CITATION.cff "$work/$name"
+mkdir -p "$work/$name/completions" "$work/$name/man"
+for shell in bash zsh fish; do
+    "$static" completions "$shell" >"$work/$name/completions/flexbody.$shell"
+done
+for command in convert inspect check compare select simulate trade response view export audit recipe doctor; do
+    "$static" man "$command" >"$work/$name/man/flexbody-$command.1"
+done
+# Equal files give an equal archive.
+stamp="${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || echo 0)}"
+tar --create --directory "$work" --sort=name --mtime="@$stamp" --owner=0 --group=0 --numeric-owner "$name" | gzip -n9 >"$out/$name.tar.gz"
+
+if [ "$wheel" = yes ]; then
+    step "wheel"
+    FLEXBODY_WHEELS="$(realpath "$out")" ./scripts/wheel.sh --zig
+    python3 scripts/sbom.py --manifest python/Cargo.toml --target x86_64-unknown-linux-gnu --sbom "$out/flexbody-$version-python.cdx.json"
+fi
+
+step "sums"
+(cd "$out" && sha256sum flexbody-* | tee SHA256SUMS)
+if [ -n "$(git status --porcelain 2>/dev/null)" ]; then
+    echo "warning: the sources are not those of a commit" >&2
+fi
