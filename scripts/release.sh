@@ -51,9 +51,9 @@ step "build"
 [ -n "${FLEXBODY:-}" ] || cargo build --release --locked
 # The two usual compilers are found without being told.
 [ -z "${MUSL_CC:-}" ] || export CC_x86_64_unknown_linux_musl="$MUSL_CC"
-cargo build --release --locked --target "$target"
+cargo build --profile dist --locked --target "$target"
 ordinary="$(realpath "${FLEXBODY:-$built/release/flexbody}")"
-static="$(realpath "$built/$target/release/flexbody")"
+static="$(realpath "$built/$target/dist/flexbody")"
 
 step "the program stands alone"
 if readelf --dynamic --wide "$static" | grep NEEDED || readelf --program-headers --wide "$static" | grep INTERP; then
