@@ -38,7 +38,6 @@ pub use identities::{Expected, IdentityCheck, derived_identities, identities};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use numbered::Numbered;
 pub use primary::{GeneralTerms, Invariants, MassKind, PrimaryData};
-#[cfg(feature = "hdf5")]
 pub(crate) use principal_axes::principal_axes;
 pub(crate) use restriction::{UnitFactors, ibar_of_c2, s_of_modal_mass, symmetric_part};
 pub use softening::relative_norm;
