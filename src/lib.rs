@@ -119,6 +119,11 @@ mod cli;
 #[doc(hidden)]
 pub mod cli;
 #[cfg(not(feature = "internals"))]
+mod cluster;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod cluster;
+#[cfg(not(feature = "internals"))]
 mod formats;
 #[cfg(feature = "internals")]
 #[doc(hidden)]

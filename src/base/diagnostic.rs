@@ -245,6 +245,16 @@ codes! {
     AuditSurplus = "FB747", Error, CheckFailed, "file has more numbers than its header says", "count what the header states, or take out what is too much";
     AuditFrame = "FB748", Error, CheckFailed, "axes of a frame are no rotation", "write the axes of the frame right-handed and orthonormal";
     ForeignUnsound = "FB749", Error, BadInput, "file contradicts what every body fulfils", "flexbody audit says what is wrong with the file; write it anew";
+    ClusterUnreadable = "FB760", Error, BadInput, "not a folder of flexbody prepare, or a damaged one", "prepare the folder again, or name the one that was prepared";
+    ClusterChanged = "FB761", Error, CheckFailed, "file of a cluster changed since it was written", "copy the folder again as the cluster wrote it, or run the driver again";
+    ClusterForeign = "FB762", Error, BadInput, "result of a cluster that belongs to another model", "name the model that was prepared, or prepare this one and run the driver";
+    ClusterUnfinished = "FB763", Error, BadInput, "cluster has no result yet", "run the driver; it goes on from what is kept";
+    ClusterInaccurate = "FB764", Error, Untrustworthy, "modes of a cluster are not those of the model", "run the driver again, with --solver mumps where another was taken";
+    CompletenessElsewhere = "FB765", Note, Done, "completeness rests on the count of another program", "flexbody assemble --prove counts once more";
+    EngineMissing = "FB766", Error, BadInput, "MPI, PETSc or SLEPc is not at hand", "install them (docs/cluster.md), name them with --mpiexec and --python, or take --engine built-in";
+    EngineFailed = "FB767", Error, Untrustworthy, "solver on MPI ended without a result", "run the same command again: it goes on from the modes that are kept";
+    BatchSyntax = "FB770", Error, BadInput, "list of bodies cannot be read", "see docs/cluster.md for the keys";
+    BatchFailed = "FB771", Error, CheckFailed, "bodies of a batch failed", "see what is said of each; the others are there, and a second run makes the missing ones only";
     // FB8xx: usage
     Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
     LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";

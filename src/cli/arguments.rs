@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+mod cluster;
 mod guidance;
 
 use crate::formats::FORMATS;
@@ -8,6 +9,9 @@ use crate::formats::export::ExportFormat;
 use crate::study::response::{Band, Settings as ResponseSettings};
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+pub use cluster::{
+    AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments, SolverName,
+};
 pub use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
 use std::path::PathBuf;
 
@@ -33,6 +37,15 @@ pub enum Command {
         --mass M.mtx.gz --nodes nodes.csv --units mm,t,s --modes 40 -o rod.flex.h5 --report rod.html"
     )]
     Convert(Box<ConvertArguments>),
+    /// Write what a cluster needs to find the modes of a model by SLEPc over MPI, its driver included
+    #[command(
+        after_help = "Example:\n  flexbody prepare model.toml --modes 40 -o job\n  mpiexec -n 64 python3 job/driver.py job\n  flexbody assemble job -o rod.flex.h5"
+    )]
+    Prepare(PrepareArguments),
+    /// Make a body of the modes that a cluster has found in a folder of `prepare`
+    Assemble(AssembleArguments),
+    /// Make the bodies of a list, as many at a time as fit the memory; those that are there are left
+    Batch(BatchArguments),
     /// Show what a flex-body file holds
     Inspect(InspectArguments),
     /// Check a flex-body file: its schema and every identity that must hold
@@ -497,6 +510,9 @@ pub struct ConvertArguments {
     /// checkpoint likewise)
     #[arg(long, conflicts_with = "shapes")]
     pub split: bool,
+    /// Who finds the modes.
+    #[command(flatten)]
+    pub engine: EngineArguments,
     /// Threads; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,

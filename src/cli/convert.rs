@@ -1,6 +1,8 @@
 //! `flexbody convert`.
 
+use super::arguments::EngineName;
 use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
+use super::elsewhere::Elsewhere;
 use super::import;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
@@ -33,6 +35,14 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
         return import::run(arguments, from);
     }
+    let elsewhere = Elsewhere::of(arguments);
+    let outcome = run_with(arguments, &elsewhere)?;
+    elsewhere.tidy();
+    Ok(outcome)
+}
+
+/// A conversion whose modes this program finds, or somebody else.
+pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
     if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
         let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
         return Err(Diagnostic::new(Code::Usage, message)
@@ -65,6 +75,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
         loads: &loads,
         formats: &formats,
         scenes: &scenes,
+        elsewhere,
         threads,
     };
     if !arguments.split {
@@ -112,6 +123,7 @@ struct Job<'a> {
     formats: &'a [Format],
     /// The load cases of the scene; none without one.
     scenes: &'a [Scene],
+    elsewhere: &'a Elsewhere,
     threads: usize,
 }
 
@@ -153,11 +165,15 @@ impl Job<'_> {
     ) -> Result<Done> {
         let Self { arguments, .. } = *self;
         let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, model)).transpose()?;
-        let settings = self.settings(model, basis(arguments, self.loads, model)?);
+        let mut settings = self.settings(model, BasisChoice::default());
+        let watch = |event: Event<'_>| watcher.hear(event);
+        settings.basis = match self.elsewhere.modes(model, &settings.modes, &watch)? {
+            Some(found) => found,
+            None => basis(arguments, self.loads, model)?,
+        };
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
-        let watch = |event: Event<'_>| watcher.hear(event);
         let (mut conversion, selection) = match &arguments.scene {
             Some(path) => convert_for_cases(model, &self.of_band(settings), self.scenes, resume, &watch)
                 .map_err(|error| error.in_file(path))
@@ -287,6 +303,7 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
     let residual = !loads.is_empty();
+    let slepc = arguments.engine.engine == EngineName::Slepc;
     let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang | BasisName::Scene);
     let coupled = matches!(basis, BasisName::CraigBampton | BasisName::CraigChang);
     let message = match arguments {
@@ -299,6 +316,16 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
         }
         ConvertArguments { storage: StorageName::F32, accuracy: AccuracyName::Certified, .. } => {
             "--storage f32 rounds what --accuracy certified guarantees: take --storage f64"
+        }
+        _ if slepc && basis != BasisName::Free => "--engine slepc finds free modes: it needs --basis free",
+        _ if slepc && residual => "residual vectors need the factor of --engine built-in",
+        ConvertArguments { scene: Some(_), .. } if slepc => "--scene chooses modes of --engine built-in",
+        ConvertArguments { split: true, .. } if slepc => "--engine slepc takes one body: --split has several",
+        ConvertArguments { checkpoint: Some(_), .. } if slepc => {
+            "--checkpoint is for --engine built-in: that of slepc lies in its folder"
+        }
+        ConvertArguments { accuracy: AccuracyName::Certified, .. } if slepc => {
+            "--accuracy certified needs --engine built-in"
         }
         ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
             "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
@@ -386,7 +413,7 @@ fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
     Ok(schemes)
 }
 
-fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
+pub(super) fn model_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     let mut files = stated_files(arguments)?;
     files.allow_implausible |= arguments.allow_implausible;
     Ok(files)
@@ -428,7 +455,7 @@ fn refuse_overwriting(
     refuse_replacing(inputs.chain(series), outputs.iter().flat_map(Places::all))
 }
 
-fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
+pub(super) fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {
     match arguments.max_frequency {
         Some(hertz) => Wanted::Below(units.eigenvalue_of(hertz)),
         None => Wanted::Lowest(match (arguments.modes, arguments.basis) {

@@ -2,12 +2,15 @@
 //! arithmetic.
 
 mod arguments;
+mod assemble;
 mod audit;
+mod batch;
 mod check;
 mod compare;
 mod completions;
 mod convert;
 mod doctor;
+mod elsewhere;
 mod export;
 mod import;
 mod inspect;
@@ -15,6 +18,7 @@ mod models;
 mod outcome;
 mod output;
 mod places;
+mod prepare;
 mod recipe;
 mod resources;
 mod response;

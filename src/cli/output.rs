@@ -5,8 +5,8 @@ use super::outcome::{Outcome, warnings};
 use super::resources::use_threads;
 use super::terminal::colours_of_stderr;
 use super::{
-    audit, check, compare, completions, convert, doctor, export, inspect, recipe, response, select, simulate,
-    trade, view,
+    assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare, recipe,
+    response, select, simulate, trade, view,
 };
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{ExitCode, Result};
@@ -59,11 +59,15 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Select(arguments) => arguments.threads,
         Command::Simulate(arguments) => arguments.threads,
         Command::Response(arguments) => arguments.threads,
+        Command::Assemble(arguments) => arguments.threads,
         _ => None,
     });
     let (name, printing) = command_of(arguments);
     let outcome = match &arguments.command {
         Command::Convert(arguments) => convert::run(arguments),
+        Command::Prepare(arguments) => prepare::run(arguments),
+        Command::Assemble(arguments) => assemble::run(arguments),
+        Command::Batch(arguments) => batch::run(arguments),
         Command::Inspect(arguments) => inspect::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
@@ -85,6 +89,9 @@ pub fn run(arguments: &Arguments) -> ExitCode {
 fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
     match &arguments.command {
         Command::Convert(arguments) => ("convert", arguments.printing),
+        Command::Prepare(arguments) => ("prepare", arguments.printing),
+        Command::Assemble(arguments) => ("assemble", arguments.printing),
+        Command::Batch(arguments) => ("batch", arguments.printing),
         Command::Inspect(arguments) => ("inspect", arguments.printing),
         Command::Check(arguments) => ("check", arguments.printing),
         Command::Compare(arguments) => ("compare", arguments.printing),

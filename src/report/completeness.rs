@@ -61,6 +61,17 @@ fn static_shapes(body: &FlexBody) -> usize {
 /// Verdict about shapes of which nothing is to be proved.
 const GIVEN: &str = "given";
 
+/// Whether another engine has counted as many modes as the body has.
+fn counted_elsewhere(body: &FlexBody) -> bool {
+    let c = body.certificate();
+    let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();
+    let flexible = c.negative_pivots.and_then(|count| count.checked_sub(c.rigid_modes));
+    body.source().settings["engine"].is_string()
+        && c.proved_modes.is_none()
+        && below == body.n_modes()
+        && flexible.is_some_and(|flexible| flexible >= below)
+}
+
 /// The verdict in one word, and in a few.
 fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
     let basis = body.source().settings["basis"].as_str().unwrap_or_default();
@@ -76,6 +87,9 @@ fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
         (None, false) if basis == "imported" && body.certificate().negative_pivots.is_none() => {
             (GIVEN, "Shapes as given.")
         }
+        (None, false) if counted_elsewhere(body) => {
+            (GIVEN, "No mode is missing by the count of another program.")
+        }
         (None, false) => ("open", "Not proved complete."),
     }
 }
@@ -88,7 +102,11 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
     }
     let Some(flexible) = c.proved_modes else {
         let why = if c.remark.is_empty() { "no inertia count was made".to_owned() } else { plain(&c.remark) };
-        let verdict = if head(body, false).0 == GIVEN { "not proved" } else { "NOT PROVED" };
+        let verdict = match head(body, false).0 {
+            _ if counted_elsewhere(body) => "counted elsewhere",
+            GIVEN => "not proved",
+            _ => "NOT PROVED",
+        };
         return (false, format!("{verdict}: {why}"));
     };
     let shift = significant(shift_hz.unwrap_or(f64::NAN), 5);

@@ -4,6 +4,7 @@
 
 mod audit;
 mod bar_chart;
+mod batch;
 mod clusters;
 mod common_modes;
 mod comparison;
@@ -51,6 +52,7 @@ mod unit_names;
 mod view;
 
 pub use audit::{audit_json, audit_text};
+pub use batch::{BatchFacts, BatchRow};
 pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
 pub use comparison_report::{ComparisonFormat, ComparisonReport};
 pub use facts::Facts;

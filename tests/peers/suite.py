@@ -70,6 +70,15 @@ def nastran(flexbody, folder):
     return rows
 
 
+def cluster(flexbody, folder):
+    """SLEPc over MPI: a table of its own page."""
+    import cluster as slepc
+
+    rows = slepc.rows(flexbody, folder) + slepc.one_command(flexbody, folder)
+    TABLES["docs/cluster.md", "cluster"] = table(rows, [])
+    return rows
+
+
 def arm_table(flexbody, folder):
     import compilers
 
@@ -100,6 +109,7 @@ PEERS = [
     ("CalculiX", "suite.calculix", True),
     ("open FE codes", "suite.recipes", True),
     ("pyNastran, pyYeti", "suite.nastran", True),
+    ("SLEPc over MPI", "suite.cluster", True),
 ]
 
 
@@ -184,7 +194,7 @@ def main():
     bad = [row for row in rows if not row.good()]
     if args.write and not (bad or args.small):
         elsewhere = ("CalculiX", "pyNastran", "pyYeti", "NX Nastran")
-        of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith("recipe"))]
+        of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith(("recipe", "cluster")))]
         TABLES["docs/export.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():
             write(page, mark, text)

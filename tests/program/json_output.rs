@@ -15,6 +15,9 @@ use tempfile::TempDir;
 
 const SCENE: &str = "[run]\nduration = 0.001\noutputs = 20\n[initial]\nangular_velocity = [10, 30, 5]\n";
 
+const LIST: &str =
+    "[[body]]\nmodel = \"model.toml\"\noutput = \"listed.h5\"\noptions = [\"--modes\", \"4\"]\n";
+
 /// The schemas beside the one that refers to them.
 struct Folder;
 
@@ -39,6 +42,7 @@ fn folder() -> TempDir {
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).with_lumped_mass().raw_model();
     write_model(folder.path(), &raw, Triangle::Lower);
     fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
+    fs::write(folder.path().join("list.toml"), LIST).expect("written");
     let words = ["convert", "model.toml", "--modes", "4", "--quiet", "-o", "b.h5"];
     assert!(flexbody(folder.path(), &words).status.success());
     folder
@@ -70,6 +74,11 @@ fn every_command_prints_an_object_of_the_schema() {
         ("convert model.toml --modes 4 -o new.h5", 0),
         ("convert model.toml --modes 4 -o new.h5 --split", 0),
         ("convert model.toml --max-frequency 1 -o none.h5", 2),
+        ("prepare model.toml --modes 4 -o job", 0),
+        ("prepare nothing.toml -o job", 2),
+        ("assemble job -o assembled.h5", 2),
+        ("batch list.toml", 0),
+        ("batch nothing.toml", 2),
         ("inspect b.h5", 0),
         ("inspect b.h5 --structure", 0),
         ("inspect nothing.h5", 2),

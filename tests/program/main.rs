@@ -7,6 +7,7 @@ mod support;
 mod architecture;
 mod bad_input;
 mod checkpoint;
+mod cluster;
 mod command_line;
 mod docs_generated;
 mod front_door;

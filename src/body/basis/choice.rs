@@ -1,6 +1,6 @@
 //! The bases there are.
 
-use super::{Basis, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads};
+use super::{Basis, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, SolvedModes};
 use crate::base::provenance::SourceFile;
 use faer::Mat;
 
@@ -11,6 +11,8 @@ pub enum BasisChoice {
     Free(FreeSurface),
     /// Shapes that were computed elsewhere.
     Imported(ImportedShapes),
+    /// Free-surface modes that another eigen-solver found.
+    Solved(SolvedModes),
     /// Modes with the interfaces held, and constraint modes.
     CraigBampton(CraigBampton),
     /// Free-surface modes, and attachment modes of the interfaces.
@@ -29,6 +31,7 @@ impl BasisChoice {
     pub fn sources(&self) -> Vec<&SourceFile> {
         match self {
             Self::Imported(shapes) => shapes.source().into_iter().collect(),
+            Self::Solved(modes) => vec![&modes.source],
             _ => self.residual_vectors().iter().filter_map(Loads::source).collect(),
         }
     }
@@ -38,6 +41,7 @@ impl BasisChoice {
         match self {
             Self::Free(free) => free,
             Self::Imported(shapes) => shapes,
+            Self::Solved(modes) => modes,
             Self::CraigBampton(fixed) => fixed,
             Self::CraigChang(free) => free,
         }
@@ -50,7 +54,7 @@ impl BasisChoice {
         let residual_vectors = match &mut own {
             Self::Free(FreeSurface { residual_vectors })
             | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
-            Self::Imported(_) | Self::CraigBampton(_) => return None,
+            Self::Imported(_) | Self::Solved(_) | Self::CraigBampton(_) => return None,
         };
         if loads.ncols() > 0 {
             residual_vectors.push(Loads::Motion(loads.clone()));
@@ -58,12 +62,20 @@ impl BasisChoice {
         Some(own)
     }
 
+    /// The eigen-solver that found the modes, where it is not the one of this program.
+    pub fn engine(&self) -> Option<&str> {
+        match self {
+            Self::Solved(modes) => Some(&modes.engine),
+            _ => None,
+        }
+    }
+
     /// Loads, named by the user, whose static responses join the modes.
     pub fn residual_vectors(&self) -> &[Loads] {
         match self {
             Self::Free(FreeSurface { residual_vectors })
             | Self::CraigChang(CraigChang { residual_vectors }) => residual_vectors,
-            Self::Imported(_) | Self::CraigBampton(_) => &[],
+            Self::Imported(_) | Self::Solved(_) | Self::CraigBampton(_) => &[],
         }
     }
 }

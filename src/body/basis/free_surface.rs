@@ -10,7 +10,8 @@ use crate::base::error::Result;
 use crate::base::progress::Watch;
 use crate::model::{FeModel, centre_and_length};
 use crate::numerics::eigen::{
-    Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted, solve,
+    Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted,
+    planned_bytes, solve,
 };
 use crate::numerics::linalg::{Pencil, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{Mat, MatRef};
@@ -159,6 +160,22 @@ fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Opti
         _ => return None,
     };
     Some(Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {singular}")))
+}
+
+/// An upper bound of the first flexible eigenvalue of a model with these rigid modes, near it for a uniform
+/// body: the scale of a shift.
+pub fn first_eigenvalue_estimate(model: &FeModel, rigid: MatRef<'_, f64>) -> f64 {
+    quadratic_estimate(model, &model.pencil(), rigid)
+}
+
+/// Bytes that the search for the free modes of a model holds at the most.
+///
+/// # Errors
+/// Those of the analysis of a model that has no factor.
+pub fn memory_estimate(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<u64> {
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+    planned_bytes(&problem, settings, watch).map_err(|failure| explain(model, failure))
 }
 
 /// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an

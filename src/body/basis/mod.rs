@@ -16,6 +16,7 @@ mod nodal_modes;
 mod pseudo_free_surface;
 mod residual_vectors;
 mod rigid_modes;
+mod solved;
 
 /// What is asked for.
 pub use crate::numerics::eigen::EigenSettings as ModeSettings;
@@ -23,9 +24,12 @@ pub use choice::BasisChoice;
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;
-pub use free_surface::{FreeSurface, free_surface, free_surface_resumed};
+pub use free_surface::{
+    FreeSurface, first_eigenvalue_estimate, free_surface, free_surface_resumed, memory_estimate,
+};
 pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
 pub use residual_vectors::{Loads, UserLoads, free_static_responses, interface_loads};
 pub use rigid_modes::rigid_modes;
+pub use solved::{CountElsewhere, SolvedModes};

@@ -90,6 +90,9 @@ impl ConvertSettings {
         if let Some(damping) = model.damping() {
             described["damping"] = serde_json::json!({ damping.name(): damping_numbers(damping) });
         }
+        if let Some(engine) = self.basis.engine() {
+            described["engine"] = serde_json::json!(engine);
+        }
         // Whether there is a surface at all is seen in the file.
         if let (MeshChoice::AtMost(most), Some(_)) = (self.mesh, model.mesh()) {
             described["mesh_triangles"] = serde_json::json!(most);

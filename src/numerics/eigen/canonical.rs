@@ -8,7 +8,7 @@ use std::ops::Range;
 
 /// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form
 /// together.
-pub(super) const CLUSTER_GAP: f64 = 1e-9;
+pub const CLUSTER_GAP: f64 = 1e-9;
 
 /// Components within this part of the largest count as equally large; the first of them in row order is
 /// taken, so that rounding does not choose between symmetric nodes.

@@ -28,7 +28,7 @@ mod unresisted;
 mod without_factor;
 mod zero_energy;
 
-pub use canonical::{canonical_basis, clusters};
+pub use canonical::{CLUSTER_GAP, canonical_basis, clusters};
 pub use completeness::{Completeness, Proof};
 pub use counters::Counters;
 pub use dynamic_response::dynamic_responses;
@@ -40,7 +40,7 @@ pub use refine::{relative_residual, residual_scale};
 pub use resume::{Resume, Save, Snapshot};
 pub use settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
 pub use solution::{EigenSolution, EigenvalueBounds};
-pub use solve::solve;
+pub use solve::{planned_bytes, solve};
 pub use span::modes_of_span;
 pub use static_response::{ResponseAccuracy, static_responses, static_responses_twice};
 pub use unresisted::{Unresisted, unresisted_motions};

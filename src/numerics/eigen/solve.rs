@@ -75,6 +75,25 @@ pub fn solve(
     )
 }
 
+/// Bytes that [`solve`] holds at the most, by its plan; all flexible modes below an eigenvalue count as
+/// [`EigenSettings::DEFAULT_COUNT`].
+///
+/// # Errors
+/// [`EigenFailure`] of the analysis.
+pub fn planned_bytes(
+    problem: &EigenProblem<'_>,
+    settings: &EigenSettings,
+    watch: Watch<'_>,
+) -> Result<u64, EigenFailure> {
+    let analysis = analyse(problem, watch, &mut Counters::default())?;
+    let wanted = match settings.wanted {
+        Wanted::Lowest(count) => count.min(flexible_rows(problem)),
+        Wanted::Below(_) => EigenSettings::DEFAULT_COUNT,
+    };
+    let free = EigenSettings { memory: None, longest: None, ..*settings };
+    Plan::new(problem, &free, &analysis, wanted, is_dense(problem, settings, wanted)).map(|plan| plan.bytes)
+}
+
 /// The order of elimination, and whether M is a mass at all.
 fn analyse(
     problem: &EigenProblem<'_>,

@@ -1,0 +1,161 @@
+//! What can be said on the command line about work on a cluster and about many bodies.
+
+use super::{AccuracyName, FrameName, JobArguments, Printing, StorageName, memory_size, positive};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Arguments of `prepare`.
+#[derive(Debug, Args)]
+pub struct PrepareArguments {
+    /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md)
+    #[arg(value_name = "MODEL.toml|JOB.inp")]
+    pub model: PathBuf,
+    /// The job of an FE program.
+    #[command(flatten)]
+    pub job: JobArguments,
+    /// Warn only of densities that no matter has, and of mass between nodes that no stiffness joins
+    #[arg(long)]
+    pub allow_implausible: bool,
+    /// Folder to write, all that the cluster needs; it is made where it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Number of flexible modes [default: 20]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "max_frequency")]
+    pub modes: Option<u32>,
+    /// All flexible modes up to this frequency instead
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub max_frequency: Option<f64>,
+    /// Promise about the modes: fast or standard
+    #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
+    pub accuracy: AccuracyName,
+    /// Bits of the whole numbers of the PETSc on the cluster; matrices of more than two billion entries need
+    /// 64
+    #[arg(long, value_name = "BITS", default_value = "32", value_parser = ["32", "64"])]
+    pub indices: String,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `assemble`.
+#[derive(Debug, Args)]
+pub struct AssembleArguments {
+    /// Folder that `prepare` has written and the driver has worked in
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// The model, where it does not lie any more where `prepare` has read it
+    #[arg(long, value_name = "MODEL.toml|JOB.inp")]
+    pub model: Option<PathBuf>,
+    /// Flex-body file to write
+    #[arg(short, long, value_name = "BODY.flex.h5")]
+    pub output: PathBuf,
+    /// Take so many of the modes [default: as many as were wanted]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub modes: Option<u32>,
+    /// Make the built-in inertia count too, which factors K - sigma M on this machine
+    #[arg(long)]
+    pub prove: bool,
+    /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
+    #[arg(long, value_enum, default_value_t = StorageName::F64)]
+    pub storage: StorageName,
+    /// Memory that the program may use: a number with K, M, G or T
+    /// [default: what the machine and its control groups leave]
+    #[arg(long, value_name = "SIZE", value_parser = memory_size)]
+    pub memory_limit: Option<u64>,
+    /// Frame of the body
+    #[arg(long, value_enum, default_value_t = FrameName::Principal)]
+    pub frame: FrameName,
+    /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
+    #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
+    pub lumped: String,
+    /// Leave the surface out of the file
+    #[arg(long)]
+    pub no_mesh: bool,
+    /// Report to write, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// Threads; results do not depend on it [default: all processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Arguments of `batch`.
+#[derive(Debug, Args)]
+pub struct BatchArguments {
+    /// List of bodies (see docs/cluster.md)
+    #[arg(value_name = "LIST.toml")]
+    pub list: PathBuf,
+    /// Memory that all conversions together may use: a number with K, M, G or T
+    /// [default: what the machine and its control groups leave]
+    #[arg(long, value_name = "SIZE", value_parser = memory_size)]
+    pub memory_limit: Option<u64>,
+    /// Report about all bodies, format by extension: .html, .json or .txt (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub report: Vec<PathBuf>,
+    /// How to print.
+    #[command(flatten)]
+    pub printing: Printing,
+}
+
+/// Who finds the modes.
+#[derive(Debug, Args)]
+pub struct EngineArguments {
+    /// Who finds the free modes: this program, or SLEPc over MPI (docs/cluster.md)
+    #[arg(long, value_enum, default_value_t = EngineName::BuiltIn)]
+    pub engine: EngineName,
+    /// Ranks of --engine slepc
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub ranks: u32,
+    /// How --engine slepc solves
+    #[arg(long, value_enum, default_value_t = SolverName::Mumps)]
+    pub solver: SolverName,
+    /// Words that start MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
+    #[arg(long, value_name = "WORDS")]
+    pub mpiexec: Option<String>,
+    /// Python with petsc4py and slepc4py [default: FLEXBODY_PYTHON, else python3 or /usr/bin/python3]
+    #[arg(long, value_name = "PYTHON")]
+    pub python: Option<PathBuf>,
+    /// Folder that --engine slepc works in and that stays
+    /// [default: BODY.flex.h5.cluster, which stays only where the run fails, to go on from]
+    #[arg(long, value_name = "DIR")]
+    pub cluster_folder: Option<PathBuf>,
+}
+
+impl Default for EngineArguments {
+    /// This program.
+    fn default() -> Self {
+        Self {
+            engine: EngineName::BuiltIn,
+            ranks: 1,
+            solver: SolverName::Mumps,
+            mpiexec: None,
+            python: None,
+            cluster_folder: None,
+        }
+    }
+}
+
+/// Names of the engines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EngineName {
+    /// This program
+    BuiltIn,
+    /// SLEPc over MPI
+    Slepc,
+}
+
+/// Names of the solvers of SLEPc.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SolverName {
+    /// Krylov-Schur, shift-invert, on one factor of MUMPS
+    Mumps,
+    /// Spectrum slicing, one factor for each part of the spectrum: hundreds of modes
+    Slices,
+    /// Krylov-Schur on conjugate gradients with algebraic multigrid: no factor, no count
+    Gamg,
+    /// LOBPCG with algebraic multigrid: no factor, no count
+    Lobpcg,
+}

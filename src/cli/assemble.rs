@@ -1,0 +1,69 @@
+//! `flexbody assemble`: a conversion whose modes a cluster has found.
+
+use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, JobArguments};
+use super::arguments::{AssembleArguments, EngineArguments};
+use super::convert::run_with;
+use super::elsewhere::Elsewhere;
+use super::outcome::Outcome;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::cluster::{Prepared, read_prepared};
+use crate::numerics::eigen::Accuracy;
+
+pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
+    let prepared = read_prepared(&arguments.folder)?;
+    let converted = as_conversion(arguments, &prepared)?;
+    let (folder, prove) = (arguments.folder.clone(), arguments.prove);
+    run_with(&converted, &Elsewhere::Cluster { folder, prepared: Box::new(prepared), prove })
+}
+
+/// What `convert` would be asked for.
+fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<ConvertArguments> {
+    let model = arguments.model.clone().or_else(|| prepared.model.path.clone()).ok_or_else(|| {
+        Diagnostic::new(Code::Usage, "the folder does not say where its model is").with_help("give --model")
+    })?;
+    let hertz = |lambda: f64| lambda.sqrt() / std::f64::consts::TAU * prepared.hertz;
+    let modes = prepared.wanted.modes.and_then(|count| u32::try_from(count).ok());
+    Ok(ConvertArguments {
+        model: Some(model),
+        from: None,
+        job: JobArguments {
+            format: prepared.model.format.clone(),
+            units: prepared.model.units.clone(),
+            interface: prepared.model.interfaces.clone(),
+        },
+        stiffness: None,
+        mass: None,
+        nodes: None,
+        dofs: None,
+        dimension: None,
+        allow_implausible: prepared.model.allow_implausible,
+        output: arguments.output.clone(),
+        modes: arguments.modes.or(modes),
+        max_frequency: prepared.wanted.below.filter(|_| arguments.modes.is_none()).map(hertz),
+        basis: BasisName::Free,
+        shapes: None,
+        residual_vectors: Some(String::new()),
+        accuracy: match prepared.accuracy() {
+            Accuracy::Fast => AccuracyName::Fast,
+            _ => AccuracyName::Standard,
+        },
+        factor: FactorName::Auto,
+        storage: arguments.storage,
+        memory_limit: arguments.memory_limit,
+        allow_long: true,
+        frame: arguments.frame,
+        lumped: arguments.lumped.clone(),
+        lumped_modes: false,
+        mesh_triangles: None,
+        no_mesh: arguments.no_mesh,
+        scene: None,
+        case: None,
+        report: arguments.report.clone(),
+        checkpoint: None,
+        split: false,
+        engine: EngineArguments::default(),
+        threads: arguments.threads,
+        printing: arguments.printing,
+    })
+}

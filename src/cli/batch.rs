@@ -1,0 +1,235 @@
+//! `flexbody batch`: the bodies of a list, each by a process of its own, as many at a time as fit the memory.
+
+use super::arguments::BatchArguments;
+use super::arguments::{Arguments, Command, ConvertArguments};
+use super::convert::{model_files, wanted};
+use super::outcome::Outcome;
+use super::places::{format_of, refuse_replacing};
+use super::resources::memory_left;
+use super::watcher::Watcher;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::output::OutputSlot;
+use crate::base::progress::Event;
+use crate::body::basis::ModeSettings;
+use crate::cluster::{
+    BatchBody, BatchList, Budget, Ledger, conversion_bytes, inputs_fingerprint, read_batch_list,
+};
+use crate::input::read_model;
+use crate::model::FeModel;
+use crate::report::{BatchFacts, BatchRow, Format};
+use clap::Parser;
+use serde_json::Value;
+use std::path::PathBuf;
+use std::process::{Command as Process, Stdio};
+use std::sync::mpsc;
+use std::time::Instant;
+
+/// Threads of a conversion where the list says nothing.
+const THREADS: u16 = 1;
+
+/// Bytes that reading a body of another program takes: such files are small.
+const IMPORT: u64 = 500_000_000;
+
+/// A body that is to be made.
+struct Body {
+    words: Vec<String>,
+    output: PathBuf,
+    /// Fingerprint of what it is made of.
+    inputs: String,
+    need: u64,
+}
+
+pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
+    let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
+    let list = read_batch_list(&arguments.list)?;
+    refuse_replacing(std::iter::once(&arguments.list), arguments.report.iter())?;
+    let slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
+    let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading the list");
+    let parsed = list.bodies.iter().map(|body| parse(&list, body)).collect::<Result<Vec<_>>>()?;
+    let mut ledger = Ledger::of(&arguments.list);
+    let budget = Budget {
+        memory: memory_left(arguments.memory_limit).unwrap_or(u64::MAX),
+        parallel: list.parallel.unwrap_or_else(|| {
+            let processors = std::thread::available_parallelism().map_or(1, usize::from);
+            (processors / usize::from(list.threads.unwrap_or(THREADS))).max(1)
+        }),
+    };
+    let mut rows: Vec<BatchRow> = Vec::new();
+    let mut waiting: Vec<(usize, Body)> = Vec::new();
+    for (index, (body, (words, converted))) in list.bodies.iter().zip(parsed).enumerate() {
+        let mut row = empty_row(body);
+        let inputs = inputs_of(&words, &converted);
+        match ledger.done(&body.output, &inputs) {
+            Some(done) => {
+                row.read(&done.told);
+                row.state = "unchanged";
+            }
+            None => match need(body, &converted, &watcher) {
+                Ok(need) => {
+                    row.memory_estimate_bytes = need;
+                    waiting.push((index, Body { words, output: body.output.clone(), inputs, need }));
+                }
+                Err(error) => fail(&mut row, &error),
+            },
+        }
+        rows.push(row);
+    }
+    watcher.hear(Event::Phase("converting"));
+    let finished = work(waiting, budget, &mut rows, &mut ledger);
+    watcher.clear();
+    finished?;
+    let facts = BatchFacts::new(arguments.list.display().to_string(), budget.memory, budget.parallel, rows);
+    for (slot, format) in slots.iter().zip(formats) {
+        slot.fill(facts.render(format).as_bytes())?;
+    }
+    OutputSlot::commit_all(slots)?;
+    let failed = (facts.failed() > 0).then(|| {
+        let message = format!("{} of {} bodies failed", facts.failed(), list.bodies.len());
+        Diagnostic::new(Code::BatchFailed, message).in_file(&arguments.list)
+    });
+    let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
+    Ok(Outcome { text, json, passed: failed.is_none(), diagnostics: failed.into_iter().collect() })
+}
+
+/// The words of a conversion, and what they say.
+fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<ConvertArguments>)> {
+    let (model, output) = (body.model.display().to_string(), body.output.display().to_string());
+    let own = ["convert".to_owned(), model, "--output".to_owned(), output, "--json".to_owned()];
+    let threads = ["--threads".to_owned(), list.threads.unwrap_or(THREADS).to_string()];
+    let more = own.into_iter().chain(threads).chain(list.options.clone()).chain(body.options.clone());
+    let words: Vec<String> = more.collect();
+    let program = std::iter::once("flexbody".to_owned());
+    match Arguments::try_parse_from(program.chain(words.clone())).map(|parsed| parsed.command) {
+        Ok(Command::Convert(converted)) => Ok((words, converted)),
+        Ok(_) => Err(refused(body, "its options are those of another command")),
+        Err(error) => {
+            let text = error.render().to_string();
+            let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+            Err(refused(body, &first))
+        }
+    }
+}
+
+fn refused(body: &BatchBody, why: &str) -> Error {
+    Diagnostic::new(Code::BatchSyntax, format!("{}: {why}", body.output.display())).into()
+}
+
+/// The fingerprint of the words of a conversion and of every file that they name or that the model names.
+fn inputs_of(words: &[String], converted: &ConvertArguments) -> String {
+    let mut files = model_files(converted).map(|files| files.paths()).unwrap_or_default();
+    let named = words.iter().skip(1).map(|word| word.rsplit('=').next().unwrap_or(word)).map(PathBuf::from);
+    files.extend(named.filter(|path| *path != converted.output && path.is_file()));
+    inputs_fingerprint(words, &files)
+}
+
+/// Bytes that a conversion needs: as the list says, or as its plan says, for which the model is read.
+fn need(body: &BatchBody, converted: &ConvertArguments, watcher: &Watcher) -> Result<u64> {
+    if let Some(known) = body.memory {
+        return Ok(known);
+    }
+    if converted.from.is_some() {
+        return Ok(IMPORT);
+    }
+    watcher.hear(Event::Phase("estimating"));
+    let model = FeModel::from_raw(read_model(&model_files(converted)?)?)?.model;
+    let settings = ModeSettings { wanted: wanted(converted, model.units()), ..ModeSettings::default() };
+    conversion_bytes(&model, &settings)
+}
+
+fn empty_row(body: &BatchBody) -> BatchRow {
+    BatchRow {
+        output: body.output.display().to_string(),
+        state: "failed",
+        exit_code: 0,
+        error: None,
+        warnings: 0,
+        memory_estimate_bytes: 0,
+        peak_memory_bytes: None,
+        seconds: 0.0,
+        n_dofs: None,
+        modes: None,
+        frequencies_hz: None,
+        complete: None,
+    }
+}
+
+fn fail(row: &mut BatchRow, error: &Error) {
+    row.exit_code = error.exit_code() as i32;
+    row.error = error.diagnostics().first().map(|d| format!("{} {}", d.code().id(), d.message()));
+}
+
+/// A conversion that has ended.
+struct Ended {
+    index: usize,
+    need: u64,
+    output: PathBuf,
+    inputs: String,
+    exit_code: i32,
+    told: Value,
+    seconds: f64,
+}
+
+/// Runs all that waits, as many at a time as fit; each that is done is written down at once.
+fn work(
+    mut waiting: Vec<(usize, Body)>,
+    budget: Budget,
+    rows: &mut [BatchRow],
+    ledger: &mut Ledger,
+) -> Result<()> {
+    let program = std::env::current_exe().map_err(|e| {
+        Error::from(Diagnostic::new(Code::MemoryShort, format!("this program cannot be started again: {e}")))
+    })?;
+    let (ended, of) = mpsc::channel::<Ended>();
+    std::thread::scope(|scope| {
+        let mut running: Vec<u64> = Vec::new();
+        loop {
+            let needs =
+                |waiting: &[(usize, Body)]| waiting.iter().map(|(_, body)| body.need).collect::<Vec<_>>();
+            while let Some(next) = budget.next(&needs(&waiting), &running) {
+                let (index, body) = waiting.remove(next);
+                running.push(body.need);
+                let (program, ended) = (program.clone(), ended.clone());
+                let limit = budget.limit(body.need);
+                scope.spawn(move || {
+                    // Somebody always listens: this thread ends before the loop does.
+                    let _ = ended.send(convert(&program, index, body, limit));
+                });
+            }
+            if running.is_empty() {
+                return Ok(());
+            }
+            let Ok(done) = of.recv() else { return Ok(()) };
+            running.iter().position(|need| *need == done.need).map(|at| running.swap_remove(at));
+            let row = &mut rows[done.index];
+            row.read(&done.told);
+            (row.exit_code, row.seconds) = (done.exit_code, done.seconds);
+            if done.exit_code == 0 {
+                row.state = "done";
+                ledger.add(&done.output, done.inputs, done.told)?;
+            } else if row.error.is_none() {
+                row.error = Some(format!("its process ended with code {}", done.exit_code));
+            }
+        }
+    })
+}
+
+/// One conversion, by a process of its own: one that ends for lack of memory takes no other with it.
+fn convert(program: &std::path::Path, index: usize, body: Body, limit: u64) -> Ended {
+    let Body { words, output, inputs, need } = body;
+    let begun = Instant::now();
+    let mut process = Process::new(program);
+    process.args(&words).stdin(Stdio::null());
+    if !words.iter().any(|word| word.starts_with("--memory-limit")) {
+        process.args(["--memory-limit", &limit.to_string()]);
+    }
+    let ended = process.output();
+    let (exit_code, told) = match ended {
+        Ok(ended) => {
+            let told = serde_json::from_slice(&ended.stdout).unwrap_or(Value::Null);
+            (ended.status.code().unwrap_or(-1), told)
+        }
+        Err(_) => (-1, Value::Null),
+    };
+    Ended { index, need, output, inputs, exit_code, told, seconds: begun.elapsed().as_secs_f64() }
+}

@@ -1,0 +1,108 @@
+//! Modes that are found elsewhere: by SLEPc over MPI in this run, or by a cluster before.
+
+use super::arguments::ConvertArguments;
+use super::arguments::{EngineName, SolverName};
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::progress::{Event, Watch};
+use crate::body::basis::{BasisChoice, ModeSettings};
+use crate::cluster::{Engine, ModelReference, PrepareSettings, Prepared, Solver, prepare, read_found};
+use crate::model::FeModel;
+use std::path::{Path, PathBuf};
+
+/// Who finds the modes of a conversion.
+pub(super) enum Elsewhere {
+    /// This program.
+    Nowhere,
+    /// SLEPc over MPI, in a folder that is removed after it where nobody named it.
+    Slepc { engine: Engine, folder: PathBuf, kept: bool },
+    /// A cluster that has worked in this folder; whether the built-in count is made beside its own.
+    Cluster { folder: PathBuf, prepared: Box<Prepared>, prove: bool },
+}
+
+impl Elsewhere {
+    /// What the command line says.
+    pub(super) fn of(arguments: &ConvertArguments) -> Self {
+        let asked = &arguments.engine;
+        if asked.engine == EngineName::BuiltIn {
+            return Self::Nowhere;
+        }
+        let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+        let mpiexec = asked.mpiexec.clone().or_else(|| variable("FLEXBODY_MPIEXEC"));
+        let named = asked.python.as_ref().map(|python| python.display().to_string());
+        let mut beside = arguments.output.clone().into_os_string();
+        beside.push(".cluster");
+        Self::Slepc {
+            engine: Engine {
+                mpiexec: mpiexec.map_or_else(
+                    || vec!["mpiexec".to_owned()],
+                    |words| words.split_whitespace().map(str::to_owned).collect(),
+                ),
+                python: named.or_else(|| variable("FLEXBODY_PYTHON")),
+                ranks: asked.ranks,
+                solver: match asked.solver {
+                    SolverName::Mumps => Solver::Mumps,
+                    SolverName::Slices => Solver::Slices,
+                    SolverName::Gamg => Solver::Gamg,
+                    SolverName::Lobpcg => Solver::Lobpcg,
+                },
+            },
+            folder: asked.cluster_folder.clone().unwrap_or_else(|| beside.into()),
+            kept: asked.cluster_folder.is_some(),
+        }
+    }
+
+    /// The modes of `model`; `None` where this program is to find them.
+    pub(super) fn modes(
+        &self,
+        model: &FeModel,
+        settings: &ModeSettings,
+        watch: Watch<'_>,
+    ) -> Result<Option<BasisChoice>> {
+        let found = match self {
+            Self::Nowhere => return Ok(None),
+            Self::Cluster { folder, prepared, prove } => {
+                watch(Event::Phase("modes of the cluster"));
+                read_found(folder, prepared, model, *prove)?
+            }
+            Self::Slepc { engine, folder, .. } => {
+                let python = engine.check()?;
+                watch(Event::Phase("preparing"));
+                let asked = PrepareSettings {
+                    wanted: settings.wanted,
+                    accuracy: settings.accuracy,
+                    index_bytes: 4,
+                    model: ModelReference::default(),
+                };
+                let prepared = in_made_folder(folder, || prepare(model, &asked, folder)?.commit())?;
+                watch(Event::Phase("SLEPc"));
+                engine.run(&python, folder)?;
+                read_found(folder, &prepared, model, false)?
+            }
+        };
+        Ok(Some(BasisChoice::Solved(found.modes)))
+    }
+
+    /// Removes the folder that nobody named, after the work.
+    pub(super) fn tidy(&self) {
+        if let Self::Slepc { folder, kept: false, .. } = self {
+            // A folder that stays does no harm.
+            let _ = std::fs::remove_dir_all(folder);
+        }
+    }
+}
+
+/// Does work in a folder, which is made where it is not there, and removed again where the work fails.
+pub(super) fn in_made_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let is_new = !folder.exists();
+    std::fs::create_dir_all(folder).map_err(|e| {
+        let message = format!("cannot make the folder {}: {e}", folder.display());
+        Error::from(Diagnostic::new(Code::OutputUnwritable, message))
+    })?;
+    let done = work();
+    if done.is_err() && is_new {
+        // Only an empty one goes: whatever else is in it is not of this run.
+        let _ = std::fs::remove_dir(folder);
+    }
+    done
+}

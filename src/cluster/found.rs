@@ -1,0 +1,184 @@
+//! What a cluster found: `result.jsonl` and `modes.petsc`, held to the model and to what was prepared.
+
+use super::petsc::{IndexBytes, read_vector};
+use super::prepare::{index_bytes, matrices_of};
+use super::prepared::Prepared;
+use super::row_order::RowOrder;
+use super::sealed;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::base::provenance::{Fingerprint, SourceFile};
+use crate::body::basis::{CountElsewhere, SolvedModes};
+use crate::model::FeModel;
+use faer::Mat;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+const RESULT: &str = "result.jsonl";
+const CHECKPOINT: &str = "checkpoint.jsonl";
+const MODES: &str = "modes.petsc";
+
+/// What the driver writes.
+#[derive(Debug, Clone, Deserialize)]
+struct ResultFile {
+    matrices: String,
+    modes: usize,
+    index_bytes: u64,
+    modes_sha256: String,
+    eigenvalues: Vec<f64>,
+    next_eigenvalue: Option<f64>,
+    count: Option<CountFile>,
+    solver: String,
+    slepc: String,
+    petsc: String,
+    ranks: u64,
+    #[serde(default)]
+    seconds: BTreeMap<String, f64>,
+    #[serde(default)]
+    factor: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct CountFile {
+    negative: usize,
+    zero: usize,
+    shift: f64,
+    by: String,
+}
+
+/// What it keeps on the way.
+#[derive(Debug, Clone, Deserialize)]
+struct CheckpointFile {
+    matrices: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Part {
+    vectors: usize,
+}
+
+/// Modes that a cluster found, and how.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The modes, in the rows of the model.
+    pub modes: SolvedModes,
+    /// How they were found, in words.
+    pub told: String,
+    /// Seconds of each phase on the cluster.
+    pub seconds: BTreeMap<String, f64>,
+    /// Size and work of the factor of the count.
+    pub factor: BTreeMap<String, f64>,
+}
+
+/// Reads the result of a cluster for `model`; `prove`: the built-in count is to be made.
+///
+/// # Errors
+/// [`ClusterForeign`](Code::ClusterForeign) where the matrices are others,
+/// [`ClusterUnfinished`](Code::ClusterUnfinished) where there is no result,
+/// [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable).
+pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bool) -> Result<Found> {
+    let order = RowOrder::of(model);
+    let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
+    if matrices != prepared.matrices {
+        let message = format!(
+            "K and M of `{}` are not those that the folder was prepared with, of `{}`",
+            model.name(),
+            prepared.name
+        );
+        return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(folder).into());
+    }
+    let path = folder.join(RESULT);
+    if !path.exists() {
+        return Err(unfinished(folder, prepared));
+    }
+    let result: ResultFile = sealed::open(&path, "flexbody-result")?;
+    if result.matrices != matrices {
+        let message = "the result belongs to other matrices than those that were prepared";
+        return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(path).into());
+    }
+    let damaged = |why: &str| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(&path));
+    if result.modes == 0 || result.eigenvalues.len() != result.modes {
+        return Err(damaged("the result does not have one eigenvalue for each of its modes"));
+    }
+    let count = result.count.clone().map(|CountFile { negative, zero, shift, by }| {
+        let by = format!("{by} ({} ranks)", result.ranks);
+        CountElsewhere { negative, zero, shift, by }
+    });
+    let vectors = read_modes(&folder.join(MODES), &result, model, &order)?;
+    let told = format!(
+        "SLEPc {}, PETSc {}, solver `{}` on {} ranks",
+        result.slepc, result.petsc, result.solver, result.ranks
+    );
+    let modes = SolvedModes {
+        vectors,
+        eigenvalues: result.eigenvalues,
+        next_eigenvalue: result.next_eigenvalue,
+        count,
+        engine: "slepc".to_owned(),
+        prove,
+        source: SourceFile::new("modes", Path::new(MODES), result.modes_sha256),
+    };
+    Ok(Found { modes, told, seconds: result.seconds, factor: result.factor })
+}
+
+/// Says how far the cluster came.
+fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
+    let kept = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
+    let kept = kept.filter(|kept| kept.matrices == prepared.matrices);
+    let kept = kept.map_or(0, |kept| kept.parts.iter().map(|part| part.vectors).sum());
+    let message = match kept {
+        0 => "there is no result, and no mode is kept yet".to_owned(),
+        kept => format!("there is no result yet; {kept} modes are kept"),
+    };
+    Diagnostic::new(Code::ClusterUnfinished, message).in_file(folder).into()
+}
+
+/// The vectors of a file, by internal rows, whose bytes are those that the driver wrote.
+fn read_modes(path: &Path, result: &ResultFile, model: &FeModel, order: &RowOrder) -> Result<Mat<f64>> {
+    let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
+    let digest = fingerprint(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    if digest != result.modes_sha256 {
+        let message = "the modes are not those that the result was written with";
+        return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(path).into());
+    }
+    let (index, n) = (index_bytes(result.index_bytes)?, model.stiffness().n());
+    let file = File::open(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    columns(BufReader::with_capacity(1 << 20, file), result.modes, n, order, index)
+        .map_err(|e| unreadable(format!("file cannot be read: {e}")))?
+        .ok_or_else(|| {
+            unreadable(format!("file does not hold {} vectors of {n} finite numbers", result.modes))
+        })
+}
+
+fn columns(
+    mut file: impl Read,
+    count: usize,
+    n: usize,
+    order: &RowOrder,
+    index: IndexBytes,
+) -> std::io::Result<Option<Mat<f64>>> {
+    let mut all = Mat::zeros(n, count);
+    for j in 0..count {
+        let Some(column) = read_vector(&mut file, n, index)? else { return Ok(None) };
+        if column.iter().any(|value| !value.is_finite()) {
+            return Ok(None);
+        }
+        order.to_internal(&column, |row, value| all[(row, j)] = value);
+    }
+    Ok(Some(all))
+}
+
+fn fingerprint(path: &Path) -> std::io::Result<String> {
+    let (mut file, mut fingerprint) = (File::open(path)?, Fingerprint::default());
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(fingerprint.hex()),
+            length => fingerprint.update(&piece[..length]),
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The order of rows in files for other solvers: node by node, with the rotations of a node behind its
+//! displacements. Rows of one node then lie on one rank, and multigrid sees blocks.
+
+use crate::model::FeModel;
+use crate::numerics::linalg::SymmetricMatrix;
+use faer::{Mat, MatRef};
+
+/// Which internal row each row of the files is, and back.
+pub(super) struct RowOrder {
+    /// Internal row of each row of the files.
+    internal: Vec<u32>,
+    /// Row of the files of each internal row.
+    written: Vec<u32>,
+    /// Rows of every node, where all nodes have as many and no other rows are there; else 1.
+    pub block_size: usize,
+}
+
+impl RowOrder {
+    pub fn of(model: &FeModel) -> Self {
+        let rows = model.rows();
+        let (d, n, displacements) = (model.dimension(), rows.len(), rows.displacements());
+        // Vertex and place within it: displacements, then rotations; rows without a place come last.
+        let key = |row: usize| match row.checked_sub(displacements) {
+            None => (row / d, row % d),
+            Some(after) => match rows.rotations().get(after) {
+                Some(&(node, axis)) => (node as usize, d + usize::from(axis)),
+                None => (usize::MAX, row),
+            },
+        };
+        let mut internal: Vec<u32> = (0..n as u32).collect();
+        internal.sort_by_key(|&row| key(row as usize));
+        let mut written = vec![0; n];
+        for (to, &from) in internal.iter().enumerate() {
+            written[from as usize] = to as u32;
+        }
+        let nodes = model.nodes().len();
+        let turning = rows.rotations().len();
+        let whole = rows.vectors() == 0 && n == displacements + turning && turning.is_multiple_of(nodes);
+        let block_size = if whole { d + turning / nodes } else { 1 };
+        Self { internal, written, block_size }
+    }
+
+    /// Columns by internal rows in the order of the files.
+    pub fn to_written(&self, columns: MatRef<'_, f64>) -> Mat<f64> {
+        Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| columns[(self.internal[i] as usize, j)])
+    }
+
+    /// A column in the order of the files, by internal rows.
+    pub fn to_internal(&self, written: &[f64], mut internal: impl FnMut(usize, f64)) {
+        for (&to, &value) in self.internal.iter().zip(written) {
+            internal(to as usize, value);
+        }
+    }
+}
+
+/// A matrix A kron I_block as its rows are written.
+pub(super) struct WrittenRows<'a> {
+    pub matrix: &'a SymmetricMatrix,
+    pub block: usize,
+    pub order: &'a RowOrder,
+}
+
+impl WrittenRows<'_> {
+    /// Number of rows.
+    pub fn n(&self) -> usize {
+        self.matrix.n() * self.block
+    }
+
+    /// Columns and values of a row, ascending. The diagonal is there even where it is zero, since solvers
+    /// need its place.
+    pub fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
+        entries.clear();
+        let internal = self.order.internal[row] as usize;
+        let (vertex, component) = (internal / self.block, internal % self.block);
+        let (columns, values) = self.matrix.row(vertex);
+        let column = |j: u32| self.order.written[j as usize * self.block + component];
+        entries.extend(columns.iter().zip(values).map(|(&j, &value)| (column(j), value)));
+        if entries.iter().all(|(j, _)| *j as usize != row) {
+            entries.push((row as u32, 0.0));
+        }
+        if !entries.is_sorted_by_key(|(j, _)| *j) {
+            entries.sort_unstable_by_key(|(j, _)| *j);
+        }
+    }
+
+    /// Number of entries that are written.
+    pub fn entries(&self) -> u64 {
+        let matrix = self.matrix;
+        let stored = |i: usize| {
+            let (columns, _) = matrix.row(i);
+            columns.len() as u64 + u64::from(columns.binary_search(&(i as u32)).is_err())
+        };
+        self.block as u64 * (0..matrix.n()).map(stored).sum::<u64>()
+    }
+}
