@@ -64,6 +64,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         split: false,
         engine: EngineArguments::default(),
         threads: arguments.threads,
+        verbose: arguments.verbose,
         printing: arguments.printing,
     })
 }

@@ -77,6 +77,9 @@ pub struct AssembleArguments {
     /// Threads; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
+    /// Print all that is known of the body instead of a summary
+    #[arg(short, long)]
+    pub verbose: bool,
     /// How to print.
     #[command(flatten)]
     pub printing: Printing,
