@@ -7,8 +7,6 @@ Needs PyVista (pip install pyvista).
 """
 
 import argparse
-import gzip
-import shutil
 import subprocess
 import tempfile
 from pathlib import Path
@@ -45,16 +43,11 @@ def main():
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         place = Path(place)
-        for name in ("K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv"):
-            shutil.copy(MODEL / name, place)
-        (place / "mesh.inp").write_bytes(gzip.decompress((MODEL / "matrices.inp.gz").read_bytes()))
-        manifest = (MODEL / "model.toml").read_text().replace("[files]", '[files]\nmesh = "mesh.inp"')
-        (place / "model.toml").write_text(manifest)
 
         def run(*words):
             subprocess.run([arguments.program, *words], cwd=place, check=True, capture_output=True)
 
-        run("convert", "model.toml", "-o", "rod.flex.h5")
+        run("convert", MODEL / "model.toml", "-o", "rod.flex.h5")
         run("export", "rod.flex.h5", "--to", "vtk", "-o", "rod.vtu")
         draw(place / "rod.vtu", arguments.mode, arguments.output)
 
