@@ -243,13 +243,9 @@ class Run:
         count = min(count, self.prepared["rows"] - self.prepared["rigid"] - len(self.found))
         if count <= 0:
             return 0
-        eps = SLEPc.EPS().create(PETSc.COMM_WORLD)
-        eps.setOperators(self.shifted, self.mass)
-        eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+        eps = self.eigen_solver()
         eps.setDimensions(count, self.options.subspace)
-        eps.setTolerances(1e-2 * self.prepared["residual"], 1000)
         eps.setDeflationSpace(self.rigid + self.found)
-        self.solver(eps)
         kept = [0]
 
         def converged(eps, its, nconv, eigenvalues, errors):
@@ -258,10 +254,9 @@ class Run:
                 self.keep([self.column(eps, j) for j in range(kept[0], nconv)])
                 kept[0] = nconv
 
+        eps.cancelMonitor()
         eps.setMonitor(converged)
-        eps.setFromOptions()
         eps.solve()
-        self.solvers.append(eps)
         given = eps.getConverged()
         new = []
         for j in range(given):
@@ -274,6 +269,18 @@ class Run:
         self.time("search")
         self.say(f"{given} of {count} modes converged in {eps.getIterationNumber()} restarts")
         return given
+
+    def eigen_solver(self):
+        """The one of this run: its factor serves all searches."""
+        if not self.solvers:
+            eps = SLEPc.EPS().create(PETSc.COMM_WORLD)
+            eps.setOperators(self.shifted, self.mass)
+            eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+            eps.setTolerances(1e-2 * self.prepared["residual"], 1000)
+            self.solver(eps)
+            eps.setFromOptions()
+            self.solvers.append(eps)
+        return self.solvers[-1]
 
     def column(self, eps, j):
         vector = self.stiffness.createVecRight()

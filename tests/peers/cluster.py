@@ -123,4 +123,4 @@ def one_command(flexbody, folder):
     manifest, body = ROOT / "fixtures/models/bracket_hex20/model.toml", Path(folder) / "one.flex.h5"
     common.run(flexbody, "convert", manifest, "--engine", "slepc", "--ranks", 2, "--mpiexec", MPIEXEC, "--python", PYTHON, "--quiet", "-o", body)
     found = differences(flexbody, folder / "bracket_hex20.own.flex.h5", body)
-    return [Row("SLEPc", "cluster: bracket_hex20", "frequencies of convert --engine slepc", found[0], QUANTITIES["frequency"])]
+    return [Row(version(folder / "bracket_hex20.job"), "cluster: bracket_hex20", "frequencies of convert --engine slepc", found[0], QUANTITIES["frequency"])]

@@ -82,8 +82,8 @@ struct Run {
 /// The option for the result of a command and the name of its file; an audit tells its result.
 fn result_option(command: &str) -> Option<(&'static str, &'static str)> {
     match command {
-        "convert" | "simulate" | "view" | "export" => Some(("--output", "body.flex.h5")),
-        "select" | "response" | "trade" => Some(("--report", "report.json")),
+        "convert" | "assemble" | "simulate" | "view" | "export" => Some(("--output", "body.flex.h5")),
+        "select" | "response" | "trade" | "batch" => Some(("--report", "report.json")),
         "audit" => None,
         other => panic!("no case ran `{other}` before: name the option for its result here"),
     }
