@@ -131,9 +131,14 @@ def from_cad(flexbody, folder, version):
     import h5py
 
     try:
-        gmsh = program("gmsh", "GMSH", "pip install gmsh, or Debian's gmsh")
+        gmsh = program("gmsh", "GMSH", "pip install gmsh")
     except Absent as missing:
         print(f"  not found: {missing}: from_cad is skipped")
+        return []
+    said = subprocess.run([gmsh, "--version"], capture_output=True, text=True)
+    number = re.search(r"(\d+)\.(\d+)", said.stdout + said.stderr)
+    if number and (int(number[1]), int(number[2])) < (4, 9):
+        print(f"  Gmsh {number[0]} writes no node sets of groups, 4.9 and newer do: from_cad is skipped")
         return []
     place = folder / "from_cad"
     environment = dict(os.environ, GMSH=gmsh, CCX=program("ccx", "CCX", "Debian's calculix-ccx"), FLEXBODY=str(flexbody))
