@@ -1,5 +1,9 @@
 //! What a result was made from: fingerprints of the input files and the generator's name.
 
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
 /// One input file of a model.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SourceFile {
@@ -13,7 +17,7 @@ pub struct SourceFile {
 
 impl SourceFile {
     /// A file at `path`, of which only the name is kept.
-    pub fn new(role: &str, path: &std::path::Path, sha256: String) -> Self {
+    pub fn new(role: &str, path: &Path, sha256: String) -> Self {
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Self { role: role.to_owned(), name, sha256 }
     }
@@ -52,4 +56,19 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
     let mut fingerprint = Fingerprint::default();
     fingerprint.update(bytes);
     fingerprint.hex()
+}
+
+/// SHA-256 of all that a file holds in lowercase hex; it is read piece by piece.
+///
+/// # Errors
+/// Those of reading it.
+pub fn sha256_of_file(path: &Path) -> std::io::Result<String> {
+    let (mut file, mut fingerprint) = (File::open(path)?, Fingerprint::default());
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(fingerprint.hex()),
+            length => fingerprint.update(&piece[..length]),
+        }
+    }
 }

@@ -7,7 +7,7 @@ use super::row_order::RowOrder;
 use super::sealed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::base::provenance::{Fingerprint, SourceFile};
+use crate::base::provenance::{SourceFile, sha256_of_file};
 use crate::body::basis::{CountElsewhere, SolvedModes};
 use crate::model::FeModel;
 use faer::Mat;
@@ -140,7 +140,7 @@ fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
 /// The vectors of a file, by internal rows, whose bytes are those that the driver wrote.
 fn read_modes(path: &Path, result: &ResultFile, model: &FeModel, order: &RowOrder) -> Result<Mat<f64>> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
-    let digest = fingerprint(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    let digest = sha256_of_file(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
     if digest != result.modes_sha256 {
         let message = "the modes are not those that the result was written with";
         return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(path).into());
@@ -170,15 +170,4 @@ fn columns(
         order.to_internal(&column, |row, value| all[(row, j)] = value);
     }
     Ok(Some(all))
-}
-
-fn fingerprint(path: &Path) -> std::io::Result<String> {
-    let (mut file, mut fingerprint) = (File::open(path)?, Fingerprint::default());
-    let mut piece = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut piece)? {
-            0 => return Ok(fingerprint.hex()),
-            length => fingerprint.update(&piece[..length]),
-        }
-    }
 }

@@ -3,11 +3,9 @@
 use super::sealed;
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
-use crate::base::provenance::{Fingerprint, generator};
+use crate::base::provenance::{Fingerprint, generator, sha256_of_file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "flexbody-batch";
@@ -48,7 +46,7 @@ impl Ledger {
     /// What was made of these inputs and still lies there.
     pub fn done(&self, output: &Path, inputs: &str) -> Option<&DoneBody> {
         let body = self.done.get(&output.display().to_string())?;
-        let is_there = || fingerprint(output).ok().is_some_and(|sha| sha == body.output);
+        let is_there = || sha256_of_file(output).ok().is_some_and(|sha| sha == body.output);
         (body.inputs == inputs && is_there()).then_some(body)
     }
 
@@ -57,7 +55,7 @@ impl Ledger {
     /// # Errors
     /// Those of [`OutputSlot`].
     pub fn add(&mut self, output: &Path, inputs: String, told: serde_json::Value) -> Result<()> {
-        let Ok(sha) = fingerprint(output) else { return Ok(()) };
+        let Ok(sha) = sha256_of_file(output) else { return Ok(()) };
         self.done.insert(output.display().to_string(), DoneBody { inputs, output: sha, told });
         OutputSlot::prepare(&self.path)?.write(sealed::seal(FORMAT, &self.done).as_bytes())
     }
@@ -74,18 +72,7 @@ pub fn inputs_fingerprint(words: &[String], files: &[PathBuf]) -> String {
     add(&generator());
     words.iter().for_each(|word| add(word));
     for file in files {
-        add(&fingerprint(file).unwrap_or_default());
+        add(&sha256_of_file(file).unwrap_or_default());
     }
     all.hex()
-}
-
-fn fingerprint(path: &Path) -> std::io::Result<String> {
-    let (mut file, mut fingerprint) = (File::open(path)?, Fingerprint::default());
-    let mut piece = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut piece)? {
-            0 => return Ok(fingerprint.hex()),
-            length => fingerprint.update(&piece[..length]),
-        }
-    }
 }

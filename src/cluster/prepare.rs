@@ -12,16 +12,13 @@ use crate::base::output::OutputSlot;
 use crate::base::provenance::{generator, sha256_hex};
 use crate::body::basis::{first_eigenvalue_estimate, rigid_modes};
 use crate::model::FeModel;
-use crate::numerics::eigen::{Accuracy, CLUSTER_GAP, Wanted};
+use crate::numerics::eigen::{Accuracy, CLUSTER_GAP, FIRST_SHIFT, Wanted};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::path::Path;
 
 /// The program for the cluster.
 pub(super) const DRIVER_SOURCE: &str = include_str!("driver.py");
-
-/// The shift as a part of an upper bound of the first flexible eigenvalue, as the built-in search has it.
-const FIRST_SHIFT: f64 = 0.3;
 
 /// What is asked of a preparation.
 #[derive(Debug, Clone, PartialEq)]

@@ -34,6 +34,16 @@ pub(super) struct Sides {
     pub upper: bool,
 }
 
+impl Storage {
+    /// Of a file that does not say it: entries on one side alone stand for both.
+    pub(super) fn of(sides: Sides) -> Self {
+        match sides {
+            Sides { lower: true, upper: true } => Self::Full,
+            _ => Self::Triangle,
+        }
+    }
+}
+
 /// Checks a declared size against the number of stored entries, before anything of that size is allocated.
 pub(crate) fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnostic> {
     if rows != cols {

@@ -20,6 +20,7 @@ use calculix::Calculix;
 use deck::Deck;
 use deck_mesh::DeckMesh;
 use nastran::Nastran;
+pub(super) use nastran::nodes_of_bulk;
 use std::path::{Path, PathBuf};
 
 /// A job of an FE program: its main file, and the program where the user said which.
@@ -134,14 +135,6 @@ pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets, Element
     let elements = mesh.drawn();
     let (ids, positions) = mesh.nodes.into_iter().unzip();
     Ok((Nodes { ids, positions }, mesh.sets, elements))
-}
-
-/// The grids, sets and elements of a deck of Nastran.
-///
-/// # Errors
-/// FB101, FB106, FB110, FB111, FB205.
-pub(super) fn nodes_of_bulk(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
-    nastran::nodes_of_bulk(file.path())
 }
 
 /// Whether a path is that of a keyword deck, by its name.

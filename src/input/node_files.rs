@@ -94,7 +94,7 @@ fn deck(file: &InputFile) -> Found<NodeFile> {
 }
 
 fn bulk(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_bulk(file).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
+    nodes_of_bulk(file.path()).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
 }
 
 /// FB115 at a line.

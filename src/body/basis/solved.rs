@@ -9,8 +9,9 @@ use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
 use crate::model::FeModel;
 use crate::numerics::eigen::{
-    Accuracy, Completeness, EigenSettings, EigenSolution, Proof, Wanted, modes_of_span,
+    Accuracy, Completeness, EigenSettings, EigenSolution, Proof, SAME_EIGENVALUE, Wanted, modes_of_span,
 };
+use crate::numerics::linalg::larger;
 use faer::Mat;
 
 /// The inertia count of another program.
@@ -44,10 +45,6 @@ pub struct SolvedModes {
     /// The file that they were read from.
     pub source: SourceFile,
 }
-
-/// Relative difference of an eigenvalue and the Rayleigh quotient of its mode that residuals of eigenvectors
-/// explain by far.
-const SAME_EIGENVALUE: f64 = 1e-6;
 
 impl Basis for SolvedModes {
     fn name(&self) -> &'static str {
@@ -83,7 +80,7 @@ impl SolvedModes {
             |message: String| Err(Error::from(Diagnostic::new(Code::ClusterInaccurate, message)));
         let (given, exact) = (solution.residuals.len(), solution.eigenvectors(accuracy));
         if exact < given {
-            let worst = solution.residuals.iter().copied().fold(0.0, f64::max);
+            let worst = solution.residuals.iter().copied().fold(0.0, larger);
             return inaccurate(format!(
                 "{} of {given} modes are no eigenvectors of the model: K-residual up to {worst:.0e}, accuracy `{}` promises {:.0e}",
                 given - exact,

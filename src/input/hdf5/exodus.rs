@@ -104,14 +104,9 @@ impl Mesh<'_> {
             let opened = Numbers::open(&self.root, &self.members, "", &dataset)?;
             let kind = opened.dataset.attr("elem_type").ok();
             let kind = kind.and_then(|kind| text_of(&kind, self.bytes)).unwrap_or_default();
-            let node = |place: &f64| match *place {
-                place if place >= 1.0 && place.fract() == 0.0 => ids.get(place as usize - 1).copied(),
-                _ => None,
-            };
             for places in self.rows_of(&dataset)? {
-                let nodes: Option<Vec<i64>> = places.iter().map(node).collect();
-                let nodes =
-                    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))?;
+                let whole = |place: &f64| (place.fract() == 0.0).then_some(*place as i64);
+                let nodes = nodes_at(&dataset, ids, places.iter().map(whole))?;
                 add_element(&mut elements, &kind, &nodes);
             }
         }
@@ -133,16 +128,23 @@ impl Mesh<'_> {
                 if k < names.len().max(numbers.len()) { continue } else { break }
             }
             let places = self.whole_numbers(&dataset)?;
-            let node =
-                |place: &i64| usize::try_from(place.checked_sub(1)?).ok().and_then(|at| ids.get(at).copied());
-            let nodes: Option<Vec<i64>> = places.iter().map(node).collect();
-            let nodes = nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))?;
+            let nodes = nodes_at(&dataset, ids, places.iter().map(|place| Some(*place)))?;
             let number = numbers.get(k).copied().unwrap_or(k as i64 + 1);
             let name = names.get(k).filter(|name| !name.is_empty()).cloned();
             sets.push((name.unwrap_or_else(|| number.to_string()), nodes));
         }
         Ok(sets)
     }
+}
+
+/// Numbers of the nodes at `places`, from 1, that a dataset lists; `None` is no place.
+fn nodes_at(dataset: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) -> Found<Vec<i64>> {
+    let node = |place: Option<i64>| {
+        let at = usize::try_from(place?.checked_sub(1)?).ok()?;
+        ids.get(at).copied()
+    };
+    let nodes: Option<Vec<i64>> = places.map(node).collect();
+    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))
 }
 
 /// Adds an element of a type as Exodus names it (`HEX8`, `TETRA`, `SHELL4`); points are not drawn.

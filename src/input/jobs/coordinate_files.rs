@@ -61,10 +61,7 @@ impl CoordinateFile {
     pub(super) fn into_matrix(self, n: usize) -> Found<RawMatrix> {
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&self.path)];
         check_size(n as u64, n as u64, self.count).map_err(in_file)?;
-        let storage = match self.sides {
-            Sides { lower: true, upper: true } => Storage::Full,
-            _ => Storage::Triangle,
-        };
-        assemble(n, self.pieces, storage, self.written, &self.path).map_err(|diagnostic| vec![diagnostic])
+        assemble(n, self.pieces, Storage::of(self.sides), self.written, &self.path)
+            .map_err(|diagnostic| vec![diagnostic])
     }
 }

@@ -4,7 +4,7 @@
 use super::deck::fields;
 use super::{Found, both};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::assemble::{Entry, Storage, assemble, check_size};
+use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::{excerpt, line_aligned, real};
 use crate::input::digits::written_digits;
@@ -74,10 +74,12 @@ impl LabelledLines {
         let numbered: Vec<Vec<Entry>> =
             self.pieces.into_par_iter().map(|piece| piece.numbered(labels)).collect();
         let some = |side: fn(&Entry) -> bool| numbered.par_iter().flatten_iter().any(side);
-        let lower = some(|entry| entry.row > entry.col && entry.value != 0.0);
-        let upper = some(|entry| entry.row < entry.col && entry.value != 0.0);
-        let storage = if lower && upper { Storage::Full } else { Storage::Triangle };
-        assemble(labels.len(), numbered, storage, written, path).map_err(|diagnostic| vec![diagnostic])
+        let sides = Sides {
+            lower: some(|entry| entry.row > entry.col && entry.value != 0.0),
+            upper: some(|entry| entry.row < entry.col && entry.value != 0.0),
+        };
+        assemble(labels.len(), numbered, Storage::of(sides), written, path)
+            .map_err(|diagnostic| vec![diagnostic])
     }
 }
 

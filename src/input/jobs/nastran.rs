@@ -103,7 +103,7 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
 /// # Errors
 /// Those of [`Bulk::read`], and FB111 where rows of grids stand along other axes than those of the basic
 /// system.
-pub(super) fn nodes_of_bulk(path: &Path) -> Found<(Nodes, NodeSets, Elements)> {
+pub(in crate::input) fn nodes_of_bulk(path: &Path) -> Found<(Nodes, NodeSets, Elements)> {
     let bulk = Bulk::read(path)?;
     let (nodes, axes) = places(&bulk)?;
     if let Some(grid) = axes.keys().min() {

@@ -42,5 +42,6 @@ pub use settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wan
 pub use solution::{EigenSolution, EigenvalueBounds};
 pub use solve::{planned_bytes, solve};
 pub use span::modes_of_span;
+pub use start::{FIRST_SHIFT, SAME_EIGENVALUE};
 pub use static_response::{ResponseAccuracy, static_responses, static_responses_twice};
 pub use unresisted::{Unresisted, unresisted_motions};

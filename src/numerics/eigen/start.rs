@@ -10,7 +10,10 @@ use faer::MatRef;
 const ORTHONORMAL: f64 = 1e-9;
 
 /// Largest relative difference of lambda and the Rayleigh quotient of a converged mode.
-const SAME_EIGENVALUE: f64 = 1e-6;
+pub const SAME_EIGENVALUE: f64 = 1e-6;
+
+/// The shift that a search begins with, as a part of the upper bound of the first flexible eigenvalue.
+pub const FIRST_SHIFT: f64 = 0.3;
 
 /// The start of a search, where there is one that fits the problem. A repeated search (`attempt` > 0) has
 /// none: it must not start from the directions that led to a wrong count.
@@ -21,7 +24,7 @@ pub(super) fn fitting_start<'a>(problem: &EigenProblem<'a>, attempt: u64) -> Opt
 /// The shift that an iterative search begins with: that of its start, or a part of the upper bound of the
 /// first eigenvalue.
 pub(super) fn first_shift(problem: &EigenProblem<'_>, start: Option<&Snapshot>) -> f64 {
-    start.map_or(0.3 * problem.first_estimate, |start| start.shift)
+    start.map_or(FIRST_SHIFT * problem.first_estimate, |start| start.shift)
 }
 
 fn fits(problem: &EigenProblem<'_>, snapshot: &Snapshot) -> bool {

@@ -113,7 +113,7 @@ impl Estimate {
         let largest = (0..energies.len()).fold(0, |at, i| if energies[i] > energies[at] { i } else { at });
         let mut errors = missed.errors(&view, body, &energies, &motion, &watched, &times);
         if scene.spin.is_none() {
-            let turning = Turning::new(&view, missed.responses.as_ref());
+            let turning = Turning::new(&view, &missed.responses);
             errors.attitude = Peak::of(&times, turning.angles(&looked_at, &missed.forces.amplitudes)).value;
         }
         let tolerance = &scene.requirements.tolerance;

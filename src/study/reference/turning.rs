@@ -4,7 +4,7 @@ use super::residual::NodalView;
 use crate::motion::dynamics::add_turned;
 use crate::motion::scene::Instant;
 use crate::numerics::linalg::{combine, gram};
-use faer::{Mat, MatRef};
+use faer::Mat;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// What a free body and the static responses E that it lacks have of angular momentum, in body axes. In the
@@ -22,7 +22,7 @@ pub(super) struct Turning {
 impl Turning {
     /// With the rotations R_a = e_a x (x - x_cm) about the axes of the body, J_ab = R_a'M R_b, and to first
     /// order R_a changes by e_a x u.
-    pub fn new(view: &NodalView<'_>, responses: MatRef<'_, f64>) -> Self {
+    pub fn new(view: &NodalView<'_>, responses: &Mat<f64>) -> Self {
         let plane = view.model.dimension() == 2;
         let turns = central_turns(view);
         let weighted = view.model.pencil().apply_mass(turns.as_ref());
@@ -40,7 +40,6 @@ impl Turning {
             let half = square(&gram(turned.as_ref(), weighted.as_ref()));
             half + half.transpose()
         };
-        let responses = responses.to_owned();
         let changes = (0..responses.ncols()).map(|j| change(responses.col_as_slice(j))).collect();
         let at_load = |unit: &Mat<f64>| {
             let moved = gram(unit.as_ref().subcols(0, view.model.dimension()), responses.as_ref());
