@@ -84,7 +84,7 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
         let (elastic, inertial) = (whole.apply_stiffness(shape), whole.apply_mass(shape));
         let force = |i: usize, _| lambda * inertial[(missing[i], 0)] - elastic[(missing[i], 0)];
         let mut values = Mat::from_fn(missing.len(), 1, force);
-        let factor = Indefinite::new(&analysis, &own, lambda);
+        let factor = Indefinite::<f64>::new(&analysis, &own, lambda);
         let inertia = factor.inertia();
         if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > INACCURATE {
             return Err(refuse("they do not follow from the others").into());

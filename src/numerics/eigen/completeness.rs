@@ -4,9 +4,9 @@
 use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
-use crate::numerics::linalg::{Analysis, Inertia};
+use crate::numerics::linalg::{Analysis, Indefinite, Inertia};
 
-/// A probe residual above this means that element growth may have spoilt the count.
+/// A backward error above this means that element growth may have spoilt a count in double precision.
 const GROWTH_LIMIT: f64 = 1e-4;
 
 /// How complete the modes are.
@@ -30,7 +30,7 @@ pub struct Completeness {
     /// Flexible modes below sigma that were computed; those after the wanted ones complete a repeated
     /// eigenvalue.
     pub modes_below: usize,
-    /// Why there is no proof; empty when there is one.
+    /// Why there is no proof, or what limits it; empty when nothing does.
     pub remark: String,
 }
 
@@ -41,7 +41,66 @@ impl Completeness {
     }
 }
 
+/// How eigenvalues are counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counting {
+    /// With a factor in double precision, which is not kept.
+    Double,
+    /// With a factor in single precision, whose rounding is then measured; where that may change the count,
+    /// in double precision, if that fits the memory.
+    Single {
+        /// It does.
+        double_fits: bool,
+    },
+}
+
+/// A count of eigenvalues.
+pub(super) struct Count {
+    /// How many lie below the shift, rigid modes included.
+    pub below: usize,
+    /// Of a count in single precision: what rounding amounts to, one being what may change the count.
+    pub rounding: Option<f64>,
+}
+
+impl Count {
+    /// What limits a proof by this count; empty when nothing does.
+    pub fn remark(&self) -> String {
+        self.rounding.map_or_else(String::new, |rounding| {
+            format!(
+                "counted in single precision, whose rounding is {rounding:.0e} of what may change the count"
+            )
+        })
+    }
+}
+
 /// Eigenvalues of the pencil below `sigma`, rigid modes included.
+///
+/// # Errors
+/// [`EigenFailure::Inaccurate`] where rounding may change the count.
+pub(super) fn count(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    sigma: f64,
+    counting: Counting,
+    counters: &mut Counters,
+) -> Result<Count, EigenFailure> {
+    if let Counting::Single { double_fits } = counting {
+        counters.factorizations += 1;
+        let factor = Indefinite::<f32>::new(analysis, &problem.pencil, sigma);
+        let inertia = factor.inertia();
+        let rounding = if inertia.zero > 0 { None } else { factor.perturbation(&problem.pencil) };
+        if rounding.is_some() {
+            return Ok(Count { below: inertia.negative, rounding });
+        }
+        if !double_fits {
+            return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });
+        }
+    }
+    let below = count_below(problem, analysis, sigma, counters)?;
+    Ok(Count { below, rounding: None })
+}
+
+/// The same in double precision.
 pub(super) fn count_below(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,

@@ -37,7 +37,7 @@ pub fn dynamic_responses(
     let pencil = &problem.pencil;
     let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
     counters.factorizations += 1;
-    let factor = Indefinite::new(&analysis, pencil, square);
+    let factor = Indefinite::<f64>::new(&analysis, pencil, square);
     let inertia = factor.inertia();
     if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
         return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });

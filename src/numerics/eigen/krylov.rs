@@ -3,7 +3,7 @@
 use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
-use crate::numerics::linalg::{Solve, combine, gram, subtract_combination};
+use crate::numerics::linalg::{Solve, combine, gram, subtract_combination, uniform};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
@@ -137,7 +137,7 @@ impl<'a> Krylov<'a> {
         // Of M-norm about one, by a power of two: what the operator makes of it can be squared in any units.
         let heaviest = self.mass_diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let unit = (-0.5 * heaviest.log2()).round().exp2();
-        let x = Mat::from_fn(n, width, |i, j| unit * noise(seed, i as u64, j as u64));
+        let x = Mat::from_fn(n, width, |i, j| unit * uniform(seed, i as u64, j as u64));
         counters.mass_columns += width as u64;
         let mut y = self.problem.pencil.apply_mass(x.as_ref());
         counters.solved_columns += width as u64;
@@ -317,17 +317,4 @@ fn subtract_column(block: &mut Mat<f64>, target: usize, source: usize, factor: f
     for (t, s) in to.iter_mut().zip(from) {
         *t -= factor * s;
     }
-}
-
-/// Reproducible uniform noise in (-1, 1) by place: a SplitMix64 hash of (seed, row, column).
-fn noise(seed: u64, row: u64, column: u64) -> f64 {
-    let mut z = seed
-        .wrapping_mul(0xA076_1D64_78BD_642F)
-        .wrapping_add(row.wrapping_mul(0x9E37_79B9_7F4A_7C15))
-        .wrapping_add(column.wrapping_mul(0xD1B5_4A32_D192_ED03))
-        .wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^= z >> 31;
-    (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }

@@ -1,5 +1,6 @@
 //! Memory and precision, decided before the work: the symbolic analysis knows what a factor needs.
 
+use super::completeness::Counting;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
@@ -23,6 +24,8 @@ pub struct Plan {
     pub multigrid: Multigrid,
     /// About how long the search takes on one processor, in seconds, without the factorisation.
     pub seconds: f64,
+    /// How completeness is counted; `None`: not at all.
+    pub counting: Option<Counting>,
     /// Why completeness cannot be proved: bytes of the count, bytes there are.
     pub proof_too_large: Option<(u64, u64)>,
 }
@@ -145,25 +148,70 @@ fn search_bytes(
     found.max(made_of_them(n, wanted))
 }
 
-/// What an inertia count of `inertia` numbers needs, with the modes and their products.
-fn count_bytes(problem: &EigenProblem<'_>, inertia: u64, modes: usize) -> u64 {
-    8 * (inertia + (3 * modes * problem.pencil.n()) as u64)
+/// What an inertia count in double precision needs, with the modes and their products.
+fn count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
+    8 * (peaks.inertia + (3 * modes * problem.pencil.n()) as u64)
 }
 
-/// Bytes of the count that proves completeness, none where there is no proof, and why it is left out. What
-/// the search solves with is given back before.
-fn proof(
-    problem: &EigenProblem<'_>,
-    settings: &EigenSettings,
-    peaks: &Peaks,
-    wanted: usize,
-) -> (u64, Option<(u64, u64)>) {
-    if settings.accuracy == Accuracy::Fast {
-        return (0, None);
+/// The same in single precision, with the vectors that tell of its rounding.
+fn single_count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
+    4 * peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * problem.pencil.n()) as u64
+}
+
+/// Vectors that are held while the rounding of a count in single precision is measured.
+const PROBE_VECTORS: usize = 40;
+
+/// Part of [`EigenSettings::single_pays`] above which a count in single precision is faster, with the
+/// solutions that tell of its rounding.
+const COUNT_PART: f64 = 0.15;
+
+/// How a count is made.
+pub(super) struct CountPlan {
+    /// `None` where there is none.
+    pub counting: Option<Counting>,
+    /// Bytes that it needs.
+    bytes: u64,
+    /// Why there is none: bytes of the count, bytes there are.
+    too_large: Option<(u64, u64)>,
+}
+
+impl CountPlan {
+    /// How a count beside so many modes is made. What the search solves with is given back before.
+    pub(super) fn new(
+        problem: &EigenProblem<'_>,
+        settings: &EigenSettings,
+        analysis: &Analysis,
+        modes: usize,
+    ) -> Self {
+        let peaks = analysis.peaks(rayon::current_num_threads());
+        let available = settings.memory.unwrap_or(u64::MAX);
+        let (single, double) =
+            (single_count_bytes(problem, &peaks, modes), count_bytes(problem, &peaks, modes));
+        let fits = |bytes: u64| resident(bytes) <= available;
+        let double_fits = fits(double);
+        let pays = match settings.factor {
+            _ if settings.accuracy == Accuracy::Certified => false,
+            FactorChoice::Always(precision) => precision == Precision::Single,
+            FactorChoice::Auto => !double_fits || analysis.flops() > COUNT_PART * settings.single_pays,
+        };
+        if pays && fits(single) {
+            let bytes = if double_fits { single.max(double) } else { single };
+            Self { counting: Some(Counting::Single { double_fits }), bytes, too_large: None }
+        } else if double_fits {
+            Self { counting: Some(Counting::Double), bytes: double, too_large: None }
+        } else {
+            let least = if pays { single.min(double) } else { double };
+            Self { counting: None, bytes: 0, too_large: Some((resident(least), available)) }
+        }
     }
-    let count = count_bytes(problem, peaks.inertia, wanted);
-    let available = settings.memory.unwrap_or(u64::MAX);
-    (count, (resident(count) > available).then_some((resident(count), available)))
+
+    /// That of the settings: `fast` has none.
+    fn of(problem: &EigenProblem<'_>, settings: &EigenSettings, analysis: &Analysis, modes: usize) -> Self {
+        if settings.accuracy == Accuracy::Fast {
+            return Self { counting: None, bytes: 0, too_large: None };
+        }
+        Self::new(problem, settings, analysis, modes)
+    }
 }
 
 impl Plan {
@@ -203,18 +251,18 @@ impl Plan {
         if settings.memory.is_some_and(|available| resident(needed) > available) {
             return None;
         }
-        let peaks = analysis.peaks(rayon::current_num_threads());
-        let (count, proof_too_large) = proof(problem, settings, &peaks, wanted);
+        let count = CountPlan::of(problem, settings, analysis, wanted);
         Some(Self {
             precision: Precision::Single,
-            bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
+            bytes: resident(needed.max(count.bytes)),
             factor_bytes: 0,
             flops: analysis.flops(),
             // As with a factor of the size of K.
             seconds: seconds(n, wanted, entries, false),
             single_failed: false,
             multigrid: Multigrid::Used,
-            proof_too_large,
+            counting: count.counting,
+            proof_too_large: count.too_large,
         })
     }
 
@@ -234,7 +282,7 @@ impl Plan {
         let peaks = analysis.peaks(rayon::current_num_threads());
         let available = settings.memory.unwrap_or(u64::MAX);
         let search = |precision: Precision| search_bytes(problem, &peaks, wanted, dense, precision);
-        let (count, proof_too_large) = proof(problem, settings, &peaks, wanted);
+        let count = CountPlan::of(problem, settings, analysis, wanted);
         let certified = settings.accuracy == Accuracy::Certified;
         let precision = match settings.factor {
             _ if certified => Precision::Double,
@@ -246,7 +294,7 @@ impl Plan {
         let mut needed = search(precision);
         if certified {
             // The bounds factor a matrix of their own, beside the modes.
-            needed = needed.max(count_bytes(problem, peaks.inertia, wanted))
+            needed = needed.max(count_bytes(problem, &peaks, wanted))
                 + 12 * problem.pencil.stiffness().as_csc().nnz() as u64;
         }
         if resident(needed) > available {
@@ -257,19 +305,20 @@ impl Plan {
         }
         Ok(Self {
             precision,
-            bytes: resident(if proof_too_large.is_none() { needed.max(count) } else { needed }),
+            bytes: resident(needed.max(count.bytes)),
             factor_bytes: precision.bytes() * peaks.factor,
             flops: analysis.flops(),
             seconds,
             single_failed: false,
             multigrid: Multigrid::Unsuited,
-            proof_too_large,
+            counting: count.counting,
+            proof_too_large: count.too_large,
         })
     }
 
     /// Bytes that an inertia count beside `found` modes needs.
     pub(super) fn count_bytes(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
-        resident(count_bytes(problem, analysis.peaks(rayon::current_num_threads()).inertia, found))
+        resident(count_bytes(problem, &analysis.peaks(rayon::current_num_threads()), found))
     }
 
     /// The same in double precision, where that fits.

@@ -2,13 +2,13 @@
 
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, cluster_end, clusters};
-use super::completeness::{Completeness, Proof, count_below};
+use super::completeness::{Completeness, Counting, Proof, count};
 use super::counters::Counters;
 use super::dense;
 use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
 use super::lanczos::{self, BLOCK, Goal};
-use super::plan::{Multigrid, Plan, gigabytes};
+use super::plan::{CountPlan, Multigrid, Plan, gigabytes};
 use super::problem::EigenProblem;
 use super::refine::{Refined, refine, residuals as residuals_of};
 use super::resume::Snapshot;
@@ -122,7 +122,10 @@ fn count_wanted(
         Wanted::Lowest(count) => Ok(count.min(flexible_rows(problem))),
         Wanted::Below(lambda) => {
             watch(Event::Phase("counting modes"));
-            Ok(count_below(problem, analysis, lambda, counters)?.saturating_sub(problem.rigid.ncols()))
+            let counting =
+                CountPlan::new(problem, settings, analysis, 0).counting.unwrap_or(Counting::Double);
+            let below = count(problem, analysis, lambda, counting, counters)?.below;
+            Ok(below.saturating_sub(problem.rigid.ncols()))
         }
     }
 }
@@ -369,13 +372,13 @@ fn prove(
     }
     watch(Event::Phase("completeness"));
     let below = search.refined.eigenvalues.iter().filter(|&&l| l < shift).count();
-    let negative = count_below(problem, analysis, shift, counters)?;
+    let count = count(problem, analysis, shift, plan.counting.unwrap_or(Counting::Double), counters)?;
     Ok(Completeness {
         proof: Proof::InertiaCount,
         shift,
-        negative_pivots: Some(negative),
+        negative_pivots: Some(count.below),
         modes_below: below,
-        remark: String::new(),
+        remark: count.remark(),
     })
 }
 

@@ -64,6 +64,7 @@ impl Analysis {
             cholesky: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: 0 }),
             // L and L B.
             inertia: numbers(&|s| Needs { kept: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
+            kept_inertia: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: pivots(s) }),
         }
     }
 
@@ -98,8 +99,10 @@ pub struct Peaks {
     pub factor: u64,
     /// During a Cholesky factorisation.
     pub cholesky: u64,
-    /// During an inertia count, in double precision.
+    /// During an inertia count that forgets its factor.
     pub inertia: u64,
+    /// During one that keeps it.
+    pub kept_inertia: u64,
 }
 
 /// Multiplications and additions that eliminate `width` columns with `rest` rows below them.

@@ -15,10 +15,10 @@ use std::ops::{AddAssign, Mul, Neg};
 pub(super) const PANEL: usize = 128;
 
 /// Rows of a piece of parallel work.
-const ROWS: usize = 256;
+pub(super) const ROWS: usize = 256;
 
 /// Multiplications below which a piece of work is not worth a task.
-const WORTH_A_TASK: usize = 4_000_000;
+pub(super) const WORTH_A_TASK: usize = 4_000_000;
 
 /// The numbers of a factor.
 pub trait Real:
@@ -247,7 +247,7 @@ pub(super) fn divide_rows<T: Real>(below: &mut [T], l: MatRef<'_, T>, unit: bool
 }
 
 /// Sets entries below [`Real::NEGLIGIBLE`] to zero.
-fn drop_negligible<T: Real>(entries: &mut [T]) {
+pub(super) fn drop_negligible<T: Real>(entries: &mut [T]) {
     if T::NEGLIGIBLE == 0.0 {
         return;
     }

@@ -1,46 +1,50 @@
 //! K - sigma M = L B L' with pivoting inside the panels of each front, kept to solve with: the dynamic
-//! stiffness at a frequency.
+//! stiffness at a frequency; and in single precision, to count with.
 
+use super::Pencil;
 use super::factor::{Analysis, COLUMNS, substitute};
-use super::front::PANEL;
+use super::front::{PANEL, ROWS, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
-use super::{Pencil, front};
-use faer::MatMut;
+use super::random::normal;
 use faer::prelude::ReborrowMut;
-use front::Trapezoid;
+use faer::{Mat, MatMut};
+use pulp::Arch;
+use rayon::prelude::*;
 use std::convert::Infallible;
 
-/// Factor of the indefinite matrix K - sigma M.
-pub struct Indefinite<'a> {
+/// Factor of the indefinite matrix K - sigma M with numbers of type `T`. It is solved with in double
+/// precision: what it is off from the matrix is the rounding of the factorisation alone.
+pub struct Indefinite<'a, T = f64> {
     analysis: &'a Analysis,
+    sigma: f64,
     /// L below the leading squares, and these.
-    fronts: Vec<(Trapezoid<f64>, Vec<Blocks>)>,
+    fronts: Vec<(Trapezoid<T>, Vec<Blocks<T>>)>,
     /// Scale of each row.
     scale: Vec<f64>,
     inertia: Inertia,
 }
 
-impl<'a> Indefinite<'a> {
+impl<'a, T: Real> Indefinite<'a, T> {
     /// Factors K - sigma M. Whether the factor is any good its [`Inertia`] tells: no zero pivot, and a small
-    /// backward error.
+    /// backward error; or [`perturbation`](Self::perturbation).
     pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, sigma);
-        let mut fronts: Vec<Option<Eliminated>> = (0..tree.len()).map(|_| None).collect();
-        let visit = |s: usize, slot: &mut Option<Eliminated>, children: Vec<Contribution>| {
+        let mut fronts: Vec<Option<Eliminated<T>>> = (0..tree.len()).map(|_| None).collect();
+        let visit = |s: usize, slot: &mut Option<Eliminated<T>>, children: Vec<Contribution<T>>| {
             let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
             *slot = Some(eliminated);
             Ok::<_, Infallible>(handed_on)
         };
         let Ok(()) = analysis.walk.up(tree, &mut fronts, &visit);
-        let fronts: Vec<Eliminated> = fronts.into_iter().flatten().collect();
+        let fronts: Vec<Eliminated<T>> = fronts.into_iter().flatten().collect();
         let counts = fronts.iter().map(|front| {
             let (negative, zero) = front.signs();
             (negative, zero, front.growth)
         });
-        let inertia = Inertia::of_fronts(counts);
+        let inertia = Inertia::of_fronts::<T>(counts);
         let fronts = fronts.into_iter().map(|front| (front.columns, front.blocks)).collect();
-        Self { analysis, fronts, scale: matrix.scale, inertia }
+        Self { analysis, sigma, fronts, scale: matrix.scale, inertia }
     }
 
     /// Signs of the pivots, and the backward error of the factorisation.
@@ -59,16 +63,109 @@ impl<'a> Indefinite<'a> {
             start += width;
         }
     }
+
+    /// Whether K - sigma M has the inertia of this factor in spite of its rounding; the number that tells.
+    ///
+    /// With A the matrix and F the product of the factors, both scaled to a diagonal of about one, and
+    /// G = I - F^-1 A: a matrix (1 - t) F + t A between the two is singular only where 1/t is an eigenvalue
+    /// of G. So A has the inertia of F if no eigenvalue of G reaches one, which no norm of a power of G less
+    /// than one permits. The mean square of G^p z over normal vectors z has the square of the Frobenius norm
+    /// of G^p as its mean: less than that over [`MARGIN`] squared it is, for [`COLUMNS`] vectors, with a
+    /// probability of 10^-15. G^2 and G^3 tell more than G, whose norm comes from what it turns into the
+    /// modes next to sigma from all others.
+    ///
+    /// The norm that was measured, times [`MARGIN`]; `None` where none of the powers is small enough.
+    pub fn perturbation(&self, pencil: &Pencil<'_>) -> Option<f64> {
+        let n = pencil.n();
+        let scale = |i: usize| self.scale[i];
+        let mut z = Mat::from_fn(n, COLUMNS, |i, j| normal(i as u64, j as u64));
+        for _ in 0..POWERS {
+            let x = Mat::from_fn(n, COLUMNS, |i, j| scale(i) * z[(i, j)]);
+            let mut product = pencil.apply_stiffness(x.as_ref());
+            product -= pencil.apply_mass(x.as_ref()) * faer::Scale(self.sigma);
+            self.solve_in_place(product.as_mut());
+            z = Mat::from_fn(n, COLUMNS, |i, j| z[(i, j)] - product[(i, j)] / scale(i));
+            let bound = MARGIN * z.squared_norm_l2().sqrt() / (COLUMNS as f64).sqrt();
+            if bound < 1.0 {
+                return Some(bound);
+            }
+        }
+        None
+    }
 }
 
+/// See [`Indefinite::perturbation`]: the probability that the mean square of eight normal numbers is less
+/// than 10^-4 is 10^-15.
+const MARGIN: f64 = 100.0;
+
+/// Powers of G that are looked at.
+const POWERS: usize = 3;
+
 /// to -= factor from.
+#[inline(always)]
 fn subtract<const K: usize>(to: &mut [f64; K], factor: f64, from: &[f64; K]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
 }
 
+/// Rows of L that are taken together: what is read for them is read once.
+const TOGETHER: usize = 4;
+
+/// below -= L y, for rows of L.
+fn subtract_product<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut [[f64; K]]) {
+    Arch::new().dispatch(|| product_by_rows(l, y, below));
+}
+
+#[inline(always)]
+fn product_by_rows<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut [[f64; K]]) {
+    let width = y.len();
+    let (groups, rest) = below.as_chunks_mut::<TOGETHER>();
+    let (l, l_rest) = l.split_at(groups.len() * TOGETHER * width);
+    for (l, group) in l.chunks_exact(TOGETHER * width).zip(groups) {
+        let mut values = *group;
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| &l[i * width..(i + 1) * width]);
+        for ((((y, a), b), c), d) in y.iter().zip(a).zip(b).zip(c).zip(d) {
+            subtract(&mut values[0], a.wide(), y);
+            subtract(&mut values[1], b.wide(), y);
+            subtract(&mut values[2], c.wide(), y);
+            subtract(&mut values[3], d.wide(), y);
+        }
+        *group = values;
+    }
+    for (row, value) in l_rest.chunks_exact(width).zip(rest) {
+        row.iter().zip(y).for_each(|(l, y)| subtract(value, l.wide(), y));
+    }
+}
+
+/// y -= L' below, for rows of L.
+fn subtract_transposed<T: Real, const K: usize>(l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]) {
+    Arch::new().dispatch(|| transposed_by_rows(l, below, y));
+}
+
+#[inline(always)]
+fn transposed_by_rows<T: Real, const K: usize>(l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]) {
+    let width = y.len();
+    let (groups, rest) = below.as_chunks::<TOGETHER>();
+    let (l, l_rest) = l.split_at(groups.len() * TOGETHER * width);
+    for (l, values) in l.chunks_exact(TOGETHER * width).zip(groups) {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| &l[i * width..(i + 1) * width]);
+        for ((((y, a), b), c), d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            subtract(y, a.wide(), &values[0]);
+            subtract(y, b.wide(), &values[1]);
+            subtract(y, c.wide(), &values[2]);
+            subtract(y, d.wide(), &values[3]);
+        }
+    }
+    for (row, value) in l_rest.chunks_exact(width).zip(rest) {
+        row.iter().zip(&mut *y).for_each(|(l, y)| subtract(y, l.wide(), value));
+    }
+}
+
 /// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows
 /// below.
-fn forward<const K: usize>((columns, blocks): &(Trapezoid<f64>, Vec<Blocks>), values: &mut [[f64; K]]) {
+fn forward<T: Real, const K: usize>(
+    (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
+    values: &mut [[f64; K]],
+) {
     for (p, block) in blocks.iter().enumerate() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
@@ -76,20 +173,25 @@ fn forward<const K: usize>((columns, blocks): &(Trapezoid<f64>, Vec<Blocks>), va
         for j in 0..width {
             let (done, rest) = y.split_at_mut(j + 1);
             for (i, y) in rest.iter_mut().enumerate() {
-                subtract(y, block.l[(j + 1 + i, j)], &done[j]);
+                subtract(y, block.l[(j + 1 + i, j)].wide(), &done[j]);
             }
         }
         own.copy_from_slice(&y);
-        for (row, value) in columns.panels[p][width * width..].chunks_exact(width).zip(below) {
-            for (l, y) in row.iter().zip(&y) {
-                subtract(value, *l, y);
-            }
+        let l = &columns.panels[p][width * width..];
+        if l.len() < WORTH_TASKS {
+            subtract_product(l, &y, below);
+        } else {
+            let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
+            pieces.for_each(|(l, below)| subtract_product(l, &y, below));
         }
     }
 }
 
 /// Leading rows x with B L' x = y, back in the order of the front; the rows below are known.
-fn backward<const K: usize>((columns, blocks): &(Trapezoid<f64>, Vec<Blocks>), values: &mut [[f64; K]]) {
+fn backward<T: Real, const K: usize>(
+    (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
+    values: &mut [[f64; K]],
+) {
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
@@ -100,15 +202,24 @@ fn backward<const K: usize>((columns, blocks): &(Trapezoid<f64>, Vec<Blocks>), v
             block.divide(&mut column);
             y.iter_mut().zip(&column).for_each(|(to, from)| to[k] = *from);
         }
-        for (row, value) in columns.panels[p][width * width..].chunks_exact(width).zip(&*below) {
-            for (l, y) in row.iter().zip(&mut y) {
-                subtract(y, *l, value);
+        let l = &columns.panels[p][width * width..];
+        if l.len() < WORTH_TASKS {
+            subtract_transposed(l, below, &mut y);
+        } else {
+            let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
+            let parts = pieces.map(|(l, below)| {
+                let mut part = vec![[0.0; K]; width];
+                subtract_transposed(l, below, &mut part);
+                part
+            });
+            for part in parts.collect::<Vec<_>>() {
+                y.iter_mut().zip(&part).for_each(|(y, part)| subtract(y, -1.0, part));
             }
         }
         for j in (0..width).rev() {
             let (rest, found) = y.split_at_mut(j + 1);
             for (i, x) in found.iter().enumerate() {
-                subtract(&mut rest[j], block.l[(j + 1 + i, j)], x);
+                subtract(&mut rest[j], block.l[(j + 1 + i, j)].wide(), x);
             }
         }
         for (&row, x) in block.order.iter().zip(&y) {
@@ -116,6 +227,9 @@ fn backward<const K: usize>((columns, blocks): &(Trapezoid<f64>, Vec<Blocks>), v
         }
     }
 }
+
+/// Numbers of a panel below which cutting it is not worth the tasks.
+const WORTH_TASKS: usize = 300_000;
 
 #[cfg(test)]
 mod tests {
@@ -177,7 +291,7 @@ mod tests {
                 let pencil = Pencil::new(&k, &m, block);
                 let analysis = Analysis::new(&pencil).expect("small");
                 for sigma in [0.0731, 1.37, 5.91, 400.0] {
-                    let factor = Indefinite::new(&analysis, &pencil, sigma);
+                    let factor = Indefinite::<f64>::new(&analysis, &pencil, sigma);
                     let b = Mat::from_fn(n * block, 11, |i, j| ((i * 31 + j * 17) % 23) as f64 - 11.0);
                     let mut x = b.clone();
                     factor.solve_in_place(x.as_mut());
@@ -198,5 +312,67 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Eigenvalues of the chain, ascending.
+    fn eigenvalues([k, m]: &[SymmetricMatrix; 2]) -> Vec<f64> {
+        let root = |i: usize| m.as_csc().get(i, i).sqrt();
+        let dense = Mat::from_fn(k.n(), k.n(), |i, j| k.as_csc().get(i, j) / root(i) / root(j));
+        symmetric_eigen(dense.as_ref()).expect("finite").values
+    }
+
+    /// A count in single precision is never sure of a wrong number, is sure where the shift is well between
+    /// two eigenvalues, and unsure where rounding moves one across.
+    #[test]
+    fn counts_in_single_precision_know_how_far_they_go() {
+        for n in [40, 700] {
+            let matrices = chain(n);
+            let eigenvalues = eigenvalues(&matrices);
+            let pencil = Pencil::new(&matrices[0], &matrices[1], 1);
+            let analysis = Analysis::new(&pencil).expect("small");
+            let (mut sure, mut unsure) = (0, 0);
+            for at in [0, 1, 3, n / 8, n / 2] {
+                let (below, above) = (eigenvalues[at], eigenvalues[at + 1]);
+                for part in [0.5, 1e-2, 1e-4, 1e-6, 1e-8] {
+                    for sigma in [below + part * (above - below), above - part * (above - below)] {
+                        let factor = Indefinite::<f32>::new(&analysis, &pencil, sigma);
+                        let counted = factor.inertia().negative;
+                        match factor.perturbation(&pencil) {
+                            Some(rounding) => {
+                                assert_eq!(counted, at + 1, "{n} rows, {sigma:e}: {rounding}");
+                                sure += 1;
+                            }
+                            None => {
+                                assert!(part < 0.1, "{n} rows, {sigma:e}: unsure in the middle of a gap");
+                                unsure += 1;
+                            }
+                        }
+                    }
+                }
+            }
+            assert!(sure >= 10 && unsure >= 5, "{n} rows: {sure} sure, {unsure} unsure");
+        }
+    }
+
+    /// What is measured is the rounding of the factor: none of it in double precision, and in single as much
+    /// as the spectrum of I - F^-1 A has, which dense algebra finds.
+    #[test]
+    fn the_rounding_of_a_count_is_measured() {
+        let matrices = chain(60);
+        let pencil = Pencil::new(&matrices[0], &matrices[1], 1);
+        let analysis = Analysis::new(&pencil).expect("small");
+        let sigma = 1.37;
+        let double = Indefinite::<f64>::new(&analysis, &pencil, sigma);
+        assert!(double.perturbation(&pencil).expect("sure") < 1e-9);
+        let single = Indefinite::<f32>::new(&analysis, &pencil, sigma);
+        let measured = single.perturbation(&pencil).expect("sure") / MARGIN;
+        let scale = |i: usize| single.scale[i];
+        let unit = Mat::from_fn(60, 60, |i, j| if i == j { scale(i) } else { 0.0 });
+        let mut g =
+            pencil.apply_stiffness(unit.as_ref()) - pencil.apply_mass(unit.as_ref()) * faer::Scale(sigma);
+        single.solve_in_place(g.as_mut());
+        let g = Mat::from_fn(60, 60, |i, j| f64::from(u8::from(i == j)) - g[(i, j)] / scale(i));
+        let true_norm = g.norm_l2();
+        assert!(measured > 0.3 * true_norm && measured < 3.0 * true_norm, "{measured:e} {true_norm:e}");
     }
 }

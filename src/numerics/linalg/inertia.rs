@@ -4,12 +4,14 @@
 use super::Pencil;
 use super::factor::{Analysis, Scaled};
 use super::front::{
-    PANEL, Trapezoid, by_rows, divide_rows, extend_add, subtract_eliminated, subtract_from_rest,
+    PANEL, ROWS, Real, Trapezoid, WORTH_A_TASK, divide_rows, drop_negligible, extend_add,
+    subtract_eliminated, subtract_from_rest,
 };
 use super::largest::largest;
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
+use rayon::prelude::*;
 use std::convert::Infallible;
 
 /// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma
@@ -27,23 +29,23 @@ pub struct Inertia {
 }
 
 /// What a front hands to its parent.
-pub(super) struct Contribution {
-    schur: Trapezoid<f64>,
+pub(super) struct Contribution<T> {
+    schur: Trapezoid<T>,
     /// Diagonal of |L| |B| |L|' so far, for its rows.
     growth: Vec<f64>,
 }
 
 /// The columns of a front after their elimination.
-pub(super) struct Eliminated {
+pub(super) struct Eliminated<T> {
     /// L below the leading squares of the panels.
-    pub columns: Trapezoid<f64>,
+    pub columns: Trapezoid<T>,
     /// The leading squares, one per panel.
-    pub blocks: Vec<Blocks>,
+    pub blocks: Vec<Blocks<T>>,
     /// Largest diagonal entry of |L| |B| |L|' in these columns.
     pub growth: f64,
 }
 
-impl Eliminated {
+impl<T> Eliminated<T> {
     /// Numbers of negative and of zero pivots.
     pub fn signs(&self) -> (usize, usize) {
         self.blocks.iter().fold((0, 0), |(n, z), block| (n + block.negative, z + block.zero))
@@ -52,13 +54,13 @@ impl Eliminated {
 
 /// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and
 /// eliminates its columns.
-pub(super) fn eliminate_front(
+pub(super) fn eliminate_front<T: Real>(
     analysis: &Analysis,
     matrix: &Scaled<'_>,
     s: usize,
-    children: Vec<Contribution>,
-) -> (Eliminated, Contribution) {
-    let (mut columns, mut rest) = analysis.new_front::<f64>(s);
+    children: Vec<Contribution<T>>,
+) -> (Eliminated<T>, Contribution<T>) {
+    let (mut columns, mut rest) = analysis.new_front::<T>(s);
     matrix.assemble(s, &mut columns);
     let mut growth = vec![0.0; columns.height()];
     for (&c, child) in analysis.tree.children(s).iter().zip(children) {
@@ -81,30 +83,34 @@ impl Inertia {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, sigma);
         let mut counts = vec![(0usize, 0usize, 0.0f64); tree.len()];
-        let visit = |s: usize, count: &mut (usize, usize, f64), children: Vec<Contribution>| {
+        let visit = |s: usize, count: &mut (usize, usize, f64), children: Vec<Contribution<f64>>| {
             let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
             let (negative, zero) = eliminated.signs();
             *count = (negative, zero, eliminated.growth);
             Ok::<_, Infallible>(handed_on)
         };
         let Ok(()) = analysis.walk.up(tree, &mut counts, &visit);
-        Self::of_fronts(counts)
+        Self::of_fronts::<f64>(counts)
     }
 
     /// Of the negative pivots, the zero pivots and the growth of every front.
-    pub(super) fn of_fronts(counts: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
+    pub(super) fn of_fronts<T: Real>(counts: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
         let (mut negative, mut zero, mut growth) = (0, 0, Vec::new());
         for (n, z, g) in counts {
             negative += n;
             zero += z;
             growth.push(g);
         }
-        Self { negative, zero, backward_error: largest(growth) * f64::EPSILON }
+        Self { negative, zero, backward_error: largest(growth) * 2.0 * T::ROUNDOFF }
     }
 }
 
 /// Eliminates the columns `pivots` of a front. Returns the leading squares of its panels, factored.
-fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mut [f64]) -> Vec<Blocks> {
+fn eliminate<T: Real>(
+    pivots: &mut Trapezoid<T>,
+    rest: &mut Trapezoid<T>,
+    growth: &mut [f64],
+) -> Vec<Blocks<T>> {
     let (height, width) = (pivots.height(), pivots.width());
     // L B beside L.
     let mut scaled = Trapezoid::zeros(height, width);
@@ -112,31 +118,18 @@ fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mu
     for p in 0..pivots.panels.len() {
         let (first, width) = (p * PANEL, pivots.panel_width(p));
         let mut panel = std::mem::take(&mut pivots.panels[p]);
-        let left: Vec<MatRef<'_, f64>> = (0..p).map(|q| pivots.below(q, first)).collect();
-        let right: Vec<MatRef<'_, f64>> = (0..p).map(|q| scaled.below(q, first)).collect();
+        let left: Vec<MatRef<'_, T>> = (0..p).map(|q| pivots.below(q, first)).collect();
+        let right: Vec<MatRef<'_, T>> = (0..p).map(|q| scaled.below(q, first)).collect();
         subtract_eliminated(&mut panel, width, &left, &right);
         let (square, below) = panel.split_at_mut(width * width);
         let blocks = Blocks::new(MatRef::from_row_major_slice(&*square, width, width));
-        by_rows(below, width, 0, |_, rows| {
-            let mut old = vec![0.0; width];
-            for row in rows.chunks_exact_mut(width) {
-                old.copy_from_slice(row);
-                for (new, &from) in row.iter_mut().zip(&blocks.order) {
-                    *new = old[from];
-                }
-            }
-        });
-        divide_rows(below, blocks.l.as_ref(), true);
-        scaled.panels[p][width * width..].copy_from_slice(below);
-        for (row, g) in below.chunks_exact_mut(width).zip(&mut growth[first + width..]) {
-            blocks.divide(row);
-            *g += blocks.growth(row);
-        }
+        let (own, later) = growth[first..].split_at_mut(width);
+        blocks.divide_below(below, &mut scaled.panels[p][width * width..], later);
         for (i, &place) in blocks.order.iter().enumerate() {
-            let row: Vec<f64> = (0..width)
-                .map(|j| if j < i { blocks.l[(i, j)] } else { f64::from(u8::from(i == j)) })
+            let row: Vec<T> = (0..width)
+                .map(|j| if j < i { blocks.l[(i, j)] } else { T::of(f64::from(u8::from(i == j))) })
                 .collect();
-            growth[first + place] += blocks.growth(&row);
+            own[place] += blocks.growth(&row);
         }
         pivots.panels[p] = panel;
         squares.push(blocks);
@@ -146,9 +139,9 @@ fn eliminate(pivots: &mut Trapezoid<f64>, rest: &mut Trapezoid<f64>, growth: &mu
 }
 
 /// P A P' = L B L' of the leading square of a panel.
-pub(super) struct Blocks {
+pub(super) struct Blocks<T> {
     /// Unit lower triangle below the diagonal.
-    pub l: Mat<f64>,
+    pub l: Mat<T>,
     /// Row of A at each place.
     pub order: Vec<usize>,
     diagonal: Vec<f64>,
@@ -158,14 +151,14 @@ pub(super) struct Blocks {
     zero: usize,
 }
 
-impl Blocks {
-    fn new(square: MatRef<'_, f64>) -> Self {
+impl<T: Real> Blocks<T> {
+    fn new(square: MatRef<'_, T>) -> Self {
         let n = square.nrows();
         let mut l = square.to_owned();
-        let mut subdiagonal = faer::Mat::<f64>::zeros(n, 1);
+        let mut subdiagonal = faer::Mat::<T>::zeros(n, 1);
         let (mut order, mut inverse) = (vec![0usize; n], vec![0usize; n]);
         let params = Spec::default();
-        let mut memory = MemBuffer::new(lblt::cholesky_in_place_scratch::<usize, f64>(n, Par::Seq, params));
+        let mut memory = MemBuffer::new(lblt::cholesky_in_place_scratch::<usize, T>(n, Par::Seq, params));
         lblt::cholesky_in_place(
             l.as_mut(),
             subdiagonal.as_mut().col_mut(0).as_diagonal_mut(),
@@ -175,10 +168,49 @@ impl Blocks {
             MemStack::new(&mut memory),
             params,
         );
-        let diagonal: Vec<f64> = (0..n).map(|j| l[(j, j)]).collect();
-        let coupling: Vec<f64> = (0..n).map(|j| if j + 1 < n { subdiagonal[(j, 0)] } else { 0.0 }).collect();
+        let diagonal: Vec<f64> = (0..n).map(|j| l[(j, j)].wide()).collect();
+        let coupling: Vec<f64> =
+            (0..n).map(|j| if j + 1 < n { subdiagonal[(j, 0)].wide() } else { 0.0 }).collect();
         let (negative, zero) = count(&diagonal, &coupling);
         Self { l, order, diagonal, coupling, negative, zero }
+    }
+
+    /// Rows of L from the rows `below` the square, whose L B is left in `scaled`; adds what they contribute
+    /// to |L| |B| |L|'.
+    fn divide_below(&self, below: &mut [T], scaled: &mut [T], growth: &mut [f64]) {
+        let width = self.order.len();
+        let piece = |rows: &mut [T], scaled: &mut [T], growth: &mut [f64]| {
+            let mut old = vec![T::default(); width];
+            for row in rows.chunks_exact_mut(width) {
+                old.copy_from_slice(row);
+                for (new, &from) in row.iter_mut().zip(&self.order) {
+                    *new = old[from];
+                }
+            }
+            divide_rows(rows, self.l.as_ref(), true);
+            drop_negligible(rows);
+            scaled.copy_from_slice(rows);
+            let mut wide = vec![0.0; width];
+            for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
+                wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());
+                self.divide(&mut wide);
+                row.iter_mut().zip(&wide).for_each(|(to, from)| *to = T::of(*from));
+                *g += self.growth(row);
+            }
+            drop_negligible(rows);
+        };
+        let length = ROWS * width;
+        if below.len() * width < WORTH_A_TASK {
+            let pieces = below.chunks_mut(length).zip(scaled.chunks_mut(length));
+            pieces
+                .zip(growth.chunks_mut(ROWS))
+                .for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
+        } else {
+            let pieces = below.par_chunks_mut(length).zip(scaled.par_chunks_mut(length));
+            pieces
+                .zip(growth.par_chunks_mut(ROWS))
+                .for_each(|((rows, scaled), growth)| piece(rows, scaled, growth));
+        }
     }
 
     /// Row of L from a row of L B: the row times B^-1.
@@ -202,9 +234,10 @@ impl Blocks {
     }
 
     /// |l|' |B| |l| of a row of L.
-    fn growth(&self, row: &[f64]) -> f64 {
-        let pairs = row.windows(2).zip(&self.coupling).map(|(l, off)| 2.0 * (l[0] * l[1] * off).abs());
-        let squares = row.iter().zip(&self.diagonal).map(|(l, d)| l * l * d.abs());
+    fn growth(&self, row: &[T]) -> f64 {
+        let pairs = row.windows(2).zip(&self.coupling);
+        let pairs = pairs.map(|(l, off)| 2.0 * (l[0].wide() * l[1].wide() * off).abs());
+        let squares = row.iter().zip(&self.diagonal).map(|(l, d)| l.wide() * l.wide() * d.abs());
         pairs.sum::<f64>() + squares.sum::<f64>()
     }
 }

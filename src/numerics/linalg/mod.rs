@@ -18,6 +18,7 @@ mod matrix_sum;
 mod ordering;
 mod pencil;
 mod product;
+mod random;
 mod sparse;
 mod substitution;
 mod tall;
@@ -39,6 +40,7 @@ pub use matrix_sum::{MatrixSum, Scalar};
 pub use ordering::connected_components;
 pub use pencil::Pencil;
 pub use product::{multiply, multiply_vector, sum_terms};
+pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{
