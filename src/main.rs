@@ -2,7 +2,7 @@
 
 mod process;
 
-use flexbody::program::{Arguments, abandon_unfinished, parse, run, tell_bug};
+use flexbody::program::{Arguments, abandon_unfinished, parse, processes, run, tell_bug};
 use flexbody::{Code, Diagnostic, ExitCode};
 use std::io::{IsTerminal, Write};
 
@@ -57,8 +57,9 @@ fn keep_freed_memory() {
     }
 }
 
-/// Ctrl-C, or SIGTERM: ends the process at once, whatever it is doing.
+/// Ctrl-C, or SIGTERM: ends the process at once, whatever it is doing, and the programs that it waits for.
 fn interrupted() {
+    process::interrupt(&processes());
     abandon_unfinished();
     let mut stderr = std::io::stderr();
     // A progress bar may stand on the line.

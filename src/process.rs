@@ -105,6 +105,18 @@ fn tell(text: &[u8]) {
     let _ = std::io::Write::write_all(&mut std::io::stderr(), text);
 }
 
+/// Asks other processes to end, as an interruption does: they leave nothing unfinished either.
+pub fn interrupt(processes: &[u32]) {
+    #[cfg(unix)]
+    for &process in processes {
+        // SAFETY: sends a signal to a program that this one has started; none is there to hear it when it has
+        // just ended, which is as well.
+        let _ = unsafe { libc::kill(process.cast_signed() as libc::pid_t, libc::SIGTERM) };
+    }
+    #[cfg(not(unix))]
+    let _ = processes;
+}
+
 /// Ends the process at once: other threads may be inside HDF5, whose own end waits for them or crashes.
 pub fn end(code: ExitCode) -> ! {
     #[cfg(unix)]

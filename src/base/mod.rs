@@ -1,6 +1,7 @@
 //! What every room may use: errors and the one table of diagnostic codes, units, provenance, progress,
 //! memory, and files that appear whole or not at all. Nothing here knows matrices, models or bodies.
 
+pub mod children;
 pub mod diagnostic;
 pub mod error;
 mod exit_code;

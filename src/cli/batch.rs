@@ -7,6 +7,7 @@ use super::outcome::Outcome;
 use super::places::{format_of, refuse_replacing};
 use super::resources::memory_left;
 use super::watcher::Watcher;
+use crate::base::children;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::output::OutputSlot;
@@ -223,7 +224,7 @@ fn convert(program: &std::path::Path, index: usize, body: Body, limit: u64) -> E
     if !words.iter().any(|word| word.starts_with("--memory-limit")) {
         process.args(["--memory-limit", &limit.to_string()]);
     }
-    let ended = process.output();
+    let ended = children::output(&mut process);
     let (exit_code, told) = match ended {
         Ok(ended) => {
             let told = serde_json::from_slice(&ended.stdout).unwrap_or(Value::Null);

@@ -2,6 +2,7 @@
 
 use super::prepare::DRIVER_SOURCE;
 use super::prepared::DRIVER;
+use crate::base::children;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use std::io::Write;
@@ -97,7 +98,7 @@ impl Engine {
         command.arg(python).arg(folder.join(DRIVER)).arg(folder).args(["--solver", self.solver.name()]);
         // Threads of BLAS beside the ranks would take their processors.
         command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").stdin(Stdio::null());
-        let output = command.output().map_err(|e| missing(program, &e))?;
+        let output = children::output(&mut command).map_err(|e| missing(program, &e))?;
         if output.status.success() {
             return Ok(());
         }

@@ -97,6 +97,39 @@ fn an_interrupted_convert_goes_on_from_its_checkpoint() {
     assert_eq!(members(&out), ["body.flex.h5", "search.h5"]);
 }
 
+/// A queue ends the program that it has started, not those that this one has started.
+#[test]
+fn programs_that_it_waits_for_end_with_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    std::fs::create_dir(place.join("model")).expect("a folder");
+    let raw = Mesh::block(Kind::Hex8, [18; 3], [1.0; 3])
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
+    write_model(&place.join("model"), &raw, Triangle::Lower);
+    let list = "[[body]]\nmodel = \"model/model.toml\"\noutput = \"new.flex.h5\"\noptions = [\"--modes\", \"100\"]\n";
+    std::fs::write(place.join("list.toml"), list).expect("a list");
+    let mut batch = Command::new(env!("CARGO_BIN_EXE_flexbody"));
+    batch.args(["batch", "list.toml"]).current_dir(place).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut batch = batch.spawn().expect("the program");
+    let began = Instant::now();
+    let unfinished = || members(place).iter().any(|name| name.starts_with(".flexbody-"));
+    while !unfinished() {
+        assert!(batch.try_wait().expect("a child").is_none(), "the batch ended before its conversion began");
+        assert!(began.elapsed() < Duration::from_secs(120), "no conversion began");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let sent = Command::new("kill").arg("-TERM").arg(batch.id().to_string()).status();
+    assert!(sent.expect("kill").success());
+    assert_eq!(batch.wait().expect("a child").code(), Some(ExitCode::Interrupted as i32));
+    // The conversion removes what it has begun when it is told to end; left alone it would make the body.
+    while unfinished() {
+        assert!(began.elapsed() < Duration::from_secs(180), "the conversion went on");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert_eq!(members(place), ["list.toml", "model"]);
+}
+
 /// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of
 /// these names.
 fn small_convert(out: &Path) -> Command {

@@ -3,7 +3,7 @@
 
 use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
-use super::ordering::{nested_dissection, node_graph};
+use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
 use super::tree_walk::{Needs, Walk};
 use super::{Pencil, SymmetricMatrix};
@@ -25,9 +25,9 @@ pub struct Analysis {
 impl Analysis {
     /// Orders and analyses the pencil; `None` when memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        let mut graph = node_graph(pencil)?;
+        let (mut graph, rows) = smallest_graph(pencil)?;
         let order = nested_dissection(&mut graph)?;
-        Some(Self::with_tree(AssemblyTree::new(&graph, &order, pencil.block()), pencil.block()))
+        Some(Self::with_tree(AssemblyTree::new(&graph, &order, rows), rows))
     }
 
     fn with_tree(tree: AssemblyTree, block: usize) -> Self {
@@ -155,13 +155,21 @@ impl Scaled<'_> {
                     }
                 }
             }
-            let (nodes, masses) = self.pencil.mass().row(vertex);
-            for (&other, &mass) in nodes.iter().zip(masses) {
-                let Some(row) = place(other as usize, column) else { continue };
-                for b in 0..block {
-                    let (i, j) = (other as usize * block + b, vertex * block + b);
-                    let value = -self.sigma * mass * self.scale[i] * self.scale[j];
-                    front.add(row + b, (column - columns.start) * block + b, T::of(value));
+            // Rows of Ms that a vertex has, each for as many rows of M.
+            let (copies, heavy) = (self.pencil.block(), block / self.pencil.block());
+            for own in 0..heavy {
+                let (others, masses) = self.pencil.mass().row(vertex * heavy + own);
+                for (&other, &mass) in others.iter().zip(masses) {
+                    let (other, part) = (other as usize / heavy, other as usize % heavy);
+                    let Some(first) = place(other, column) else { continue };
+                    for copy in 0..copies {
+                        let (b, c) = (part * copies + copy, own * copies + copy);
+                        let (row, local) = (first + b, (column - columns.start) * block + c);
+                        if row >= local {
+                            let scale = self.scale[other * block + b] * self.scale[vertex * block + c];
+                            front.add(row, local, T::of(-self.sigma * mass * scale));
+                        }
+                    }
                 }
             }
         }
@@ -308,12 +316,13 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 
 /// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the
 /// diagonal has been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a
-/// matrix). Most are far from semidefinite: where it succeeds in single precision with a diagonal that is
-/// 1e-3 less, that settles it in half the time. Uses the node order of `analysis`, whose pencil has `block`
-/// rows per node.
+/// matrix). Most are far from the border: where it succeeds in single precision with a diagonal that is
+/// 1e-3 less, that settles it in half the time. Uses the order of `analysis`.
 pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
-    let Some(graph) = node_graph(&Pencil::new(mass, mass, 1)) else { return false };
-    let analysis = Analysis::with_tree(AssemblyTree::new(&graph, analysis.tree.order(), 1), 1);
+    let order = analysis.tree.order();
+    let rows = mass.n() / order.len().max(1);
+    let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows.max(1)) else { return false };
+    let analysis = Analysis::with_tree(AssemblyTree::new(&graph, order, rows.max(1)), rows.max(1));
     drop(graph);
     let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
     if Cholesky::<f32>::new(&analysis, &Pencil::new(&lowered, &lowered, 1), 0.0).is_some() {

@@ -11,31 +11,33 @@ use std::sync::Mutex;
 /// METIS seeds and uses one random state per process: one call at a time keeps the ordering reproducible.
 static METIS: Mutex<()> = Mutex::new(());
 
-/// Calls `take` with every neighbour of a node, ascending: those that K or M couples it to.
-fn neighbours(pencil: &Pencil<'_>, vertex: u32, mut take: impl FnMut(u32)) {
-    let block = pencil.block() as u32;
-    let row = |b: u32| pencil.stiffness().row((vertex * block + b) as usize).0;
-    // Blocks of up to three rows are merged without a list of what has been met.
-    let mut stiffness: [&[u32]; 3] =
-        std::array::from_fn(|b| if (b as u32) < block { row(b as u32) } else { &[] });
-    let mut mass = pencil.mass().row(vertex as usize).0;
+/// Calls `take` with every neighbour of a vertex of `S` rows, ascending: those that K or M couples it to. The
+/// vertex has `H` rows of Ms.
+fn neighbours<const S: usize, const H: usize>(pencil: &Pencil<'_>, vertex: u32, mut take: impl FnMut(u32)) {
+    // Merged without a list of what has been met.
+    let at = vertex as usize;
+    let mut stiffness: [&[u32]; S] = std::array::from_fn(|b| pencil.stiffness().row(at * S + b).0);
+    let mut mass: [&[u32]; H] = std::array::from_fn(|b| pencil.mass().row(at * H + b).0);
+    let (rows, heavy) = (S as u32, H as u32);
     loop {
-        let coupled = stiffness.iter().filter_map(|row| row.first()).min().map(|&column| column / block);
-        let Some(next) = coupled.into_iter().chain(mass.first().copied()).min() else { return };
-        for row in &mut stiffness {
-            // At most `block` columns belong to one neighbour.
-            while let Some((&column, after)) = row.split_first()
-                && column < (next + 1) * block
-            {
-                *row = after;
-            }
-        }
-        if mass.first() == Some(&next) {
-            mass = &mass[1..];
-        }
+        let coupled = stiffness.iter().filter_map(|row| row.first()).min().map(|&column| column / rows);
+        let light = mass.iter().filter_map(|row| row.first()).min().map(|&column| column / heavy);
+        let Some(next) = coupled.into_iter().chain(light).min() else { return };
+        stiffness.iter_mut().for_each(|row| skip(row, (next + 1) * rows));
+        mass.iter_mut().for_each(|row| skip(row, (next + 1) * heavy));
         if next != vertex {
             take(next);
         }
+    }
+}
+
+/// Leaves the columns from `end` on: before it are at most those of one vertex.
+#[inline(always)]
+fn skip(columns: &mut &[u32], end: u32) {
+    while let Some((&column, after)) = columns.split_first()
+        && column < end
+    {
+        *columns = after;
     }
 }
 
@@ -45,13 +47,54 @@ fn neighbours(pencil: &Pencil<'_>, vertex: u32, mut take: impl FnMut(u32)) {
 /// # Panics
 /// When a node has not one, two or three rows.
 pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
+    vertex_graph(pencil, pencil.block())
+}
+
+/// Rows of a node with rotations, and of parts of it, that vertices may stand for where the pencil has rows
+/// alone.
+const NODE_ROWS: [usize; 3] = [6, 3, 2];
+
+/// Numbers of a graph of nodes, all rows of two neighbours taken as coupled, over those of K: up to here a
+/// node is one vertex. Rows that are coupled one by one are better told apart.
+const MOST_FILL: f64 = 1.6;
+
+/// Graph whose vertices are nodes, also where the pencil has rows alone, and the rows of a vertex: rows one
+/// after the other that are coupled to the same ones are those of a node. The graph of rows of shells has 36
+/// times the edges and takes as much longer to be ordered. `None` as above.
+pub(super) fn smallest_graph(pencil: &Pencil<'_>) -> Option<(Graph, usize)> {
+    if pencil.block() == 1 {
+        let (n, entries) = (pencil.n(), pencil.stiffness().as_csc().nnz() as f64);
+        for size in NODE_ROWS.into_iter().filter(|size| n > 0 && n % size == 0) {
+            let graph = vertex_graph(pencil, size)?;
+            let coupled = (size * size * (graph.neighbours.len() + graph.len())) as f64;
+            if coupled <= MOST_FILL * entries {
+                return Some((graph, size));
+            }
+        }
+    }
+    Some((node_graph(pencil)?, pencil.block()))
+}
+
+/// Graph with one vertex for every `size` rows.
+pub(super) fn vertex_graph(pencil: &Pencil<'_>, size: usize) -> Option<Graph> {
+    match (size, size / pencil.block()) {
+        (1, 1) => graph::<1, 1>(pencil),
+        (2, 1) => graph::<2, 1>(pencil),
+        (3, 1) => graph::<3, 1>(pencil),
+        (2, 2) => graph::<2, 2>(pencil),
+        (3, 3) => graph::<3, 3>(pencil),
+        (6, 6) => graph::<6, 6>(pencil),
+        _ => panic!("vertices of {size} rows, nodes of {}", pencil.block()),
+    }
+}
+
+fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
     /// Vertices per parallel task.
     const VERTICES: usize = 1024;
-    assert!((1..=3).contains(&pencil.block()), "nodes of 1, 2 or 3 rows, not {}", pencil.block());
-    let vertices = pencil.mass().n();
+    let vertices = pencil.n() / S;
     let mut pointers = vec![0i32; vertices + 1];
     pointers[1..].par_iter_mut().with_min_len(VERTICES).enumerate().for_each(|(vertex, count)| {
-        neighbours(pencil, vertex as u32, |_| *count += 1);
+        neighbours::<S, H>(pencil, vertex as u32, |_| *count += 1);
     });
     for vertex in 0..vertices {
         pointers[vertex + 1] = pointers[vertex].checked_add(pointers[vertex + 1])?;
@@ -68,7 +111,7 @@ pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
     shares.into_par_iter().for_each(|(range, share)| {
         let mut places = share.iter_mut();
         for vertex in range {
-            neighbours(pencil, vertex, |other| {
+            neighbours::<S, H>(pencil, vertex, |other| {
                 *places.next().expect("as many neighbours as were counted") = other as i32;
             });
         }
@@ -152,7 +195,8 @@ pub fn connected_components(matrices: &[&SymmetricMatrix], block: usize) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::linalg::CscMatrix;
+    use crate::numerics::linalg::{Analysis, Cholesky, CscMatrix, Solve, is_positive_semidefinite};
+    use faer::Mat;
     use std::collections::BTreeSet;
 
     /// Blocks of three rows, coupled through any one of their nine entries; the last two blocks stand alone.
@@ -194,6 +238,49 @@ mod tests {
         }
         let order = nested_dissection(&mut graph).expect("small");
         assert_eq!(order.iter().collect::<BTreeSet<_>>().len(), 2500);
+    }
+
+    /// Rows of a matrix of nodes with six rows, all coupled to those of the neighbours along a chain and a
+    /// loop; `holes`: but for some.
+    fn of_six_rows(nodes: u32, holes: u32) -> SymmetricMatrix {
+        let mut entries = Vec::new();
+        for v in 0..nodes {
+            for w in [v, v + 1, v + 11].into_iter().filter(|&w| w < nodes) {
+                for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+                    if v == w || (i + j + v) % 6 >= holes {
+                        let value = if v == w && i == j { 90.0 } else { f64::from(i + j + 1) / 9.0 };
+                        entries.push((6 * v + i, 6 * w + j, value));
+                        if v != w {
+                            entries.push((6 * w + j, 6 * v + i, value));
+                        }
+                    }
+                }
+            }
+        }
+        let n = 6 * nodes as usize;
+        SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric")
+    }
+
+    /// Six rows of a node become one vertex where they are coupled alike, and rows stay alone where not; the
+    /// solution is the same.
+    #[test]
+    fn nodes_are_found_among_rows() {
+        for (holes, expected) in [(0, 6), (1, 6), (5, 1)] {
+            let k = of_six_rows(60, holes);
+            let m = of_six_rows(60, 4);
+            let pencil = Pencil::new(&k, &m, 1);
+            let (graph, rows) = smallest_graph(&pencil).expect("small");
+            assert_eq!((rows, graph.len()), (expected, 360 / expected), "{holes} of six couplings missing");
+            let analysis = Analysis::new(&pencil).expect("small");
+            let factor = Cholesky::<f64>::new(&analysis, &pencil, 0.37).expect("definite");
+            let b = Mat::from_fn(360, 3, |i, j| ((i * 7 + j * 5) % 13) as f64 - 6.0);
+            let mut x = b.clone();
+            factor.solve_in_place(x.as_mut());
+            let product =
+                pencil.apply_stiffness(x.as_ref()) + pencil.apply_mass(x.as_ref()) * faer::Scale(0.37);
+            assert!((&product - &b).norm_max() < 1e-12, "{holes}");
+            assert!(is_positive_semidefinite(&m, &analysis), "{holes}");
+        }
     }
 
     #[test]

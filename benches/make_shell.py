@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Writes a panel of flat shell rectangles, folded into an arc, for benches: K, a general M with nodal rotations, node and DOF tables, manifest.
+
+    pip install numpy
+    python benches/make_shell.py /tmp/shell200k --dofs 200000
+
+An arc of 120 degrees, as long as it is wide, of strips that each lie in a plane: membrane, bending and drilling are
+coupled in every node. The elements are those of fixtures/make/elements.py; isotropic, SI units. Values carry 17
+significant digits.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fixtures/make"))
+
+from elements import shell_rectangle
+from make_block import write_manifest
+from make_tet10 import write_lower
+
+RADIUS, ANGLE, THICKNESS = 1.0, 2 * np.pi / 3, 0.005
+
+
+def panel(cells):
+    """Nodes along the arc first, and strips: nodes of their elements, stiffness and mass of one."""
+    angles = np.linspace(-ANGLE / 2, ANGLE / 2, cells + 1)
+    arc = RADIUS * np.column_stack([np.sin(angles), np.cos(angles)])
+    width = RADIUS * ANGLE / cells
+    x, y = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1))
+    points = np.column_stack([arc[x.ravel(), 0], y.ravel() * width, arc[x.ravel(), 1]])
+    strips = []
+    for i in range(cells):
+        chord = arc[i + 1] - arc[i]
+        length = np.linalg.norm(chord)
+        along = np.array([chord[0], 0.0, chord[1]]) / length
+        across = np.array([0.0, 1.0, 0.0])
+        axes = np.array([along, across, np.cross(along, across)])
+        matrices = shell_rectangle((length, width), axes, THICKNESS, (2.1e11, 0.3, 7850.0))
+        first = i + (cells + 1) * np.arange(cells)
+        nodes = np.stack([first, first + 1, first + cells + 2, first + cells + 1], axis=1)
+        strips.append((nodes, *matrices))
+    return points, strips
+
+
+def assembled(strips, which, size):
+    """Rows, columns and values of the sum of the elements' matrices."""
+    keys, values = [], []
+    for nodes, *matrices in strips:
+        rows = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), 24)
+        keys.append((rows[:, None, :] * size + rows[:, :, None]).ravel())
+        values.append(np.broadcast_to(matrices[which], (len(nodes), 24, 24)).ravel())
+    keys, values = np.concatenate(keys), np.concatenate(values)
+    order = np.argsort(keys, kind="stable")
+    keys, starts = np.unique(keys[order], return_index=True)
+    return keys % size, keys // size, np.add.reduceat(values[order], starts)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--dofs", type=int, default=6000, help="about this many degrees of freedom")
+    args = parser.parse_args()
+    began = time.perf_counter()
+    points, strips = panel(max(1, round((args.dofs / 6) ** 0.5) - 1))
+    size = 6 * len(points)
+    args.folder.mkdir(parents=True, exist_ok=True)
+    name = args.folder.resolve().name
+    entries = [write_lower(args.folder / f"{letter}.mtx", size, f"{what} of {name}", *assembled(strips, which, size))
+               for which, (letter, what) in enumerate([("K", "stiffness"), ("M", "consistent mass")])]
+    numbers = range(1, len(points) + 1)
+    (args.folder / "nodes.csv").write_text("node,x,y,z\n" + "".join([f"{n},{x!r},{y!r},{z!r}\n" for n, (x, y, z) in zip(numbers, points.tolist())]))
+    (args.folder / "dofs.csv").write_text("node,dir\n" + "".join([f"{n},{d}\n" for n in numbers for d in range(1, 7)]))
+    write_manifest(args.folder, name, "K.mtx", "M.mtx")
+    print(json.dumps({"folder": str(args.folder), "nodes": len(points), "dofs": size, "elements": sum(len(strip[0]) for strip in strips), "stiffness_entries": 2 * entries[0] - size,
+                      "mass_entries": 2 * entries[1] - size, "seconds": round(time.perf_counter() - began, 2)}))
+
+
+if __name__ == "__main__":
+    main()
