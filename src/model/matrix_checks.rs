@@ -5,7 +5,7 @@ use super::tolerance::rounding;
 use super::wording::name_some;
 use super::{DofLabel, RawMatrix, RawModel};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::numerics::linalg::SymmetricMatrix;
+use crate::numerics::linalg::{CscMatrix, SymmetricMatrix};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -48,23 +48,7 @@ pub(super) fn symmetric(
         Err(ordered) => ordered,
     };
     let n = ordered.n_cols();
-    let size: Vec<f64> = (0..n).map(|i| ordered.get(i, i).abs().sqrt()).collect();
-    let (mut worst, mut at) = (0.0f64, (0, 0));
-    let mut one_sided = 0usize;
-    for j in 0..n {
-        let (rows, values) = ordered.column(j);
-        for (&i, &v) in rows.iter().zip(values) {
-            let i = i as usize;
-            let other = ordered.get(j, i);
-            one_sided += usize::from(other == 0.0);
-            // Beyond the diagonal, as only indefinite matrices go, an entry is compared with itself.
-            let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
-            let difference = (v - other).abs() / scale;
-            if difference > worst {
-                (worst, at) = (difference, (i, j));
-            }
-        }
-    }
+    let Asymmetry { worst, at, one_sided } = Asymmetry::of(&ordered);
     if worst > rounding(raw.digits, 2) {
         let (i, j) = at;
         let message = format!(
@@ -81,7 +65,51 @@ pub(super) fn symmetric(
         found.push(diagnostic);
         return None;
     }
-    Some(SymmetricMatrix::symmetrised(&ordered))
+    Some(SymmetricMatrix::symmetrised(ordered))
+}
+
+/// How far a matrix is from its transpose.
+#[derive(Clone, Copy, Default)]
+struct Asymmetry {
+    /// The largest difference over the size of the entries or of the diagonal entries beside them, and the first
+    /// entry that has it.
+    worst: f64,
+    at: (usize, usize),
+    /// Entries without one at the mirrored place.
+    one_sided: usize,
+}
+
+impl Asymmetry {
+    fn of(matrix: &CscMatrix) -> Self {
+        /// Columns that are not worth a task of their own.
+        const COLUMNS: usize = 256;
+        let n = matrix.n_cols();
+        let size: Vec<f64> = (0..n).map(|i| matrix.get(i, i).abs().sqrt()).collect();
+        let of_column = |j: usize| {
+            let mut own = Self::default();
+            let (rows, values) = matrix.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                let i = i as usize;
+                let other = matrix.get(j, i);
+                own.one_sided += usize::from(other == 0.0);
+                // Beyond the diagonal, as only indefinite matrices go, an entry is compared with itself.
+                let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
+                let difference = (v - other).abs() / scale;
+                if difference > own.worst {
+                    (own.worst, own.at) = (difference, (i, j));
+                }
+            }
+            own
+        };
+        let columns = (0..n).into_par_iter().with_min_len(COLUMNS);
+        columns.map(of_column).reduce(Self::default, Self::and)
+    }
+
+    /// That of some columns and of those that follow.
+    fn and(self, next: Self) -> Self {
+        let first = if next.worst > self.worst { next } else { self };
+        Self { one_sided: self.one_sided + next.one_sided, ..first }
+    }
 }
 
 pub(super) fn check_diagonals(

@@ -199,7 +199,7 @@ impl Elimination {
         let matrix = CscMatrix::from_parts(m, m, col_ptr, row_idx, values);
         // Without dependent rows entries are only left out; sums may round differently on both sides of the
         // diagonal.
-        SymmetricMatrix::try_from(matrix).unwrap_or_else(|matrix| SymmetricMatrix::symmetrised(&matrix))
+        SymmetricMatrix::try_from(matrix).unwrap_or_else(SymmetricMatrix::symmetrised)
     }
 
     /// Adds T' of `value` in one row.

@@ -254,7 +254,7 @@ mod tests {
         for i in 0..n {
             m.push((i as u32, i as u32, 1.0 + (i % 3) as f64));
         }
-        [k, m].map(|t| SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(n, n, &t)))
+        [k, m].map(|t| SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &t)))
     }
 
     /// Solutions fulfil their equations between, below and above all eigenvalues, with one and several panels
@@ -274,7 +274,7 @@ mod tests {
                             rows.iter().zip(values).map(|(&i, &v)| (i, j as u32, v)).collect::<Vec<_>>()
                         }))
                         .collect();
-                    k = SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(n, n, &all));
+                    k = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &all));
                 }
                 let spread: Vec<_> = (0..n)
                     .flat_map(|j| {
@@ -286,8 +286,7 @@ mod tests {
                             .collect::<Vec<_>>()
                     })
                     .collect();
-                let k =
-                    SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(n * block, n * block, &spread));
+                let k = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n * block, n * block, &spread));
                 let pencil = Pencil::new(&k, &m, block);
                 let analysis = Analysis::new(&pencil).expect("small");
                 for sigma in [0.0731, 1.37, 5.91, 400.0] {

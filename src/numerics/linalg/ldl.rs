@@ -274,7 +274,7 @@ mod tests {
                 triplets.extend(entries.iter().map(|&(j, b)| (i, j, a * b)));
             }
         }
-        SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(n, n, &triplets))
+        SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &triplets))
     }
 
     fn residual(a: &SymmetricMatrix, block: usize, x: &[f64], b: &[f64]) -> f64 {

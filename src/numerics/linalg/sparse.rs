@@ -238,6 +238,29 @@ impl CscMatrix {
     }
 }
 
+impl CscMatrix {
+    /// Leaves out the entries that are zero.
+    fn drop_zeros(&mut self) {
+        if self.values.iter().all(|value| *value != 0.0) {
+            return;
+        }
+        let (mut from, mut to) = (0, 0);
+        for j in 0..self.n_cols {
+            let end = self.col_ptr[j + 1];
+            while from < end {
+                if self.values[from] != 0.0 {
+                    (self.row_idx[to], self.values[to]) = (self.row_idx[from], self.values[from]);
+                    to += 1;
+                }
+                from += 1;
+            }
+            self.col_ptr[j + 1] = to;
+        }
+        self.row_idx.truncate(to);
+        self.values.truncate(to);
+    }
+}
+
 /// Symmetric sparse matrix, both triangles stored: column j is also row j, so products gather row by row
 /// with the same sum order at any thread count.
 #[derive(Debug, Clone, PartialEq)]
@@ -249,12 +272,43 @@ impl SymmetricMatrix {
         Self::try_from(matrix).ok()
     }
 
-    /// Takes the mean of a nearly symmetric matrix and its transpose.
+    /// Takes the mean of a nearly symmetric matrix and its transpose, without the entries that cancel. Where both
+    /// have the same pattern that takes no more memory than the matrix has.
     ///
     /// # Panics
     /// When the matrix is not square.
-    pub fn symmetrised(matrix: &CscMatrix) -> Self {
+    pub fn symmetrised(mut matrix: CscMatrix) -> Self {
         assert_eq!(matrix.n_rows, matrix.n_cols, "square");
+        let mut cursor: Vec<usize> = matrix.col_ptr[..matrix.n_cols].to_vec();
+        for j in 0..matrix.n_cols {
+            for at in matrix.col_ptr[j]..matrix.col_ptr[j + 1] {
+                let i = matrix.row_idx[at] as usize;
+                if i <= j {
+                    continue;
+                }
+                // Ascending columns j meet the mirrored entries (j, i) of column i in ascending order.
+                let mirrored = cursor[i];
+                if mirrored == matrix.col_ptr[i + 1] || matrix.row_idx[mirrored] as usize != j {
+                    // The means taken so far are those of themselves.
+                    return Self::symmetrised_by_transpose(&matrix);
+                }
+                cursor[i] += 1;
+                let mean = 0.5 * (matrix.values[at] + matrix.values[mirrored]);
+                matrix.values[at] = mean;
+                matrix.values[mirrored] = mean;
+            }
+            // What is left above the diagonal has no entry below it.
+            let end = matrix.col_ptr[j + 1];
+            let above = matrix.row_idx[cursor[j]..end].first().is_some_and(|&row| (row as usize) < j);
+            if above {
+                return Self::symmetrised_by_transpose(&matrix);
+            }
+        }
+        matrix.drop_zeros();
+        Self(matrix)
+    }
+
+    fn symmetrised_by_transpose(matrix: &CscMatrix) -> Self {
         let transpose = matrix.transpose();
         let n = matrix.n_cols;
         let (mut col_ptr, mut row_idx, mut values) = (vec![0usize], Vec::new(), Vec::new());
@@ -426,7 +480,28 @@ mod tests {
         let matrix = CscMatrix::from_triplets(2, 2, &entries);
         assert_eq!((matrix.nnz(), matrix.get(0, 0), matrix.get(0, 1)), (2, 2.0, 0.5));
         let skew = CscMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (0, 1, 3.0), (1, 0, -3.0)]);
-        assert_eq!(SymmetricMatrix::symmetrised(&skew).as_csc().nnz(), 1);
+        assert_eq!(SymmetricMatrix::symmetrised(skew).as_csc().nnz(), 1);
+    }
+
+    #[test]
+    fn the_mean_with_the_transpose_is_the_same_in_place_and_beside_the_matrix() {
+        let value = |k: u32| if k.is_multiple_of(13) { 0.0 } else { f64::from(k).sin() };
+        let band = |i: u32, j: u32| (i, j, value(31 * i + 7 * j));
+        let all = |i: u32| (i.saturating_sub(3)..(i + 4).min(50)).map(move |j| band(i, j));
+        let mut entries: Vec<_> = (0..50).flat_map(all).collect();
+        // These two cancel.
+        entries.retain(|(i, j, _)| (*i, *j) != (20, 21) && (*i, *j) != (21, 20));
+        entries.extend([(20, 21, 1.5), (21, 20, -1.5)]);
+        let both = CscMatrix::from_triplets(50, 50, &entries);
+        for extra in [vec![], vec![(0, 40, 2.0)], vec![(40, 0, 2.0)], vec![(49, 0, 1.0), (3, 30, 1.0)]] {
+            let more: Vec<_> = entries.iter().copied().chain(extra).collect();
+            let matrix = CscMatrix::from_triplets(50, 50, &more);
+            let beside = SymmetricMatrix::symmetrised_by_transpose(&matrix);
+            assert_eq!(SymmetricMatrix::symmetrised(matrix), beside);
+        }
+        let mean = SymmetricMatrix::symmetrised(both);
+        assert!(mean.as_csc().is_symmetric());
+        assert_eq!(mean.as_csc().get(20, 21), 0.0);
     }
 
     /// A banded symmetric matrix of several tasks.

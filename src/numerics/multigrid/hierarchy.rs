@@ -325,7 +325,7 @@ mod tests {
             let n = points.len();
             let ones: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
             let symmetric = |size: usize, entries: &[(u32, u32, f64)]| {
-                SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(size, size, entries))
+                SymmetricMatrix::symmetrised(CscMatrix::from_triplets(size, size, entries))
             };
             Self {
                 places: points.iter().map(|p| p.map(|x| x as f64)).collect(),

@@ -125,7 +125,7 @@ fn bodies_without_mass_or_place_are_refused() {
     for value in [-1.0, f64::NAN, f64::INFINITY] {
         // A NaN never equals its own transpose: the mean of both takes it.
         let triplets = [(0, 0, value), (1, 1, value)];
-        let mass = SymmetricMatrix::symmetrised(&CscMatrix::from_triplets(2, 2, &triplets));
+        let mass = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(2, 2, &triplets));
         let error = choose_frame(&mass, &positions, BodyFrame::Com).expect_err("refused");
         assert!(error.has(Code::MassNotPositive), "{value}");
     }
