@@ -88,15 +88,39 @@ pub(super) fn assemble(
     path: &Path,
 ) -> Result<RawMatrix, Diagnostic> {
     let digits = digits_of(&pieces, written);
-    finish(n, compress(n, pieces, storage), digits, path)
+    finish(n, Counted::of(n, pieces, storage).added_up(), digits, path)
+}
+
+/// [`assemble`] where no entry may be given twice; `twice` tells the first that is, by row and then column. Of a
+/// triangle it is named by its place below the diagonal.
+///
+/// # Errors
+/// What `twice` tells; FB312 when nothing but zeros is left.
+pub(super) fn assemble_distinct(
+    n: usize,
+    pieces: Vec<Vec<Entry>>,
+    storage: Storage,
+    written: u8,
+    path: &Path,
+    twice: impl FnOnce(u32, u32) -> Diagnostic,
+) -> Result<RawMatrix, Diagnostic> {
+    let digits = digits_of(&pieces, written);
+    match Counted::of(n, pieces, storage).distinct(storage) {
+        Ok(matrix) => finish(n, Ok(matrix), digits, path),
+        Err((row, col)) => Err(twice(row, col)),
+    }
 }
 
 /// [`assemble`] for columns that are complete: they become the matrix where they lie.
 ///
 /// # Errors
 /// As [`assemble`].
-pub(super) fn assemble_columns(columns: ColumnEntries, path: &Path) -> Result<RawMatrix, Diagnostic> {
-    let digits = significant_digits(columns.values.len(), 17, |k| columns.values[k]);
+pub(super) fn assemble_columns(
+    columns: ColumnEntries,
+    written: u8,
+    path: &Path,
+) -> Result<RawMatrix, Diagnostic> {
+    let digits = significant_digits(columns.values.len(), written, |k| columns.values[k]);
     finish(columns.counts.len() - 1, columns.compress(), digits, path)
 }
 
@@ -131,37 +155,66 @@ fn digits_of(pieces: &[Vec<Entry>], written: u8) -> u8 {
     })
 }
 
-/// `Err` holds the entry whose sum is not finite.
-fn compress(n: usize, pieces: Vec<Vec<Entry>>, storage: Storage) -> Result<CscMatrix, (u32, u32)> {
-    let list = List::new(pieces, storage);
-    let mut col_ptr = vec![0usize; n + 1];
-    let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
-    col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
-        let first = task * width;
-        list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
-    });
-    add_up(&mut col_ptr);
-    let entries = col_ptr[n];
-    let (mut row_idx, mut values) = (vec![0u32; entries], vec![0.0f64; entries]);
-    let fill = |block: ColumnBlock<'_>| {
-        let (first, end) = (block.columns.start, block.columns.end);
-        let start = col_ptr[first];
-        let mut next = col_ptr[first..end].to_vec();
-        list.visit(first..end, |row, col, value| {
-            let at = &mut next[col - first];
-            block.rows[*at - start] = row;
-            block.values[*at - start] = value;
-            *at += 1;
+/// Entries in compressed columns, each sorted by row; duplicates stand in file order.
+struct Counted {
+    col_ptr: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+    has_duplicates: bool,
+}
+
+impl Counted {
+    fn of(n: usize, pieces: Vec<Vec<Entry>>, storage: Storage) -> Self {
+        let list = List::new(pieces, storage);
+        let mut col_ptr = vec![0usize; n + 1];
+        let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
+        col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
+            let first = task * width;
+            list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
         });
-        sort_columns(&col_ptr[first..=end], block.rows, block.values)
-    };
-    let blocks = split_columns(&col_ptr, &equal_shares(&col_ptr), &mut row_idx, &mut values);
-    let duplicates = blocks.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
-    drop(list);
-    if duplicates {
-        merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
+        add_up(&mut col_ptr);
+        let entries = col_ptr[n];
+        let (mut row_idx, mut values) = (vec![0u32; entries], vec![0.0f64; entries]);
+        let fill = |block: ColumnBlock<'_>| {
+            let (first, end) = (block.columns.start, block.columns.end);
+            let start = col_ptr[first];
+            let mut next = col_ptr[first..end].to_vec();
+            list.visit(first..end, |row, col, value| {
+                let at = &mut next[col - first];
+                block.rows[*at - start] = row;
+                block.values[*at - start] = value;
+                *at += 1;
+            });
+            sort_columns(&col_ptr[first..=end], block.rows, block.values)
+        };
+        let blocks = split_columns(&col_ptr, &equal_shares(&col_ptr), &mut row_idx, &mut values);
+        let has_duplicates = blocks.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
+        Self { col_ptr, row_idx, values, has_duplicates }
     }
-    Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+
+    /// `Err` holds the entry whose sum is not finite.
+    fn added_up(self) -> Result<CscMatrix, (u32, u32)> {
+        let Self { mut col_ptr, mut row_idx, mut values, has_duplicates } = self;
+        if has_duplicates {
+            merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
+        }
+        let n = col_ptr.len() - 1;
+        Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+    }
+
+    /// `Err` holds the first entry that is there twice, by row and then column.
+    fn distinct(self, storage: Storage) -> Result<CscMatrix, (u32, u32)> {
+        if !self.has_duplicates {
+            return self.added_up();
+        }
+        let twice = self.col_ptr.windows(2).zip(0u32..).flat_map(|(ends, col)| {
+            let rows = &self.row_idx[ends[0]..ends[1]];
+            rows.windows(2).filter(|pair| pair[0] == pair[1]).map(move |pair| (pair[0], col))
+        });
+        // Each of a triangle was put into both.
+        let twice = twice.filter(|(row, col)| storage == Storage::Full || row >= col);
+        Err(twice.min().expect("duplicates were found"))
+    }
 }
 
 /// Adds an entry to the last piece, or begins a new one: pieces that cover few columns are left out by most
@@ -197,6 +250,13 @@ impl ColumnEntries {
             }
         });
         Self { counts: vec![0; n + 1], row_idx, values }
+    }
+
+    /// Of `n` columns; `lengths` has each column with entries and their number, in ascending order.
+    pub(super) fn new(n: usize, lengths: &[(u32, usize)], row_idx: Vec<u32>, values: Vec<f64>) -> Self {
+        let mut counts = vec![0; n + 1];
+        lengths.iter().for_each(|&(column, length)| counts[column as usize + 1] = length);
+        Self { counts, row_idx, values }
     }
 
     /// Adds an entry to its column; columns come in ascending order.
@@ -408,7 +468,7 @@ mod tests {
             columns
         };
         let lower: Vec<_> = ordered.iter().map(|e| (e.row, e.col, e.value)).collect();
-        let full = assemble_columns(columns(), Path::new("K.h5")).unwrap();
+        let full = assemble_columns(columns(), 17, Path::new("K.h5")).unwrap();
         assert_eq!(full.matrix, CscMatrix::from_triplets(n, n, &lower));
         let mirrored = assemble(n, columns().into_entries(), Storage::Triangle, 17, Path::new("K.h5"));
         assert_eq!(mirrored.unwrap().matrix, expected);

@@ -1,9 +1,12 @@
 //! Decks of Nastran: lines of case control, then bulk data cards in free, small and large fields, with
 //! continuations, comments and included files.
 
+mod matrix_lines;
+
 use super::bytes::InputFile;
 use super::coordinates::{excerpt, real};
 use crate::base::diagnostic::{Code, Diagnostic};
+pub(super) use matrix_lines::MatrixLines;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +22,8 @@ pub(super) enum Item<'a> {
     /// BEGIN BULK, BEGIN SUPER.
     Begin(&'a Place<'a>),
     Card(&'a Card, &'a Path),
+    /// DMIG cards that stand one below the other, not read yet.
+    Matrices(&'a MatrixLines<'a>),
 }
 
 /// Where something stands.
@@ -89,6 +94,12 @@ impl Card {
         self.continuation.clear();
     }
 
+    /// Its continuation has to have the name in this field.
+    fn continue_as(&mut self, field: &[u8]) {
+        self.continuation.clear();
+        self.continuation.extend_from_slice(bare(field.trim_ascii()));
+    }
+
     fn push(&mut self, field: &[u8]) {
         self.text.extend_from_slice(field.trim_ascii());
         self.ends.push(self.text.len());
@@ -97,7 +108,20 @@ impl Card {
 
 /// A whole number as cards have it.
 pub(super) fn whole(field: &[u8]) -> Option<i64> {
-    std::str::from_utf8(field).ok()?.parse().ok()
+    /// As many digits fit into the number, whichever they are.
+    const FIT: usize = 18;
+    let digits = match field {
+        [b'+' | b'-', digits @ ..] => digits,
+        digits => digits,
+    };
+    if digits.is_empty() || digits.len() > FIT {
+        return std::str::from_utf8(field).ok()?.parse().ok();
+    }
+    let mut number = 0;
+    for digit in digits {
+        number = 10 * number + i64::from(digit.is_ascii_digit().then(|| digit - b'0')?);
+    }
+    Some(if field[0] == b'-' { -number } else { number })
 }
 
 /// Whether a file is a deck of Nastran or bulk data, by its first lines that say so.
@@ -105,41 +129,110 @@ pub(super) fn is_bulk_data(bytes: &[u8]) -> bool {
     const LOOKED_AT: usize = 1 << 20;
     let head = &bytes[..bytes.len().min(LOOKED_AT)];
     head.split(|&b| b == b'\n').any(|line| {
-        let line: Vec<u8> = line.iter().take(16).map(u8::to_ascii_uppercase).collect();
+        let upper: Vec<u8> = line.iter().take(16).map(u8::to_ascii_uppercase).collect();
         let is_card = |name: &[u8]| {
-            line.strip_prefix(name)
+            upper
+                .strip_prefix(name)
                 .is_some_and(|rest| matches!(rest.first(), Some(b' ' | b',' | b'*' | b'\t')))
         };
-        is_begin(&line) || line.trim_ascii() == b"CEND" || is_card(b"GRID") || is_card(b"DMIG")
+        is_begin(line) || upper.trim_ascii() == b"CEND" || is_card(b"GRID") || is_card(b"DMIG")
     })
 }
 
-/// Whether a line, in upper case, begins bulk data.
+/// Whether a line begins bulk data.
 fn is_begin(line: &[u8]) -> bool {
-    let rest = line.trim_ascii_start().strip_prefix(b"BEGIN").filter(|rest| rest.first() == Some(&b' '));
-    rest.is_some_and(|rest| {
-        [&b"BULK"[..], b"SUPER"].iter().any(|kind| rest.trim_ascii_start().starts_with(kind))
-    })
+    let word = |text: &[u8], word: &[u8]| {
+        text.get(..word.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(word))
+    };
+    let line = line[..line.len().min(40)].trim_ascii_start();
+    word(line, b"BEGIN ") && {
+        let kind = line[6..].trim_ascii_start();
+        word(kind, b"BULK") || word(kind, b"SUPER")
+    }
 }
+
+/// Whether a line is of case control or executive control, or ends them.
+fn is_control(line: &[u8]) -> bool {
+    let line = &line[..line.len().min(40)];
+    // What most lines are not is told by one letter.
+    if !matches!(line.trim_ascii_start().first(), Some(b'b' | b'B' | b'c' | b'C' | b's' | b'S')) {
+        return false;
+    }
+    let begins = |word: &[u8]| line.get(..word.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(word));
+    line.trim_ascii().eq_ignore_ascii_case(b"CEND") || begins(b"SOL ") || is_begin(line)
+}
+
+type Taken = Result<(), Diagnostic>;
 
 /// Reads a deck with the files that it includes and gives what it is made of to `take`. The files, the main
 /// one first.
 ///
 /// # Errors
 /// FB101, FB106 for files that cannot be read; FB110 for continuations without a card, fields beyond the
-/// line, and files that include themselves; FB301 for a matrix at the end of a file that has no line end.
-pub(super) fn read_deck(path: &Path, take: &mut dyn FnMut(Item<'_>)) -> Result<Vec<PathBuf>, Diagnostic> {
+/// line, and files that include themselves; FB301 for a matrix at the end of a file that has no line end;
+/// what `take` gives.
+pub(super) fn read_deck(
+    path: &Path,
+    take: &mut dyn FnMut(Item<'_>) -> Taken,
+) -> Result<Vec<PathBuf>, Diagnostic> {
     let file = InputFile::open(path)?;
-    let upper = |line: &[u8]| line.iter().take(40).map(u8::to_ascii_uppercase).collect::<Vec<u8>>();
-    let has_control = file
-        .bytes()
-        .split(|&b| b == b'\n')
-        .map(upper)
-        .any(|line| line.trim_ascii() == b"CEND" || line.starts_with(b"SOL ") || is_begin(&line));
-    let mut reading = Reading { files: Vec::new(), in_bulk: !has_control, ended: false, open: None, take };
+    let mut given = 0;
+    let has_control = Lines::of(file.bytes(), 0).any(|(_, range)| {
+        file.release_up_to(range.start, &mut given);
+        is_control(&file.bytes()[range])
+    });
+    let mut reading = Reading::new(!has_control, take);
     reading.file(path, &file, 0)?;
-    reading.flush();
+    reading.flush()?;
     Ok(reading.files)
+}
+
+/// Gives the cards of some whole lines of bulk data to `take`; `above` is the number of lines above them in
+/// their file.
+///
+/// # Errors
+/// FB110 for continuations without a card and fields beyond the line; what `take` gives.
+pub(super) fn read_cards(
+    text: &[u8],
+    path: &Path,
+    above: usize,
+    take: &mut dyn FnMut(&Card) -> Taken,
+) -> Taken {
+    let mut each = |item: Item<'_>| match item {
+        Item::Card(card, _) => take(card),
+        _ => Ok(()),
+    };
+    let mut reading = Reading::new(true, &mut each);
+    for (number, range) in Lines::of(text, 0) {
+        reading.line(&text[range], &Place { path, line: above + number })?;
+    }
+    reading.flush()
+}
+
+/// The lines of a text: their numbers, from 1, and their bytes without the line end.
+struct Lines<'a> {
+    text: &'a [u8],
+    at: usize,
+    number: usize,
+}
+
+impl<'a> Lines<'a> {
+    fn of(text: &'a [u8], at: usize) -> Self {
+        Self { text, at, number: 0 }
+    }
+}
+
+impl Iterator for Lines<'_> {
+    type Item = (usize, std::ops::Range<usize>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let length = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
+        let range = self.at..self.at + length;
+        self.at = range.end + 1;
+        self.number += 1;
+        Some((self.number, range))
+    }
 }
 
 /// A deck while it is read.
@@ -148,13 +241,21 @@ struct Reading<'t> {
     in_bulk: bool,
     /// ENDDATA has come.
     ended: bool,
-    /// The card that continuations go on with.
-    open: Option<(Card, PathBuf)>,
-    take: &'t mut dyn FnMut(Item<'_>),
+    /// The card that was read last, and its file.
+    card: Card,
+    card_path: PathBuf,
+    /// Continuations may go on with that card: it was not given yet.
+    is_open: bool,
+    take: &'t mut dyn FnMut(Item<'_>) -> Taken,
 }
 
-impl Reading<'_> {
-    fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Result<(), Diagnostic> {
+impl<'t> Reading<'t> {
+    fn new(in_bulk: bool, take: &'t mut dyn FnMut(Item<'_>) -> Taken) -> Self {
+        let (files, card, card_path) = (Vec::new(), Card::default(), PathBuf::new());
+        Self { files, in_bulk, ended: false, card, card_path, is_open: false, take }
+    }
+
+    fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
         if depth > DEEPEST || self.files.len() >= MOST_FILES {
             let message =
                 format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
@@ -163,22 +264,32 @@ impl Reading<'_> {
                 .with_help("a file includes itself: take the INCLUDE out"));
         }
         self.files.push(path.to_path_buf());
-        let mut lines = file.bytes().split(|&b| b == b'\n').enumerate().map(|(k, line)| (k + 1, line));
-        while let Some((number, line)) = lines.next() {
+        let mut lines = Lines::of(file.bytes(), 0);
+        while let Some((number, range)) = lines.next() {
             if self.ended {
                 return Ok(());
             }
             let at = Place { path, line: number };
+            let line = &file.bytes()[range.clone()];
             let bare = line.trim_ascii();
             if bare.is_empty() || bare.starts_with(b"$") {
                 continue;
             }
-            if is_include(bare) {
+            if self.in_bulk
+                && let Some(matrices) = MatrixLines::at(file, range.start, number - 1)
+            {
+                self.flush()?;
+                (lines.at, lines.number) = matrices.end();
+                (self.take)(Item::Matrices(&matrices))?;
+                if matrices.are_cut_off() {
+                    return Err(cut_off(path, lines.number));
+                }
+            } else if is_include(bare) {
                 let mut name = String::from_utf8_lossy(&bare[7..]).trim().to_owned();
                 // A name between quotes may go on in the next lines.
                 while unclosed(&name) {
                     let Some((_, more)) = lines.next() else { break };
-                    name += String::from_utf8_lossy(more).trim();
+                    name += String::from_utf8_lossy(&file.bytes()[more]).trim();
                 }
                 self.include(&name, &at, depth)?;
             } else {
@@ -199,25 +310,23 @@ impl Reading<'_> {
             let message = format!("{} is included: {}", path.display(), diagnostic.message());
             Diagnostic::new(diagnostic.code(), message).in_file(at.path).at_line(at.line)
         })?;
-        self.flush();
+        self.flush()?;
         self.file(&path, &file, depth + 1)
     }
 
-    fn line(&mut self, line: &[u8], at: &Place<'_>) -> Result<(), Diagnostic> {
-        let end = line.iter().position(|&b| b == b'$').unwrap_or(line.len());
-        let line = line[..end].trim_ascii_end();
+    fn line(&mut self, line: &[u8], at: &Place<'_>) -> Taken {
+        let line = without_comment(line);
         if line.is_empty() {
             return Ok(());
         }
-        let upper: Vec<u8> = line.iter().take(40).map(u8::to_ascii_uppercase).collect();
-        if is_begin(&upper) {
-            self.flush();
+        if is_begin(line) {
+            self.flush()?;
             self.in_bulk = true;
-            (self.take)(Item::Begin(at));
+            return (self.take)(Item::Begin(at));
         } else if !self.in_bulk {
-            (self.take)(Item::Control(&String::from_utf8_lossy(line)));
-        } else if upper.starts_with(b"ENDDATA") {
-            self.flush();
+            return (self.take)(Item::Control(&String::from_utf8_lossy(line)));
+        } else if line.get(..7).is_some_and(|begin| begin.eq_ignore_ascii_case(b"ENDDATA")) {
+            self.flush()?;
             self.ended = true;
         } else {
             return self.bulk_line(line, at);
@@ -225,14 +334,9 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn bulk_line(&mut self, line: &[u8], at: &Place<'_>) -> Result<(), Diagnostic> {
-        let is_free = line.contains(&b',');
-        let line = if is_free { Cow::Borrowed(line) } else { without_tabs(line) };
-        let head = match is_free {
-            true => line.split(|&b| b == b',').next().unwrap_or_default(),
-            false => &line[..line.len().min(8)],
-        };
-        let head = head.trim_ascii();
+    fn bulk_line(&mut self, line: &[u8], at: &Place<'_>) -> Taken {
+        let line = Line::of(line);
+        let head = line.head();
         let (is_large, goes_on) = match head.first() {
             None => (false, true),
             Some(b'+') => (false, true),
@@ -241,52 +345,88 @@ impl Reading<'_> {
         };
         if goes_on {
             let refused = |what: &str| {
-                let message = format!("`{}` continues {what}", excerpt(&line));
+                let message = format!("`{}` continues {what}", excerpt(&line.text));
                 Diagnostic::new(Code::DeckSyntax, message).in_file(at.path).at_line(at.line)
             };
-            let Some((card, _)) = &self.open else { return Err(refused("no card")) };
-            let name = bare(head);
+            if !self.is_open {
+                return Err(refused("no card"));
+            }
+            let (name, card) = (bare(head), &self.card);
             if !name.is_empty() && !card.continuation.is_empty() && name != card.continuation {
                 let help = "write the lines of a card one after the other";
                 return Err(refused(&format!("another card than the {} above it", card.name)).with_help(help));
             }
         } else {
-            self.flush();
+            self.flush()?;
             let name = String::from_utf8_lossy(head).trim_end_matches('*').trim().to_uppercase();
-            let mut card = Card::default();
-            card.begin(name);
-            self.open = Some((card, at.path.to_path_buf()));
+            self.card.begin(name);
+            if self.card_path != at.path {
+                self.card_path = at.path.to_path_buf();
+            }
+            self.is_open = true;
         }
-        let (card, _) = self.open.as_mut().expect("a card is open");
+        let card = &mut self.card;
         card.lines.push((card.ends.len(), at.line));
         let fields = if is_large { 4 } else { 8 };
-        match is_free {
-            true => free_fields(card, &line, fields).map_err(|d| d.in_file(at.path).at_line(at.line)),
+        match line.is_free {
+            true => free_fields(card, &line.text, fields).map_err(|d| d.in_file(at.path).at_line(at.line)),
             false => {
-                fixed_fields(card, &line, fields);
+                fixed_fields(card, &line.text, fields);
                 Ok(())
             }
         }
     }
 
     /// Gives the card that has been read.
-    fn flush(&mut self) {
-        if let Some((card, path)) = self.open.take() {
-            (self.take)(Item::Card(&card, &path));
+    fn flush(&mut self) -> Taken {
+        if !std::mem::take(&mut self.is_open) {
+            return Ok(());
         }
+        (self.take)(Item::Card(&self.card, &self.card_path))
     }
 
     /// FB301 where the last card is of a matrix and has no line end: digits may be missing.
-    fn refuse_cut_off(&mut self, path: &Path, bytes: &[u8]) -> Result<(), Diagnostic> {
-        match &self.open {
-            Some((card, own)) if card.name == "DMIG" && own == path && !bytes.ends_with(b"\n") => {
-                let message = "the matrix ends in a line without a line end: the file may be cut off";
-                let line = bytes.iter().filter(|&&b| b == b'\n').count() + 1;
-                let diagnostic = Diagnostic::new(Code::MatrixSyntax, message).in_file(path).at_line(line);
-                Err(diagnostic.with_help("write the file again; if it is whole, end the last line"))
-            }
-            _ => Ok(()),
+    fn refuse_cut_off(&mut self, path: &Path, bytes: &[u8]) -> Taken {
+        let is_matrix = self.is_open && self.card.name == "DMIG" && self.card_path == path;
+        if is_matrix && !bytes.ends_with(b"\n") {
+            return Err(cut_off(path, bytes.iter().filter(|&&b| b == b'\n').count() + 1));
         }
+        Ok(())
+    }
+}
+
+fn cut_off(path: &Path, line: usize) -> Diagnostic {
+    let message = "the matrix ends in a line without a line end: the file may be cut off";
+    let diagnostic = Diagnostic::new(Code::MatrixSyntax, message).in_file(path).at_line(line);
+    diagnostic.with_help("write the file again; if it is whole, end the last line")
+}
+
+/// A line up to its comment.
+fn without_comment(line: &[u8]) -> &[u8] {
+    line[..memchr::memchr(b'$', line).unwrap_or(line.len())].trim_ascii_end()
+}
+
+/// A line of a card, without its comment.
+struct Line<'a> {
+    /// Fields lie between commas.
+    is_free: bool,
+    /// Without tabs where fields lie between columns.
+    text: Cow<'a, [u8]>,
+}
+
+impl<'a> Line<'a> {
+    fn of(line: &'a [u8]) -> Self {
+        let is_free = memchr::memchr(b',', line).is_some();
+        Self { is_free, text: if is_free { Cow::Borrowed(line) } else { without_tabs(line) } }
+    }
+
+    /// What stands before the fields: the name of the card, or a continuation.
+    fn head(&self) -> &[u8] {
+        let head = match self.is_free {
+            true => self.text.split(|&b| b == b',').next().unwrap_or_default(),
+            false => &self.text[..self.text.len().min(8)],
+        };
+        head.trim_ascii()
     }
 }
 
@@ -309,7 +449,7 @@ fn unclosed(name: &str) -> bool {
 
 /// Tabs go on to the next column that is a multiple of eight.
 fn without_tabs(line: &[u8]) -> Cow<'_, [u8]> {
-    if !line.contains(&b'\t') {
+    if memchr::memchr(b'\t', line).is_none() {
         return Cow::Borrowed(line);
     }
     let mut wide = Vec::new();
@@ -328,7 +468,7 @@ fn fixed_fields(card: &mut Card, line: &[u8], fields: usize) {
     for k in 0..fields {
         card.push(part(8 + k * width, 8 + (k + 1) * width));
     }
-    card.continuation = bare(part(72, 80).trim_ascii()).to_vec();
+    card.continue_as(part(72, 80));
 }
 
 fn free_fields(card: &mut Card, line: &[u8], fields: usize) -> Result<(), Diagnostic> {
@@ -336,7 +476,7 @@ fn free_fields(card: &mut Card, line: &[u8], fields: usize) -> Result<(), Diagno
     for _ in 0..fields {
         card.push(given.next().unwrap_or_default());
     }
-    card.continuation = bare(given.next().unwrap_or_default().trim_ascii()).to_vec();
+    card.continue_as(given.next().unwrap_or_default());
     if given.any(|field| !field.trim_ascii().is_empty()) {
         let message = format!("the line has more than {fields} fields");
         return Err(Diagnostic::new(Code::DeckSyntax, message).with_help("begin a continuation line"));

@@ -66,6 +66,15 @@ impl InputFile {
         fingerprint.hex()
     }
 
+    /// [`Self::release`] of what lies before the byte `at`, block by block; `given` is how far it was done.
+    pub(super) fn release_up_to(&self, at: usize, given: &mut usize) {
+        const BLOCK: usize = 8 << 20;
+        if at - *given >= BLOCK {
+            self.release(*given..at);
+            *given = at;
+        }
+    }
+
     /// Says that `range` of the bytes has been used: it need not stay in memory. It can still be read.
     pub(super) fn release(&self, range: Range<usize>) {
         // SAFETY: pages of a file mapped for reading hold nothing but the file; dropped ones are read again

@@ -47,7 +47,7 @@ impl Compressed<'_> {
         }
         match undeclared_triangle(check.sides, |_| self.both_triangles.to_owned()) {
             Some(triangle) => Err(triangle),
-            None => assemble_columns(columns, path),
+            None => assemble_columns(columns, 17, path),
         }
     }
 

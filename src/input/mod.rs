@@ -33,6 +33,7 @@ mod petsc;
 mod read_model;
 mod reader;
 mod readers;
+mod recent;
 mod recipes;
 mod region;
 mod scipy_npz;

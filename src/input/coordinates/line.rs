@@ -166,20 +166,34 @@ fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Bad> {
 /// A number in the dialects of Fortran too: `1.0D+05`, `1.0Q5`, and `1.0-105` as three-digit exponents come
 /// out.
 pub(in crate::input) fn real(field: &[u8]) -> Option<f64> {
-    if let Ok(value) = fast_float2::parse(field) {
+    // Nothing but the digits of the exponent stands behind its letter.
+    let letter = field.iter().rposition(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-'));
+    let letter = letter.filter(|&at| matches!(field[at], b'd' | b'D' | b'q' | b'Q'));
+    if letter.is_none()
+        && let Ok(value) = fast_float2::parse(field)
+    {
         return Some(value);
     }
-    let mut text = field.to_vec();
-    if let Some(letter) = text.iter_mut().find(|b| matches!(b, b'd' | b'D' | b'q' | b'Q')) {
-        *letter = b'e';
-    } else {
-        let sign = (1..text.len()).find(|&k| matches!(text[k], b'+' | b'-'))?;
-        if !matches!(text[sign - 1], b'0'..=b'9' | b'.') {
-            return None;
+    let (mut short, mut long) = ([0; 64], Vec::new());
+    let text = match short.get_mut(..=field.len()) {
+        Some(text) => text,
+        None => {
+            long.resize(field.len() + 1, 0);
+            &mut long[..]
         }
-        text.insert(sign, b'e');
+    };
+    text[..field.len()].copy_from_slice(field);
+    if let Some(letter) = letter {
+        text[letter] = b'e';
+        return fast_float2::parse(&text[..field.len()]).ok();
     }
-    fast_float2::parse(&text).ok()
+    let sign = (1..field.len()).find(|&k| matches!(field[k], b'+' | b'-'))?;
+    if !matches!(field[sign - 1], b'0'..=b'9' | b'.') {
+        return None;
+    }
+    text.copy_within(sign..field.len(), sign + 1);
+    text[sign] = b'e';
+    fast_float2::parse(&text[..]).ok()
 }
 
 #[cfg(test)]

@@ -46,7 +46,7 @@ pub(super) fn read(group: &Group, name: &str, file: &InputFile) -> Found<RawMatr
         _ => Storage::Full,
     };
     let assembled = match (parsed.entries, storage) {
-        (Entries::Columns(columns), Storage::Full) => assemble_columns(columns, file.path()),
+        (Entries::Columns(columns), Storage::Full) => assemble_columns(columns, 17, file.path()),
         (Entries::Columns(columns), Storage::Triangle) => {
             assemble(parsed.n, columns.into_entries(), storage, 17, file.path())
         }

@@ -8,6 +8,7 @@ use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::{excerpt, line_aligned, real};
 use crate::input::digits::written_digits;
+use crate::input::recent::Recent;
 use crate::input::table::integer;
 use crate::model::{DofLabel, RawMatrix};
 use rayon::prelude::*;
@@ -120,7 +121,10 @@ impl Piece {
             match labelled_line(line) {
                 Some((row, col, value, digits)) => {
                     piece.written = piece.written.max(digits);
-                    let [row, col] = [row, col].map(|label| recent.place(label, &mut piece.labels));
+                    let mut place = |label: DofLabel| {
+                        recent.place(label, (label.node, label.direction), &mut piece.labels)
+                    };
+                    let (row, col) = (place(row), place(col));
                     piece.entries.push(Entry { row, col, value });
                 }
                 None if piece.bad.len() < SHOWN => piece.bad.push((piece.lines, excerpt(line))),
@@ -138,33 +142,6 @@ impl Piece {
             (entry.row, entry.col) = (place[entry.row as usize], place[entry.col as usize]);
         }
         self.entries
-    }
-}
-
-/// Where labels that came lately stand. A label that was pushed out stands in the list once more.
-struct Recent {
-    slots: Vec<Option<(DofLabel, u32)>>,
-}
-
-impl Recent {
-    const BITS: u32 = 12;
-
-    fn new() -> Self {
-        Self { slots: vec![None; 1 << Self::BITS] }
-    }
-
-    fn place(&mut self, label: DofLabel, labels: &mut Vec<DofLabel>) -> u32 {
-        let key = (label.node as u64).wrapping_mul(8).wrapping_add(u64::from(label.direction));
-        let slot = &mut self.slots[(key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS)) as usize];
-        match *slot {
-            Some((known, at)) if known == label => at,
-            _ => {
-                let at = labels.len() as u32;
-                labels.push(label);
-                *slot = Some((label, at));
-                at
-            }
-        }
     }
 }
 

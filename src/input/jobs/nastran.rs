@@ -45,13 +45,14 @@ impl JobReader for Nastran {
     }
 
     fn read(&self, path: &Path) -> Found<JobModel> {
-        let bulk = Bulk::read(path)?;
+        let mut bulk = Bulk::read(path)?;
         if bulk.grids.is_empty() {
             let diagnostic = Diagnostic::new(Code::DeckSyntax, "the deck has no GRID").in_file(path);
             return Err(vec![diagnostic.with_help("give the deck, or the punch file that has the grids")]);
         }
         let (nodes, axes) = places(&bulk)?;
-        let matrices = Matrices::of(&bulk, path, &axes)?;
+        let dmigs = std::mem::take(&mut bulk.dmigs);
+        let matrices = Matrices::of(&bulk, dmigs, path, &axes)?;
         let mut diagnostics = told(&bulk, path);
         let matrices = matrices.turned(&axes)?.without_empty_rows(&mut diagnostics);
         matrices.refuse_modal(&bulk)?;
@@ -146,12 +147,12 @@ struct Matrices {
 
 impl Matrices {
     /// The matrices of the deck, else those of the files beside it: either of punch files or of OUTPUT4.
-    fn of(bulk: &Bulk, path: &Path, axes: &HashMap<i64, Axes>) -> Found<Self> {
-        let names = bulk.dmigs.names();
+    fn of(bulk: &Bulk, dmigs: Dmigs, path: &Path, axes: &HashMap<i64, Axes>) -> Found<Self> {
+        let names = dmigs.names();
         // Beside elements they are a part of the model that its own matrices contain.
         if !names.is_empty() && !bulk.has_elements {
             let pair = pair(&names).map_err(|pairs| no_pair(&names, &pairs, path))?;
-            return Self::of_dmigs(&bulk.dmigs, pair, Vec::new(), axes);
+            return Self::of_dmigs(dmigs, pair, Vec::new(), axes);
         }
         // A file of the name of the deck, else those whose names go on.
         let with = |extension: &str| {
@@ -170,7 +171,7 @@ impl Matrices {
         let punched = Dmigs::of(&punches)?;
         let outputs = Outputs::of(outputs)?;
         match (pair(&punched.names()), pair(&outputs.names)) {
-            (Ok(pair), Err(_)) => Self::of_dmigs(&punched, pair, punches, axes),
+            (Ok(pair), Err(_)) => Self::of_dmigs(punched, pair, punches, axes),
             (Err(_), Ok(pair)) => outputs.matrices(bulk, pair),
             (punch_pair, output_pair) => {
                 let names = [punched.names(), outputs.names].concat();
@@ -185,7 +186,7 @@ impl Matrices {
     }
 
     fn of_dmigs(
-        dmigs: &Dmigs,
+        mut dmigs: Dmigs,
         (k, m): (usize, usize),
         files: Vec<PathBuf>,
         axes: &HashMap<i64, Axes>,
@@ -198,7 +199,7 @@ impl Matrices {
             points.extend((first..first + 3).map(|component| (id, component)));
         }
         let points: Vec<Point> = points.into_iter().collect();
-        let matrix = |at| dmigs.matrix(at, &points).map_err(|diagnostic| vec![diagnostic]);
+        let mut matrix = |at| dmigs.take_matrix(at, &points).map_err(|diagnostic| vec![diagnostic]);
         let (stiffness, mass) = both(matrix(k), matrix(m))?;
         let labels = points.into_iter().map(rows::label).collect();
         Ok(Self { stiffness, mass, labels, files })
@@ -311,7 +312,7 @@ fn principal(raw: RawMatrix, kept: &[usize]) -> RawMatrix {
 
 /// The OUTPUT4 files beside a deck.
 struct Outputs {
-    files: Vec<InputFile>,
+    files: Vec<(InputFile, output4::Contents)>,
     names: Vec<String>,
     /// File of each name, and which of its matrices it is.
     places: Vec<(usize, usize)>,
@@ -322,10 +323,12 @@ impl Outputs {
         let mut all = Self { files: Vec::new(), names: Vec::new(), places: Vec::new() };
         for path in paths {
             let file = InputFile::open(&path).map_err(|diagnostic| vec![diagnostic])?;
-            let names = output4::names(&file).map_err(|diagnostic| vec![diagnostic.in_file(&path)])?;
+            let found = output4::Contents::of(&file);
+            let contents = found.map_err(|diagnostic| vec![diagnostic.in_file(&path)])?;
+            let names = contents.names();
             all.places.extend((0..names.len()).map(|at| (all.files.len(), at)));
             all.names.extend(names);
-            all.files.push(file);
+            all.files.push((file, contents));
         }
         Ok(all)
     }
@@ -333,8 +336,8 @@ impl Outputs {
     fn matrices(&self, bulk: &Bulk, (k, m): (usize, usize)) -> Found<Matrices> {
         let matrix = |name: usize| {
             let (file, at) = self.places[name];
-            let file = &self.files[file];
-            output4::matrix(file, at).map_err(|diagnostic| vec![diagnostic.in_file(file.path())])
+            let (file, contents) = &self.files[file];
+            contents.matrix(file, at).map_err(|diagnostic| vec![diagnostic.in_file(file.path())])
         };
         let (stiffness, mass) = both(matrix(k), matrix(m))?;
         let [rows, others] = [&stiffness, &mass].map(|own| own.matrix.n_cols());

@@ -1,8 +1,9 @@
 //! Binary files: records of Fortran, each between two lengths, in either order of bytes and with words of
 //! four or eight bytes.
 
-use super::layout::{Column, Columns, Header, SINGLE_DIGITS, cut_off};
+use super::layout::{Column, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::input::bytes::InputFile;
 
 /// How the numbers of a file are stored.
 #[derive(Debug, Clone, Copy)]
@@ -31,34 +32,56 @@ impl Binary {
         ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(own)
     }
 
-    /// Goes through the matrices; the columns of the one that `take` gives a place for.
-    pub(super) fn walk(
-        self,
-        bytes: &[u8],
-        take: &mut dyn FnMut(&Header) -> Option<Columns>,
-    ) -> Result<Option<Columns>, Diagnostic> {
-        let (mut at, mut wanted) = (0, None);
+    /// Where the columns of the matrices stand. Pages of the file are given back once they were gone through.
+    ///
+    /// # Errors
+    /// FB301, FB303, FB304 for records that are none of a matrix.
+    pub(super) fn contents(self, file: &InputFile) -> Result<Vec<Stored>, Diagnostic> {
+        let bytes = file.bytes();
+        let (mut at, mut given, mut all) = (0, 0, Vec::new());
         while at < bytes.len() {
             let (record, next) = self.record(bytes, at).ok_or_else(|| cut_off("a header"))?;
             let [columns, rows, form, kind] = [0, 1, 2, 3].map(|k| self.integer(record, k).unwrap_or(0));
             let name = record.get(4 * self.word..).unwrap_or_default();
-            let header = Header::new(columns, rows, form, kind, name)?;
-            let mut place = take(&header);
+            let mut stored = Stored::new(Header::new(columns, rows, form, kind, name)?);
+            let size = self.size(&stored.header);
             at = next;
             loop {
+                let header = &stored.header;
                 let (record, next) = self.record(bytes, at).ok_or_else(|| cut_off(&header.name))?;
+                let column = self.integer(record, 0).ok_or_else(|| misread(header))?;
+                let column = header.column(column)?;
+                let bytes = at..next;
                 at = next;
-                let column = self.integer(record, 0).ok_or_else(|| misread(&header))?;
-                let Column::Number(column) = header.column(column)? else { break };
-                if let Some(columns) = &mut place {
-                    self.column(record, &header, column, columns)?;
-                }
+                let Column::Number(column) = column else { break };
+                stored.add(column, record.len() / size, bytes, 0);
+                file.release_up_to(at, &mut given);
             }
-            if place.is_some() {
-                wanted = place;
-            }
+            all.push(stored);
         }
-        Ok(wanted)
+        Ok(all)
+    }
+
+    /// The entries of some columns.
+    ///
+    /// # Errors
+    /// FB301, FB303, FB306.
+    pub(super) fn columns(self, bytes: &[u8], header: &Header) -> Result<Columns, Diagnostic> {
+        let mut columns = Columns::with_room(bytes.len() / self.size(header));
+        columns.written = if self.size(header) == 4 { SINGLE_DIGITS } else { 17 };
+        let mut at = 0;
+        while let Some((record, next)) = self.record(bytes, at) {
+            at = next;
+            let column = self.integer(record, 0).ok_or_else(|| misread(header))?;
+            let Column::Number(column) = header.column(column)? else { break };
+            self.column(record, header, column, &mut columns)?;
+        }
+        Ok(columns)
+    }
+
+    /// Bytes of a value. Words of eight bytes hold any number.
+    fn size(self, header: &Header) -> usize {
+        if header.is_single() { self.word } else { 8 }
     }
 
     /// The values of one column.
@@ -107,17 +130,19 @@ impl Binary {
         column: u32,
         columns: &mut Columns,
     ) -> Result<(), Diagnostic> {
-        // Words of eight bytes hold any number.
-        let size = if header.is_single() { self.word } else { 8 };
+        let size = self.size(header);
         if !data.len().is_multiple_of(size) {
             return Err(misread(header));
         }
         let first = header.first_row(start, data.len() / size)?;
-        for (k, bytes) in data.chunks_exact(size).enumerate() {
-            columns.push(first + k as u32, column, self.real(bytes))?;
+        let (eight, _) = data.as_chunks::<8>();
+        let (four, _) = data.as_chunks::<4>();
+        match (size, self.is_big_endian) {
+            (8, false) => columns.extend(first, column, eight.iter().map(|b| f64::from_le_bytes(*b))),
+            (8, true) => columns.extend(first, column, eight.iter().map(|b| f64::from_be_bytes(*b))),
+            (_, false) => columns.extend(first, column, four.iter().map(|b| f32::from_le_bytes(*b).into())),
+            (_, true) => columns.extend(first, column, four.iter().map(|b| f32::from_be_bytes(*b).into())),
         }
-        columns.written = if size == 4 { SINGLE_DIGITS } else { 17 };
-        Ok(())
     }
 
     /// The record at a byte of the file, and where the next begins.
@@ -150,21 +175,6 @@ impl Binary {
                 i64::from(if big { i32::from_be_bytes(four) } else { i32::from_le_bytes(four) })
             }
         })
-    }
-
-    fn real(self, bytes: &[u8]) -> f64 {
-        let big = self.is_big_endian;
-        match (<[u8; 8]>::try_from(bytes), <[u8; 4]>::try_from(bytes)) {
-            (Ok(eight), _) => {
-                if big {
-                    f64::from_be_bytes(eight)
-                } else {
-                    f64::from_le_bytes(eight)
-                }
-            }
-            (_, Ok(four)) => f64::from(if big { f32::from_be_bytes(four) } else { f32::from_le_bytes(four) }),
-            _ => f64::NAN,
-        }
     }
 }
 

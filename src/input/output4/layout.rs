@@ -1,7 +1,11 @@
 //! What text and binary files have in common: headers, strings of values, and where they go.
 
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::assemble::{Entry, Sides, push};
+use crate::base::memory::or_go_without;
+use crate::input::assemble::{ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, push};
+use crate::model::RawMatrix;
+use std::ops::Range;
+use std::path::Path;
 
 /// Digits of single precision.
 pub(super) const SINGLE_DIGITS: u8 = 7;
@@ -96,35 +100,144 @@ pub(super) enum Column {
     End,
 }
 
-/// The entries of a matrix.
+/// Where the columns of a matrix stand in its file. It is found from the lengths that the file states, before
+/// any value is read.
+pub(super) struct Stored {
+    pub header: Header,
+    /// Some whole columns each, in file order.
+    pub stretches: Vec<Stretch>,
+    /// At least as many values as the columns hold.
+    pub values: usize,
+    /// Whether every column has a higher number than the one before it.
+    pub ascending: bool,
+    last: Option<u32>,
+}
+
+/// Some columns of a matrix: their bytes in the file, and the number of lines above them in a text file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Stretch {
+    pub bytes: Range<usize>,
+    pub line: usize,
+}
+
+impl Stored {
+    /// Bytes of columns that one thread reads before it takes others.
+    const STRETCH: usize = 1 << 20;
+
+    pub(super) fn new(header: Header) -> Self {
+        Self { header, stretches: Vec::new(), values: 0, ascending: true, last: None }
+    }
+
+    /// Adds a column of at most so many values that stands at these bytes, below so many lines.
+    pub(super) fn add(&mut self, column: u32, values: usize, bytes: Range<usize>, line: usize) {
+        self.ascending &= self.last.is_none_or(|last| last < column);
+        self.last = Some(column);
+        self.values += values;
+        match self.stretches.last_mut() {
+            Some(stretch) if stretch.bytes.len() < Self::STRETCH => stretch.bytes.end = bytes.end,
+            _ => self.stretches.push(Stretch { bytes, line }),
+        }
+    }
+}
+
+/// The entries of some columns, in file order, without zeros.
+#[derive(Default)]
 pub(super) struct Columns {
-    pub pieces: Vec<Vec<Entry>>,
-    pub count: u64,
-    pub sides: Sides,
+    /// Each column and how many of the entries it has.
+    lengths: Vec<(u32, usize)>,
+    rows: Vec<u32>,
+    values: Vec<f64>,
+    sides: Sides,
     /// Digits as written.
     pub written: u8,
 }
 
 impl Columns {
-    pub(super) fn new(header: &Header) -> Self {
-        let written = if header.is_single() { SINGLE_DIGITS } else { 0 };
-        Self { pieces: Vec::new(), count: 0, sides: Sides::default(), written }
+    /// Room for so many entries, as far as there is memory for it.
+    pub(super) fn with_room(entries: usize) -> Self {
+        let mut own = Self::default();
+        or_go_without(|| {
+            if own.rows.try_reserve_exact(entries).is_ok() {
+                let _ = own.values.try_reserve_exact(entries);
+            }
+        });
+        own
     }
 
     /// # Errors
     /// FB306.
     pub(super) fn push(&mut self, row: u32, col: u32, value: f64) -> Result<(), Diagnostic> {
-        if !value.is_finite() {
-            let message = format!("entry ({}, {}) is {value}", row + 1, col + 1);
-            return Err(Diagnostic::new(Code::MatrixNotFinite, message));
+        self.extend(row, col, std::iter::once(value))
+    }
+
+    /// Adds values that stand below one another in a column, from a row on.
+    ///
+    /// # Errors
+    /// FB306.
+    pub(super) fn extend(
+        &mut self,
+        first: u32,
+        col: u32,
+        values: impl Iterator<Item = f64>,
+    ) -> Result<(), Diagnostic> {
+        if self.lengths.last().is_none_or(|(last, _)| *last != col) {
+            self.lengths.push((col, 0));
         }
-        if value != 0.0 {
-            self.count += 1;
-            self.sides.lower |= row > col;
-            self.sides.upper |= row < col;
-            push(&mut self.pieces, Entry { row, col, value });
+        let before = self.rows.len();
+        // In this order the rows do not go beyond the last one.
+        for (value, row) in values.zip(first..) {
+            if !value.is_finite() {
+                let message = format!("entry ({}, {}) is {value}", row + 1, col + 1);
+                return Err(Diagnostic::new(Code::MatrixNotFinite, message));
+            }
+            if value != 0.0 {
+                self.rows.push(row);
+                self.values.push(value);
+            }
+        }
+        let added = &self.rows[before..];
+        // Rows ascend from the first to the last.
+        self.sides.lower |= added.last().is_some_and(|row| *row > col);
+        self.sides.upper |= added.first().is_some_and(|row| *row < col);
+        if let Some((_, length)) = self.lengths.last_mut() {
+            *length += added.len();
         }
         Ok(())
+    }
+
+    /// Adds the columns that follow in the file.
+    pub(super) fn append(&mut self, next: &Self) {
+        self.lengths.extend_from_slice(&next.lengths);
+        self.rows.extend_from_slice(&next.rows);
+        self.values.extend_from_slice(&next.values);
+        self.sides.lower |= next.sides.lower;
+        self.sides.upper |= next.sides.upper;
+        self.written = self.written.max(next.written);
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values.len()
+    }
+
+    pub(super) fn sides(&self) -> Sides {
+        self.sides
+    }
+
+    /// The matrix of `n` rows and columns.
+    ///
+    /// # Errors
+    /// FB306, FB312.
+    pub(super) fn into_matrix(self, n: usize, ascending: bool, path: &Path) -> Result<RawMatrix, Diagnostic> {
+        if ascending {
+            let columns = ColumnEntries::new(n, &self.lengths, self.rows, self.values);
+            return assemble_columns(columns, self.written, path);
+        }
+        let mut pieces = Vec::new();
+        let columns = self.lengths.iter().flat_map(|&(col, length)| std::iter::repeat_n(col, length));
+        for ((col, row), value) in columns.zip(self.rows).zip(self.values) {
+            push(&mut pieces, Entry { row, col, value });
+        }
+        assemble(n, pieces, Storage::Full, self.written, path)
     }
 }
 

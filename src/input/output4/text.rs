@@ -1,9 +1,10 @@
 //! Text files: a header with the format of the numbers, a line for each column or string, and the numbers,
 //! side by side without blanks.
 
-use super::layout::{Column, Columns, Header, cut_off};
+use super::layout::{Column, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::whole;
+use crate::input::bytes::InputFile;
 use crate::input::coordinates::{excerpt, real};
 use crate::input::digits::written_digits;
 
@@ -15,7 +16,7 @@ pub(super) fn begins(head: &[u8]) -> bool {
 
 /// Numbers in a line, and columns that each takes.
 #[derive(Debug, Clone, Copy)]
-struct Format {
+pub(super) struct Format {
     per_line: usize,
     width: usize,
 }
@@ -66,80 +67,101 @@ fn format(text: &[u8]) -> Option<Format> {
     ((1..=100).contains(&format.per_line) && (8..=100).contains(&format.width)).then_some(format)
 }
 
+/// Where the columns of the matrices stand, and how their numbers are written. Pages of the file are given back
+/// once they were gone through.
+///
+/// # Errors
+/// FB301, FB303, FB304 for lines that are none of a matrix.
+pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagnostic> {
+    let mut text = Text { rest: file.bytes(), line: 0 };
+    let (mut all, mut given) = (Vec::new(), 0);
+    while let Some(line) = text.next_line() {
+        if line.is_empty() {
+            continue;
+        }
+        let heading = Heading::of(line).ok_or_else(|| text.expected("the header of a matrix", line))?;
+        let [columns, rows, form, kind] = heading.numbers;
+        let header =
+            Header::new(columns, rows, form, kind, heading.name).map_err(|d| d.at_line(text.line))?;
+        let mut stored = Stored::new(header);
+        loop {
+            let (start, above) = (file.bytes().len() - text.rest.len(), text.line);
+            let (column, values) = match text.column(&stored.header, heading.format, None)? {
+                Some(found) => found,
+                None => break,
+            };
+            let end = file.bytes().len() - text.rest.len();
+            stored.add(column, values, start..end, above);
+            file.release_up_to(end, &mut given);
+        }
+        all.push((stored, heading.format));
+    }
+    Ok(all)
+}
+
+/// The entries of some columns of a matrix, which stand below so many lines.
+///
+/// # Errors
+/// FB301, FB303, FB306.
+pub(super) fn columns(
+    bytes: &[u8],
+    line: usize,
+    header: &Header,
+    format: Format,
+) -> Result<Columns, Diagnostic> {
+    let mut text = Text { rest: bytes, line };
+    let mut columns = Columns::with_room(bytes.len() / format.width);
+    columns.written = if header.is_single() { SINGLE_DIGITS } else { 0 };
+    while !text.rest.is_empty() && text.column(header, format, Some(&mut columns))?.is_some() {}
+    Ok(columns)
+}
+
 /// A text file while it is read.
-pub(super) struct Text<'a> {
+struct Text<'a> {
     rest: &'a [u8],
     line: usize,
 }
 
 impl<'a> Text<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, line: 0 }
-    }
-
-    /// Goes through the matrices; the columns of the one that `take` gives a place for.
-    pub(super) fn walk(
-        mut self,
-        take: &mut dyn FnMut(&Header) -> Option<Columns>,
-    ) -> Result<Option<Columns>, Diagnostic> {
-        let mut wanted = None;
-        while let Some(line) = self.next_line() {
-            if line.is_empty() {
-                continue;
-            }
-            let heading = Heading::of(line).ok_or_else(|| self.expected("the header of a matrix", line))?;
-            let [columns, rows, form, kind] = heading.numbers;
-            let header =
-                Header::new(columns, rows, form, kind, heading.name).map_err(|d| d.at_line(self.line))?;
-            let mut place = take(&header);
-            self.columns(&header, heading.format, &mut place)?;
-            if place.is_some() {
-                wanted = place;
-            }
-        }
-        Ok(wanted)
-    }
-
-    /// All columns of a matrix, and what ends it.
-    fn columns(
+    /// The next column of a matrix: its number and how many values it has, which go to `place`. `None` for what
+    /// ends the matrix.
+    fn column(
         &mut self,
         header: &Header,
         format: Format,
-        place: &mut Option<Columns>,
-    ) -> Result<(), Diagnostic> {
-        loop {
-            let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;
-            let [column, start, words] =
-                integers(line).ok_or_else(|| self.expected("column, row and number of words", line))?;
-            let at = self.line;
-            match header.column(column).map_err(|d| d.at_line(at))? {
-                Column::End => {
-                    // The number that stands there has a format of its own.
-                    let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
-                    return match (0..lines).all(|_| self.next_line().is_some()) {
-                        true => Ok(()),
-                        false => Err(cut_off(&header.name)),
-                    };
-                }
-                Column::Number(column) if start != 0 => {
-                    self.string(header, (column, start, words), format, place)?
-                }
-                Column::Number(column) => self.strings(header, column, words, format, place)?,
+        place: Option<&mut Columns>,
+    ) -> Result<Option<(u32, usize)>, Diagnostic> {
+        let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;
+        let [column, start, words] =
+            integers(line).ok_or_else(|| self.expected("column, row and number of words", line))?;
+        let values = match header.column(column).map_err(|d| d.at_line(self.line))? {
+            Column::End => {
+                // The number that stands there has a format of its own.
+                let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
+                return match (0..lines).all(|_| self.next_line().is_some()) {
+                    true => Ok(None),
+                    false => Err(cut_off(&header.name)),
+                };
             }
-        }
+            Column::Number(column) if start != 0 => {
+                (column, self.string(header, (column, start, words), format, place)?)
+            }
+            Column::Number(column) => (column, self.strings(header, column, words, format, place)?),
+        };
+        Ok(Some(values))
     }
 
-    /// A column as strings of nonzeros.
+    /// A column as strings of nonzeros; how many values it has.
     fn strings(
         &mut self,
         header: &Header,
         column: u32,
         words: i64,
         format: Format,
-        place: &mut Option<Columns>,
-    ) -> Result<(), Diagnostic> {
+        mut place: Option<&mut Columns>,
+    ) -> Result<usize, Diagnostic> {
         let per_value = if header.is_single() { 1 } else { 2 };
-        let mut left = words;
+        let (mut left, mut values) = (words, 0);
         while left > 0 {
             let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;
             let (start, length, head) = if header.is_big {
@@ -154,69 +176,67 @@ impl<'a> Text<'a> {
             if length < per_value || length % per_value != 0 || length > left {
                 return Err(self.expected("a string of the column", line));
             }
-            self.string(header, (column, start, length / per_value), format, place)?;
+            let string = (column, start, length / per_value);
+            values += self.string(header, string, format, place.as_deref_mut())?;
             left -= length + head;
         }
-        Ok(())
+        Ok(values)
     }
 
-    /// Values below one another: column, first row, number of values.
+    /// Values below one another: column, first row, number of values. That number, as it is in the file.
     fn string(
         &mut self,
         header: &Header,
         (column, start, count): (u32, i64, i64),
         format: Format,
-        place: &mut Option<Columns>,
-    ) -> Result<(), Diagnostic> {
-        let line = self.line;
-        let (count, text) = self.numbers(header, count, format)?;
-        let Some(columns) = place else { return Ok(()) };
-        let first = header.first_row(start, count).map_err(|d| d.at_line(line))?;
-        let mut row = first;
-        for (k, line) in text.iter().enumerate() {
-            for field in line.chunks(format.width) {
-                let at = self.line + 1 + k - text.len();
-                let number = field.trim_ascii();
-                let value = real(number).filter(|_| field.len() == format.width).ok_or_else(|| {
-                    let message = format!(
-                        "expected a number of {} characters, found `{}`",
-                        format.width,
-                        excerpt(field)
-                    );
-                    Diagnostic::new(Code::MatrixSyntax, message).at_line(at).with_help("write the file again")
-                })?;
-                columns.written = columns.written.max(written_digits(number));
-                columns.push(row, column, value).map_err(|d| d.at_line(at))?;
-                row += 1;
-            }
-        }
-        Ok(())
-    }
-
-    /// The lines of some numbers, each with as many characters as its numbers take.
-    fn numbers(
-        &mut self,
-        header: &Header,
-        count: i64,
-        format: Format,
-    ) -> Result<(usize, Vec<&'a [u8]>), Diagnostic> {
+        mut place: Option<&mut Columns>,
+    ) -> Result<usize, Diagnostic> {
         let count = usize::try_from(count).ok().filter(|count| *count > 0);
         let count = count.ok_or_else(|| {
             Diagnostic::new(Code::MatrixSyntax, "a column has no values").at_line(self.line)
         })?;
-        let mut lines = Vec::new();
+        let mut row = match place {
+            Some(_) => header.first_row(start, count).map_err(|d| d.at_line(self.line))?,
+            None => 0,
+        };
         let mut left = count;
         while left > 0 {
             let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;
             let here = left.min(format.per_line);
-            let width = here * format.width;
-            if line.len() != width {
+            if line.len() != here * format.width {
                 return Err(self.expected(&format!("{here} numbers of {} characters", format.width), line));
             }
-            lines.push(line);
+            if let Some(columns) = place.as_deref_mut() {
+                for field in line.chunks_exact(format.width) {
+                    self.value(field, (row, column), columns)?;
+                    row += 1;
+                }
+            }
             left -= here;
         }
-        Ok((count, lines))
+        Ok(count)
+    }
+
+    /// Adds the number in a field of the line that was read last.
+    fn value(
+        &self,
+        field: &[u8],
+        (row, column): (u32, u32),
+        columns: &mut Columns,
+    ) -> Result<(), Diagnostic> {
+        /// Numbers whose digits as written are counted, of each of the [`Columns`].
+        const COUNTED: usize = 512;
+        let number = field.trim_ascii();
+        let value = real(number).ok_or_else(|| {
+            let message =
+                format!("expected a number of {} characters, found `{}`", field.len(), excerpt(field));
+            let diagnostic = Diagnostic::new(Code::MatrixSyntax, message).at_line(self.line);
+            diagnostic.with_help("write the file again")
+        })?;
+        if columns.count() < COUNTED {
+            columns.written = columns.written.max(written_digits(number));
+        }
+        columns.push(row, column, value).map_err(|d| d.at_line(self.line))
     }
 
     fn next_line(&mut self) -> Option<&'a [u8]> {
@@ -242,15 +262,20 @@ impl<'a> Text<'a> {
 
 /// Whole numbers that fill a line: between blanks, or in fields of 8 or 16 characters.
 fn integers<const N: usize>(line: &[u8]) -> Option<[i64; N]> {
-    let apart: Option<Vec<i64>> =
-        line.split(|b| *b == b' ').filter(|word| !word.is_empty()).map(whole).collect();
-    if let Some(Ok(numbers)) = apart.map(<[i64; N]>::try_from) {
-        return Some(numbers);
+    let apart = || exactly(line.split(|b| *b == b' ').filter(|word| !word.is_empty()));
+    let in_fields = |width: usize| {
+        exactly(line.chunks(width).map(<[u8]>::trim_ascii)).filter(|_| line.len() == N * width)
+    };
+    apart().or_else(|| in_fields(8)).or_else(|| in_fields(16))
+}
+
+/// So many whole numbers, if there are so many words and each is one.
+fn exactly<'a, const N: usize>(mut words: impl Iterator<Item = &'a [u8]>) -> Option<[i64; N]> {
+    let mut numbers = [0; N];
+    for number in &mut numbers {
+        *number = whole(words.next()?)?;
     }
-    [8, 16].into_iter().find_map(|width| {
-        let fields: Option<Vec<i64>> = line.chunks(width).map(|field| whole(field.trim_ascii())).collect();
-        <[i64; N]>::try_from(fields.filter(|_| line.len() == N * width)?).ok()
-    })
+    words.next().is_none().then_some(numbers)
 }
 
 #[cfg(test)]

@@ -70,7 +70,10 @@ impl Bulk {
     pub(super) fn read(path: &Path) -> Found<Self> {
         let mut bulk = Self::default();
         let files = read_deck(path, &mut |item| match item {
-            Item::Control(line) => bulk.sets.line(line),
+            Item::Control(line) => {
+                bulk.sets.line(line);
+                Ok(())
+            }
             Item::Begin(place) => {
                 if bulk.began > 0 && !bulk.grids.is_empty() {
                     let message = "the deck has several sections of bulk data (BEGIN SUPER)";
@@ -79,13 +82,16 @@ impl Bulk {
                     bulk.complain(diagnostic.in_file(place.path).at_line(place.line).with_help(help));
                 }
                 bulk.began += 1;
+                Ok(())
             }
             Item::Card(card, path) => {
                 if bulk.card_files.last().is_none_or(|last| last != path) {
                     bulk.card_files.push(path.to_path_buf());
                 }
                 bulk.card(card, path, bulk.card_files.len() - 1);
+                Ok(())
             }
+            Item::Matrices(lines) => bulk.dmigs.cards(lines),
         })
         .map_err(|diagnostic| vec![diagnostic])?;
         let mut bad = std::mem::take(&mut bulk.bad);
