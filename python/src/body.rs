@@ -361,6 +361,23 @@ impl Body {
         diagnostics(py, &said)
     }
 
+    /// Writes a picture of the body in the motion that a simulation of it gave: "vtk" for ParaView (a .pvd file
+    /// with a .vtu file for each instant beside it), "gltf" for viewers and pages (a .glb file). What the
+    /// picture leaves out is warned of; these warnings and notes are returned.
+    ///
+    /// Raises InputError for a format that shows no motion and for the motion of another body.
+    fn export_motion<'py>(
+        &self,
+        py: Python<'py>,
+        format: &str,
+        motion: &Motion,
+        path: PathBuf,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let said = brief(py, || self.inner.export_motion(format, motion.inner(), &path))?;
+        warn(py, &said)?;
+        diagnostics(py, &said)
+    }
+
     /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path
     /// of a scene file.
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {

@@ -141,6 +141,11 @@ impl Motion {
         Ok(Self { inner, kept: Kept::default() })
     }
 
+    /// The motion of the library.
+    pub fn inner(&self) -> &flexbody::Motion {
+        &self.inner
+    }
+
     /// An array with a row for each instant.
     fn rows<'py, R: AsRef<[f64]>>(
         &self,

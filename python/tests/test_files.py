@@ -74,6 +74,33 @@ def test_every_format_is_written(bracket_body: flexbody.Body, tmp_path: Path) ->
         shutil.rmtree(tmp_path / "other")
 
 
+@pytest.mark.filterwarnings("ignore::flexbody.FlexbodyWarning")
+def test_a_motion_is_drawn_as_the_command_draws_it(bracket_body: flexbody.Body, tmp_path: Path) -> None:
+    scene = tmp_path / "tumble.toml"
+    scene.write_text("[run]\nduration = 0.001\noutputs = 4\n[initial]\nangular_velocity = [28, 1500, 4]\n")
+    bracket_body.write(tmp_path / "body.flex.h5")
+    motion = bracket_body.simulate(scene)
+    motion.write(tmp_path / "motion.h5")
+    for format, name in (("vtk", "motion.pvd"), ("gltf", "motion.glb")):
+        own, others = tmp_path / format / "python", tmp_path / format / "command"
+        own.mkdir(parents=True)
+        others.mkdir(parents=True)
+        said = bracket_body.export_motion(format, motion, own / name)
+        assert "FB723" in [diagnostic.code for diagnostic in said]
+        words = ["export", tmp_path / "body.flex.h5", "--simulation", tmp_path / "motion.h5", "--to", format]
+        subprocess.run([sys.executable, "-m", "flexbody", *words, "--quiet", "-o", others / name], check=True)
+        written = {path.relative_to(own): digest(path) for path in own.rglob("*") if path.is_file()}
+        assert written == {path.relative_to(others): digest(path) for path in others.rglob("*") if path.is_file()}
+        assert len(written) == (6 if format == "vtk" else 1)
+    with pytest.raises(flexbody.InputError) as shows_no_motion:
+        bracket_body.export_motion("json", motion, tmp_path / "motion.json")
+    assert shows_no_motion.value.codes == ("FB801",)
+    other = flexbody.convert(MODELS / "cube_hex8" / "model.toml", modes=4)
+    with pytest.raises(flexbody.InputError) as of_another:
+        other.export_motion("gltf", motion, tmp_path / "other.glb")
+    assert of_another.value.codes == ("FB735",)
+
+
 def test_losses_are_warned_of(bracket_body: flexbody.Body, tmp_path: Path) -> None:
     with pytest.warns(flexbody.FlexbodyWarning) as caught:
         said = bracket_body.export("openradioss", tmp_path / "body.rad")
