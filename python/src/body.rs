@@ -361,9 +361,9 @@ impl Body {
         diagnostics(py, &said)
     }
 
-    /// Writes a picture of the body in the motion that a simulation of it gave: "vtk" for ParaView (a .pvd file
-    /// with a .vtu file for each instant beside it), "gltf" for viewers and pages (a .glb file). What the
-    /// picture leaves out is warned of; these warnings and notes are returned.
+    /// Writes a picture of the body in the motion that a simulation of it gave: "vtk" for ParaView (a .pvd
+    /// file with a .vtu file for each instant beside it), "gltf" for viewers and pages (a .glb file). What
+    /// the picture leaves out is warned of; these warnings and notes are returned.
     ///
     /// Raises InputError for a format that shows no motion and for the motion of another body.
     fn export_motion<'py>(

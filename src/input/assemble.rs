@@ -91,8 +91,8 @@ pub(super) fn assemble(
     finish(n, Counted::of(n, pieces, storage).added_up(), digits, path)
 }
 
-/// [`assemble`] where no entry may be given twice; `twice` tells the first that is, by row and then column. Of a
-/// triangle it is named by its place below the diagonal.
+/// [`assemble`] where no entry may be given twice; `twice` tells the first that is, by row and then column.
+/// Of a triangle it is named by its place below the diagonal.
 ///
 /// # Errors
 /// What `twice` tells; FB312 when nothing but zeros is left.

@@ -1,5 +1,6 @@
 //! gzip and Zstandard around a text file, recognised by their first bytes whatever the file is called.
 
+use super::bytes::InputFile;
 use super::zstd_frames::ZstdFrames;
 use crate::base::diagnostic::{Code, Diagnostic};
 use std::io::Read;
@@ -44,6 +45,17 @@ impl Compression {
         let _ = self.stream(bytes).take(limit as u64).read_to_end(&mut head);
         head
     }
+}
+
+/// FB102 for a compressed file whose reader takes it unpacked; `what` it is, as in "file of nodes".
+pub(super) fn refuse_packed(file: &InputFile, what: &str) -> Result<(), Diagnostic> {
+    let kind = match Compression::of(file.bytes()) {
+        Compression::None => return Ok(()),
+        Compression::Gzip => "gzip",
+        Compression::Zstd => "Zstandard",
+    };
+    let message = format!("{what} is compressed ({kind}); only matrices are read so");
+    Err(Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).with_help("unpack it"))
 }
 
 /// FB103 for `path`, with the decoder's reason.

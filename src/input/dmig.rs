@@ -89,8 +89,8 @@ impl Dmigs {
         }
     }
 
-    /// Takes DMIG cards that stand one below the other. Those of columns are read in parallel, some at a time,
-    /// and put together in the order of the file.
+    /// Takes DMIG cards that stand one below the other. Those of columns are read in parallel, some at a
+    /// time, and put together in the order of the file.
     ///
     /// # Errors
     /// FB110.
@@ -232,7 +232,8 @@ impl Dmigs {
         })
     }
 
-    /// Entries without zeros whose rows and columns are places in `points` instead of numbers, and their sides.
+    /// Entries without zeros whose rows and columns are places in `points` instead of numbers, and their
+    /// sides.
     fn in_rows(&self, mut pieces: Vec<Vec<Entry>>, points: &[Point]) -> (Vec<Vec<Entry>>, Sides) {
         let row_of = |point| points.binary_search(point).map_or(u32::MAX, |row| row as u32);
         let row_of: Vec<u32> = self.points.par_iter().map(row_of).collect();

@@ -13,6 +13,7 @@ mod labelled_lines;
 mod nastran;
 
 use super::bytes::InputFile;
+use super::compression::refuse_packed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
 use abaqus::Abaqus;
@@ -101,12 +102,13 @@ pub fn is_job(path: &Path) -> bool {
 /// Reads a job.
 ///
 /// # Errors
-/// FB108 when no reader knows the file, and those of [`JobReader::read`].
+/// FB102 for a compressed file, FB108 when no reader knows the file, and those of [`JobReader::read`].
 pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
     let reader = match &job.program {
         Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
         None => {
-            InputFile::open(&job.path).map_err(|diagnostic| vec![diagnostic])?;
+            let file = InputFile::open(&job.path);
+            file.and_then(|file| refuse_packed(&file, "file")).map_err(|diagnostic| vec![diagnostic])?;
             JOBS.iter().find(|reader| reader.recognises(&job.path))
         }
     };

@@ -1,4 +1,5 @@
-//! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its content.
+//! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its
+//! content.
 
 mod ansys_list;
 mod cdb;
@@ -12,6 +13,7 @@ mod xml_elements;
 
 use super::bulk_cards::is_bulk_data;
 use super::bytes::InputFile;
+use super::compression::refuse_packed;
 use super::jobs::{NodeSets, nodes_of_bulk, nodes_of_deck};
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -52,8 +54,9 @@ const HEAD: usize = 4096;
 /// Reads the nodes of a file; in the plane z is zero.
 ///
 /// # Errors
-/// FB106, FB203 to FB206 for tables; FB110, FB111, FB115, FB205 for other files.
+/// FB102 for compressed files; FB106, FB203 to FB206 for tables; FB110, FB111, FB115, FB205 for other files.
 pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile> {
+    refuse_packed(file, "file of nodes or elements").map_err(|found| vec![found])?;
     let bytes = file.bytes();
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
     let Some(format) = FORMATS.iter().find(|format| (format.recognises)(&head)) else {

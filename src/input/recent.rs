@@ -12,8 +12,8 @@ impl<T: Copy + PartialEq> Recent<T> {
         Self { slots: vec![None; 1 << Self::BITS] }
     }
 
-    /// The place of a label in `labels`, to which it is added where it did not come lately. Labels of one node
-    /// have one `direction` each.
+    /// The place of a label in `labels`, to which it is added where it did not come lately. Labels of one
+    /// node have one `direction` each.
     pub(super) fn place(&mut self, label: T, (node, direction): (i64, u8), labels: &mut Vec<T>) -> u32 {
         let key = (node as u64).wrapping_mul(8).wrapping_add(u64::from(direction));
         let slot = &mut self.slots[(key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS)) as usize];

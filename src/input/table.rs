@@ -1,6 +1,7 @@
 //! Text tables: a header of column names, then one row per line.
 
 use super::bytes::InputFile;
+use super::compression::refuse_packed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
@@ -38,8 +39,10 @@ impl<'a> Table<'a> {
     /// Reads the header: the first line that is neither blank nor a comment (`#`).
     ///
     /// # Errors
-    /// FB106 when there is none, FB203 when it lacks a required column or has an unknown one.
+    /// FB102 when it is compressed, FB106 when there is none, FB203 when it lacks a required column or has an
+    /// unknown one.
     pub(super) fn open(file: &'a InputFile, columns: &[Column]) -> Result<Self, Diagnostic> {
+        refuse_packed(file, "table")?;
         let path = file.path();
         let bytes = file.bytes();
         let header_error = |line: usize, message: String| {

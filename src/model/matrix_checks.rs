@@ -71,8 +71,8 @@ pub(super) fn symmetric(
 /// How far a matrix is from its transpose.
 #[derive(Clone, Copy, Default)]
 struct Asymmetry {
-    /// The largest difference over the size of the entries or of the diagonal entries beside them, and the first
-    /// entry that has it.
+    /// The largest difference over the size of the entries or of the diagonal entries beside them, and the
+    /// first entry that has it.
     worst: f64,
     at: (usize, usize),
     /// Entries without one at the mirrored place.

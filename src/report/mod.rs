@@ -63,7 +63,7 @@ pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
-pub use summary::summary;
+pub use summary::{Screen, summary};
 pub use term_facts::dropped_text;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};

@@ -6,15 +6,47 @@ use super::facts::{InterfaceFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped_effect::scheme_in_words;
 use super::numbers::{bytes, counted, duration, plain, significant};
-use super::text::{LABEL, coordinates, entry_lines, own_modes, triple};
+use super::text::{LABEL, WIDTH, coordinates, entry_lines, own_modes, triple};
 use crate::base::diagnostic::Severity;
 
 /// Entries of a list that are shown.
 const LISTED: usize = 4;
 
-/// The summary, with labels in colour where a terminal is to show them.
-pub fn summary(facts: &Facts<'_>, coloured: bool) -> String {
-    let mut summary = Summary { text: String::new(), coloured };
+/// What the summary is shown on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Screen {
+    /// Labels are in colour.
+    is_coloured: bool,
+    columns: usize,
+}
+
+impl Screen {
+    /// Columns that a summary can be read in.
+    const NARROWEST: usize = 40;
+    /// Lines that are longer are hard to read.
+    const WIDEST: usize = 100;
+
+    /// With labels in colour, or without.
+    pub fn coloured(self, is_coloured: bool) -> Self {
+        Self { is_coloured, ..self }
+    }
+
+    /// A terminal of so many columns, which the summary fills as far as it can be read.
+    pub fn with_columns(self, columns: usize) -> Self {
+        Self { columns: columns.clamp(Self::NARROWEST, Self::WIDEST), ..self }
+    }
+}
+
+impl Default for Screen {
+    /// A file, or a terminal that does not say what it is.
+    fn default() -> Self {
+        Self { is_coloured: false, columns: WIDTH }
+    }
+}
+
+/// The summary as a screen shows it.
+pub fn summary(facts: &Facts<'_>, screen: Screen) -> String {
+    let mut summary = Summary { text: String::new(), screen };
     body(&mut summary, facts);
     summary.gap();
     mass_properties(&mut summary, facts);
@@ -58,13 +90,15 @@ impl Tone {
 
 struct Summary {
     text: String,
-    coloured: bool,
+    screen: Screen,
 }
 
 impl Summary {
-    /// A text of at most so many lines under a label.
+    /// A text under a label, of at most so many lines where lines have the usual length.
     fn entry(&mut self, tone: Tone, label: &str, text: &str, most: usize) {
-        for line in entry_lines(label, text, most) {
+        let columns = self.screen.columns;
+        let most = most * (WIDTH - LABEL).div_ceil(columns.min(WIDTH) - LABEL);
+        for line in entry_lines(label, text, most, columns) {
             let at = line.char_indices().nth(LABEL).map_or(line.len(), |(at, _)| at);
             let (label, text) = line.split_at(at);
             let [of_label, of_text] = tone.codes();
@@ -75,7 +109,7 @@ impl Summary {
     }
 
     fn painted(&mut self, code: &str, text: &str) {
-        match self.coloured && !code.is_empty() && !text.trim().is_empty() {
+        match self.screen.is_coloured && !code.is_empty() && !text.trim().is_empty() {
             true => self.text.push_str(&format!("\u{1b}[{code}m{text}\u{1b}[0m")),
             false => self.text.push_str(text),
         }

@@ -8,7 +8,7 @@ use super::numbers::{bytes, counted, duration, percent, plain, significant};
 use crate::base::diagnostic::{Diagnostic, Severity};
 
 /// Columns of a terminal that every terminal has.
-const WIDTH: usize = 80;
+pub(super) const WIDTH: usize = 80;
 /// Columns of the labels.
 pub(super) const LABEL: usize = 12;
 /// Stands for a space at which a line must not end.
@@ -44,7 +44,7 @@ pub(super) struct Page(pub String);
 impl Page {
     /// Adds a text under a label, wrapped at spaces.
     pub fn entry(&mut self, label: &str, text: &str) {
-        for line in entry_lines(label, text, LINES) {
+        for line in entry_lines(label, text, LINES, WIDTH) {
             self.0.push_str(&line);
             self.0.push('\n');
         }
@@ -68,13 +68,13 @@ impl Page {
     }
 }
 
-/// The lines of a text under a label, `most` at the most.
-pub(super) fn entry_lines(label: &str, text: &str, most: usize) -> Vec<String> {
-    let mut lines = wrapped(text, WIDTH - LABEL);
+/// The lines of a text under a label, each of so many `columns`, and `most` of them at the most.
+pub(super) fn entry_lines(label: &str, text: &str, most: usize, columns: usize) -> Vec<String> {
+    let mut lines = wrapped(text, columns - LABEL);
     if lines.len() > most {
         lines.truncate(most);
         if let Some(last) = lines.last_mut() {
-            *last = last.chars().take(WIDTH - LABEL - 2).collect::<String>() + " …";
+            *last = last.chars().take(columns - LABEL - 2).collect::<String>() + " …";
         }
     }
     let labels = std::iter::once(label).chain(std::iter::repeat(""));

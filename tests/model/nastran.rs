@@ -4,8 +4,10 @@ use crate::jobs::{assert_has_inertia_of_the_block, body, job, set, small};
 use crate::support::program::fixtures;
 use flexbody::base::diagnostic::{Code, Severity};
 use flexbody::base::error::Error;
+use flexbody::body::verification::own_identities;
 use flexbody::input::{MatrixLocation, MatrixRole, ModelFiles, read_matrix, read_model};
 use flexbody::model::{FeModel, RawModel};
+use flexbody::numerics::linalg::CscMatrix;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -17,8 +19,8 @@ fn said(raw: &RawModel) -> Vec<Code> {
     raw.diagnostics.iter().map(|diagnostic| diagnostic.code()).collect()
 }
 
-/// The block whose grids and rows stand in a cylinder, in turned axes and in those that three grids span, in a
-/// punch file of ten digits, beside the same from OUTPUT4.
+/// The block whose grids and rows stand in a cylinder, in turned axes and in those that three grids span, in
+/// a punch file of ten digits, beside the same from OUTPUT4.
 #[test]
 fn both_forms_of_nastran_are_one_model() {
     let punched = job(&main_file("nastran"), vec![set("left", "set5"), set("right", "6")]);
@@ -51,13 +53,34 @@ fn both_forms_of_nastran_are_one_model() {
     assert!(pairs.clone().all(|(a, b)| (a / b - 1.0).abs() < 1e-7), "{pairs:?}");
 }
 
-/// Grids and matrices in one file: the block condensed to its ends. Rigid motion, and so mass and moments, are
-/// exact; that the rest is not is told.
+/// Grids and matrices in one file: the block condensed to its ends. Rigid motion, and so mass and moments,
+/// are exact; that the rest is not is told.
 #[test]
 fn a_superelement_keeps_the_inertia_of_its_body() {
     let raw = job(&main_file("nastran_superelement"), Vec::new());
     assert_eq!(said(&raw), [Code::JobCondensed]);
     assert_has_inertia_of_the_block(&body(raw, 6), 1e-10);
+}
+
+/// Condensed matrices add up large entries to the mass, and their directions agree on it to eleven digits: an
+/// external superelement of NX Nastran with six modes and more was refused for that.
+#[test]
+fn a_superelement_whose_directions_differ_in_the_last_digits_of_the_mass_is_a_body() {
+    let mut raw = job(&main_file("nastran_superelement"), Vec::new());
+    let mass: f64 = raw.mass.matrix.values().iter().sum::<f64>() / 3.0;
+    let entries: Vec<(u32, u32, f64)> = (0..raw.mass.matrix.n_cols())
+        .flat_map(|j| {
+            let (rows, values) = raw.mass.matrix.column(j);
+            rows.iter().zip(values).map(move |(&i, &v)| (i, j as u32, v)).collect::<Vec<_>>()
+        })
+        .chain([(0, 0, 2e-11 * mass)])
+        .collect();
+    let n = raw.mass.matrix.n_cols();
+    raw.mass.matrix = CscMatrix::from_triplets(n, n, &entries);
+    let identities = own_identities(&body(raw, 14));
+    let gram = identities.iter().find(|check| check.name == "velocity_gram_psd").expect("a general mass");
+    assert!(gram.value > 1e-12, "the case is one: {gram:?}");
+    assert!(identities.iter().all(|check| check.passed), "{identities:?}");
 }
 
 /// A changed copy of a small job.
@@ -184,6 +207,31 @@ fn rows_of_output4_have_to_be_those_of_a_set() {
     assert!(error.has(Code::DeckUnsupported), "{error}");
 }
 
+/// The matrices stand in files of any name where the deck says, or under that name beside it.
+#[test]
+fn files_that_the_deck_assigns_are_found() {
+    let (folder, path) = changed("nastran_op4", |file, text| match file {
+        "job.bdf" => format!("ASSIGN OUTPUT4='out/matrices.f12',UNIT=12,\n FORM=UNFORMATTED\n{text}"),
+        _ => text,
+    });
+    let expected = job(&main_file("nastran_op4"), Vec::new());
+    fs::create_dir(folder.path().join("out")).expect("a folder");
+    let places = ["job.op4", "out/matrices.f12", "matrices.f12"].map(|place| folder.path().join(place));
+    for pair in places.windows(2) {
+        fs::rename(&pair[0], &pair[1]).expect("moved");
+        let raw = read(&path).expect("read");
+        assert_eq!(
+            (&raw.stiffness.matrix, &raw.mass.matrix),
+            (&expected.stiffness.matrix, &expected.mass.matrix)
+        );
+        let name = pair[1].file_name().and_then(|name| name.to_str()).expect("a name");
+        assert!(raw.sources.iter().any(|source| source.name == name), "{name}");
+    }
+    fs::remove_file(&places[2]).expect("removed");
+    let error = read(&path).expect_err("no matrices");
+    assert!(error.has(Code::JobIncomplete) && error.to_string().contains("matrices.f12"), "{error}");
+}
+
 /// A scalar point with mass is a modal coordinate: nobody knows what it moves.
 /// A string of K that begins one row too low reaches rows of rotations, which nothing else has: they count as
 /// rows of the model, whose matrices are then not symmetric.
@@ -221,8 +269,8 @@ fn modal_coordinates_without_shapes_are_refused() {
     assert_eq!(raw.dofs.expect("labels").last().map(|label| label.node), Some(901));
 }
 
-/// A DMIG entry that is given twice, or in both triangles of a symmetric matrix, is a mistake, and a file that
-/// ends within a line may have lost digits.
+/// A DMIG entry that is given twice, or in both triangles of a symmetric matrix, is a mistake, and a file
+/// that ends within a line may have lost digits.
 #[test]
 fn punch_files_that_contradict_themselves_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -6,7 +6,8 @@ use flexbody::body::flex_body::{FlexBody, Guarantee, MassStructure, Parts, Stora
 use flexbody::body::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, identities};
 use flexbody::model::{BodyNumber, Coupling};
 use flexbody::report::{
-    Facts, Format, LumpedModes, RunData, diagnostics_json, identities_json, identities_text, render, summary,
+    Facts, Format, LumpedModes, RunData, Screen, diagnostics_json, identities_json, identities_text, render,
+    summary,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -54,7 +55,7 @@ fn golden(name: &str, found: &str) {
 fn the_three_formats_are_these_bytes() {
     let body = engine_mount();
     let facts = Facts::new(&body, &run_data());
-    golden("summary.txt", &summary(&facts, false));
+    golden("summary.txt", &summary(&facts, Screen::default()));
     golden("report.txt", &render(&facts, Format::Text));
     golden("report.json", &render(&facts, Format::Json));
     let (page, scripts) = without_scripts(&render(&facts, Format::Html));
@@ -132,14 +133,32 @@ proptest! {
         let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).unwrap();
         let errors: Vec<_> = schema().iter_errors(&json).map(|e| e.to_string()).collect();
         prop_assert!(errors.is_empty(), "{errors:?}");
-        for text in [render(&facts, Format::Text), summary(&facts, false)] {
+        for text in [render(&facts, Format::Text), summary(&facts, Screen::default())] {
             for line in text.lines() {
                 prop_assert!(line.chars().count() <= 80, "{line}");
                 prop_assert!(!line.contains(|c: char| c.is_control()), "{line:?}");
             }
         }
+        for (columns, longest) in [(1, 40), (57, 57), (1000, 100)] {
+            for line in summary(&facts, Screen::default().with_columns(columns)).lines() {
+                prop_assert!(line.chars().count() <= longest, "{line}");
+            }
+        }
         well_formed(&render(&facts, Format::Html));
     }
+}
+
+/// Lines are broken elsewhere, and more of them are shown where they are short.
+#[test]
+fn a_narrow_terminal_shows_what_a_wide_one_shows() {
+    let (body, run) = (engine_mount(), run_data());
+    let facts = Facts::new(&body, &run);
+    let words = |screen: Screen| {
+        summary(&facts, screen).split_whitespace().map(str::to_owned).collect::<Vec<String>>()
+    };
+    let usual = words(Screen::default());
+    assert_eq!(words(Screen::default().with_columns(57)), usual);
+    assert_eq!(words(Screen::default().with_columns(100)), usual);
 }
 
 /// Warnings and interfaces take lines of their own.
@@ -147,7 +166,7 @@ proptest! {
 fn the_summary_of_a_usual_body_is_read_in_seconds() {
     let body = changed(|parts| parts.interfaces.clear());
     let run = RunData { diagnostics: Vec::new(), ..run_data() };
-    let told = summary(&Facts::new(&body, &run), false);
+    let told = summary(&Facts::new(&body, &run), Screen::default());
     let lines = told.lines().filter(|line| !line.is_empty()).count();
     assert!(lines <= 14 && told.lines().count() <= 18, "{told}");
 }
@@ -156,7 +175,7 @@ fn the_summary_of_a_usual_body_is_read_in_seconds() {
 #[test]
 fn the_summary_keeps_what_the_body_cannot_do() {
     let told = |change: &dyn Fn(&mut Parts)| {
-        let text = summary(&Facts::new(&changed(change), &RunData::default()), false);
+        let text = summary(&Facts::new(&changed(change), &RunData::default()), Screen::default());
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let has = |change: &dyn Fn(&mut Parts), part: &str| {
@@ -170,7 +189,7 @@ fn the_summary_keeps_what_the_body_cannot_do() {
     has(&|p| p.storage = Storage::F32, "rounded to 32-bit floats");
     has(&|p| p.source.number = Some(BodyNumber { number: 1, of: 2 }), "body 1 of 2");
     has(&|p| p.interfaces[0].coupling = Some(Coupling::Rigid), "rigid but DEFORMS");
-    let warned = summary(&Facts::new(&engine_mount(), &run_data()), false);
+    let warned = summary(&Facts::new(&engine_mount(), &run_data()), Screen::default());
     assert!(line(&warned, "warnings").contains("FB510 rigid modes reach"), "{warned}");
 }
 
@@ -178,7 +197,8 @@ fn the_summary_keeps_what_the_body_cannot_do() {
 fn colours_are_in_the_summary_where_they_are_asked_for_alone() {
     let body = changed(|p| p.certificate.proved_modes = None);
     let facts = Facts::new(&body, &run_data());
-    let (plain, coloured) = (summary(&facts, false), summary(&facts, true));
+    let (plain, coloured) =
+        (summary(&facts, Screen::default()), summary(&facts, Screen::default().coloured(true)));
     assert!(!plain.contains('\u{1b}') && coloured.contains("\u{1b}[31mNOT PROVED"), "{coloured}");
     let mut without = String::new();
     for (i, piece) in coloured.split("\u{1b}[").enumerate() {

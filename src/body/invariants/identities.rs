@@ -9,6 +9,11 @@ use nalgebra::Vector3;
 /// Limit of what holds for the Gram matrix of any vectors: rounding of its sums, 1e-15 relative to the
 /// Cauchy-Schwarz bounds, with room for data that were rotated or shifted after they were condensed.
 const ROUNDING: f64 = 1e-12;
+/// Limit of the same where M does not commute with rotations. Such matrices often come condensed: their
+/// entries are larger than the mass that they add up to, which directions then agree on to fewer digits
+/// (6.5e-12 of the mass in an external superelement of NX Nastran with entries of 1e4 times the mass; its
+/// body was 1.3e-12 to 3.5e-12 from this identity).
+const CONDENSED: f64 = 1e-10;
 /// Limit of what holds for modes: the solver separates them from each other and from rigid motion to 1e-13, a
 /// residual of 1e-10 leaves 1e-10 in close pairs; worse modes are not modes.
 const MODAL: f64 = 1e-9;
@@ -100,7 +105,7 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityChec
             "velocity_gram_psd",
             "[Phi_t B Psi]' M [Phi_t B Psi] positive semidefinite",
             terms::velocity_gram_negative(body, &w2, &w3, bound),
-            ROUNDING,
+            CONDENSED,
         )),
         None if body.0.general.is_some() => {}
         None => checks.extend(scalar_identities(body, bound)),

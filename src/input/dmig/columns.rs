@@ -15,8 +15,8 @@ pub(in crate::input) type Point = (i64, u8);
 /// complex matrices are passed over.
 pub(super) type Heads = Vec<(String, bool)>;
 
-/// The entries of some columns. Rows and columns of the entries are places in `points`, where a point may stand
-/// more than once.
+/// The entries of some columns. Rows and columns of the entries are places in `points`, where a point may
+/// stand more than once.
 pub(super) struct Columns {
     pub points: Vec<Point>,
     /// Matrix, entries, and the largest number of their digits as written.

@@ -1,6 +1,7 @@
 //! Jobs of Nastran: a deck (.bdf, .dat, .nas), or a punch file with the grids of a superelement, and the
 //! matrices in it or beside it: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
 
+mod assigned;
 mod axes;
 mod bulk;
 mod elements;
@@ -164,9 +165,17 @@ impl Matrices {
             }
             files.into_iter().map(|(_, file)| file).collect::<Vec<PathBuf>>()
         };
-        let (punches, outputs) = (with(".pch"), with(".op4"));
+        let (punches, mut outputs) = (with(".pch"), with(".op4"));
+        let assigned = bulk.assigned.outputs(path);
+        let (there, absent): (Vec<PathBuf>, Vec<PathBuf>) =
+            assigned.into_iter().partition(|file| file.is_file());
+        outputs.extend(there.into_iter().filter(|file| !outputs.contains(file)).collect::<Vec<_>>());
         if punches.is_empty() && outputs.is_empty() {
-            return Err(vec![missing(path, "beside the deck a file of matrices (job.pch, job.op4)", HELP)]);
+            let what = match absent.first() {
+                Some(file) => format!("{}, which the deck assigns to OUTPUT4,", file.display()),
+                None => "beside the deck a file of matrices (job.pch, job.op4)".to_owned(),
+            };
+            return Err(vec![missing(path, &what, HELP)]);
         }
         let punched = Dmigs::of(&punches)?;
         let outputs = Outputs::of(outputs)?;

@@ -67,8 +67,8 @@ fn format(text: &[u8]) -> Option<Format> {
     ((1..=100).contains(&format.per_line) && (8..=100).contains(&format.width)).then_some(format)
 }
 
-/// Where the columns of the matrices stand, and how their numbers are written. Pages of the file are given back
-/// once they were gone through.
+/// Where the columns of the matrices stand, and how their numbers are written. Pages of the file are given
+/// back once they were gone through.
 ///
 /// # Errors
 /// FB301, FB303, FB304 for lines that are none of a matrix.
@@ -123,8 +123,8 @@ struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// The next column of a matrix: its number and how many values it has, which go to `place`. `None` for what
-    /// ends the matrix.
+    /// The next column of a matrix: its number and how many values it has, which go to `place`. `None` for
+    /// what ends the matrix.
     fn column(
         &mut self,
         header: &Header,

@@ -272,8 +272,8 @@ impl SymmetricMatrix {
         Self::try_from(matrix).ok()
     }
 
-    /// Takes the mean of a nearly symmetric matrix and its transpose, without the entries that cancel. Where both
-    /// have the same pattern that takes no more memory than the matrix has.
+    /// Takes the mean of a nearly symmetric matrix and its transpose, without the entries that cancel. Where
+    /// both have the same pattern that takes no more memory than the matrix has.
     ///
     /// # Panics
     /// When the matrix is not square.

@@ -1,5 +1,6 @@
 //! What the bulk data and the case control of a deck say: places, axes of rows, boundary, supports, sets.
 
+use super::assigned::Assigned;
 use super::elements;
 use super::sets::SetLines;
 use super::systems::{Definition, Grid, Kind, SystemCard};
@@ -40,6 +41,7 @@ pub(super) struct Bulk {
     pub systems: HashMap<i64, SystemCard>,
     pub dmigs: Dmigs,
     pub sets: SetLines,
+    pub assigned: Assigned,
     /// PARAM,COUPMASS.
     pub coupled_mass: bool,
     pub has_elements: bool,
@@ -72,6 +74,7 @@ impl Bulk {
         let files = read_deck(path, &mut |item| match item {
             Item::Control(line) => {
                 bulk.sets.line(line);
+                bulk.assigned.line(line);
                 Ok(())
             }
             Item::Begin(place) => {
