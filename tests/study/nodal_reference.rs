@@ -360,6 +360,21 @@ fn settled_starts_have_the_static_deformation_of_the_nodes() {
     }
 }
 
+/// What hangs from an interface begins in equilibrium too, under gravity and the acceleration of what carries
+/// it: its first frequency is far below that of the free body.
+#[test]
+fn a_carried_body_starts_in_equilibrium() {
+    assert_same("solid", &solid(), |size, scheme| {
+        let mut scene = Scene {
+            carried: size.carried(Point::Interface("left".to_owned())),
+            gravity: Some(size.along([0.01, -0.02, 0.02]) * size.rate * size.rate),
+            ..size.scene(scheme)
+        };
+        scene.initial.settled = true;
+        scene
+    });
+}
+
 /// Steps that are halved: those of the explicit method have their own error control.
 #[test]
 fn implicit_and_explicit_steps_meet_in_one_motion() {

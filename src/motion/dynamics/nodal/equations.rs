@@ -62,6 +62,8 @@ pub struct NodalEquations<'m> {
     pub(super) rigid_mass: Matrix6<f64>,
     /// C'.
     pub(super) conditions: Motions,
+    /// Whether the conditions are those of places that rest, not mean axes.
+    pub(super) is_held: bool,
     /// R'C', completed in the same way.
     pub(super) conditions_rigid: Matrix6<f64>,
     /// (C R)^-1.
@@ -173,6 +175,7 @@ impl<'m> NodalEquations<'m> {
             answered,
             modal_damping: None,
             conditions: columns,
+            is_held: *conditions != ReferenceConditions::MeanAxes,
             conditions_rigid,
             rigid_part,
             factor,
@@ -339,7 +342,7 @@ pub(crate) fn add_turned(model: &FeModel, factor: f64, omega: &Vector3<f64>, x: 
 }
 
 /// A'B of two sets of motions, with ones on the diagonal of those that do not exist.
-fn products(a: &Motions, b: &Motions, moving: &[usize]) -> Matrix6<f64> {
+pub(super) fn products(a: &Motions, b: &Motions, moving: &[usize]) -> Matrix6<f64> {
     let mut sum = Matrix6::zeros();
     for (a, b) in a.iter().zip(b) {
         sum += Vector6::from(*a) * Vector6::from(*b).transpose();

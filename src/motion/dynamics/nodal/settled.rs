@@ -1,8 +1,11 @@
 //! The deformation that stays as it is under what acts at time zero.
 
-use super::{NodalConfiguration, NodalEvaluation, NodalMotion};
+use super::conditions::Motions;
+use super::equations::products;
+use super::{NodalConfiguration, NodalEquations, NodalEvaluation, NodalMotion};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::{MatrixSum, SparseLdl, larger};
+use nalgebra::Matrix6;
 
 /// Steps at the most, and what is near enough.
 const MOST_STEPS: usize = 300;
@@ -11,13 +14,50 @@ const SETTLED: f64 = 1e-12;
 /// Steps below this part that no longer shrink are rounding of K u.
 const NEAR_ROUNDING: f64 = 1e-6;
 
-/// The shift of K, relative to the square of the first circular frequency: steps leave a tenth of the way to
-/// go, or less.
+/// The shift of K, relative to the square of the first circular frequency: steps of a free body leave a tenth
+/// of the way to go, or less.
 const SHIFT: f64 = 0.1;
+
+/// That of a body that something holds, whose first frequency may be far below that of the free one: K with
+/// the conditions is definite by itself.
+const SHIFT_HELD: f64 = 1e-3;
+
+/// Steps x with (K + sigma M) x = M u'' + C'mu, C x = 0.
+struct Steps {
+    factor: SparseLdl,
+    /// A = (K + sigma M)^-1 C', and (C A)^-1.
+    answered: Motions,
+    inverse: Matrix6<f64>,
+}
+
+impl Steps {
+    /// With sigma = `shift`. `None` where there is no factor, or the conditions depend on each other.
+    fn new(body: &NodalEquations<'_>, shift: f64) -> Option<Self> {
+        let pencil = body.model.pencil();
+        let terms = vec![(1.0, pencil.stiffness(), 1), (shift, pencil.mass(), pencil.block())];
+        let factor = SparseLdl::of_sum(&MatrixSum::new(terms), &pencil)?;
+        let n = body.n_rows();
+        let (mut answered, mut scratch) = (vec![[0.0; 6]; n], vec![0.0; n]);
+        for &motion in body.moving {
+            let mut column: Vec<f64> = body.conditions.iter().map(|row| row[motion]).collect();
+            factor.solve_in_place(1, &mut column, &mut scratch);
+            answered.iter_mut().zip(column).for_each(|(row, value)| row[motion] = value);
+        }
+        let inverse = products(&body.conditions, &answered, body.moving).try_inverse()?;
+        Some(Self { factor, answered, inverse })
+    }
+
+    /// Takes the forces to the step.
+    fn solve(&self, body: &NodalEquations<'_>, forces: &mut [f64], scratch: &mut [f64]) {
+        self.factor.solve_in_place(1, forces, scratch);
+        let mu = self.inverse * NodalEquations::sums(&body.conditions, forces);
+        NodalEquations::add_motion(&self.answered, -1.0, &mu, forces);
+    }
+}
 
 impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     /// `start` with the deformation that stays as it is under what acts at `time`: u'' = 0 with u' = 0, by
-    /// u += (K + sigma M)^-1 M u''.
+    /// u += x with (K + sigma M) x = M u'' + C'mu and C x = 0.
     ///
     /// * `softest`: square of the first circular frequency.
     ///
@@ -32,10 +72,9 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
     ) -> Result<NodalConfiguration, Failure> {
         let lost = |reason: &'static str| Failure::Rates { reason };
         let body = self.evaluation.equations;
-        let pencil = body.model.pencil();
-        let terms = vec![(1.0, pencil.stiffness(), 1), (SHIFT * softest, pencil.mass(), pencil.block())];
-        let factor = SparseLdl::of_sum(&MatrixSum::new(terms), &pencil);
-        let factor = factor.ok_or_else(|| lost("the stiffness of the nodes cannot be factored"))?;
+        let shift = if body.is_held { SHIFT_HELD } else { SHIFT };
+        let steps = Steps::new(body, shift * softest);
+        let steps = steps.ok_or_else(|| lost("the stiffness of the nodes cannot be factored"))?;
         let n = body.n_rows();
         let (mut step, mut acceleration, mut scratch) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut settled = start.clone();
@@ -47,8 +86,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
                 .map_err(|_| lost("the deformation does not fulfil the reference conditions"))?;
             self.accelerations(time, &state, &mut acceleration)?;
             body.weigh(&acceleration, &mut step);
-            factor.solve_in_place(1, &mut step, &mut scratch);
-            body.take_rigid(&mut step);
+            steps.solve(body, &mut step, &mut scratch);
             settled.u.iter_mut().zip(&step).for_each(|(u, step)| *u += step);
             let size = |x: &[f64]| x.iter().fold(0.0, |largest: f64, x| larger(largest, x.abs()));
             let (size, largest) = (size(&step), size(&settled.u));
