@@ -9,24 +9,34 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct LackFacts {
     modes: usize,
+    /// Radians; zero where the rotation is prescribed.
+    attitude: f64,
     deflection: Option<f64>,
     stress: Option<f64>,
+    /// Nothing where no motion is prescribed, or it has too many periods to be followed.
+    reaction: Option<f64>,
     worst: f64,
     time: f64,
 }
 
 impl LackFacts {
     pub fn new(lack: &ReferenceError) -> Self {
-        let OutputErrors { deflection, stress, .. } = lack.errors;
-        Self { modes: lack.modes, deflection, stress, worst: lack.worst, time: lack.time }
+        let OutputErrors { attitude, deflection, stress, reaction } = lack.errors;
+        Self { modes: lack.modes, attitude, deflection, stress, reaction, worst: lack.worst, time: lack.time }
     }
 
-    /// `deflection 0.5 %, stress 8.6 %`.
+    /// `attitude 0.0012 rad, deflection 0.5 %, stress 8.6 %`, of a prescribed motion with `reaction 1.2 %`.
     pub fn parts(&self) -> String {
         let part = |name: &str, value: Option<f64>| {
             value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
         };
-        let parts = [part("deflection", self.deflection), part("stress", self.stress)];
+        let attitude = format!("attitude {} rad", significant(self.attitude, 2));
+        let parts = [
+            (self.attitude > 0.0).then_some(attitude),
+            part("deflection", self.deflection),
+            part("stress", self.stress),
+            part("reaction", self.reaction),
+        ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 

@@ -15,11 +15,11 @@ use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
-use flexbody::model::{FeModel, RawModel};
+use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
-    Axes, History, Initial, Load, OutputErrors, Point, Scene, Spin, Stage, Tolerance, Trace, VectorHistory,
-    trace, trace_at,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Scene, Spin, Stage,
+    Tolerance, Trace, VectorHistory, trace, trace_at,
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
 use flexbody::study::selection::select_from;
@@ -40,9 +40,10 @@ const DEFLECTION: f64 = 2e-3;
 /// Errors below this part of a tolerance are those of integration and rounding.
 const COUNTS: f64 = 1e-3;
 
-/// What the distribution leaves open, in words.
-const REMAINS: &str = "\nAll estimates of the last 60 seeds below a third of the truth are of the plane frame, whose nodes have rotations, mostly after it was enriched; the cause has not been found. Carried bodies are not in the\n\
-    table, since nothing is estimated for them; nor are reactions. Before the inertia of what is lacking was counted, estimates of the stress were below half of the truth in 26 % of calm scenes (40 seeds, least 0.13), and one verdict missed its tolerance.\n";
+/// What there is to say of the distribution, in words.
+const REMAINS: &str = "\nThe estimate moves what is lacking together with the modes that the body has, by the mass that they share, and looks twelve times into the period of the fastest mode that counts. Before, with 121 instants and the\n\
+    modes left alone, estimates of enriched bodies were between a tenth and 2.4 times of the truth, most of all those of the plane frame, whose enriched bodies follow modes that 121 instants did not see, and estimates of a shock were below\n\
+    half of the truth in 13 %. Gyroscopic and centrifugal forces of what is lacking are not counted, nor are deflections beyond the first order.\n";
 
 /// How loads begin. A shock excites modes without end, which no number of responses follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -66,8 +67,7 @@ struct Outcome {
     seed: u64,
     what: String,
     start: Start,
-    /// Estimated over true error of the body before and after it was enriched: deflection and stress, where
-    /// the true error counts.
+    /// Estimated over true error of the body before and after it was enriched, where the true error counts.
     effectivity: Vec<(&'static str, f64)>,
     /// Whether the selection says that its tolerances hold, and its true error over the tolerance.
     verdict: (bool, f64),
@@ -107,18 +107,69 @@ fn graded_block(random: &mut Random) -> RawModel {
     left.plus(&right).raw_model()
 }
 
+/// The same with an interface `root` of the four nodes of least x.
+fn with_root(raw: RawModel) -> RawModel {
+    let mut order: Vec<usize> = (0..raw.nodes.ids.len()).collect();
+    order.sort_by(|&a, &b| raw.nodes.positions[a][0].total_cmp(&raw.nodes.positions[b][0]));
+    let near = order[..4].iter().map(|&i| (raw.nodes.ids[i], Vector3::from(raw.nodes.positions[i])));
+    let (nodes, places): (Vec<i64>, Vec<Vector3<f64>>) = near.unzip();
+    let mean = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+    let root = NodeSet {
+        coupling: Some(Coupling::Averaging),
+        reference: Reference::Point(mean.into()),
+        ..NodeSet::new("root", nodes)
+    };
+    RawModel { interfaces: vec![root], ..raw }
+}
+
 /// A body: solid, plane, or with rotations of its nodes.
 fn model(random: &mut Random) -> (String, FeModel) {
     let (name, raw) = match pick(random, 5) {
         0 => {
             let (columns, rows) = (3 + pick(random, 3) as usize, 1 + pick(random, 2) as usize);
             let raw = rectangle(columns, rows, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]);
-            (format!("plane rectangle {columns} x {rows}"), raw)
+            (format!("plane rectangle {columns} x {rows}"), with_root(raw))
         }
         1 => ("plane frame with rotations".to_owned(), raw_fixture("plane_frame")),
-        _ => ("graded block".to_owned(), graded_block(random)),
+        _ => ("graded block".to_owned(), with_root(graded_block(random))),
     };
     (name, FeModel::from_raw(raw).expect("a sound model").model)
+}
+
+/// What carries a body in a third of the cases: its root, or a node that has rotations, which turns faster and
+/// faster, swings along a line, or rests. Drawn from numbers of its own.
+fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<Carried> {
+    let random = &mut Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    if pick(random, 3) != 0 {
+        return None;
+    }
+    let plane = model.dimension() == 2;
+    let ids = &model.nodes().ids;
+    let by = match model.interfaces().is_empty() {
+        true => Point::Node(ids[pick(random, ids.len() as u64) as usize]),
+        false => Point::Interface("root".to_owned()),
+    };
+    let kind = pick(random, 3);
+    let turn = if plane { Vector3::z() } else { Vector3::from(random.vector::<3>()).normalize() };
+    let duration = TAU / probe.modes().eigenvalue[0].sqrt();
+    let spin = (kind == 0).then(|| CarriedSpin {
+        velocity: VectorHistory::Along {
+            direction: turn,
+            factor: History::Ramp { from: speed, to: 1.5 * speed, start: 0.0, duration },
+        },
+        axes: Axes::Model,
+        start: None,
+        through: None,
+    });
+    let [x, y, z] = random.vector::<3>();
+    let direction = Vector3::new(x, y, if plane { 0.0 } else { z }).normalize();
+    let frequency = between(random, 0.1, 0.6) / duration;
+    let amplitude = 0.3 * DEFLECTION * probe.extent() * probe.modes().eigenvalue[0] / (TAU * frequency);
+    let translation = (kind == 1).then(|| {
+        let factor = History::Sine { amplitude, frequency, phase: 0.0 };
+        Drive::Velocity(VectorHistory::Along { direction, factor })
+    });
+    Some(Carried { by, spin, translation })
 }
 
 fn settings(modes: usize) -> ConvertSettings {
@@ -198,11 +249,21 @@ fn case(seed: u64) -> Case {
         least_deflection: None,
     };
     scale_loads(&mut scene, &probe);
+    scene.carried = carried(seed, &model, speed, &probe);
+    if scene.carried.is_some() {
+        (scene.spin, scene.initial.angular_velocity) = (None, Vector3::zeros());
+    }
     let modes = 3 + pick(random, 6) as usize;
     let what = format!(
         "{name}, {} rows, {modes} modes, {count} loads, {}, {}, tolerance {tolerance:.1e}",
         model.rows().len(),
-        if spun { "spun" } else { "free" },
+        match &scene.carried {
+            Some(Carried { spin: Some(_), .. }) => "carried and spun",
+            Some(Carried { translation: Some(_), .. }) => "carried along a line",
+            Some(_) => "carried",
+            None if spun => "spun",
+            None => "free",
+        },
         if start == Start::Shock { "shock" } else { "calm" }
     );
     Case { seed, what, model, scene, start, modes }
@@ -246,6 +307,7 @@ fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64)
         ("attitude", Some(estimated.attitude), Some(found.attitude)),
         ("deflection", estimated.deflection, found.deflection),
         ("stress", estimated.stress, found.stress),
+        ("reaction", estimated.reaction, found.reaction),
     ];
     outputs
         .into_iter()
@@ -302,8 +364,8 @@ fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
         "<!-- Written by FLEXBODY_BLESS=1 FLEXBODY_VERDICTS=COUNT cargo test --test study random_verdicts -->\n\n\
          # Estimates and verdicts beside the truth\n\n\
          Random bodies (blocks of bricks askew, with a soft part of up to 30 times less stiffness; plane rectangles; a plane frame with nodal rotations) in random\n\
-         scenes (one or two forces at random nodes, along axes of the body or of the world, ramps and sines; free with a spin, or with a prescribed spin that changes; with\n\
-         modal damping and without; tolerances of 0.5 to 16 %), from static starts (*calm*) and from loads that begin with a *shock*. Each is converted with 3 to 8 free modes, enriched and selected as\n\
+         scenes (one or two forces at random nodes, along axes of the body or of the world, ramps and sines; free with a spin, with a prescribed spin that changes, or carried by an\n\
+         interface or a node with rotations that rests, swings along a line or turns faster and faster; with modal damping and without; tolerances of 0.5 to 16 %), from static starts (*calm*) and from loads that begin with a *shock*. Each is converted with 3 to 8 free modes, enriched and selected as\n\
          `select MODEL` does it, and held to the motion of all nodes (`trade --reference nodal`). None of the scenes was chosen: they follow from a seed\n\
          (`tests/study/random_verdicts.rs`).\n\n",
     );
@@ -316,7 +378,7 @@ fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
     );
     page.push_str("## Effectivity: the estimated error of a body over the true one\n\nOf bodies as they were first converted and as they were enriched, where the true error is more than a thousandth of the tolerance.\n\n| start | output | numbers | least | 5 % | median | 95 % | largest | below 1/2 |\n|---|---|---|---|---|---|---|---|---|\n");
     for start in [Start::Calm, Start::Shock] {
-        for output in ["attitude", "deflection", "stress"] {
+        for output in ["attitude", "deflection", "stress", "reaction"] {
             let of = outcomes.iter().filter(|one| one.start == start).flat_map(|one| &one.effectivity);
             let values: Vec<f64> = of.filter(|(name, _)| *name == output).map(|(_, value)| *value).collect();
             let (count, low) = (values.len(), values.iter().filter(|value| **value < 0.5).count());
@@ -387,9 +449,9 @@ fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
         for one in outcomes {
             let (holds, worst) = one.verdict;
             assert!(!holds || worst <= 1.0, "{}: {worst}", one.what);
-            let calm = one.start == Start::Calm;
+            let near = if one.start == Start::Calm { 0.6..1.7 } else { 0.4..2.5 };
             assert!(
-                !calm || one.effectivity.iter().all(|(_, value)| *value > 0.4),
+                one.effectivity.iter().all(|(_, value)| near.contains(value)),
                 "{}: {:?}",
                 one.what,
                 one.effectivity

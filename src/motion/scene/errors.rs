@@ -2,7 +2,7 @@
 
 use super::lively::{LivelyNodes, along_axes, longest};
 use super::peak::Peak;
-use super::{Tolerance, Trace};
+use super::{Extremes, Tolerance, Trace};
 use crate::body::flex_body::FlexBody;
 use crate::motion::dynamics::EulerParameters;
 use crate::numerics::linalg::{larger, not_negative};
@@ -184,12 +184,22 @@ fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>
 
 /// Errors of the force and the torque that prescribed motion takes, the larger of both.
 fn reactions(reference: &Trace, candidate: &Trace) -> Option<Vec<f64>> {
-    let (a, b) = (reference.reactions.as_ref()?, candidate.reactions.as_ref()?);
-    let (mass, radius) = reference.size;
-    let (motion, spin) = (reference.extremes.internal, reference.extremes.spin);
+    let both = [reference.reactions.as_deref()?, candidate.reactions.as_deref()?];
+    reaction_errors(&reference.time, both, reference.size, &reference.extremes)
+}
+
+/// The same for reactions at times: those of the reference, whose mass, radius of gyration and largest
+/// motion are given, and of what is held to it.
+pub(crate) fn reaction_errors(
+    time: &[f64],
+    [a, b]: [&[Reaction]; 2],
+    (mass, radius): (f64, f64),
+    extremes: &Extremes,
+) -> Option<Vec<f64>> {
+    let (motion, spin) = (extremes.internal, extremes.spin);
     let difference = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
         let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
-        let largest = Peak::of(&reference.time, a.iter().map(|a| part(a).norm())).value;
+        let largest = Peak::of(time, a.iter().map(|a| part(a).norm())).value;
         // Forces that are rounding are no forces, however small the least that counts.
         let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
         (largest > NO_TORQUE * motion / lever).then(|| relative(differences, largest.max(least))).flatten()

@@ -38,8 +38,8 @@ pub use description::{
 };
 pub(crate) use driving::Driving;
 pub(crate) use effort::fastest_history;
-pub(crate) use errors::LEAST_REACTION;
 pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
+pub(crate) use errors::{LEAST_REACTION, reaction_errors};
 pub use extremes::{Drift, Extremes};
 pub use history::History;
 pub use instants::{Instant, instants};

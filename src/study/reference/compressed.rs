@@ -10,28 +10,38 @@ const LEFT_OUT: f64 = 1e-12;
 /// Combinations at the most.
 const MOST: usize = 32;
 
-/// F = B C: forces (N x m) by `basis` (N x k) and `amplitudes` (k x m).
+/// A basis B (N x k) of forces F that is orthonormal where each row counts by one over the diagonal of K:
+/// about the energy that a force does work with at that row alone.
 pub(super) struct Compressed {
     pub basis: Mat<f64>,
-    pub amplitudes: Mat<f64>,
+    /// Roots of these weights, and the basis times them.
+    weights: Vec<f64>,
+    weighted: Mat<f64>,
 }
 
 impl Compressed {
-    /// The first principal directions of `forces` where each row counts by one over the diagonal of K: about
-    /// the energy that a force does work with at that row alone. Nothing where the forces are zero, or beyond
-    /// the range of numbers.
+    /// The first principal directions of `forces` (N x m). Nothing where the forces are zero, or beyond the
+    /// range of numbers.
     pub fn new(model: &FeModel, forces: &Mat<f64>) -> Option<Self> {
         let diagonal = model.stiffness().diagonal();
         let weights: Vec<f64> =
             diagonal.iter().map(|k| if *k > 0.0 { k.sqrt().recip() } else { 0.0 }).collect();
-        let weighted = Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| weights[i] * forces[(i, j)]);
+        let weigh = |forces: &Mat<f64>| {
+            Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| weights[i] * forces[(i, j)])
+        };
+        let weighted = weigh(forces);
         let (directions, values) = principal(gram(weighted.as_ref(), weighted.as_ref()), LEFT_OUT, MOST)?;
         let scaled =
             Mat::from_fn(directions.nrows(), directions.ncols(), |i, j| directions[(i, j)] / values[j]);
-        Some(Self {
-            basis: combine(forces.as_ref(), scaled.as_ref()),
-            amplitudes: Mat::from_fn(values.len(), forces.ncols(), |j, i| values[j] * directions[(i, j)]),
-        })
+        let basis = combine(forces.as_ref(), scaled.as_ref());
+        let weighted = weigh(&basis);
+        Some(Self { basis, weights, weighted })
+    }
+
+    /// C (k x m) with B C next to the `forces` F (N x m).
+    pub fn amplitudes(&self, forces: &Mat<f64>) -> Mat<f64> {
+        let weighted = Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| self.weights[i] * forces[(i, j)]);
+        gram(self.weighted.as_ref(), weighted.as_ref())
     }
 }
 

@@ -5,7 +5,12 @@ mod answered;
 mod compressed;
 mod enrich;
 mod estimate;
+mod grid;
+mod held;
+mod lack;
+mod missed;
 mod motion_shapes;
+mod reaction;
 mod residual;
 mod turning;
 

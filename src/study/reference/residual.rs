@@ -1,15 +1,18 @@
 //! The forces that the equations of all nodes leave unbalanced in the motion of a body.
 
+use super::held::Held;
 use crate::body::flex_body::FlexBody;
-use crate::model::FeModel;
-use crate::motion::dynamics::add_turned;
+use crate::model::{Damping, FeModel};
+use crate::motion::dynamics::{NodalPoint, add_turned};
 use crate::motion::scene::Instant;
-use crate::numerics::linalg::{combine, gram, subtract_combination};
-use faer::Mat;
+use crate::numerics::linalg::{
+    combine, dense_cholesky, gram, multiply, solve_lower, solve_upper, subtract_combination,
+};
+use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
 /// Instants that are computed together.
-const BLOCK: usize = 32;
+pub(super) const BLOCK: usize = 32;
 
 /// A body in its frame, seen from the rows of its model.
 pub(super) struct NodalView<'m> {
@@ -17,60 +20,159 @@ pub(super) struct NodalView<'m> {
     /// Psi (N x nf) and M Psi, rows and axes of the model.
     pub vectors: Mat<f64>,
     weighted: Mat<f64>,
+    /// m_ff = Psi'M Psi, and its Cholesky factor.
+    pub modal_mass: Mat<f64>,
+    lower: Mat<f64>,
+    /// D_ff of the modes.
+    pub modal_damping: Mat<f64>,
+    /// Whether the body has stiffness that depends on the motion, which nodes do not have.
+    stiffens: bool,
     /// Rigid motions about the origin of the frame (N x 6, in the plane N x 3), axes of the model.
     pub rigid: Mat<f64>,
     /// Axes of the frame in the model.
     pub axes: Matrix3<f64>,
     /// Nodal forces of unit forces and torques where each load of the scene acts (N x 6, in the plane N x 3).
     pub loads: Vec<Mat<f64>>,
+    /// What carries the body.
+    pub held: Option<Held>,
+}
+
+/// Forces that are left unbalanced.
+pub(super) struct Unbalanced {
+    /// At the nodes, beside what they do to the modes (N of every instant).
+    pub forces: Mat<f64>,
+    /// What they do to the modes (nf of every instant).
+    pub in_modes: Mat<f64>,
+}
+
+/// Displacements of all rows with their rates and accelerations, relative to the frame (N of every instant).
+pub(super) struct Displacements {
+    pub u: Mat<f64>,
+    pub ud: Mat<f64>,
+    pub udd: Mat<f64>,
+}
+
+/// What the inertia of all rows does at every instant, gravity as an acceleration that is not there.
+pub(super) struct Inertia {
+    /// w = M (R (V, omega) + omega x u + u').
+    pub momentum: Mat<f64>,
+    /// M (R (V' - g, omega') + omega' x u + omega x u' + u'').
+    pub change: Mat<f64>,
 }
 
 impl<'m> NodalView<'m> {
-    /// `body`, which was made of `model`; `None` when it has other rows.
-    pub fn new(model: &'m FeModel, body: &FlexBody, loads: Vec<Mat<f64>>) -> Option<Self> {
+    /// `body`, with the damping of its scene, which was made of `model` and is carried by the point `carrier`; `None` when it has other
+    /// rows, modes that depend on each other, or is carried by a point without an orientation.
+    pub fn new(
+        model: &'m FeModel,
+        body: &FlexBody,
+        loads: Vec<Mat<f64>>,
+        carrier: Option<&NodalPoint>,
+    ) -> Option<Self> {
         let vectors = body.vectors_of(model)?;
         let weighted = model.pencil().apply_mass(vectors.as_ref());
+        let modal_mass = gram(vectors.as_ref(), weighted.as_ref());
+        let lower = dense_cholesky(modal_mass.clone())?;
         let rigid = model.rigid_fields(body.frame().origin.into(), 1.0);
-        Some(Self { model, vectors, weighted, rigid, axes: body.frame().axes, loads })
+        let held = match carrier {
+            Some(point) => Some(Held::new(model, point, &rigid)?),
+            None => None,
+        };
+        Some(Self {
+            model,
+            vectors,
+            weighted,
+            modal_mass,
+            lower,
+            modal_damping: body.damping(),
+            stiffens: !body.geometric_stiffness().is_empty(),
+            rigid,
+            axes: body.frame().axes,
+            loads,
+            held,
+        })
     }
 
-    /// r = f - K u - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with
+    /// r = f - K u - D u' - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with
     /// w = M (R (V, omega) + omega x u + u') and u = Psi q (theory 6.9 to 6.13), a column for every
-    /// instant, without what it does to the modes: that is zero, but for damping and geometric stiffness,
-    /// which nodes do not have.
+    /// instant, parted into g = Psi'r and r - M Psi m_ff^-1 g, of which what carries the body takes the
+    /// resultants. g vanishes but for what the equations of the body take as approximate; of geometric
+    /// stiffness, which nodes do not have, nothing is counted.
+    pub fn unbalanced(&self, motion: &[Instant]) -> Unbalanced {
+        let own = |of: fn(&Instant) -> &Vec<f64>| self.displacements(motion, of);
+        let field = Displacements { u: own(|now| &now.q), ud: own(|now| &now.qd), udd: own(|now| &now.qdd) };
+        let Inertia { momentum, change: mut taken } = self.inertia(motion, &field);
+        self.add_turned(motion, |now| self.axes * now.omega, &momentum, &mut taken);
+        taken += self.model.pencil().apply_stiffness(field.u.as_ref());
+        taken += self.damping_forces(motion, &field.ud);
+        let mut forces = self.loads_of(motion) - taken;
+        let mut in_modes = gram(self.vectors.as_ref(), forces.as_ref());
+        subtract_combination(forces.as_mut(), self.weighted.as_ref(), self.over_mass(&in_modes).as_ref());
+        if let Some(held) = &self.held {
+            held.balance(&mut forces);
+        }
+        if self.stiffens {
+            in_modes.fill(0.0);
+        }
+        Unbalanced { forces, in_modes }
+    }
+
+    /// The forces of [`NodalView::unbalanced`] beside what they do to the modes, few instants at a time.
     pub fn residual(&self, motion: &[Instant]) -> Mat<f64> {
         let mut residual = Mat::zeros(self.vectors.nrows(), motion.len());
         for first in (0..motion.len()).step_by(BLOCK) {
             let block = &motion[first..motion.len().min(first + BLOCK)];
-            residual.as_mut().subcols_mut(first, block.len()).copy_from(self.block(block));
+            residual.as_mut().subcols_mut(first, block.len()).copy_from(self.unbalanced(block).forces);
         }
         residual
     }
 
-    fn block(&self, motion: &[Instant]) -> Mat<f64> {
-        let u = self.displacements(motion, |now| &now.q);
-        let ud = self.displacements(motion, |now| &now.qd);
-        let udd = self.displacements(motion, |now| &now.qdd);
-        let omega = |now: &Instant| self.axes * now.omega;
-        let mut velocity = self.rigid_part(motion, |now| (now.velocity, now.omega)) + &ud;
-        self.add_turned(motion, omega, &u, &mut velocity);
-        let momentum = self.model.pencil().apply_mass(velocity.as_ref());
-
-        // Gravity is an acceleration that is not there.
-        let free = |now: &Instant| (now.velocity_rate - now.gravity, now.omega_rate);
-        let mut acceleration = self.rigid_part(motion, free) + udd;
-        self.add_turned(motion, |now| self.axes * now.omega_rate, &u, &mut acceleration);
-        self.add_turned(motion, omega, &ud, &mut acceleration);
-        let mut residual = self.model.pencil().apply_mass(acceleration.as_ref());
-        self.add_turned(motion, omega, &momentum, &mut residual);
-        residual += self.model.pencil().apply_stiffness(u.as_ref());
-        let mut residual = self.loads_of(motion) - residual;
-        let in_modes = gram(self.vectors.as_ref(), residual.as_ref());
-        subtract_combination(residual.as_mut(), self.weighted.as_ref(), in_modes.as_ref());
-        residual
+    /// m_ff^-1 x.
+    pub fn over_mass(&self, x: &Mat<f64>) -> Mat<f64> {
+        solve_upper(&self.lower, &solve_lower(&self.lower, x))
     }
 
-    fn displacements<'i>(&self, motion: &'i [Instant], of: impl Fn(&'i Instant) -> &'i Vec<f64>) -> Mat<f64> {
+    /// D u', as the equations of all nodes have it: that of the model, else that of the modes on the nodes
+    /// (theory 6.15).
+    fn damping_forces(&self, motion: &[Instant], ud: &Mat<f64>) -> Mat<f64> {
+        match self.model.damping() {
+            Some(Damping::Rayleigh { alpha, beta }) => {
+                let pencil = self.model.pencil();
+                let (of_mass, of_stiffness) =
+                    (pencil.apply_mass(ud.as_ref()), pencil.apply_stiffness(ud.as_ref()));
+                Mat::from_fn(ud.nrows(), ud.ncols(), |i, j| {
+                    alpha * of_mass[(i, j)] + beta * of_stiffness[(i, j)]
+                })
+            }
+            Some(Damping::Matrix(damping)) => {
+                let mut forces = Mat::zeros(ud.nrows(), ud.ncols());
+                multiply(damping, 1, ud.as_ref(), forces.as_mut());
+                forces
+            }
+            None | Some(Damping::Ratio(_) | Damping::Bands(_)) => {
+                let rates = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| motion[i].qd[j]);
+                let forces = combine(self.modal_damping.as_ref(), rates.as_ref());
+                combine(self.weighted.as_ref(), self.over_mass(&forces).as_ref())
+            }
+        }
+    }
+
+    /// What the inertia of the rows with the displacements `field` does while the frame moves as in `motion`.
+    pub fn inertia(&self, motion: &[Instant], field: &Displacements) -> Inertia {
+        let Displacements { u, ud, udd } = field;
+        let omega = |now: &Instant| self.axes * now.omega;
+        let mut velocity = self.rigid_part(motion, |now| (now.velocity, now.omega)) + ud;
+        self.add_turned(motion, omega, u, &mut velocity);
+        let free = |now: &Instant| (now.velocity_rate - now.gravity, now.omega_rate);
+        let mut acceleration = self.rigid_part(motion, free) + udd;
+        self.add_turned(motion, |now| self.axes * now.omega_rate, u, &mut acceleration);
+        self.add_turned(motion, omega, ud, &mut acceleration);
+        let weigh = |x: MatRef<'_, f64>| self.model.pencil().apply_mass(x);
+        Inertia { momentum: weigh(velocity.as_ref()), change: weigh(acceleration.as_ref()) }
+    }
+
+    /// Psi q, or with the rates or accelerations in place of q.
+    pub fn displacements(&self, motion: &[Instant], of: impl Fn(&Instant) -> &Vec<f64>) -> Mat<f64> {
         let q = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| of(&motion[i])[j]);
         combine(self.vectors.as_ref(), q.as_ref())
     }
@@ -119,7 +221,7 @@ impl<'m> NodalView<'m> {
     }
 
     /// Nodal forces of the loads of the scene.
-    fn loads_of(&self, motion: &[Instant]) -> Mat<f64> {
+    pub fn loads_of(&self, motion: &[Instant]) -> Mat<f64> {
         let mut forces = Mat::zeros(self.vectors.nrows(), motion.len());
         for (at, columns) in self.loads.iter().enumerate() {
             let amplitudes = self.along_model(motion, |now| now.loads[at]);

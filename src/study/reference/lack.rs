@@ -1,0 +1,211 @@
+//! The motion that a body lacks, and the errors that it makes.
+
+use super::answered::{Answer, Lacking};
+use super::grid::Grid;
+use super::missed::Missed;
+use super::residual::{BLOCK, NodalView};
+use super::turning::Turning;
+use crate::body::flex_body::FlexBody;
+use crate::body::invariants::symmetric_part;
+use crate::motion::scene::{Instant, OutputErrors, Peak, Scene, Trace, reaction_errors};
+use crate::numerics::linalg::{combine, gram, larger, not_negative, side_by_side};
+use faer::{Mat, MatRef};
+use nalgebra::Vector3;
+
+/// The displacements X y(t) of all rows that a body lacks, with X = [Psi, E]: its modes, which what it lacks
+/// drags along, and the static responses that it has not.
+pub(super) struct Lack<'a> {
+    view: &'a NodalView<'a>,
+    grid: &'a Grid,
+    /// The motion of the body at the instants.
+    looked_at: &'a [Instant],
+    /// X (N x (nf + k)).
+    columns: Mat<f64>,
+    answer: Answer,
+    /// K_ff and E'K E.
+    modal_stiffness: Mat<f64>,
+    energy: Mat<f64>,
+}
+
+/// Errors along the instants, and when that of the elastic energy is largest.
+pub(super) struct Found {
+    pub errors: OutputErrors,
+    pub time: f64,
+}
+
+impl<'a> Lack<'a> {
+    /// Of `body`, with the damping of its scene.
+    pub fn new(
+        view: &'a NodalView<'a>,
+        body: &FlexBody,
+        missed: &Missed,
+        looked_at: &'a [Instant],
+        grid: &'a Grid,
+        settled: bool,
+    ) -> Self {
+        let weigh = |x: MatRef<'_, f64>| view.model.pencil().apply_mass(x);
+        let (nf, k) = (view.vectors.ncols(), missed.responses.ncols());
+        let weighted = weigh(missed.responses.as_ref());
+        // Between instants that are far apart nothing is known of the frequencies of the modes.
+        let moving = if grid.is_fine { nf } else { 0 };
+        let first = |a: &Mat<f64>, columns: usize| a.as_ref().submatrix(0, 0, moving, columns).to_owned();
+        let modal_stiffness = symmetric_part(body.invariants().modal_stiffness());
+        let system = Lacking {
+            modal_stiffness: first(&modal_stiffness, moving),
+            modal_mass: first(&view.modal_mass, moving),
+            modal_damping: first(&view.modal_damping, moving),
+            shared_mass: first(&gram(view.vectors.as_ref(), weighted.as_ref()), k),
+            stiffness: missed.energy.clone(),
+            mass: symmetric_part(&gram(missed.responses.as_ref(), weighted.as_ref())),
+        };
+        let in_modes = missed.in_modes.as_ref().subrows(0, moving).to_owned();
+        let answer = system.answered(&missed.amplitudes, &in_modes, grid, settled);
+        let m = grid.times.len();
+        let zeros = || Mat::zeros(nf + k, m);
+        let placed = |own: Mat<f64>| {
+            let mut all = Mat::zeros(nf + k, m);
+            all.as_mut().subrows_mut(0, moving).copy_from(own.as_ref().subrows(0, moving));
+            all.as_mut().subrows_mut(nf, k).copy_from(own.as_ref().subrows(moving, k));
+            all
+        };
+        let answer = match answer {
+            Some(Answer { value, rate, acceleration }) => {
+                Answer { value: placed(value), rate: placed(rate), acceleration: placed(acceleration) }
+            }
+            None => Answer { value: zeros(), rate: zeros(), acceleration: zeros() },
+        };
+        Self {
+            view,
+            grid,
+            looked_at,
+            columns: side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]),
+            answer,
+            modal_stiffness,
+            energy: missed.energy.clone(),
+        }
+    }
+
+    /// z (k x m): the amplitudes of the responses.
+    pub fn of_responses(&self) -> Mat<f64> {
+        let nf = self.view.vectors.ncols();
+        self.answer.value.as_ref().subrows(nf, self.energy.nrows()).to_owned()
+    }
+
+    /// Errors relative to the motion of all nodes: that of the body, `motion`, with what it lacks.
+    pub fn errors(&self, scene: &Scene, body: &FlexBody, motion: &Trace, watched: &[Mat<f64>]) -> Found {
+        let (stress, time) = self.stress(motion);
+        let free = !scene.prescribes();
+        let errors = OutputErrors {
+            attitude: if free { self.attitude() } else { 0.0 },
+            deflection: self.deflection(body, motion, watched),
+            stress: Some(stress),
+            reaction: if free || !self.grid.is_fine { None } else { self.reaction(scene, motion) },
+        };
+        Found { errors, time }
+    }
+
+    /// sqrt(V(X y) / max V), with the elastic energy V, at its largest and when that is. What is missed is
+    /// K-orthogonal to the modes: its energy adds to theirs.
+    fn stress(&self, motion: &Trace) -> (f64, f64) {
+        let nf = self.view.vectors.ncols();
+        let y = &self.answer.value;
+        let of_responses = quadratics(&self.energy, &self.of_responses());
+        let in_modes = y.as_ref().subrows(0, nf).to_owned();
+        let of_modes = quadratics(&self.modal_stiffness, &in_modes);
+        let whole = Mat::from_fn(nf, y.ncols(), |j, i| in_modes[(j, i)] + self.looked_at[i].q[j]);
+        let root = |energy: f64| not_negative(0.5 * energy).sqrt();
+        let lacking = of_modes.iter().zip(&of_responses).map(|(a, b)| root(a + b));
+        let lacking = Peak::of(&self.grid.times, lacking);
+        let largest = match self.grid.is_fine {
+            true => {
+                let all = quadratics(&self.modal_stiffness, &whole);
+                let roots = all.iter().zip(&of_responses).map(|(a, b)| root(a + b));
+                Peak::of(&self.grid.times, roots).value
+            }
+            false => energy_scale(motion).hypot(lacking.value),
+        };
+        (lacking.value / largest.max(motion.resolution.root_energy), lacking.time)
+    }
+
+    /// The largest displacement X y of the watched points, of all nodes without any, over the largest of
+    /// Psi q + X y.
+    fn deflection(&self, body: &FlexBody, motion: &Trace, watched: &[Mat<f64>]) -> Option<f64> {
+        let (mut missed, mut whole) = (Vec::new(), Vec::new());
+        for first in (0..self.looked_at.len()).step_by(BLOCK) {
+            let count = BLOCK.min(self.looked_at.len() - first);
+            let y = self.answer.value.as_ref().subcols(first, count);
+            let lacking = combine(self.columns.as_ref(), y.to_owned().as_ref());
+            let u = self.view.displacements(&self.looked_at[first..first + count], |now| &now.q) + &lacking;
+            missed.extend(self.longest(&lacking, watched));
+            whole.extend(self.longest(&u, watched));
+        }
+        let largest = match (self.grid.is_fine, motion.deflections.is_empty()) {
+            (true, _) => Peak::of(&self.grid.times, whole).value,
+            (false, true) => motion.extremes.deflection.value * body.extent(),
+            (false, false) => {
+                let norms = |path: &Vec<Vector3<f64>>| {
+                    Peak::of(&motion.time, path.iter().map(nalgebra::Vector3::norm)).value
+                };
+                motion.deflections.iter().map(norms).fold(0.0, larger)
+            }
+        };
+        let scale = largest.max(motion.resolution.deflection);
+        (scale > 0.0).then(|| Peak::of(&self.grid.times, missed).value / scale)
+    }
+
+    /// Length of the longest displacement of the watched points, or of any node, of every column.
+    fn longest(&self, u: &Mat<f64>, watched: &[Mat<f64>]) -> Vec<f64> {
+        if watched.is_empty() {
+            return (0..u.ncols()).map(|i| self.view.model.longest_displacement(u.col_as_slice(i))).collect();
+        }
+        let mut longest = vec![0.0; u.ncols()];
+        for point in watched {
+            let moved = self.view.moved(point.as_ref(), u.as_ref());
+            longest
+                .iter_mut()
+                .zip(moved)
+                .for_each(|(longest, moved)| *longest = larger(*longest, moved.norm()));
+        }
+        longest
+    }
+
+    /// The angle that what is lacking turns a free body by.
+    fn attitude(&self) -> f64 {
+        let turning = Turning::new(self.view, &self.columns);
+        Peak::of(&self.grid.times, turning.angles(self.looked_at, &self.answer.value)).value
+    }
+
+    /// Differences of the reaction of the nodes with and without what is lacking.
+    fn reaction(&self, scene: &Scene, motion: &Trace) -> Option<f64> {
+        let (mut own, mut whole) = (Vec::new(), Vec::new());
+        let Answer { value, rate, acceleration } = &self.answer;
+        let nothing = Mat::<f64>::zeros(value.nrows(), BLOCK);
+        let holds = scene.carried.is_some() || scene.spin.as_ref().is_some_and(|spin| spin.hold);
+        for first in (0..self.looked_at.len()).step_by(BLOCK) {
+            let block = &self.looked_at[first..self.looked_at.len().min(first + BLOCK)];
+            let amplitudes = [value, rate, acceleration].map(|y| y.as_ref().subcols(first, block.len()));
+            let none = [(); 3].map(|()| nothing.as_ref().subcols(0, block.len()));
+            for (all, y) in [(&mut whole, amplitudes), (&mut own, none)] {
+                let field = self.view.field(block, self.columns.as_ref(), y);
+                let reactions = self.view.reactions(block, &field);
+                let given = |(force, torque)| (if holds { force } else { Vector3::zeros() }, torque);
+                all.extend(reactions.into_iter().map(given));
+            }
+        }
+        let errors = reaction_errors(&self.grid.times, [&whole, &own], motion.size, &motion.extremes)?;
+        Some(Peak::of(&self.grid.times, errors).value)
+    }
+}
+
+/// x'A x of every column.
+fn quadratics(a: &Mat<f64>, x: &Mat<f64>) -> Vec<f64> {
+    let product = combine(a.as_ref(), x.as_ref());
+    let of = |i: usize| (0..x.nrows()).map(|k| x[(k, i)] * product[(k, i)]).sum();
+    (0..x.ncols()).map(of).collect()
+}
+
+/// Root of the largest elastic energy of a motion, or the least that counts.
+pub(super) fn energy_scale(motion: &Trace) -> f64 {
+    let roots = motion.elastic.iter().map(|energy| energy.max(0.0).sqrt());
+    Peak::of(&motion.time, roots).value.max(motion.resolution.root_energy)
+}
