@@ -57,8 +57,8 @@ impl Lacking {
     ///     = (g, E'K E c + E'M Psi m_ff^-1 g)
     /// ```
     ///
-    /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the modes on all
-    /// nodes, of which the diagonal counts in the own motions of the system. Each of these is solved exactly.
+    /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the modes
+    /// on all nodes, of which the diagonal counts in the own motions of the system. Each of these is solved exactly.
     /// Where c changes slowly beside its frequency that is the static response; where it changes as fast, or
     /// begins with a shock, the static response would be too small. What is missed drags along modes that are
     /// no eigenvectors, by its inertia.
@@ -228,8 +228,8 @@ mod tests {
     use super::*;
 
     fn grid(times: Vec<f64>) -> Grid {
-        let pieces = vec![0..times.len()];
-        Grid { times, pieces, is_fine: true }
+        let whole = 0..times.len();
+        Grid { times, pieces: Vec::from([whole]), is_fine: true }
     }
 
     /// No forces on the modes.

@@ -12,8 +12,8 @@ const LEAST: usize = 120;
 const MOST: usize = 20_000;
 const MOST_NUMBERS: usize = 20_000_000;
 
-/// Intervals in the period of the fastest motion that counts, and the fewest that show it: a spline through so
-/// many values of an oscillation has its second derivative to 2 %, and to 5 %.
+/// Intervals in the period of the fastest motion that counts, and the fewest that show it: a spline through
+/// so many values of an oscillation has its second derivative to 2 %, and to 5 %.
 const PER_PERIOD: f64 = 12.0;
 const FEWEST_PER_PERIOD: f64 = 8.0;
 

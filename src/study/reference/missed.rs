@@ -22,7 +22,8 @@ pub(super) struct Missed {
     pub amplitudes: Mat<f64>,
     /// g (nf x m): what the unbalanced forces do to the modes.
     pub in_modes: Mat<f64>,
-    /// E = K^+ B (N x k), beside the modes; where something carries the body with the point at rest that does.
+    /// E = K^+ B (N x k), beside the modes; where something carries the body, with the point at rest that
+    /// does.
     pub responses: Mat<f64>,
     /// E'K E.
     pub energy: Mat<f64>,

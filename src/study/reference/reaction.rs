@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 
 impl NodalView<'_> {
     /// Force and torque about the origin of the frame, axes of the model, that a motion of the frame as in
-    /// `motion` takes of the nodes with the displacements `field`, at every instant: with the momenta p = R_t'w
-    /// and h = (R_r + B(u))'w,
+    /// `motion` takes of the nodes with the displacements `field`, at every instant: with the momenta
+    /// p = R_t'w and h = (R_r + B(u))'w,
     ///
     /// ```text
     /// p' + omega x p - F,    h' + omega x h + V x p - tau
