@@ -394,9 +394,9 @@ impl Body {
     /// Measures what accuracy costs in a scene, of parts of this body. `Model.trade` compares conversions.
     #[pyo3(signature = (scene, *, repeat=3))]
     fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
-        let (scene, body) = (Scene::one(py, scene)?, Arc::clone(&self.inner));
+        let (cases, body) = (cases_of(py, scene)?, Arc::clone(&self.inner));
         let options = trade_options(self.inner.n_modes(), repeat, "full")?;
-        Trade::told(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
+        Trade::told(py, run(py, move |listener| body.trade_for_cases(&cases, &options, listener))?)
     }
 
     /// The report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.

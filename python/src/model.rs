@@ -3,7 +3,7 @@
 use crate::arrays::rows_of_three;
 use crate::body::Body;
 use crate::errors::{diagnostics, exception, warn};
-use crate::scene::{Scene, cases_of};
+use crate::scene::cases_of;
 use crate::trade::{Trade, options as trade_options};
 use crate::work::run;
 use flexbody::{Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, Frame, ModelBuilder, SparseMatrix};
@@ -287,7 +287,8 @@ impl Model {
         Ok(Body::new(body, found))
     }
 
-    /// Measures what accuracy costs in a scene: candidate bodies beside a reference, as `flexbody.trade`.
+    /// Measures what accuracy costs in a scene: candidate bodies beside a reference, as `flexbody.trade`. Of
+    /// several load cases every candidate is measured in each, and is as good as it is in the worst.
     #[pyo3(signature = (scene, *, modes=20, repeat=3, reference="full"))]
     fn trade(
         &self,
@@ -297,9 +298,9 @@ impl Model {
         repeat: usize,
         reference: &str,
     ) -> PyResult<Trade> {
-        let (scene, options) = (Scene::one(py, scene)?, trade_options(modes, repeat, reference)?);
+        let (cases, options) = (cases_of(py, scene)?, trade_options(modes, repeat, reference)?);
         let model = Arc::clone(&self.inner);
-        Trade::told(py, run(py, move |listener| model.trade(&scene, &options, listener))?)
+        Trade::told(py, run(py, move |listener| model.trade_for_cases(&cases, &options, listener))?)
     }
 
     fn __repr__(&self) -> String {

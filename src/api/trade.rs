@@ -1,4 +1,4 @@
-//! What accuracy costs in a scene.
+//! What accuracy costs in a scene, or in several load cases.
 
 use super::progress::{Listener, heard};
 use super::{FlexBody, Model, ReportFormat, Scene, report};
@@ -8,7 +8,7 @@ use crate::base::progress::Watch;
 use crate::body::basis::ModeSettings;
 use crate::report::{TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{self, Settings, Source, conversions};
+use crate::study::trade::{self, ReferenceKind, Settings, Source, conversions_for_cases};
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
 /// everything that it has, the median time of 3 simulations of each candidate.
@@ -50,7 +50,8 @@ impl TradeOptions {
 pub struct Trade {
     study: trade::Trade,
     sources: Vec<Source>,
-    lacks: Vec<ReferenceError>,
+    /// Of each load case.
+    lacks: Vec<Vec<ReferenceError>>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -62,13 +63,28 @@ impl Model {
     /// As [`Model::convert`]; FB212 where the scene does not fit the body; FB540 when its motion cannot be
     /// integrated; FB605 where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
+        self.trade_for_cases(std::slice::from_ref(scene), options, listener)
+    }
+
+    /// The same for several load cases: every candidate is measured in each, and as good as it is in the
+    /// worst.
+    ///
+    /// # Errors
+    /// As [`Model::trade`]; FB801 when there is no case.
+    pub fn trade_for_cases(
+        &self,
+        cases: &[Scene],
+        options: &TradeOptions,
+        listener: Listener<'_>,
+    ) -> Result<Trade> {
+        let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
         heard(listener, |watch| {
-            let made = conversions(&self.checked, &scene.0, options.modes, None, None, watch)?;
+            let made = conversions_for_cases(&self.checked, &scenes, options.modes, None, None, watch)?;
             let nodal = options.nodal.then_some(&self.checked);
-            let lacking = made.lacks.last().filter(|own| nodal.is_none() && own.is_reference());
-            let reserved = lacking.map_or(0.0, |own| own.worst);
-            let settings = Settings { repeat: options.repeat, memory: None, reserved, longest: None };
-            let study = trade::trade(&made.sources, &scene.0, nodal, &settings, watch)?;
+            let reserved = trade::reserved(&made.lacks, options.nodal);
+            let settings =
+                Settings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
+            let study = trade::trade_for_cases(&made.sources, &scenes, nodal, &settings, watch)?;
             let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
             Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
         })
@@ -82,13 +98,27 @@ impl FlexBody {
     /// FB801 for errors against all nodes, of which a body knows nothing; FB212 and FB540 as there; FB605
     /// where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
+        self.trade_for_cases(std::slice::from_ref(scene), options, listener)
+    }
+
+    /// The same for several load cases, as [`Model::trade_for_cases`].
+    ///
+    /// # Errors
+    /// As [`FlexBody::trade`]; FB801 when there is no case.
+    pub fn trade_for_cases(
+        &self,
+        cases: &[Scene],
+        options: &TradeOptions,
+        listener: Listener<'_>,
+    ) -> Result<Trade> {
         if options.nodal {
             let message = "errors against all nodes need the matrices: ask the model, not the body";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
+        let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
         let sources = vec![Source::new("file", self.0.clone(), None)?];
-        let settings = Settings { repeat: options.repeat, memory: None, reserved: 0.0, longest: None };
-        let measure = |watch: Watch<'_>| trade::trade(&sources, &scene.0, None, &settings, watch);
+        let settings = Settings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
+        let measure = |watch: Watch<'_>| trade::trade_for_cases(&sources, &scenes, None, &settings, watch);
         let study = heard(listener, measure)?;
         let diagnostics = study.diagnostics.clone();
         Ok(Trade { study, sources, lacks: Vec::new(), diagnostics })
@@ -125,8 +155,10 @@ impl Trade {
 
     /// Whether there is a candidate to take, and what it was measured against can be trusted.
     pub fn holds(&self) -> bool {
-        let nodal = self.study.nodal.is_some();
-        self.recommended().is_some() && (nodal || self.lacks.last().is_none_or(ReferenceError::is_reference))
+        let nodal = self.study.reference == ReferenceKind::Nodal;
+        let is_reference =
+            |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
+        self.recommended().is_some() && (nodal || self.lacks.iter().all(is_reference))
     }
 
     /// The report of `flexbody trade`.

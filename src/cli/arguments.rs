@@ -233,7 +233,7 @@ pub struct TradeArguments {
     /// What the body does, and the tolerances (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Load case of the scene to take, by its name (a scene with cases needs one)
+    /// Load case of the scene to take, by its name [default: all; a candidate is as good as in the worst]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
     /// What errors are measured against: full, the body with all modes and groups, of a model twice the

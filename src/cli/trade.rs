@@ -5,6 +5,7 @@ use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::resources::{longest, memory_left, use_threads};
+use super::select::asked_cases;
 use super::watcher::Watcher;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -12,10 +13,9 @@ use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::body::basis::ModeSettings;
 use crate::formats::flex_body_file;
-use crate::motion::scene::read_case;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Row, Settings, Source, Trade, conversions, trade};
+use crate::study::trade::{Row, Settings, Source, Trade, conversions_for_cases, reserved, trade_for_cases};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
@@ -29,8 +29,9 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scene = read_case(&arguments.scene, arguments.case.as_deref())?;
-    refuse_replacing(scene.series.iter().map(|file| &file.path), outputs())?;
+    let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
+    let series = scenes.iter().flat_map(|scene| &scene.series);
+    refuse_replacing(series.map(|file| &file.path), outputs())?;
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();
     let (model, sources, lacks) = if is_model {
@@ -39,7 +40,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
         let longest = longest(arguments.allow_long);
         let watch = |event: Event<'_>| watcher.hear(event);
-        let made = conversions(&checked.model, &scene, modes, memory, longest, &watch)
+        let made = conversions_for_cases(&checked.model, &scenes, modes, memory, longest, &watch)
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
         (Some(checked.model), made.sources, made.lacks)
@@ -49,16 +50,15 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         (None, vec![Source::new("file", body, None)?], Vec::new())
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
-    // All nodes lack nothing.
-    let lacking = lacks.last().filter(|own| nodal.is_none() && own.is_reference());
-    let reserved = lacking.map_or(0.0, |own| own.worst);
+    let reserved = reserved(&lacks, nodal.is_some());
     let settings = Settings {
         repeat: arguments.repeat.into(),
         memory: memory_left(None),
-        reserved,
+        reserved: &reserved,
         longest: longest(arguments.allow_long),
     };
-    let study = trade(&sources, &scene, nodal, &settings, &|event: Event<'_>| watcher.hear(event))
+    let watch = |event: Event<'_>| watcher.hear(event);
+    let study = trade_for_cases(&sources, &scenes, nodal, &settings, &watch)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
@@ -80,7 +80,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     };
     // Nothing appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports).chain(bodies))?;
-    let is_reference = nodal.is_some() || lacks.last().is_none_or(ReferenceError::is_reference);
+    let holds = |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
+    let is_reference = nodal.is_some() || lacks.iter().all(holds);
     let passed = study.recommended.row().is_some() && is_reference;
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })

@@ -45,6 +45,8 @@ mod term_facts;
 mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
+mod trade_cases;
+mod trade_nodes;
 #[cfg(feature = "hdf5")]
 mod trade_verdict;
 mod unit_names;

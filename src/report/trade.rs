@@ -9,13 +9,15 @@ use super::render::json;
 use super::run_data::RunData;
 use super::scatter_chart::{Chart, Series, scatter_chart};
 use super::text::{Page, diagnostics_lines};
+use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
+use super::trade_nodes::NodalFacts;
 use super::trade_verdict::verdict_lines;
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::generator;
 use crate::body::flex_body::Storage;
-use crate::motion::scene::{OutputErrors, Scheme, Tolerance};
+use crate::motion::scene::{OutputErrors, Tolerance};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Kind, LumpedMass, Measured, NodalIntegration, ReferenceKind, Row, Trade};
+use crate::study::trade::{InCase, Kind, LumpedMass, Measured, ReferenceKind, Row, Trade, TradeCase};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -32,11 +34,13 @@ pub struct TradeFacts<'a> {
     scene: &'a str,
     body: &'a str,
     reference: ReferenceKind,
-    /// How the equations of all nodes were integrated, where they are the reference.
+    /// How the equations of all nodes were integrated, where they are the reference; of several load cases in
+    /// the first.
     nodal: Option<NodalFacts>,
     /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only
-    /// a file is at hand.
+    /// a file is at hand. Of several load cases in that where it is most.
     reference_lacks: Vec<LackFacts>,
+    /// Of several load cases the least of any.
     tolerance: Tolerance,
     allowed_multiplications: Option<usize>,
     /// The study in five lines.
@@ -44,6 +48,9 @@ pub struct TradeFacts<'a> {
     recommended: Option<usize>,
     front: Vec<usize>,
     rows: Vec<RowFacts<'a>>,
+    /// What belongs to each load case, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cases: Vec<TradeCaseFacts<'a>>,
     diagnostics: &'a [Diagnostic],
     threads: usize,
     wall_seconds: f64,
@@ -55,47 +62,6 @@ pub struct TradeFacts<'a> {
 struct VerdictLine {
     label: &'static str,
     text: String,
-}
-
-/// How the equations of all nodes were integrated.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct NodalFacts {
-    rows: usize,
-    /// None: of order 8 with error control.
-    order: Option<usize>,
-    tolerance: Option<f64>,
-    step: Option<f64>,
-    steps: u64,
-    error: Option<f64>,
-}
-
-impl NodalFacts {
-    fn new(nodal: &NodalIntegration) -> Self {
-        let (order, tolerance, step) = match nodal.scheme {
-            Scheme::Adaptive { tolerance } => (None, Some(tolerance), None),
-            Scheme::Conserving { order, step } => (Some(order), None, step),
-        };
-        Self { rows: nodal.rows, order, tolerance, step, steps: nodal.steps, error: nodal.error }
-    }
-
-    fn in_words(&self) -> String {
-        let how = match (self.order, self.step, self.tolerance) {
-            (Some(order), Some(step), _) => {
-                format!("implicit steps of order {order}, of {} at most", significant(step, 3))
-            }
-            (_, _, tolerance) => {
-                format!("explicit steps, tolerance {}", significant(tolerance.unwrap_or(0.0), 2))
-            }
-        };
-        let worth = match self.error {
-            Some(error) => {
-                let part = significant(100.0 * error, 2);
-                format!("; steps twice as long change it by {part} % of the tolerances")
-            }
-            None => String::new(),
-        };
-        format!("{} rows, {} {how}{worth}", self.rows, self.steps)
-    }
 }
 
 /// A candidate.
@@ -115,15 +81,21 @@ struct RowFacts<'a> {
     lumped_part: Option<&'static str>,
     storage: &'static str,
     failed: Option<&'a Diagnostic>,
-    measured: Option<MeasuredFacts>,
+    measured: Option<MeasuredFacts<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct MeasuredFacts {
+struct MeasuredFacts<'a> {
+    /// Of several load cases in that where they are largest beside the tolerances.
     errors: OutputErrors,
     /// Largest ratio of error to tolerance.
     worst: f64,
     growth: Option<f64>,
+    /// This case, and the largest ratio in each.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    case: Option<&'a str>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    by_case: Vec<f64>,
     multiplications: usize,
     file_bytes: u64,
     /// Nothing of candidates that are not on the front.
@@ -141,13 +113,18 @@ struct Seconds {
     integration: Option<f64>,
 }
 
-impl MeasuredFacts {
-    fn new(measured: &Measured) -> Self {
+impl<'a> MeasuredFacts<'a> {
+    fn new(measured: &Measured, cases: &'a [TradeCase]) -> Self {
         let timed = measured.timed.as_ref();
+        let InCase { errors, worst, growth } = *measured.deciding();
+        let case = cases[measured.case].name.as_deref();
+        let ratios = measured.by_case.iter().map(|own| own.worst);
         Self {
-            errors: measured.errors,
-            worst: measured.worst,
-            growth: measured.growth,
+            errors,
+            worst,
+            growth,
+            case,
+            by_case: ratios.filter(|_| case.is_some()).collect(),
             multiplications: measured.multiplications,
             file_bytes: measured.bytes,
             steps: timed.map(|timed| timed.work.steps),
@@ -163,7 +140,7 @@ impl MeasuredFacts {
 }
 
 impl<'a> RowFacts<'a> {
-    fn new(number: usize, row: &'a Row) -> Self {
+    fn new(number: usize, row: &'a Row, cases: &'a [TradeCase]) -> Self {
         let candidate = &row.candidate;
         Self {
             number,
@@ -177,7 +154,7 @@ impl<'a> RowFacts<'a> {
             lumped_part: candidate.lumped.as_ref().map(LumpedMass::part),
             storage: candidate.storage.name(),
             failed: row.outcome.as_ref().err().map(|failed| &failed.0),
-            measured: row.outcome.as_ref().ok().map(MeasuredFacts::new),
+            measured: row.outcome.as_ref().ok().map(|measured| MeasuredFacts::new(measured, cases)),
         }
     }
 
@@ -207,10 +184,11 @@ impl<'a> RowFacts<'a> {
 }
 
 impl<'a> TradeFacts<'a> {
-    /// Facts of a study whose reference `lacks` something of the model, and of the run that made it.
-    pub fn new(trade: &'a Trade, lacks: &[ReferenceError], run: &'a RunData) -> Self {
-        let rows: Vec<RowFacts<'a>> =
-            trade.rows.iter().enumerate().map(|(at, row)| RowFacts::new(at + 1, row)).collect();
+    /// Facts of a study whose reference `lacks` something of the model in each load case, and of the run that
+    /// made it.
+    pub fn new(trade: &'a Trade, lacks: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
+        let row = |(at, row): (usize, &'a Row)| RowFacts::new(at + 1, row, &trade.cases);
+        let rows: Vec<RowFacts<'a>> = trade.rows.iter().enumerate().map(row).collect();
         let mut facts = Self {
             format: "flexbody-trade",
             format_major: 2,
@@ -219,23 +197,28 @@ impl<'a> TradeFacts<'a> {
             scene: &trade.scene,
             body: &trade.body,
             reference: trade.reference,
-            nodal: trade.nodal.as_ref().map(NodalFacts::new),
-            reference_lacks: lacks.iter().map(LackFacts::new).collect(),
-            tolerance: trade.tolerance,
+            nodal: trade.cases[0].nodal.as_ref().map(NodalFacts::new),
+            reference_lacks: worst_lacks(lacks).iter().map(LackFacts::new).collect(),
+            tolerance: least_tolerance(trade),
             allowed_multiplications: trade.allowed,
             verdict: Vec::new(),
             recommended: trade.recommended.row().map(|row| row + 1),
             front: trade.front.iter().map(|row| row + 1).collect(),
             rows,
+            cases: case_facts(trade, lacks),
             diagnostics: &run.diagnostics,
             threads: run.threads,
             wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
             cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
         };
-        let names: Vec<String> = facts.rows.iter().map(RowFacts::in_words).collect();
+        let names = facts.names();
         let lines = verdict_lines(trade, &names, &facts.tolerances_in_words()).into_iter();
         facts.verdict = lines.map(|(label, text)| VerdictLine { label, text }).collect();
         facts
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.rows.iter().map(RowFacts::in_words).collect()
     }
 
     /// The facts in a format, ending with a line break.
@@ -286,6 +269,10 @@ impl<'a> TradeFacts<'a> {
         );
         for line in &self.verdict {
             page.entry(line.label, &line.text);
+        }
+        let names = self.names();
+        for (i, case) in self.cases.iter().enumerate() {
+            page.entry(if i == 0 { "Load cases" } else { "" }, &case.in_words(&names));
         }
         if let Some(nodal) = &self.nodal {
             page.entry("Nodes", &nodal.in_words());
@@ -355,6 +342,10 @@ impl<'a> TradeFacts<'a> {
                 ),
             ],
         );
+        if !self.cases.is_empty() {
+            section(&mut html, "Load cases");
+            cases_table(&mut html, &self.cases, &self.names());
+        }
         section(&mut html, "Error against cost");
         html.push_str(&self.chart());
         section(&mut html, "Pareto front");
@@ -395,12 +386,13 @@ impl<'a> TradeFacts<'a> {
         let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
         let none = || "&ndash;".to_owned();
         let optional = |value: Option<f64>| value.map_or_else(none, |v| significant(v, 3));
-        let made_in = |m: &MeasuredFacts| m.seconds.preprocessing.map_or_else(none, duration);
+        let made_in = |m: &MeasuredFacts<'_>| m.seconds.preprocessing.map_or_else(none, duration);
         let mut head = vec!["No.", "What"];
         head.extend(several.then_some("Of"));
         head.extend(["To (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
         head.extend(several.then_some("Made in"));
         head.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
+        head.extend((!self.cases.is_empty()).then_some("Worst case"));
         let cells = |row: &&RowFacts<'a>| {
             let take = if self.recommended == Some(row.number) { "&#9654;&nbsp;" } else { "" };
             let mut cells =
@@ -424,6 +416,7 @@ impl<'a> TradeFacts<'a> {
                         optional(m.errors.reaction),
                         significant(m.worst, 3),
                     ]);
+                    cells.extend(m.case.map(escape));
                 }
                 (None, failed) => {
                     let message = failed.map_or("", |diagnostic| diagnostic.message());
@@ -439,6 +432,28 @@ impl<'a> TradeFacts<'a> {
     }
 }
 
+/// What the reference lacks in the load case where it lacks most at last.
+fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
+    let last = |rounds: &&Vec<ReferenceError>| rounds.last().map_or(-1.0, |own| own.worst);
+    // The first of equals.
+    let worst = lacks.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
+    worst.map_or(&[], Vec::as_slice)
+}
+
+/// Largest errors that are allowed in all load cases.
+fn least_tolerance(trade: &Trade) -> Tolerance {
+    let mut least = trade.cases[0].tolerance;
+    for Tolerance { attitude, deflection, stress, reaction, .. } in
+        trade.cases.iter().map(|case| case.tolerance)
+    {
+        least.attitude = least.attitude.min(attitude);
+        least.deflection = least.deflection.min(deflection);
+        least.stress = least.stress.min(stress);
+        least.reaction = least.reaction.min(reaction);
+    }
+    least
+}
+
 /// A short time.
 fn short(seconds: f64) -> String {
     if seconds < 1e-6 {
@@ -452,15 +467,15 @@ fn short(seconds: f64) -> String {
 pub fn trade_csv(trade: &Trade) -> String {
     let mut out = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
                    integration_seconds,preprocessing_seconds,steps,file_bytes,attitude,deflection,stress,reaction,worst,\
-                   on_front,recommended,failed\n"
+                   case,on_front,recommended,failed\n"
         .to_owned();
     for (at, row) in trade.rows.iter().enumerate() {
-        let facts = RowFacts::new(at + 1, row);
+        let facts = RowFacts::new(at + 1, row, &trade.cases);
         let text = |text: &str| super::simulation::csv_cell(text);
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
         let errors = m.map(|m| m.errors);
-        let count = |number: fn(&MeasuredFacts) -> Option<u64>| {
+        let count = |number: fn(&MeasuredFacts<'_>) -> Option<u64>| {
             m.and_then(number).map_or_else(String::new, |value| value.to_string())
         };
         let cells = [
@@ -484,6 +499,7 @@ pub fn trade_csv(trade: &Trade) -> String {
             number(errors.and_then(|e| e.stress)),
             number(errors.and_then(|e| e.reaction)),
             number(m.map(|m| m.worst)),
+            text(m.and_then(|m| m.case).unwrap_or_default()),
             trade.front.contains(&at).to_string(),
             (trade.recommended.row() == Some(at)).to_string(),
             text(facts.failed.map_or("", |failed| failed.message())),

@@ -1,8 +1,8 @@
 //! A trade study in five lines: what was asked, what to take, why, the error, and what it saves.
 
 use super::errors_in_words::errors_in_words;
-use super::numbers::{duration, significant};
-use crate::study::trade::{Measured, Recommendation, Row, Trade};
+use super::numbers::{duration, plain, significant};
+use crate::study::trade::{InCase, Measured, Recommendation, Row, Trade};
 
 /// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in
 /// words.
@@ -22,7 +22,7 @@ pub(super) fn verdict_lines(
         ("Asked", asked),
         ("Take", taken(&names[at], row)),
         ("Why", why(trade, names, measured)),
-        ("Error", error(measured)),
+        ("Error", error(trade, measured)),
         ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
     ]
 }
@@ -30,6 +30,9 @@ pub(super) fn verdict_lines(
 fn asked(trade: &Trade, tolerances: &str) -> String {
     match trade.allowed {
         Some(allowed) => format!("the most accurate of at most {allowed} multiplications per evaluation"),
+        None if trade.cases.len() > 1 => {
+            format!("in {} load cases errors of at most {tolerances}", trade.cases.len())
+        }
         None => format!("errors of at most {tolerances}"),
     }
 }
@@ -38,7 +41,7 @@ fn nothing(trade: &Trade) -> String {
     if trade.allowed.is_some() {
         return "no candidate is as cheap as allowed".to_owned();
     }
-    let worst = trade.rows.iter().filter_map(|row| Some(row.outcome.as_ref().ok()?.worst));
+    let worst = trade.rows.iter().filter_map(|row| Some(row.outcome.as_ref().ok()?.worst()));
     match worst.fold(f64::INFINITY, f64::min) {
         worst if worst.is_finite() => {
             let worst = significant(worst, 3);
@@ -68,31 +71,42 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
         (own.multiplications < measured.multiplications).then_some((at, own))
     });
     let Some((at, own)) = cheaper else { return first };
-    let (output, error, allowed) = own.errors.decisive(&trade.tolerance);
+    let case = &trade.cases[own.case];
+    let (output, error, allowed) = own.deciding().errors.decisive(&case.tolerance);
     let part = error / allowed;
     let times = significant(part, 2);
-    let reference = match part <= 1.0 && trade.reserved > 0.0 {
-        true => format!(", beside the {} that the reference itself lacks", significant(trade.reserved, 2)),
+    let reference = match part <= 1.0 && case.reserved > 0.0 {
+        true => format!(", beside the {} that the reference itself lacks", significant(case.reserved, 2)),
         false => String::new(),
     };
     format!(
-        "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed{reference}",
-        names[at]
+        "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed{}{reference}",
+        names[at],
+        in_case(trade, own)
     )
 }
 
-fn error(measured: &Measured) -> String {
-    let growth = measured.growth.map_or_else(String::new, |growth| {
+/// ` in case braking`, of several load cases.
+fn in_case(trade: &Trade, measured: &Measured) -> String {
+    let name = trade.cases[measured.case].name.as_ref();
+    name.map_or_else(String::new, |name| format!(" in case {}", plain(name)))
+}
+
+fn error(trade: &Trade, measured: &Measured) -> String {
+    let InCase { errors, worst, growth } = measured.deciding();
+    let growth = growth.map_or_else(String::new, |growth| {
         format!(
             "; grows with time, {} times more than the motion from the first half to the second",
             significant(growth, 2)
         )
     });
-    let worst = significant(100.0 * measured.worst, 2);
-    format!("{}: {worst} % of what is allowed{growth}", errors_in_words(&measured.errors))
+    let worst = significant(100.0 * worst, 2);
+    let case = in_case(trade, measured);
+    format!("{}: {worst} % of what is allowed{case}{growth}", errors_in_words(errors))
 }
 
 fn saves(whole: &Measured, own: &Measured) -> String {
+    let run = if own.by_case.len() > 1 { "the runs of all load cases" } else { "this run" };
     let ratio = |whole: f64, own: f64| significant(whole / own, 2);
     let work = ratio(whole.multiplications as f64, own.multiplications as f64);
     if whole.multiplications == own.multiplications {
@@ -101,7 +115,7 @@ fn saves(whole: &Measured, own: &Measured) -> String {
     let times = whole.timed.zip(own.timed).map(|(before, after)| (before.integration, after.integration));
     let seconds = times.map_or_else(String::new, |(before, after)| {
         let (own, all) = (duration(after), duration(before));
-        format!("; {own} instead of {all} for this run in flexbody, {} times less", ratio(before, after))
+        format!("; {own} instead of {all} for {run} in flexbody, {} times less", ratio(before, after))
     });
     format!("{work} times fewer multiplications per evaluation{seconds}")
 }

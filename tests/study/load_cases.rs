@@ -225,6 +225,47 @@ fn reports_tell_every_case() {
 }
 
 #[test]
+fn a_trade_study_measures_candidates_in_every_case() {
+    let folder = folder();
+    let place = folder.path();
+    written(place);
+    let words = ["trade", "rod.flex.h5", "--repeat", "1", "--scene"];
+    let told = |more: &[&str]| -> Value {
+        let run = flexbody(place, &[&words[..], more, &["--json"]].concat());
+        let told: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+        assert!(run.status.success(), "{told:#}");
+        told["results"].clone()
+    };
+    let both = told(&["cases.toml", "--report", "t.html", "--report", "t.txt", "--csv", "t.csv"]);
+    let schema = serde_json::from_str(include_str!("../../schemas/trade-report.schema.json")).expect("JSON");
+    let schema = jsonschema::validator_for(&schema).expect("a schema");
+    let wrong: Vec<String> = schema.iter_errors(&both).map(|error| error.to_string()).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    let cases = both["cases"].as_array().expect("cases");
+    assert!(cases.iter().map(|case| &case["name"]).eq(["slow", "fast"]), "{cases:#?}");
+    assert_eq!((&both["scene"], both["tolerance"]["reaction"].as_f64()), (&Value::from("rod"), Some(0.05)));
+    let taken = &both["rows"][both["recommended"].as_u64().expect("a row") as usize - 1]["measured"];
+    for (at, case) in cases.iter().enumerate() {
+        assert_eq!(case["worst"], taken["by_case"][at], "{case:#}");
+    }
+    let text = fs::read_to_string(place.join("t.txt")).expect("a text");
+    assert!(text.contains("Load cases  slow: ") && text.contains("in 2 load cases errors"), "{text}");
+    let page = fs::read_to_string(place.join("t.html")).expect("a page");
+    assert!(page.contains("Load cases") && page.contains("Worst case"));
+    let table = fs::read_to_string(place.join("t.csv")).expect("a table");
+    let columns = table.lines().next().expect("a head").split(',').count();
+    assert!(table.lines().all(|line| line.split(',').count() == columns), "{table}");
+    // A case by its name is a scene of its own, but for the times.
+    let (alone, own) = (told(&["cases.toml", "--case", "fast"]), told(&["fast.toml"]));
+    assert!(alone.get("cases").is_none());
+    assert_eq!((&alone["recommended"], &alone["front"]), (&own["recommended"], &own["front"]));
+    for (a, b) in alone["rows"].as_array().expect("rows").iter().zip(own["rows"].as_array().expect("rows")) {
+        let (a, b) = (&a["measured"], &b["measured"]);
+        assert!(a["errors"] == b["errors"] && a["worst"] == b["worst"] && a.get("by_case").is_none());
+    }
+}
+
+#[test]
 #[ignore = "slow"]
 fn a_body_is_made_for_all_cases_of_a_scene() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -17,14 +17,14 @@ use flexbody::motion::scene::{Axes, Initial, ModeStart, Scene, Scheme, Tolerance
 use flexbody::numerics::eigen::Wanted;
 use flexbody::study::selection::select;
 use flexbody::study::trade::{
-    Conversions, Kind, LumpedMass, Recommendation, ReferenceKind, Row, Settings, Source, Trade, conversions,
-    front, trade,
+    Conversions, Kind, LumpedMass, Measured, Recommendation, ReferenceKind, Row, Settings, Source, Trade,
+    conversions, front, trade, trade_for_cases,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs;
 
-const QUICK: Settings = Settings { repeat: 1, memory: None, reserved: 0.0, longest: None };
+const QUICK: Settings<'static> = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
 
 /// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns`
 /// turns.
@@ -72,7 +72,7 @@ fn a_soft_body_that_tumbles_fast_needs_every_group() {
     assert_eq!(recommended(&found).candidate.groups, Groups::ALL);
     for row in &found.rows {
         if row.candidate.groups != Groups::ALL {
-            let worst = row.outcome.as_ref().map_or(f64::INFINITY, |measured| measured.worst);
+            let worst = row.outcome.as_ref().map_or(f64::INFINITY, |measured| measured.worst());
             assert!(worst > 1.0, "{row:?}");
         }
     }
@@ -83,7 +83,7 @@ fn the_reference_is_no_distance_from_itself_and_everything_else_is_some() {
     let body = soft_block(5);
     let found = study(body.clone(), &tumble(0.1 * first_rate(&body), 1.0));
     assert_eq!(found.reference, ReferenceKind::Full);
-    let worst = |row: &Row| row.outcome.as_ref().expect("a motion").worst;
+    let worst = |row: &Row| row.outcome.as_ref().expect("a motion").worst();
     assert_eq!(worst(&found.rows[0]), 0.0);
     assert!(found.rows[1..].iter().all(|row| worst(row) > 0.0));
     // All eight sets of groups, lumped masses and single precision with all modes.
@@ -133,7 +133,7 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
         .rows
         .iter()
         .find(|row| row.candidate.lumped == Some(LumpedMass::Couplings("diagonal-scaling".to_owned())));
-    let errors = row.expect("a row").outcome.as_ref().expect("a motion").errors;
+    let errors = row.expect("a row").outcome.as_ref().expect("a motion").deciding().errors;
     assert!(stress > 0.01, "a coarse mesh: {stress}");
     assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 2e-3, "{errors:?} {stress}");
     assert!((errors.attitude / attitude - 1.0).abs() < 2e-3, "{errors:?} {attitude}");
@@ -144,7 +144,7 @@ fn a_body_of_beams_has_candidates_of_lumped_mass_too() {
     let body = fixture("frame_beams", 4, BodyFrame::Model);
     let found = study(body.clone(), &tumble(0.05 * first_rate(&body), 0.2));
     let lumped = found.rows.iter().filter(|row| row.candidate.kind() == Kind::Lumped);
-    let worst: Vec<f64> = lumped.map(|row| row.outcome.as_ref().expect("a motion").worst).collect();
+    let worst: Vec<f64> = lumped.map(|row| row.outcome.as_ref().expect("a motion").worst()).collect();
     assert_eq!(worst.len(), body.lumped().len());
     assert!(!worst.is_empty() && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
 }
@@ -177,7 +177,7 @@ fn a_cost_is_kept_by_the_most_accurate() {
     let mut scene = tumble(0.1 * first_rate(&body), 1.0);
     let costs = |trade: &Trade| -> Vec<(usize, f64)> {
         let measured = trade.rows.iter().map(|row| row.outcome.as_ref().expect("a motion"));
-        measured.map(|measured| (measured.multiplications, measured.worst)).collect()
+        measured.map(|measured| (measured.multiplications, measured.worst())).collect()
     };
     let dearest = costs(&study(body.clone(), &scene)).into_iter().map(|point| point.0).max().expect("rows");
     let allowed = dearest / 2;
@@ -229,9 +229,10 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
     let rate = first_rate(without_scene(&model, 4).sources[0].body());
     let scene = tumble(0.15 * rate, 0.5);
     let made = conversions(&model, &scene, 4, None, None, SILENT).expect("bodies");
-    let (first, own) = (&made.lacks[0], made.lacks.last().expect("an estimate"));
+    let [lacks] = &made.lacks[..] else { panic!("one scene: {:?}", made.lacks) };
+    let (first, own) = (&lacks[0], lacks.last().expect("an estimate"));
     assert_eq!(own.modes, made.sources[0].body().n_modes());
-    assert!(first.modes < own.modes && own.worst < 0.7 * first.worst, "{:?}", made.lacks);
+    assert!(first.modes < own.modes && own.worst < 0.7 * first.worst, "{lacks:?}");
     // What still counts is said.
     assert!(made.diagnostics.iter().any(|one| one.code() == Code::ReferenceLacks), "{:?}", made.diagnostics);
 }
@@ -240,14 +241,17 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
 fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let model = model();
     let Conversions { sources, lacks, .. } = without_scene(&model, 4);
-    assert!(lacks.is_empty());
+    assert!(lacks.iter().all(Vec::is_empty));
     assert!(sources.iter().all(|source| source.preprocessing().is_some_and(|seconds| seconds > 0.0)));
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.15 * rate, 0.5);
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
     let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
     assert_eq!(found.reference, ReferenceKind::Nodal);
-    let stress = |row: &Row| row.outcome.as_ref().expect("a motion").errors.stress.expect("a deformed body");
+    let stress = |row: &Row| {
+        let measured = row.outcome.as_ref().expect("a motion");
+        measured.deciding().errors.stress.expect("a deformed body")
+    };
     // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not,
     // and lacking W1 nothing is.
     let of = |source: &str, groups: Groups| {
@@ -297,7 +301,7 @@ fn a_wholly_lumped_mass_has_modes_of_its_own() {
     let scene = tumble(0.05 * first_rate(sources[0].body()), 0.1);
     let found = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
     let whole = found.rows.iter().filter(|row| matches!(row.candidate.lumped, Some(LumpedMass::Whole(_))));
-    let worst: Vec<f64> = whole.map(|row| row.outcome.as_ref().expect("a motion").worst).collect();
+    let worst: Vec<f64> = whole.map(|row| row.outcome.as_ref().expect("a motion").worst()).collect();
     assert!(worst.len() == 2 && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
     assert!(found.front.iter().all(|&row| found.rows[row].candidate.lumped.is_none()));
 }
@@ -311,13 +315,14 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     scene.requirements.damping = Some(0.02);
     scene.run.scheme = Scheme::Conserving { order: 4, step: Some(0.1 / rate) };
     let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
-    let nodal = found.nodal.expect("the nodes are the reference");
+    let nodal = found.cases[0].nodal.expect("the nodes are the reference");
     assert_eq!((nodal.rows, nodal.scheme, nodal.error), (model.rows().len(), scene.run.scheme, None));
     let row = |at: usize| found.rows[at].outcome.as_ref().expect("a motion");
-    assert!(row(0).worst > 0.0 && row(0).errors.stress.expect("deformed") < 0.1, "{:?}", row(0).errors);
+    let first = row(0).deciding();
+    assert!(first.worst > 0.0 && first.errors.stress.expect("deformed") < 0.1, "{:?}", first.errors);
     let full = trade(&sources, &scene, None, &QUICK, SILENT).expect("a study");
-    assert!(full.nodal.is_none());
-    assert_eq!(full.rows[0].outcome.as_ref().expect("a motion").worst, 0.0);
+    assert!(full.cases[0].nodal.is_none());
+    assert_eq!(full.rows[0].outcome.as_ref().expect("a motion").worst(), 0.0);
     // Work that takes too long is refused before any.
     let hasty = Settings { longest: Some(1e-6), ..QUICK };
     let error = trade(&sources, &scene, Some(&model), &hasty, SILENT).expect_err("refused");
@@ -345,9 +350,68 @@ fn a_study_and_a_selection_take_the_same_modes() {
             && one.candidate.modes.len() + 1 == row.candidate.modes.len()
             && one.candidate.kind() == row.candidate.kind()
     });
-    let worst: Vec<f64> = fewer.map(|one| one.outcome.as_ref().expect("a motion").worst).collect();
+    let worst: Vec<f64> = fewer.map(|one| one.outcome.as_ref().expect("a motion").worst()).collect();
     assert!(row.candidate.modes.len() == 1 || worst.iter().all(|worst| *worst > 1.0), "{worst:?}");
     assert!(row.candidate.modes.len() == 1 || !worst.is_empty());
+}
+
+/// A body in two load cases: a slow tumble with a strict tolerance, and a fast one.
+fn two_cases(body: &FlexBody) -> [Scene; 2] {
+    let rate = first_rate(body);
+    let mut slow = tumble(0.02 * rate, 0.05);
+    slow.initial.modes = vec![ModeStart { mode: 2, amplitude: 0.02, rate: 0.0 }];
+    slow.requirements.tolerance = Tolerance { deflection: 0.02, stress: 0.02, ..Tolerance::default() };
+    let mut fast = tumble(0.15 * rate, 0.3);
+    fast.requirements.tolerance =
+        Tolerance { attitude: 0.05, deflection: 0.3, stress: 0.3, ..Tolerance::default() };
+    [slow, fast]
+}
+
+#[test]
+fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
+    let body = soft_block(6);
+    let scenes = two_cases(&body);
+    let sources = [Source::new("body", body.clone(), None).expect("a body")];
+    let settings = Settings { reserved: &[0.1], ..QUICK };
+    let both = trade_for_cases(&sources, &scenes, None, &settings, SILENT).expect("a study");
+    let alone = scenes.each_ref().map(|scene| study(body.clone(), scene));
+    let most = [0.9, 1.0];
+    let mut shared = 0;
+    for row in &both.rows {
+        let measured = row.outcome.as_ref().expect("a motion");
+        for (own, study) in measured.by_case.iter().zip(&alone) {
+            // Rungs of the ladders differ.
+            let Some(same) = study.rows.iter().find(|one| one.candidate == row.candidate) else { continue };
+            let same = same.outcome.as_ref().expect("a motion");
+            assert_eq!((own, measured.multiplications), (same.deciding(), same.multiplications));
+            shared += 1;
+        }
+        let worst: Vec<f64> = measured.by_case.iter().map(|own| own.worst).collect();
+        assert_eq!(measured.worst(), worst[0].max(worst[1]));
+        assert_eq!(measured.holds(), worst.iter().zip(most).all(|(worst, most)| *worst <= most), "{worst:?}");
+    }
+    assert!(shared > 30, "{shared}");
+
+    // What to take is the cheapest that holds in both, and each case says what it rules out.
+    let measured = |row: &Row| row.outcome.as_ref().expect("a motion").clone();
+    let taken = measured(recommended(&both));
+    assert!(taken.holds());
+    let exact = both.rows.iter().filter(|row| row.candidate.kind() != Kind::Lumped).map(measured);
+    let cheaper: Vec<_> = exact.filter(|own| own.multiplications < taken.multiplications).collect();
+    assert!(cheaper.len() > 5 && cheaper.iter().all(|own| !own.holds()), "{cheaper:?}");
+    for (at, case) in both.cases.iter().enumerate() {
+        let beyond = |own: &&Measured, at: usize| own.by_case[at].worst > most[at];
+        let here: Vec<_> = cheaper.iter().filter(|own| beyond(own, at)).collect();
+        let only = here.iter().filter(|own| !beyond(own, 1 - at)).count();
+        assert_eq!((case.ruled_out, case.ruled_out_alone), (here.len(), only), "case {at}");
+        assert_eq!(case.reserved, [0.1, 0.0][at]);
+        let own = measured(&both.rows[case.alone.row().expect("a candidate")]);
+        assert!(own.by_case[at].worst <= most[at] && own.multiplications <= taken.multiplications);
+    }
+    assert!(both.cases.iter().all(|case| case.ruled_out_alone > 0), "{:?}", both.cases);
+    // Both runs are what it takes.
+    let steps = |trade: &Trade| measured(&trade.rows[0]).timed.expect("the reference is timed").work.steps;
+    assert_eq!(steps(&both), alone.iter().map(steps).sum::<u64>());
 }
 
 #[test]
@@ -357,10 +421,10 @@ fn a_front_has_nothing_that_another_beats() {
     rows.truncate(5);
     for (row, (cost, worst)) in rows.iter_mut().zip([(10, 1.0), (20, 2.0), (5, 3.0), (10, 0.5), (30, 0.5)]) {
         let measured = row.outcome.as_mut().expect("a motion");
-        (measured.multiplications, measured.worst) = (cost, worst);
+        (measured.multiplications, measured.by_case[0].worst) = (cost, worst);
     }
     assert_eq!(front(&rows), [2, 3]);
-    rows[3].outcome.as_mut().expect("a motion").worst = f64::NAN;
+    rows[3].outcome.as_mut().expect("a motion").by_case[0].worst = f64::NAN;
     assert_eq!(front(&rows), [2, 0, 4]);
 }
 

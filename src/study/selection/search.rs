@@ -42,14 +42,20 @@ fn by_weight(weights: &[f64]) -> Vec<usize> {
     ranked
 }
 
-/// Modes of `body` by what they do in its `motion` in `scene`, most first: the order in which
-/// [`select`](super::select) keeps them.
+/// Modes of a body by what they do in its motion in the scene, most first: the order in which
+/// [`select`](super::select) keeps them. Of several load cases, for each the body in its frame, the scene and
+/// the motion, by the most that each mode does beside the tolerances of any.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body.
-pub fn liveliest_modes(body: &FlexBody, scene: &Scene, motion: &Trace) -> Result<Vec<usize>> {
-    let case = Case::new(body, scene, None)?;
-    Ok(by_weight(&weights(&case.runs().shares(motion), &scene.requirements.tolerance)))
+/// FB212 where a scene does not fit the body.
+pub fn liveliest_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usize>> {
+    let mut weight = vec![0.0f64; cases.first().map_or(0, |(body, ..)| body.n_modes())];
+    for (body, scene, motion) in cases {
+        let case = Case::new(body, scene, None)?;
+        let own = weights(&case.runs().shares(motion), &scene.requirements.tolerance);
+        weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
+    }
+    Ok(by_weight(&weight))
 }
 
 /// A scene that models are tried in, with the motion that they are measured against.

@@ -9,7 +9,7 @@ use crate::body::convert::{ConvertSettings, Lumping, convert};
 use crate::model::FeModel;
 use crate::motion::scene::{Scene, trace};
 use crate::numerics::eigen::{Accuracy, Wanted};
-use crate::study::reference::{Enriched, MotionShapes, ReferenceError, enrich};
+use crate::study::reference::{EnrichedForCases, MotionShapes, ReferenceError, enrich_for_cases};
 use faer::Mat;
 use std::fmt::Write;
 use std::time::Instant;
@@ -18,25 +18,43 @@ use std::time::Instant;
 pub struct Conversions {
     /// The reference first.
     pub sources: Vec<Source>,
-    /// What the reference, and bodies before it that were enriched, lack of the model in the scene; the last
-    /// one is the reference.
-    pub lacks: Vec<ReferenceError>,
+    /// What the reference, and bodies before it that were enriched, lack of the model in each load case; the
+    /// last one is the reference.
+    pub lacks: Vec<Vec<ReferenceError>>,
     /// What was said about the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Every conversion of a study in `scene`.
 ///
-/// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what [`enrich`]
-/// finds lacking. Beside it stand `modes`, their half and their quarter with residual vectors and without,
-/// `modes` at the other levels of accuracy, bodies of the shapes that the motion of the reference is made of,
-/// and what the settings of the reference make of the model with its whole mass lumped. Each is timed.
+/// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what
+/// [`enrich_for_cases`] finds lacking. Beside it stand `modes`, their half and their quarter with residual
+/// vectors and without, `modes` at the other levels of accuracy, bodies of the shapes that the motion of the
+/// reference is made of, and what the settings of the reference make of the model with its whole mass lumped.
+/// Each is timed.
 ///
 /// # Errors
-/// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
+/// Those of [`convert`] and [`enrich_for_cases`]. Accuracy `certified` is left out where it does not cover the
+/// model.
 pub fn conversions(
     model: &FeModel,
     scene: &Scene,
+    modes: usize,
+    memory: Option<u64>,
+    longest: Option<f64>,
+    watch: Watch<'_>,
+) -> Result<Conversions> {
+    conversions_for_cases(model, std::slice::from_ref(scene), modes, memory, longest, watch)
+}
+
+/// The same for the load cases `scenes`: the reference has what it lacks in any of them. Shapes are made of
+/// one motion, and there are none for several.
+///
+/// # Errors
+/// As [`conversions`].
+pub fn conversions_for_cases(
+    model: &FeModel,
+    scenes: &[Scene],
     modes: usize,
     memory: Option<u64>,
     longest: Option<f64>,
@@ -50,9 +68,9 @@ pub fn conversions(
         responses.clone_from(loads);
         making.make(&finest, loads, ConvertSettings::default().lumped)
     };
-    let enriched = enrich(model, scene, memory, true, watch, make, |(source, _)| source.body())?;
-    let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
-    diagnostics.extend(lacks.last().and_then(|own| own.warning(scene)));
+    let enriched = enrich_for_cases(model, scenes, memory, true, watch, make, |(made, _)| made.body())?;
+    let EnrichedForCases { made: (reference, mut diagnostics), rounds: lacks } = enriched;
+    diagnostics.extend(warnings(scenes, &lacks));
     let mut sources = vec![reference];
     for wish in wishes(modes) {
         let source = match making.make(&wish, &Mat::new(), Vec::new()) {
@@ -67,8 +85,10 @@ pub fn conversions(
         let beside = source.beside(sources[0].body(), model);
         sources.push(beside.expect(OF_THE_MODEL));
     }
-    for source in making.make_of_motion(&sources[0], scene)? {
-        sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
+    if let [scene] = scenes {
+        for source in making.make_of_motion(&sources[0], scene)? {
+            sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
+        }
     }
     for lumping in lumpings(model) {
         match making.make_lumped(&finest, &responses, &lumping)? {
@@ -77,6 +97,18 @@ pub fn conversions(
         }
     }
     Ok(Conversions { sources, lacks, diagnostics })
+}
+
+/// Warnings about what the reference lacks, each with its load case where there are several.
+fn warnings(scenes: &[Scene], lacks: &[Vec<ReferenceError>]) -> Vec<Diagnostic> {
+    let of = |(scene, rounds): (&Scene, &Vec<ReferenceError>)| {
+        let warning = rounds.last()?.warning(scene)?;
+        Some(match scene.case_name().filter(|_| scenes.len() > 1) {
+            Some(name) => warning.about(format!("case `{name}`")),
+            None => warning,
+        })
+    };
+    scenes.iter().zip(lacks).filter_map(of).collect()
 }
 
 const OF_THE_MODEL: &str = "bodies that were made of the model";

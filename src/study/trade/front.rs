@@ -1,6 +1,6 @@
 //! The best of the candidates.
 
-use super::Row;
+use super::{Measured, Row};
 
 /// The candidate to take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -23,9 +23,8 @@ impl Recommendation {
         }
     }
 
-    /// Of `rows`, whose errors may be `most` times their tolerances, with the multiplications that the scene
-    /// allows instead.
-    pub(super) fn new(rows: &[Row], most: f64, allowed: Option<usize>) -> Self {
+    /// Of `rows`, with the multiplications that the scene allows instead of tolerances.
+    pub(super) fn new(rows: &[Row], allowed: Option<usize>) -> Self {
         let points = points(rows);
         match allowed {
             Some(allowed) => {
@@ -34,11 +33,15 @@ impl Recommendation {
                     within.min_by(|a, b| (a.1.total_cmp(&b.1)).then(a.0.cmp(&b.0)).then(a.2.cmp(&b.2)));
                 best.map_or(Self::None, |point| Self::MostAccurate(point.2))
             }
-            None => points
-                .iter()
-                .find(|point| point.1 <= most)
-                .map_or(Self::None, |point| Self::Cheapest(point.2)),
+            None => Self::cheapest(rows, |measured| measured.holds()),
         }
+    }
+
+    /// The cheapest of `rows` that is good enough.
+    pub(super) fn cheapest(rows: &[Row], is_enough: impl Fn(&Measured) -> bool) -> Self {
+        let enough = |row: usize| rows[row].outcome.as_ref().is_ok_and(&is_enough);
+        let cheapest = points(rows).into_iter().find(|point| enough(point.2));
+        cheapest.map_or(Self::None, |point| Self::Cheapest(point.2))
     }
 }
 
@@ -63,7 +66,7 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
 fn points(rows: &[Row]) -> Vec<(usize, f64, usize)> {
     let point = |(at, row): (usize, &Row)| {
         let measured = row.outcome.as_ref().ok().filter(|_| row.candidate.lumped.is_none())?;
-        Some((measured.multiplications, measured.worst, at))
+        Some((measured.multiplications, measured.worst(), at))
     };
     let mut points: Vec<_> = rows.iter().enumerate().filter_map(point).collect();
     points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));

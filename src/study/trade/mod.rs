@@ -1,18 +1,21 @@
-//! What accuracy costs: candidate bodies for a scene, measured against a reference, and the best of them.
+//! What accuracy costs: candidate bodies for a scene or its load cases, measured against a reference, and the best of them.
 
 mod candidate;
+mod case;
 mod conversions;
 mod front;
 mod nodal;
 mod row;
+mod settings;
 mod source;
 mod study;
 mod timing;
 
 pub use candidate::{Candidate, Kind, LumpedMass};
-pub use conversions::{Conversions, conversions};
+pub use conversions::{Conversions, conversions, conversions_for_cases};
 pub use front::{Recommendation, front};
 pub use nodal::{Allowed, NodalIntegration, NodalReference};
-pub use row::{Failed, Measured, Row, Timed};
+pub use row::{Failed, InCase, Measured, Row, Timed};
+pub use settings::{Settings, reserved};
 pub use source::Source;
-pub use study::{ReferenceKind, Settings, Trade, trade};
+pub use study::{ReferenceKind, Trade, TradeCase, trade, trade_for_cases};

@@ -1,19 +1,19 @@
 //! The study: every candidate simulated, its errors measured, then its times.
 
 use super::candidate::{first_of, ladder, whole_candidates};
+use super::case::StudyCase;
 use super::{
-    Allowed, Candidate, Failed, Measured, NodalIntegration, NodalReference, Recommendation, Row, Source,
-    Timed, front, timing,
+    Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Row, Settings,
+    Source, Timed, front,
 };
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::base::memory::refuse_beyond;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::{FlexBody, Groups, Storage};
 use crate::formats::flex_body_file;
 use crate::model::FeModel;
-use crate::motion::dynamics::{EquationsOfMotion, Terms};
-use crate::motion::scene::{Measure, Scene, Stage, Tolerance, Trace, ends_a_run, trace, trace_at};
+use crate::motion::scene::{Measure, Scene, Tolerance, ends_a_run};
+use crate::numerics::integration::Work;
 use crate::study::selection::liveliest_modes;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -38,19 +38,6 @@ impl ReferenceKind {
     }
 }
 
-/// Settings of a study.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Integrations whose median time counts; of those that take long, fewer.
-    pub repeat: usize,
-    /// Bytes that there are; `None` where it is not known.
-    pub memory: Option<u64>,
-    /// Part of the tolerances that the reference lacks of its model itself: candidates get the rest.
-    pub reserved: f64,
-    /// Seconds that the motion of all nodes may take by its estimate; `None`: any.
-    pub longest: Option<f64>,
-}
-
 /// A finished study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trade {
@@ -60,12 +47,8 @@ pub struct Trade {
     pub body: String,
     /// The motion that errors are measured against.
     pub reference: ReferenceKind,
-    /// How the equations of all nodes were integrated, where they are the reference.
-    pub nodal: Option<NodalIntegration>,
-    /// Tolerances of the scene.
-    pub tolerance: Tolerance,
-    /// Part of them that the reference lacks of its model itself: candidates get the rest.
-    pub reserved: f64,
+    /// The load cases; of a scene without there is one.
+    pub cases: Vec<TradeCase>,
     /// Multiplications that the scene allows instead.
     pub allowed: Option<usize>,
     /// All candidates; the first is the whole body of the reference.
@@ -78,6 +61,32 @@ pub struct Trade {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// A load case of a study, or the scene of one without.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TradeCase {
+    /// Name of the load case; `None` of a scene alone.
+    pub name: Option<String>,
+    /// Its tolerances.
+    pub tolerance: Tolerance,
+    /// Part of them that the reference lacks of its model itself: candidates get the rest.
+    pub reserved: f64,
+    /// How the equations of all nodes were integrated, where they are the reference.
+    pub nodal: Option<NodalIntegration>,
+    /// The row to take if there were no other case.
+    pub alone: Recommendation,
+    /// Candidates that are cheaper than the recommended one and beyond the tolerances in this case.
+    pub ruled_out: usize,
+    /// Those of them that no other case rules out.
+    pub ruled_out_alone: usize,
+}
+
+impl Trade {
+    /// Tolerances of a load case (from 0).
+    pub fn tolerance(&self, case: usize) -> &Tolerance {
+        &self.cases[case].tolerance
+    }
+}
+
 /// Measures every candidate of `sources` in `scene`. The first source is the reference; others are
 /// [`Source::beside`] it.
 ///
@@ -88,57 +97,82 @@ pub struct Trade {
 /// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
 ///
 /// # Errors
-/// Those of [`trace`] and [`NodalReference::new`] for the reference; FB601 when memory is short; those of
-/// writing a file to the temporary folder.
+/// Those of [`trace`](crate::motion::scene::trace) and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the temporary folder.
 pub fn trade(
     sources: &[Source],
     scene: &Scene,
     nodal: Option<&FeModel>,
-    settings: &Settings,
+    settings: &Settings<'_>,
     watch: Watch<'_>,
 ) -> Result<Trade> {
-    let Some(source) = sources.first() else {
+    trade_for_cases(sources, std::slice::from_ref(scene), nodal, settings, watch)
+}
+
+/// The same for the load cases `scenes`, which one body has to serve: a candidate is measured in each, and as
+/// good as it is in the worst. The simulations of all cases together are what it takes.
+///
+/// # Errors
+/// As [`trade`].
+pub fn trade_for_cases(
+    sources: &[Source],
+    scenes: &[Scene],
+    nodal: Option<&FeModel>,
+    settings: &Settings<'_>,
+    watch: Watch<'_>,
+) -> Result<Trade> {
+    let (Some(source), Some(first)) = (sources.first(), scenes.first()) else {
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
     };
-    watch(Event::Phase("reference"));
-    nodal.map(|model| NodalReference::refuse(model, source.body(), scene, settings.longest)).transpose()?;
-    let stage = Stage::new(source.body(), scene)?;
-    let staged = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
-    let (sources, source) = (&staged[..], &staged[0]);
-    // Groups are what candidates differ in.
-    let mut scene = stage.scene.into_owned();
-    scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
-    let full = |part| watch(Event::Fraction(part));
-    let (motion, said) = trace(source.body(), &scene, settings.memory, full)?;
-    refuse_too_much(sources, &motion, settings.memory)?;
-    let nodal = match nodal {
-        Some(model) => {
-            watch(Event::Phase("nodal reference"));
-            let allowed = Allowed { memory: settings.memory, longest: settings.longest };
-            Some(NodalReference::new(model, source.body(), &scene, &motion, allowed, watch)?)
-        }
-        None => None,
+    let several = scenes.len() > 1;
+    let case = |(at, scene): (usize, &Scene)| {
+        let reserved = settings.reserved.get(at).copied().unwrap_or(0.0);
+        let name = several.then(|| scene.case_name().unwrap_or(&scene.name).to_owned());
+        let label = name.clone();
+        StudyCase::new(sources, scene, name, nodal, settings, reserved, watch).map_err(|error| match label {
+            Some(name) => error.about(format!("case `{name}`")),
+            None => error,
+        })
     };
-    let warning = nodal.as_ref().and_then(NodalReference::warning);
-    let diagnostics = [stage.found, said, Vec::from_iter(warning)].concat();
-    let measure = Measure::new(source.body(), &motion);
-    let most = (1.0 - settings.reserved).max(0.0);
-    let job = Job { sources, scene: &scene, motion: &motion, measure: &measure, nodal: nodal.as_ref(), most };
+    let cases = scenes.iter().enumerate().map(case).collect::<Result<Vec<_>>>()?;
+    let measures = cases.iter().map(StudyCase::measure).collect();
+    let allowed = scenes.iter().filter_map(|scene| scene.requirements.multiplications).min();
+    let job = Job { cases: &cases, measures, allowed };
     let rows = job.rows(settings.repeat, watch)?;
-    let allowed = scene.requirements.multiplications;
+    let recommended = Recommendation::new(&rows, allowed);
+    let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
-        scene: scene.name.clone(),
+        scene: first.case.as_ref().filter(|_| several).map_or(&first.name, |case| &case.scene).clone(),
         body: source.body().source().name.clone(),
         reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
-        nodal: nodal.as_ref().map(NodalReference::integration),
-        tolerance: scene.requirements.tolerance,
-        reserved: settings.reserved,
         allowed,
         front: front(&rows),
-        recommended: Recommendation::new(&rows, most, allowed),
+        recommended,
+        cases: (0..cases.len()).map(seen).collect(),
         rows,
-        diagnostics,
+        diagnostics: cases.iter().flat_map(|case| case.found.iter().cloned()).collect(),
     })
+}
+
+impl TradeCase {
+    fn new(at: usize, case: &StudyCase<'_>, rows: &[Row], recommended: Recommendation) -> Self {
+        let is_within = |measured: &Measured, at: usize, most: f64| measured.by_case[at].worst <= most;
+        let most = case.most();
+        let taken = recommended.row().and_then(|row| rows[row].outcome.as_ref().ok());
+        let is_cheaper =
+            |own: &&Measured| taken.is_none_or(|taken| own.multiplications < taken.multiplications);
+        let exact = rows.iter().filter(|row| row.candidate.lumped.is_none());
+        let cheaper = exact.filter_map(|row| row.outcome.as_ref().ok()).filter(is_cheaper);
+        let ruled_out: Vec<&Measured> = cheaper.filter(|own| !is_within(own, at, most)).collect();
+        Self {
+            name: case.name.clone(),
+            tolerance: case.scene.requirements.tolerance,
+            reserved: case.reserved,
+            nodal: case.nodal.as_ref().map(NodalReference::integration),
+            alone: Recommendation::cheapest(rows, |measured| is_within(measured, at, most)),
+            ruled_out_alone: ruled_out.iter().filter(|own| own.beyond == 1).count(),
+            ruled_out: ruled_out.len(),
+        }
+    }
 }
 
 /// Candidates that are done, told as the fraction of all.
@@ -162,21 +196,24 @@ impl<'w> Progress<'w> {
 
 /// What all candidates have in common.
 struct Job<'j> {
-    sources: &'j [Source],
-    scene: &'j Scene,
-    motion: &'j Trace,
-    measure: &'j Measure<'j>,
-    nodal: Option<&'j NodalReference<'j>>,
-    /// Largest error over its tolerance that a candidate may have.
-    most: f64,
+    cases: &'j [StudyCase<'j>],
+    /// Of each case.
+    measures: Vec<Measure<'j>>,
+    /// Multiplications that are allowed instead of tolerances.
+    allowed: Option<usize>,
 }
 
 impl Job<'_> {
+    /// The bodies that candidates are made of, as the first case has them.
+    fn sources(&self) -> &[Source] {
+        &self.cases[0].sources
+    }
+
     /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one
     /// after the other.
     fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<Row>> {
-        let carried = self.scene.carried.is_some();
-        let whole = whole_candidates(self.sources, carried);
+        let carried = self.cases.iter().any(|case| case.scene.carried.is_some());
+        let whole = whole_candidates(self.sources(), carried);
         let mut rows = self.errors(whole, "errors of whole bodies", watch)?;
         let worst_of = |groups: Groups| {
             let has_groups = |row: &&Row| {
@@ -184,10 +221,11 @@ impl Job<'_> {
                 own.source == 0 && own.groups == groups && own.lumped.is_none() && own.storage == Storage::F64
             };
             let measured = rows.iter().find(has_groups).and_then(|row| row.outcome.as_ref().ok());
-            measured.map_or(f64::INFINITY, |measured| measured.worst)
+            measured.map_or(f64::INFINITY, Measured::worst)
         };
-        let liveliest = liveliest_modes(self.sources[0].body(), self.scene, self.motion)?;
-        let some_modes = ladder(self.sources, &liveliest, carried, worst_of);
+        let motions = self.cases.iter().map(|case| (case.sources[0].body(), &case.scene, &case.motion));
+        let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
+        let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", watch)?);
         self.refine(&liveliest, &mut rows)?;
         self.time_what_is_worth_it(&mut rows, repeat, watch)?;
@@ -197,13 +235,13 @@ impl Job<'_> {
     /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that
     /// is not, as a selection does.
     fn refine(&self, liveliest: &[usize], rows: &mut Vec<Row>) -> Result<()> {
-        if self.scene.requirements.multiplications.is_some() {
+        if self.allowed.is_some() {
             return Ok(());
         }
         let is_exact =
             |own: &Candidate| own.source == 0 && own.lumped.is_none() && own.storage == Storage::F64;
         let enough = rows.iter().filter(|row| is_exact(&row.candidate)).filter_map(|row| {
-            let measured = row.outcome.as_ref().ok().filter(|measured| measured.worst <= self.most)?;
+            let measured = row.outcome.as_ref().ok().filter(|measured| measured.holds())?;
             Some((measured.multiplications, &row.candidate))
         });
         let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
@@ -223,7 +261,7 @@ impl Job<'_> {
         while too_few + 1 < enough {
             let count = too_few.midpoint(enough);
             let row = self.measure(with(count))?;
-            let passed = row.outcome.as_ref().is_ok_and(|measured| measured.worst <= self.most);
+            let passed = row.outcome.as_ref().is_ok_and(|measured| measured.holds());
             if passed {
                 enough = count
             } else {
@@ -234,12 +272,8 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn recommended(&self, rows: &[Row]) -> Recommendation {
-        Recommendation::new(rows, self.most, self.scene.requirements.multiplications)
-    }
-
     fn time_what_is_worth_it(&self, rows: &mut [Row], repeat: usize, watch: Watch<'_>) -> Result<()> {
-        let recommended = self.recommended(rows).row();
+        let recommended = Recommendation::new(rows, self.allowed).row();
         let mut worth_it: Vec<usize> = front(rows).into_iter().chain(recommended).chain([0]).collect();
         worth_it.sort_unstable();
         worth_it.dedup();
@@ -264,9 +298,9 @@ impl Job<'_> {
 
     /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
     fn measure(&self, candidate: Candidate) -> Result<Row> {
-        let source = &self.sources[candidate.source];
+        let source = &self.sources()[candidate.source];
         let last = candidate.modes.last().copied().unwrap_or(0);
-        let outcome = match self.measured(source, &candidate) {
+        let outcome = match self.measured(&candidate) {
             Ok(measured) => Ok(measured),
             // A lumped mass need not be the mass of anything: that is what the row says then.
             Err(error)
@@ -284,53 +318,56 @@ impl Job<'_> {
         })
     }
 
-    fn measured(&self, source: &Source, candidate: &Candidate) -> Result<Measured> {
-        let body = candidate.body(source)?;
-        let mut scene = self.own_scene(source, &body, candidate);
-        scene.run.scheme = self.motion.scheme;
-        let instants = self.nodal.map_or(&self.motion.time[..], NodalReference::time);
-        let motion = trace_at(&body, &scene, instants, None)?;
-        let history = match self.nodal {
-            Some(nodal) => nodal.errors(&body, &motion),
-            None => source.errors(self.measure, &body, &candidate.modes, &motion),
-        };
-        let history = history.ok_or_else(|| {
-            let message =
-                format!("the modes of {} cannot be compared with those of the reference", source.name());
-            Error::from(Diagnostic::new(Code::BodyIncomparable, message))
-        })?;
-        let errors = history.largest();
+    fn measured(&self, candidate: &Candidate) -> Result<Measured> {
+        let (mut by_case, mut multiplications, mut bytes) = (Vec::new(), 0, 0);
+        for (case, measure) in self.cases.iter().zip(&self.measures) {
+            let body = case.body(candidate)?;
+            if by_case.is_empty() {
+                bytes = file_size(&body)?;
+            }
+            let (own, cost) = case.measured(measure, candidate, &body).map_err(|error| {
+                Error::new(error.diagnostics().iter().cloned().map(|said| case.about(said)).collect())
+            })?;
+            multiplications = multiplications.max(cost);
+            by_case.push(own);
+        }
+        let worst = |at: &usize| by_case[*at].worst;
+        // The first of equals; NaN is the largest of all.
+        let largest = (0..by_case.len()).rev().max_by(|a, b| worst(a).total_cmp(&worst(b)));
+        let within = |(own, case): (&InCase, &StudyCase<'_>)| own.worst <= case.most();
+        let beyond = by_case.iter().zip(self.cases).filter(|pair| !within(*pair)).count();
         Ok(Measured {
-            errors,
-            worst: errors.worst(&scene.requirements.tolerance),
-            growth: history.growth(self.motion, &scene.requirements.tolerance),
-            multiplications: EquationsOfMotion::new(&body, scene.run.terms).multiplications(),
-            bytes: file_size(&body)?,
-            preprocessing: source.preprocessing(),
+            case: largest.expect("a load case"),
+            beyond,
+            by_case,
+            multiplications,
+            bytes,
+            preprocessing: self.sources()[candidate.source].preprocessing(),
             timed: None,
         })
     }
 
     fn time(&self, row: &mut Row, repeat: usize) -> Result<()> {
         let Ok(measured) = &mut row.outcome else { return Ok(()) };
-        let source = &self.sources[row.candidate.source];
-        let body = row.candidate.body(source)?;
-        let scene = self.own_scene(source, &body, &row.candidate);
-        let timed = timing::integration(&body, &scene, repeat);
-        match (timed, timing::evaluation(&body, scene.run.terms)) {
-            (Ok((integration, work)), Ok(evaluation)) => {
-                measured.timed = Some(Timed { evaluation, integration, work });
-            }
-            (Err(error), _) => row.outcome = Err(Failed(error.diagnostics()[0].clone())),
-            (_, Err(reason)) => {
-                row.outcome = Err(Failed(Diagnostic::new(Code::SimulationStopped, reason.to_string())));
+        let mut all = Timed { evaluation: 0.0, integration: 0.0, work: Work::default() };
+        for case in self.cases {
+            let body = case.body(&row.candidate)?;
+            match case.time(&row.candidate, &body, repeat) {
+                Ok((integration, work, evaluation)) => {
+                    all.integration += integration;
+                    all.evaluation = all.evaluation.max(evaluation);
+                    all.work.steps += work.steps;
+                    all.work.rejected += work.rejected;
+                    all.work.rates += work.rates;
+                }
+                Err(error) => {
+                    row.outcome = Err(Failed(case.about(error.diagnostics()[0].clone())));
+                    return Ok(());
+                }
             }
         }
+        measured.timed = Some(all);
         Ok(())
-    }
-
-    fn own_scene(&self, source: &Source, body: &FlexBody, candidate: &Candidate) -> Scene {
-        source.scene(self.scene, body, &candidate.modes, &self.motion.start)
     }
 }
 
@@ -340,21 +377,4 @@ fn file_size(body: &FlexBody) -> Result<u64> {
     let slot = flex_body_file::prepare_output(std::env::temp_dir().join(name))?;
     flex_body_file::fill_slot(body, &slot)?;
     Ok(std::fs::metadata(slot.temporary()).map_or(0, |meta| meta.len()))
-}
-
-/// Every thread has a body, its equations and its motion, beside that of the reference, which is there.
-fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -> Result<()> {
-    const DOUBLE: f64 = 8.0;
-    /// W1 to W3, their panels and copies, and S: squares of the modes.
-    const SQUARES: f64 = 40.0;
-    let most = |count: &dyn Fn(&FlexBody) -> usize| {
-        sources.iter().map(|s| count(s.body())).max().unwrap_or(0) as f64
-    };
-    let (nodes, modes) = (most(&FlexBody::n_nodes), most(&FlexBody::n_modes));
-    let body = nodes * (7.0 + 6.0 * modes) + SQUARES * modes * modes;
-    let motion = reference.bytes(most(&FlexBody::n_modes) as usize);
-    let threads = rayon::current_num_threads() as f64;
-    let needed = threads * (DOUBLE * 2.0 * body + motion);
-    let what = format!("a trade study on {threads} threads");
-    refuse_beyond(memory, needed, &what, "use fewer --threads or modes, or a shorter `duration`")
 }
