@@ -42,7 +42,7 @@ const COUNTS: f64 = 1e-3;
 
 /// What there is to say of the distribution, in words.
 const REMAINS: &str = "\nThe estimate moves what is lacking together with the modes that the body has, by the mass that they share, and looks twelve times into the period of the fastest mode that counts. Before, with 121 instants and the\n\
-    modes left alone, estimates of enriched bodies were between a tenth and 2.4 times of the truth, least of all those of the plane frame, whose enriched bodies follow modes that 121 instants do not see. What the equations of a body take as\n\
+    modes left alone, estimates of enriched bodies were between a tenth and 2.4 times of the truth, the smallest of the plane frame, whose enriched bodies follow modes that 121 instants do not see. What the equations of a body take as\n\
     approximate counts as well: nodal rotations that turn with the body (before, 0.05 of the deflection of a plane frame that a node carries and turns). Gyroscopic and centrifugal forces of what is lacking are not counted, nor are deflections\n\
     beyond the first order.\n";
 
@@ -264,18 +264,22 @@ fn case(seed: u64) -> Case {
         (scene.spin, scene.initial.angular_velocity) = (None, Vector3::zeros());
     }
     let modes = 3 + pick(random, 6) as usize;
-    let frame = match &scene.carried {
-        Some(Carried { spin: Some(_), .. }) => "carried and spun",
-        Some(Carried { translation: Some(_), .. }) => "carried along a line",
-        Some(_) => "carried",
-        None if spun => "spun",
-        None => "free",
-    };
-    let (rows, start_name) = (model.rows().len(), start.name());
+    let (rows, frame, start_name) = (model.rows().len(), frame(&scene), start.name());
     let what = format!(
         "{name}, {rows} rows, {modes} modes, {count} loads, {frame}, {start_name}, tolerance {tolerance:.1e}"
     );
     Case { seed, what, model, scene, start, modes }
+}
+
+/// How the frame of the body moves, in words.
+fn frame(scene: &Scene) -> &'static str {
+    match &scene.carried {
+        Some(Carried { spin: Some(_), .. }) => "carried and spun",
+        Some(Carried { translation: Some(_), .. }) => "carried along a line",
+        Some(_) => "carried",
+        None if scene.spin.is_some() => "spun",
+        None => "free",
+    }
 }
 
 /// Makes the loads so large that they deflect the body by [`DEFLECTION`].

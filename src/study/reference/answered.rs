@@ -57,11 +57,11 @@ impl Lacking {
     ///     = (g, E'K E c + E'M Psi m_ff^-1 g)
     /// ```
     ///
-    /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the modes
-    /// on all nodes, of which the diagonal counts in the own motions of the system. Each of these is solved exactly.
-    /// Where c changes slowly beside its frequency that is the static response; where it changes as fast, or
-    /// begins with a shock, the static response would be too small. What is missed drags along modes that are
-    /// no eigenvectors, by its inertia.
+    /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the
+    /// modes on all nodes, of which the diagonal counts in the own motions of the system. Each of these is
+    /// solved exactly. Where c changes slowly beside its frequency that is the static response; where it
+    /// changes as fast, or begins with a shock, the static response would be too small. What is missed drags
+    /// along modes that are no eigenvectors, by its inertia.
     ///
     /// * `amplitudes`: c (k x m); `in_modes`: g (nf x m); `settled`: whether it starts in equilibrium, z = c,
     ///   and else from zero.

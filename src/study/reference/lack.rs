@@ -12,6 +12,10 @@ use crate::numerics::linalg::{combine, gram, larger, not_negative, side_by_side}
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
+/// Instants that displacements of all nodes and reactions are computed at: the largest of a vibration that is
+/// seen so often at any phase is missed by little.
+const SHOWN: usize = 480;
+
 /// The displacements X y(t) of all rows that a body lacks, with X = [Psi, E]: its modes, which what it lacks
 /// drags along, and the static responses that it has not.
 pub(super) struct Lack<'a> {
@@ -22,6 +26,8 @@ pub(super) struct Lack<'a> {
     /// X (N x (nf + k)).
     columns: Mat<f64>,
     answer: Answer,
+    /// Which of the instants displacements of all nodes and reactions are computed at.
+    shown: Vec<usize>,
     /// K_ff and E'K E.
     modal_stiffness: Mat<f64>,
     energy: Mat<f64>,
@@ -80,6 +86,7 @@ impl<'a> Lack<'a> {
             looked_at,
             columns: side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]),
             answer,
+            shown: grid.at_most(SHOWN),
             modal_stiffness,
             energy: missed.energy.clone(),
         }
@@ -131,16 +138,15 @@ impl<'a> Lack<'a> {
     /// Psi q + X y.
     fn deflection(&self, body: &FlexBody, motion: &Trace, watched: &[Mat<f64>]) -> Option<f64> {
         let (mut missed, mut whole) = (Vec::new(), Vec::new());
-        for first in (0..self.looked_at.len()).step_by(BLOCK) {
-            let count = BLOCK.min(self.looked_at.len() - first);
-            let y = self.answer.value.as_ref().subcols(first, count);
-            let lacking = combine(self.columns.as_ref(), y.to_owned().as_ref());
-            let u = self.view.displacements(&self.looked_at[first..first + count], |now| &now.q) + &lacking;
+        for block in self.shown.chunks(BLOCK) {
+            let lacking = combine(self.columns.as_ref(), columns_at(&self.answer.value, block).as_ref());
+            let u = self.view.displacements(&self.motion_at(block), |now| &now.q) + &lacking;
             missed.extend(self.longest(&lacking, watched));
             whole.extend(self.longest(&u, watched));
         }
+        let times = self.times_shown();
         let largest = match (self.grid.is_fine, motion.deflections.is_empty()) {
-            (true, _) => Peak::of(&self.grid.times, whole).value,
+            (true, _) => Peak::of(&times, whole).value,
             (false, true) => motion.extremes.deflection.value * body.extent(),
             (false, false) => {
                 let norms = |path: &Vec<Vector3<f64>>| {
@@ -150,7 +156,7 @@ impl<'a> Lack<'a> {
             }
         };
         let scale = largest.max(motion.resolution.deflection);
-        (scale > 0.0).then(|| Peak::of(&self.grid.times, missed).value / scale)
+        (scale > 0.0).then(|| Peak::of(&times, missed).value / scale)
     }
 
     /// Length of the longest displacement of the watched points, or of any node, of every column.
@@ -179,22 +185,36 @@ impl<'a> Lack<'a> {
     fn reaction(&self, scene: &Scene, motion: &Trace) -> Option<f64> {
         let (mut own, mut whole) = (Vec::new(), Vec::new());
         let Answer { value, rate, acceleration } = &self.answer;
-        let nothing = Mat::<f64>::zeros(value.nrows(), BLOCK);
         let holds = scene.carried.is_some() || scene.spin.as_ref().is_some_and(|spin| spin.hold);
-        for first in (0..self.looked_at.len()).step_by(BLOCK) {
-            let block = &self.looked_at[first..self.looked_at.len().min(first + BLOCK)];
-            let amplitudes = [value, rate, acceleration].map(|y| y.as_ref().subcols(first, block.len()));
-            let none = [(); 3].map(|()| nothing.as_ref().subcols(0, block.len()));
-            for (all, y) in [(&mut whole, amplitudes), (&mut own, none)] {
-                let field = self.view.field(block, self.columns.as_ref(), y);
-                let reactions = self.view.reactions(block, &field);
+        for block in self.shown.chunks(BLOCK) {
+            let moving = self.motion_at(block);
+            let amplitudes = [value, rate, acceleration].map(|y| columns_at(y, block));
+            let none = Mat::zeros(value.nrows(), block.len());
+            let [y, yd, ydd] = amplitudes.each_ref().map(Mat::as_ref);
+            for (all, y) in [(&mut whole, [y, yd, ydd]), (&mut own, [none.as_ref(); 3])] {
+                let field = self.view.field(&moving, self.columns.as_ref(), y);
+                let reactions = self.view.reactions(&moving, &field);
                 let given = |(force, torque)| (if holds { force } else { Vector3::zeros() }, torque);
                 all.extend(reactions.into_iter().map(given));
             }
         }
-        let errors = reaction_errors(&self.grid.times, [&whole, &own], motion.size, &motion.extremes)?;
-        Some(Peak::of(&self.grid.times, errors).value)
+        let times = self.times_shown();
+        let errors = reaction_errors(&times, [&whole, &own], motion.size, &motion.extremes)?;
+        Some(Peak::of(&times, errors).value)
     }
+
+    fn times_shown(&self) -> Vec<f64> {
+        self.shown.iter().map(|&i| self.grid.times[i]).collect()
+    }
+
+    fn motion_at(&self, instants: &[usize]) -> Vec<Instant> {
+        instants.iter().map(|&i| self.looked_at[i].clone()).collect()
+    }
+}
+
+/// Some of the columns.
+fn columns_at(a: &Mat<f64>, columns: &[usize]) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), columns.len(), |i, j| a[(i, columns[j])])
 }
 
 /// x'A x of every column.

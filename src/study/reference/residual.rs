@@ -61,9 +61,9 @@ pub(super) struct Inertia {
 }
 
 impl<'m> NodalView<'m> {
-    /// `body`, with the damping of its scene, which was made of `model` and is carried by the point `carrier`;
-    /// `None` when it has other rows, modes that depend on each other, or is carried by a point without an
-    /// orientation.
+    /// `body`, with the damping of its scene, which was made of `model` and is carried by the point
+    /// `carrier`; `None` when it has other rows, modes that depend on each other, or is carried by a point
+    /// without an orientation.
     pub fn new(
         model: &'m FeModel,
         body: &FlexBody,
