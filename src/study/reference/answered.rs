@@ -279,13 +279,13 @@ mod tests {
     fn a_slow_swing_has_the_acceleration_of_a_swing() {
         let system = alone([1e4, 1e6]);
         let grid = grid((0..=240).map(|i| 0.05 * f64::from(i)).collect());
-        let c = Mat::from_fn(2, grid.times.len(), |_, i| 1.0 - grid.times[i].cos());
+        let c = Mat::from_fn(2, grid.times.len(), |_, i| grid.times[i] - grid.times[i].sin());
         let Answer { acceleration, .. } =
             system.answered(&c, &none(&system, &grid), &grid, true).expect("a motion");
         for (i, t) in grid.times.iter().enumerate() {
             for j in 0..2 {
                 assert!(
-                    (acceleration[(j, i)] - t.cos()).abs() < 0.02,
+                    (acceleration[(j, i)] - t.sin()).abs() < 0.02,
                     "{j} at {t}: {}",
                     acceleration[(j, i)]
                 );
@@ -306,8 +306,8 @@ mod tests {
             stiffness: one(100.0),
             mass: one(0.5),
         };
-        let step = 0.01;
-        let grid = grid((0..=500).map(|i| step * f64::from(i)).collect());
+        let step = 1e-3;
+        let grid = grid((0..=5000).map(|i| step * f64::from(i)).collect());
         let force = |t: f64| (1.7 * t).sin();
         let c = Mat::from_fn(1, grid.times.len(), |_, i| force(grid.times[i]));
         let on_modes = |t: f64| 2.0 * t.cos();
@@ -327,13 +327,11 @@ mod tests {
             assert!(balance.iter().all(|left| left.abs() < 1e-5), "{i}: {balance:?}");
         }
         assert!((0..grid.times.len()).any(|i| value[(0, i)].abs() > 0.01), "the mode moves");
-        // Damping of the mode takes the energy of both.
+        // With damping, of which the diagonal counts: what a Runge-Kutta method of order 4 makes of the whole.
         let damped = Lacking { modal_damping: one(0.4), ..system };
-        let pushed = damped
-            .answered(&Mat::full(1, grid.times.len(), 1.0), &none(&damped, &grid), &grid, false)
-            .expect("a motion");
-        let swing =
-            |from: usize| (from..from + 100).map(|i| (pushed.value[(1, i)] - 1.0).abs()).fold(0.0, f64::max);
-        assert!(swing(400) < 0.95 * swing(0), "{} {}", swing(400), swing(0));
+        let steady = Mat::full(1, grid.times.len(), 1.0);
+        let pushed = damped.answered(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;
+        let largest = |from: usize| (from..from + 1000).map(|i| pushed[(0, i)].abs()).fold(0.0, f64::max);
+        assert!((largest(0) - 0.5659).abs() < 2e-3 && (largest(4000) - 0.4415).abs() < 2e-3);
     }
 }

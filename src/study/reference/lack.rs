@@ -67,7 +67,9 @@ impl<'a> Lack<'a> {
         let in_modes = missed.in_modes.as_ref().subrows(0, moving).to_owned();
         let answer = system.answered(&missed.amplitudes, &in_modes, grid, settled);
         let m = grid.times.len();
-        let zeros = || Mat::zeros(nf + k, m);
+        // Where nothing is lacking there is nothing to be solved; what has no solution is not small.
+        let is_nothing = (0..k).all(|j| missed.energy[(j, j)] == 0.0) && missed.in_modes.is_all_finite();
+        let unknown = || Mat::full(nf + k, m, if is_nothing { 0.0 } else { f64::NAN });
         let placed = |own: Mat<f64>| {
             let mut all = Mat::zeros(nf + k, m);
             all.as_mut().subrows_mut(0, moving).copy_from(own.as_ref().subrows(0, moving));
@@ -78,7 +80,7 @@ impl<'a> Lack<'a> {
             Some(Answer { value, rate, acceleration }) => {
                 Answer { value: placed(value), rate: placed(rate), acceleration: placed(acceleration) }
             }
-            None => Answer { value: zeros(), rate: zeros(), acceleration: zeros() },
+            None => Answer { value: unknown(), rate: unknown(), acceleration: unknown() },
         };
         Self {
             view,
