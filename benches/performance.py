@@ -70,6 +70,7 @@ CASES = {
     "cube-300k": Case("make_block.py", CUBE, 300000, {"cholmod": 1, "slepc": 3}),
     "tet10-100k": Case("make_tet10.py", (), 100000, {"cholmod": 3, "slepc": 3}),
     "plate-50k": Case("make_block.py", ("--shape", "thin-plate"), 50000, {"cholmod": 3, "slepc": 3}),
+    "shell-200k": Case("make_shell.py", (), 200000, {"slepc": 3}),
     # 70 nodes along each edge: 1,029,000 degrees of freedom.
     "cube-1m": Case("make_block.py", (*CUBE, "--cells", "69", "69", "69"), 1029000, threads=(2,)),
 }

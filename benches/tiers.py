@@ -27,6 +27,7 @@ CASES = {
     "tet10-100k": ("fast", "standard", "certified"),
     "plate-50k": ("fast", "standard", "certified"),
     "cube-300k": ("fast", "standard", "certified"),
+    "shell-200k": ("fast", "standard", "certified"),
     "cube-1m": ("fast", "standard"),
 }
 
