@@ -11,6 +11,8 @@ mod cluster;
 mod command_line;
 mod docs_generated;
 mod front_door;
+#[cfg(unix)]
+mod how_to;
 mod interruption;
 mod json_output;
 mod licences;
