@@ -31,7 +31,7 @@ fn asked(trade: &Trade, tolerances: &str) -> String {
     match trade.allowed {
         Some(allowed) => format!("the most accurate of at most {allowed} multiplications per evaluation"),
         None if trade.cases.len() > 1 => {
-            format!("in {} load cases errors of at most {tolerances}", trade.cases.len())
+            format!("in {} load cases errors of at most {tolerances} (the least of any)", trade.cases.len())
         }
         None => format!("errors of at most {tolerances}"),
     }

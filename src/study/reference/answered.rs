@@ -327,7 +327,7 @@ mod tests {
             assert!(balance.iter().all(|left| left.abs() < 1e-5), "{i}: {balance:?}");
         }
         assert!((0..grid.times.len()).any(|i| value[(0, i)].abs() > 0.01), "the mode moves");
-        // With damping, of which the diagonal counts: what a Runge-Kutta method of order 4 makes of the whole.
+        // With damping, of which the diagonal counts: what a Runge-Kutta method of order 4 makes of it.
         let damped = Lacking { modal_damping: one(0.4), ..system };
         let steady = Mat::full(1, grid.times.len(), 1.0);
         let pushed = damped.answered(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;
