@@ -54,6 +54,7 @@ fn check(name: &str) {
 }
 
 #[test]
+#[ignore = "slow"]
 fn rotor() {
     check("rotor.md");
 }
@@ -64,6 +65,7 @@ fn robot_link() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn satellite() {
     check("satellite.md");
 }
