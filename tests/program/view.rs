@@ -166,9 +166,8 @@ fn carried_bodies_are_drawn_as_they_are_carried() {
     assert!(motion.iter().all(|x| x.as_f64().expect("a number").abs() < 1e-9 * largest), "{motion:?}");
 }
 
-/// A plate of 100,000 nodes with 20 modes: thinned to what a page has room for.
-#[test]
-fn a_hundred_thousand_nodes_fit_into_a_page() {
+/// A plate of 100,000 nodes with 20 modes.
+fn plate() -> FlexBody {
     let (rows, columns) = (250usize, 400usize);
     let mut parts = parts(Random::new(3), rows * columns, 20, 0, 0);
     let at = |i: usize, j: usize| (i * columns + j) as u32;
@@ -181,7 +180,13 @@ fn a_hundred_thousand_nodes_fit_into_a_page() {
     };
     let triangles: Vec<[u32; 3]> = cells.flat_map(halves).collect();
     parts.mesh = SurfaceMesh::new(triangles, Vec::new(), rows * columns).ok();
-    let body = FlexBody::new(parts).expect("a body");
+    FlexBody::new(parts).expect("a body")
+}
+
+/// A large surface is thinned to what a page has room for.
+#[test]
+fn a_hundred_thousand_nodes_fit_into_a_page() {
+    let body = plate();
     let view = View::new(&body, None, None).expect("a page");
     assert!((5_000_000..10_000_000).contains(&view.html().len()), "{}", view.html().len());
     let report = render(&Facts::new(&body, &RunData::default()), Format::Html).len();
@@ -238,6 +243,25 @@ fn a_browser_draws_the_body_of_a_report() {
     for id in ["data", "data-positions", "data-shapes", "data-triangles"] {
         assert_eq!(element(&run, id), element(&file, id), "{id}");
     }
+}
+
+/// A page says how long its frames take, however large the body is.
+#[test]
+#[ignore = "slow"]
+fn a_browser_turns_a_hundred_thousand_nodes() {
+    let Some(browser) = browser() else {
+        eprintln!("no Chromium on the PATH: no frame is drawn");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = folder.path().join("plate.html");
+    fs::write(&page, View::new(&plate(), None, None).expect("a page").html()).expect("written");
+    let (document, said) = browse(&browser, &page, "#mode=3&frames=20", &["--dump-dom"]);
+    assert!(!said.contains("CONSOLE"), "{said}");
+    let (_, rest) = document.split_once("data-frame-time=\"").expect("the time of a frame");
+    let (time, _) = rest.split_once(" ms\"").expect("milliseconds");
+    println!("{time} ms for a frame of 100,000 nodes");
+    assert!(time.parse::<f64>().is_ok_and(|time| time > 0.0), "{time}");
 }
 
 /// The page draws without complaint, and two instants of a mode look different; one looks the same twice.

@@ -498,4 +498,16 @@ choose(Math.max(0, (number("mode") ?? 1) - 1) % modes.length);
 if (motion) showTime();
 play(state.playing);
 draw();
+
+// #frames=60 says how long a frame takes: that many of one period, each read back from the card.
+const frames = Math.min(number("frames") ?? 0, 1000);
+if (frames >= 1) {
+  const begun = performance.now(), pixel = new Uint8Array(4);
+  for (let k = 0; k < frames; k++) {
+    state.phase = k / frames;
+    draw();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  }
+  document.documentElement.dataset.frameTime = `${((performance.now() - begun) / frames).toFixed(2)} ms`;
+}
 })();
