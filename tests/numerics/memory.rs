@@ -129,14 +129,14 @@ fn a_factor_that_does_not_fit_is_taken_in_single_precision() {
 #[test]
 #[ignore = "slow"]
 fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
-    let model = check(block([15; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
+    let model = check(block([26; 3], [1.0; 3]).raw_model()).expect("a sound model").model;
     let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let run = |accuracy, memory| {
+        // A search without a factor takes less than any count.
         let modes = ModeSettings {
-            wanted: Wanted::Lowest(4),
+            wanted: Wanted::Lowest(2),
             accuracy,
-            method: Method::Lanczos,
-            factor: FactorChoice::Always(Precision::Single),
+            multigrid_pays: 0.0,
             memory,
             ..ModeSettings::default()
         };
@@ -146,8 +146,8 @@ fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
     let bytes = |found: &Conversion| found.plan.expect("a sparse factor").bytes;
     let (search, all) = (run(Accuracy::Fast, None), run(Accuracy::Standard, None));
     assert!(all.body.certificate().proved_modes.is_some());
-    let limit = (bytes(&search) + bytes(&all)) / 2;
-    assert!(bytes(&search) < limit && limit < bytes(&all), "room for the search only");
+    let limit = bytes(&search) + bytes(&search) / 50;
+    assert!(limit < bytes(&all), "room for the search only: {limit} {}", bytes(&all));
     let found = run(Accuracy::Standard, Some(limit));
     assert_eq!(bytes(&found), bytes(&search));
     // The modes keep their promise all the same.
