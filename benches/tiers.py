@@ -20,14 +20,14 @@ import performance_page
 
 # What `compare` calls the constants of the equations of motion that hang on the modes.
 INVARIANTS = ("C1", "Ibar (W1, C2)", "S (W2, W3, m_ff)")
-# Tiers that are run: a million rows have no certified bounds in the memory of a workstation.
+# Tiers that are run: a million rows have no certified bounds in the memory of a workstation, rotations of nodes have none at all.
 CASES = {
     "block-100k": ("fast", "standard", "certified"),
     "cube-100k": ("fast", "standard", "certified"),
     "tet10-100k": ("fast", "standard", "certified"),
     "plate-50k": ("fast", "standard", "certified"),
     "cube-300k": ("fast", "standard", "certified"),
-    "shell-200k": ("fast", "standard", "certified"),
+    "shell-200k": ("fast", "standard"),
     "cube-1m": ("fast", "standard"),
 }
 

@@ -70,15 +70,16 @@ impl<'a, T: Real> Indefinite<'a, T> {
     /// G = I - F^-1 A: a matrix (1 - t) F + t A between the two is singular only where 1/t is an eigenvalue
     /// of G. So A has the inertia of F if no eigenvalue of G reaches one, which no norm of a power of G less
     /// than one permits. The mean square of G^p z over normal vectors z has the square of the Frobenius norm
-    /// of G^p as its mean: less than that over [`MARGIN`] squared it is, for [`COLUMNS`] vectors, with a
-    /// probability of 10^-15. G^2 and G^3 tell more than G, whose norm comes from what it turns into the
-    /// modes next to sigma from all others.
+    /// of G^p as its mean: were that one, the mean square over [`COLUMNS`] vectors would be less than 1 /
+    /// [`MARGIN`]^2 with a probability of 10^-15. Powers tell more than G, whose norm comes from what it
+    /// turns into the modes next to sigma from all others, and is much larger than its eigenvalues.
     ///
     /// The norm that was measured, times [`MARGIN`]; `None` where none of the powers is small enough.
     pub fn perturbation(&self, pencil: &Pencil<'_>) -> Option<f64> {
         let n = pencil.n();
         let scale = |i: usize| self.scale[i];
         let mut z = Mat::from_fn(n, COLUMNS, |i, j| normal(i as u64, j as u64));
+        let mut before = f64::INFINITY;
         for _ in 0..POWERS {
             let x = Mat::from_fn(n, COLUMNS, |i, j| scale(i) * z[(i, j)]);
             let mut product = pencil.apply_stiffness(x.as_ref());
@@ -89,6 +90,12 @@ impl<'a, T: Real> Indefinite<'a, T> {
             if bound < 1.0 {
                 return Some(bound);
             }
+            // Not a number falls neither.
+            let falls = bound < FALLING * before;
+            if !falls {
+                return None;
+            }
+            before = bound;
         }
         None
     }
@@ -98,8 +105,9 @@ impl<'a, T: Real> Indefinite<'a, T> {
 /// than 10^-4 is 10^-15.
 const MARGIN: f64 = 100.0;
 
-/// Powers of G that are looked at.
-const POWERS: usize = 3;
+/// Powers of G that are looked at, as long as each is so much smaller than the one before.
+const POWERS: usize = 12;
+const FALLING: f64 = 0.5;
 
 /// to -= factor from.
 #[inline(always)]
