@@ -45,7 +45,9 @@ mod term_facts;
 mod text;
 #[cfg(feature = "hdf5")]
 mod trade;
+#[cfg(feature = "hdf5")]
 mod trade_cases;
+#[cfg(feature = "hdf5")]
 mod trade_nodes;
 #[cfg(feature = "hdf5")]
 mod trade_verdict;
