@@ -17,7 +17,8 @@ from common import ROOT, Absent, Row
 PYTHON = os.environ.get("FLEXBODY_PYTHON", "/usr/bin/python3")
 MPIEXEC = os.environ.get("FLEXBODY_MPIEXEC", "mpiexec --oversubscribe" + (" --allow-run-as-root" if os.geteuid() == 0 else ""))
 # Solids of every element, shells, beams, a plane model, one with repeated eigenvalues.
-MODELS = ["connecting_rod", "bracket_hex20", "gear_disc", "shell_folded", "frame_beams", "plane_frame"]
+SOLIDS = ["connecting_rod", "bracket_hex20", "gear_disc"]
+MODELS = [*SOLIDS, "shell_folded", "frame_beams", "plane_frame"]
 QUANTITIES = {"frequency": 1e-9, "invariants": 1e-11}
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 
@@ -58,8 +59,9 @@ def agreement(flexbody, folder):
         common.run(flexbody, "prepare", manifest, "--quiet", "-o", job)
         program = program or version(job)
         own = folder / f"{model}.own.flex.h5"
-        # At `standard` the built-in modes themselves are good to no more than the limit.
-        common.run(flexbody, "convert", manifest, "--accuracy", "certified", "--residual-vectors", "", "--quiet", "-o", own)
+        # At `standard` the built-in modes of solids themselves are good to no more than the limit; rotations of nodes have nothing better.
+        accuracy = "certified" if model in SOLIDS else "standard"
+        common.run(flexbody, "convert", manifest, "--accuracy", accuracy, "--residual-vectors", "", "--quiet", "-o", own)
         worst = (0.0, 0.0)
         for ranks in (1, 2, 4):
             forget(job)
