@@ -320,9 +320,9 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 /// 1e-3 less, that settles it in half the time. Uses the order of `analysis`.
 pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
     let order = analysis.tree.order();
-    let rows = mass.n() / order.len().max(1);
-    let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows.max(1)) else { return false };
-    let analysis = Analysis::with_tree(AssemblyTree::new(&graph, order, rows.max(1)), rows.max(1));
+    let rows = (mass.n() / order.len().max(1)).max(1);
+    let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows) else { return false };
+    let analysis = Analysis::with_tree(AssemblyTree::new(&graph, order, rows), rows);
     drop(graph);
     let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
     if Cholesky::<f32>::new(&analysis, &Pencil::new(&lowered, &lowered, 1), 0.0).is_some() {

@@ -6,6 +6,7 @@ use super::factor::{Analysis, COLUMNS, substitute};
 use super::front::{PANEL, ROWS, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
 use super::random::normal;
+use super::substitution::WORTH_TASKS;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut};
 use pulp::Arch;
@@ -235,9 +236,6 @@ fn backward<T: Real, const K: usize>(
         }
     }
 }
-
-/// Numbers of a panel below which cutting it is not worth the tasks.
-const WORTH_TASKS: usize = 300_000;
 
 #[cfg(test)]
 mod tests {

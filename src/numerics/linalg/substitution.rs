@@ -13,7 +13,7 @@ use rayon::prelude::*;
 const ROWS: usize = 512;
 
 /// Numbers of a panel below which cutting it is not worth the tasks.
-const WORTH_TASKS: usize = 300_000;
+pub(super) const WORTH_TASKS: usize = 300_000;
 
 /// Forward substitution with the columns of a Cholesky factor: `front` holds a row of `K` right-hand sides
 /// for every row of the front; the leading rows become the solution, the others what is left for the parent.
