@@ -46,6 +46,8 @@ SCENES = [
 COUNTER = ("block_79_periods", "cube_hex8", 12)
 # Candidates of the front whose error is more than this many times what is allowed are not timed.
 HOPELESS = 10
+# What the reference may lack of the FE model, as `trade` names it.
+OUTPUTS = ("attitude", "deflection", "stress", "reaction")
 # Lowest modes that the guidelines are tried with.
 FEW = 6
 INSTANTS = 300

@@ -134,6 +134,9 @@ pub(super) struct Goal {
     pub tolerance: f64,
     /// Eigenvalues closer than this (relative) are one cluster.
     pub cluster_gap: f64,
+    /// Distance of eigenvalues, beside the size of the matrix along their modes, that the count needs above the
+    /// last mode: corrections go on to the next such gap, if it is near.
+    pub separation: f64,
     /// Columns per step.
     pub block: usize,
     /// Whether the solves are rough: the modes are then handed out as a span to be corrected.

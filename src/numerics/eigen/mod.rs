@@ -17,6 +17,7 @@ mod plan;
 mod problem;
 mod refine;
 mod resume;
+mod search_space;
 mod settings;
 mod single;
 mod solution;

@@ -1,8 +1,8 @@
 //! Rounding floors: how small a residual or an eigenvalue can be told from zero with the digits that are
 //! there.
 
-use crate::numerics::linalg::{SymmetricMatrix, sum_terms};
-use faer::{ColRef, Mat, MatRef};
+use crate::numerics::linalg::{SymmetricMatrix, Tall, column_norms, sum_terms};
+use faer::{ColRef, MatRef};
 
 /// Unit roundoff of f64.
 const ROUNDOFF: f64 = f64::EPSILON / 2.0;
@@ -13,7 +13,7 @@ const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 pub fn energy_noise(k: &SymmetricMatrix, x: MatRef<'_, f64>, relative: f64) -> Vec<f64> {
     let relative = relative.max(ROUNDOFF);
     let terms = row_sums(k, x, |term| term * term);
-    let columns = x.col_iter().zip(terms.col_iter());
+    let columns = x.col_iter().zip(terms.as_ref().col_iter());
     let sum = |(x, terms): (ColRef<'_, f64>, ColRef<'_, f64>)| -> f64 {
         x.iter().zip(terms.iter()).map(|(x, term)| x * x * term).sum()
     };
@@ -22,12 +22,12 @@ pub fn energy_noise(k: &SymmetricMatrix, x: MatRef<'_, f64>, relative: f64) -> V
 
 /// For each column x of X: eps | |K| |x| |_2, the norm of K x that rounding alone can leave.
 pub fn rounding_residual(k: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<f64> {
-    row_sums(k, x, f64::abs).col_iter().map(|sums| f64::EPSILON * sums.norm_l2()).collect()
+    column_norms(row_sums(k, x, f64::abs).as_ref()).into_iter().map(|norm| f64::EPSILON * norm).collect()
 }
 
 /// sum_j f(K_ij x_j) for each row i and each column x.
-fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Copy + Sync) -> Mat<f64> {
-    let mut sums = Mat::zeros(x.nrows(), x.ncols());
+fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Copy + Sync) -> Tall {
+    let mut sums = Tall::zeros(x.nrows(), x.ncols());
     sum_terms(k, 1, x, sums.as_mut(), f);
     sums
 }

@@ -5,7 +5,10 @@ use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::noise::rounding_residual;
 use super::problem::EigenProblem;
-use crate::numerics::linalg::{Solve, combine, gram, largest, subtract_combination, symmetric_eigen};
+use crate::numerics::linalg::{
+    Solve, Tall, column_norms, combine, combine_into, gram, largest, subtract_columns, subtract_combination,
+    symmetric_eigen,
+};
 use faer::{ColRef, Mat, MatRef};
 
 /// Refined modes with their products.
@@ -69,34 +72,36 @@ pub(super) fn rayleigh_ritz(
     let kx = pencil.apply_stiffness(x.as_ref());
     let gm = gram(x.as_ref(), mx.as_ref());
     let gk = gram(x.as_ref(), kx.as_ref());
-    let (values, coefficients) = small_ritz(gm, gk)?;
+    let (values, coefficients) = small_ritz(&gm, &gk)?;
     Ok((values, combine(x.as_ref(), coefficients.as_ref())))
 }
 
 /// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
 /// matrices with M and with K. Directions in which the basis is dependent are left out.
-pub(super) fn small_ritz(gm: Mat<f64>, gk: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+pub(super) fn small_ritz(gm: &Mat<f64>, gk: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+    let orthonormal = independent(gm)?;
+    let symmetric = Mat::from_fn(gk.nrows(), gk.ncols(), |i, j| 0.5 * (gk[(i, j)] + gk[(j, i)]));
+    let projected = gram(orthonormal.as_ref(), combine(symmetric.as_ref(), orthonormal.as_ref()).as_ref());
+    let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    Ok((ritz.values, combine(orthonormal.as_ref(), ritz.vectors.as_ref())))
+}
+
+/// Coefficients of M-orthonormal vectors that span what a basis with this Gram matrix spans, less the
+/// directions in which it is dependent.
+pub(super) fn independent(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
     // A column that nothing is left of spans nothing.
     let scale: Vec<f64> =
         (0..gm.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
     if scale.iter().any(|s| !s.is_finite()) {
         return Err(EigenFailure::MassIndefinite);
     }
-    let scaled = |g: &Mat<f64>| {
-        Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
-    };
-    let (gm, gk) = (scaled(&gm), scaled(&gk));
-    let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let scaled =
+        Mat::from_fn(gm.nrows(), gm.ncols(), |i, j| 0.5 * (gm[(i, j)] + gm[(j, i)]) * scale[i] * scale[j]);
+    let eigen = symmetric_eigen(scaled.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
     let first = eigen.values.partition_point(|&v| v < DEPENDENT);
-    let to_orthonormal = Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
-        eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
-    });
-    let projected = gram(to_orthonormal.as_ref(), combine(gk.as_ref(), to_orthonormal.as_ref()).as_ref());
-    let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
-    let coefficients = combine(to_orthonormal.as_ref(), ritz.vectors.as_ref());
-    let coefficients =
-        Mat::from_fn(coefficients.nrows(), coefficients.ncols(), |i, j| scale[i] * coefficients[(i, j)]);
-    Ok((ritz.values, coefficients))
+    Ok(Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
+        scale[i] * eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
+    }))
 }
 
 /// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be
@@ -111,18 +116,22 @@ pub(super) fn residuals(
     let pencil = &problem.pencil;
     counters.mass_columns += x.ncols() as u64;
     counters.stiffness_columns += x.ncols() as u64;
-    let mx = pencil.apply_mass(x);
-    let kx = pencil.apply_stiffness(x);
+    let [mut kx, mut mx, mut rigid] = [(); 3].map(|()| Tall::zeros(x.nrows(), x.ncols()));
+    pencil.stiffness_times(x, kx.as_mut());
+    pencil.mass_times(x, mx.as_mut());
+    let m_rigid = pencil.apply_mass(problem.rigid);
+    combine_into(rigid.as_mut(), m_rigid.as_ref(), gram(problem.rigid, kx.as_ref()).as_ref());
+    let (stiff, heavy) = (column_norms(kx.as_ref()), column_norms(mx.as_ref()));
+    subtract_columns(kx.as_mut(), eigenvalues, mx.as_ref());
+    let (rest, rigid) = (column_norms(kx.as_ref()), column_norms(rigid.as_ref()));
     let rounding = rounding_residual(pencil.stiffness(), x);
-    let rigid = pencil.apply_mass(problem.rigid) * gram(problem.rigid, kx.as_ref());
-    let mut residuals = Vec::with_capacity(x.ncols());
-    let mut floors = Vec::with_capacity(x.ncols());
-    for (j, &lambda) in eigenvalues.iter().enumerate() {
-        let scale = residual_scale(kx.col(j), mx.col(j), lambda);
-        residuals.push(relative_residual(kx.col(j), mx.col(j), lambda));
-        floors.push(if scale > 0.0 { (rounding[j] + rigid.col(j).norm_l2()) / scale } else { 0.0 });
-    }
-    (residuals, floors)
+    let scale = |j: usize| stiff[j] + eigenvalues[j].abs() * heavy[j];
+    let beside = |size: f64, scale: f64| if scale == 0.0 { 0.0 } else { size / scale };
+    let modes = 0..eigenvalues.len();
+    (
+        modes.clone().map(|j| beside(rest[j], scale(j))).collect(),
+        modes.map(|j| beside(rounding[j] + rigid[j], scale(j))).collect(),
+    )
 }
 
 /// |K psi| + |lambda| |M psi|.

@@ -2,7 +2,7 @@
 
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, cluster_end, clusters};
-use super::completeness::{Completeness, Counting, Proof, count};
+use super::completeness::{Completeness, Counting, NEAR, Proof, count, size_along};
 use super::counters::Counters;
 use super::dense;
 use super::factorise::{Attempt, with_suited_shift};
@@ -258,7 +258,20 @@ impl Sparse<'_> {
     ) -> Result<Search, EigenFailure> {
         let Self { problem, analysis, .. } = *self;
         let tolerance = SEARCHED * self.settings.accuracy.residual();
-        let goal = Goal { wanted, tolerance, cluster_gap: CLUSTER_GAP, block: BLOCK, rough: false, attempt };
+        // The shift of the count is in the middle of the gap; a fifth more, since the gap is not known yet.
+        let separation = match self.plan.counting {
+            Some(Counting::Single { .. }) => 2.4 * NEAR,
+            _ => 0.0,
+        };
+        let goal = Goal {
+            wanted,
+            tolerance,
+            cluster_gap: CLUSTER_GAP,
+            separation,
+            block: BLOCK,
+            rough: false,
+            attempt,
+        };
         let mut found = self.search_without_factor(&goal, watch, counters)?;
         if found.is_none() {
             found = self.search_in_single(&goal, watch, counters)?;
@@ -389,17 +402,10 @@ fn prove(
 }
 
 /// Whether the shift is so near to the last mode below it, for the size of the matrix along this mode, that
-/// the rounding of a factor in single precision is likely to move one across the other. Measured on cubes and
-/// blocks: G of [`Indefinite::perturbation`](crate::numerics::linalg::Indefinite::perturbation) has a norm of
-/// 4.5e-7 over this distance.
+/// the rounding of a factor in single precision is likely to move one across the other.
 fn is_near(problem: &EigenProblem<'_>, found: &Refined, shift: f64) -> bool {
-    const NEAR: f64 = 2e-6;
     let Some(last) = found.eigenvalues.iter().rposition(|&lambda| lambda < shift) else { return false };
-    let pencil = &problem.pencil;
-    let diagonal = pencil.stiffness().diagonal().into_iter().zip(pencil.mass_diagonal());
-    let mode = found.vectors.col(last).iter();
-    let size: f64 = diagonal.zip(mode).map(|((k, m), x)| (k.abs() + shift * m) * x * x).sum();
-    shift - found.eigenvalues[last] < NEAR * size
+    shift - found.eigenvalues[last] < NEAR * size_along(problem, shift, found.vectors.col(last))
 }
 
 /// Canonical form, the wanted number of modes, residuals of what is handed out.

@@ -6,6 +6,7 @@ use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltParams, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
 };
+use faer::linalg::cholesky::llt::inverse::{inverse as invert, inverse_scratch};
 use faer::linalg::evd::{
     ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch,
 };
@@ -80,6 +81,17 @@ pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     Some(a)
 }
 
+/// The inverse of the dense symmetric positive definite matrix whose lower triangle is that of `a`, symmetric
+/// to the last bit; `None` when it is not positive definite.
+pub fn dense_inverse(a: Mat<f64>) -> Option<Mat<f64>> {
+    let n = a.nrows();
+    let lower = dense_cholesky(a)?;
+    let mut inverse = Mat::zeros(n, n);
+    let mut memory = MemBuffer::new(inverse_scratch::<f64>(n, Par::Seq));
+    invert(inverse.as_mut(), lower.as_ref(), Par::Seq, MemStack::new(&mut memory));
+    Some(Mat::from_fn(n, n, |i, j| inverse[(i.max(j), i.min(j))]))
+}
+
 /// |A V - V L| / |A|.
 fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     let n = a.nrows();
@@ -140,6 +152,19 @@ mod tests {
             assert!(backward_error(&graded, &eigen) < BACKWARD_ERROR, "n = {n}");
             assert!(eigen.values.windows(2).all(|w| w[0] <= w[1]));
         }
+    }
+
+    #[test]
+    fn an_inverse_is_symmetric_and_one() {
+        let n = 70;
+        let a = Mat::from_fn(n, n, |i, j| if i == j { 3.0 } else { 1.0 / (1.0 + i.abs_diff(j) as f64) });
+        let inverse = dense_inverse(a.clone()).expect("positive definite");
+        let product = combine(a.as_ref(), inverse.as_ref());
+        for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
+            assert_eq!(inverse[(i, j)], inverse[(j, i)]);
+            assert!((product[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-14, "({i}, {j})");
+        }
+        assert!(dense_inverse(Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 })).is_none());
     }
 
     #[test]

@@ -27,7 +27,7 @@ mod tree_walk;
 pub use compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
 pub use compensated_pencil::small_pencil_eigenvalues;
 pub use compensated_product::{CompensatedBlock, LANES, gram_compensated, multiply_compensated, sum_length};
-pub use dense::{SymmetricEigen, dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
+pub use dense::{SymmetricEigen, dense_cholesky, dense_inverse, solve_lower, solve_upper, symmetric_eigen};
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
@@ -44,5 +44,6 @@ pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{
-    add_combination, column_products, combine, combine_into, gram, side_by_side, subtract_combination,
+    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, gram,
+    side_by_side, subtract_columns, subtract_combination,
 };

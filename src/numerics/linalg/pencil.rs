@@ -1,7 +1,7 @@
 //! The symmetric pencil K - sigma M with M = Ms kron I_block, as the eigen-solver sees it.
 
 use super::{SymmetricMatrix, multiply};
-use faer::{Mat, MatRef};
+use faer::{Mat, MatMut, MatRef};
 
 /// Stiffness K (N x N) and mass M = Ms kron I_block (Ms: N/block x N/block): products.
 #[derive(Debug, Clone, Copy)]
@@ -44,15 +44,25 @@ impl<'a> Pencil<'a> {
     /// K X.
     pub fn apply_stiffness(&self, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
-        multiply(self.stiffness, 1, x, y.as_mut());
+        self.stiffness_times(x, y.as_mut());
         y
     }
 
     /// M X.
     pub fn apply_mass(&self, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
-        multiply(self.mass, self.block, x, y.as_mut());
+        self.mass_times(x, y.as_mut());
         y
+    }
+
+    /// Y = K X.
+    pub fn stiffness_times(&self, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
+        multiply(self.stiffness, 1, x, y);
+    }
+
+    /// Y = M X.
+    pub fn mass_times(&self, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
+        multiply(self.mass, self.block, x, y);
     }
 
     /// The diagonal of M, row by row.

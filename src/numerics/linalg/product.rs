@@ -63,7 +63,6 @@ pub fn sum_terms(
 ) {
     let n = a.n() * block;
     assert!(x.nrows() == n && y.nrows() == n && x.ncols() == y.ncols(), "shapes of a block product");
-    let mut scratch = vec![0.0; n * x.ncols().min(8)];
     let mut start = 0;
     while start < x.ncols() {
         let rest = x.ncols() - start;
@@ -76,45 +75,37 @@ pub fn sum_terms(
         };
         let xs = x.subcols(start, width);
         let ys = y.rb_mut().subcols_mut(start, width);
-        let packed = &mut scratch[..n * width];
         match (block, width) {
-            (3, 8) => pass::<3, 8>(a, xs, ys, packed, f),
-            (3, 4) => pass::<3, 4>(a, xs, ys, packed, f),
-            (3, 2) => pass::<3, 2>(a, xs, ys, packed, f),
-            (3, _) => pass::<3, 1>(a, xs, ys, packed, f),
-            (2, 8) => pass::<2, 8>(a, xs, ys, packed, f),
-            (2, 4) => pass::<2, 4>(a, xs, ys, packed, f),
-            (2, 2) => pass::<2, 2>(a, xs, ys, packed, f),
-            (2, _) => pass::<2, 1>(a, xs, ys, packed, f),
-            (1, 8) => pass::<1, 8>(a, xs, ys, packed, f),
-            (1, 4) => pass::<1, 4>(a, xs, ys, packed, f),
-            (1, 2) => pass::<1, 2>(a, xs, ys, packed, f),
-            (1, _) => pass::<1, 1>(a, xs, ys, packed, f),
+            (3, 8) => pass::<3, 8>(a, xs, ys, f),
+            (3, 4) => pass::<3, 4>(a, xs, ys, f),
+            (3, 2) => pass::<3, 2>(a, xs, ys, f),
+            (3, _) => pass::<3, 1>(a, xs, ys, f),
+            (2, 8) => pass::<2, 8>(a, xs, ys, f),
+            (2, 4) => pass::<2, 4>(a, xs, ys, f),
+            (2, 2) => pass::<2, 2>(a, xs, ys, f),
+            (2, _) => pass::<2, 1>(a, xs, ys, f),
+            (1, 8) => pass::<1, 8>(a, xs, ys, f),
+            (1, 4) => pass::<1, 4>(a, xs, ys, f),
+            (1, 2) => pass::<1, 2>(a, xs, ys, f),
+            (1, _) => pass::<1, 1>(a, xs, ys, f),
             _ => panic!("blocks of 1, 2 or 3 components, not {block}"),
         }
         start += width;
     }
 }
 
-/// One pass over the matrix: `B` components per matrix row, `W` columns; `packed` has room for all of x.
+/// One pass over the matrix: `B` components per matrix row, `W` columns.
 fn pass<const B: usize, const W: usize>(
     a: &SymmetricMatrix,
     x: MatRef<'_, f64>,
     y: MatMut<'_, f64>,
-    packed: &mut [f64],
     f: impl Fn(f64) -> f64 + Copy + Sync,
 ) {
     let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
-    let packed = packed.as_chunks_mut::<W>().0;
-    packed.par_chunks_mut(ROWS * B).enumerate().for_each(|(chunk, rows)| {
-        let part = columns.map(|column| &column[chunk * ROWS * B..][..rows.len()]);
-        for (k, row) in rows.iter_mut().enumerate() {
-            *row = part.map(|column| column[k]);
-        }
-    });
-    let (packed, rest) = packed.as_chunks::<B>();
-    debug_assert!(rest.is_empty(), "n rows of B components");
+    let rows = (0..a.n()).into_par_iter().with_min_len(ROWS);
+    let packed: Vec<[[f64; W]; B]> =
+        rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
     let mut targets: Vec<_> = y
         .col_iter_mut()
         .map(|column| {
@@ -126,7 +117,7 @@ fn pass<const B: usize, const W: usize>(
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
     shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
-        arch.dispatch(|| rows_times::<B, W>(a, chunk * ROWS, packed, share, f));
+        arch.dispatch(|| rows_times::<B, W>(a, chunk * ROWS, &packed, share, f));
     });
 }
 

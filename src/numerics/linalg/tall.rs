@@ -2,11 +2,75 @@
 //! chunks are added in a fixed order, so that the bits do not depend on the number of threads.
 
 use faer::linalg::matmul::matmul;
+use faer::prelude::ReborrowMut;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows per partial product.
 const ROWS: usize = 4096;
+
+/// A tall block of zeros that is written by parts: its memory is taken from the system by whoever writes it
+/// first, where a [`Mat`] is filled by one thread, which takes longer than most of what is done with it.
+#[derive(Debug, Clone, Default)]
+pub struct Tall {
+    entries: Vec<f64>,
+    rows: usize,
+}
+
+impl Tall {
+    /// Zeros.
+    pub fn zeros(rows: usize, columns: usize) -> Self {
+        Self { entries: vec![0.0; rows * columns], rows }
+    }
+
+    /// A copy, made by all threads.
+    pub fn copied(x: MatRef<'_, f64>) -> Self {
+        let mut own = Self::zeros(x.nrows(), x.ncols());
+        let columns: Vec<_> = own.as_mut().col_iter_mut().zip(x.col_iter()).collect();
+        columns.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
+        own
+    }
+
+    /// Columns that there is room for.
+    pub fn ncols(&self) -> usize {
+        self.entries.len() / self.rows.max(1)
+    }
+
+    /// The whole block.
+    pub fn as_ref(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice(&self.entries, self.rows, self.ncols())
+    }
+
+    /// The whole block, to be written.
+    pub fn as_mut(&mut self) -> MatMut<'_, f64> {
+        let columns = self.ncols();
+        MatMut::from_column_major_slice_mut(&mut self.entries, self.rows, columns)
+    }
+
+    /// Some of the columns.
+    pub fn columns(&self, which: Range<usize>) -> MatRef<'_, f64> {
+        self.as_ref().subcols(which.start, which.len())
+    }
+
+    /// Some of the columns, to be written.
+    pub fn columns_mut(&mut self, which: Range<usize>) -> MatMut<'_, f64> {
+        self.as_mut().subcols_mut(which.start, which.len())
+    }
+
+    /// The first columns.
+    pub fn first(&self, columns: usize) -> MatRef<'_, f64> {
+        self.columns(0..columns)
+    }
+
+    /// The first columns, to be written; all are made anew where there are too few.
+    pub fn first_mut(&mut self, columns: usize) -> MatMut<'_, f64> {
+        if columns > self.ncols() {
+            *self = Self::zeros(self.rows, columns);
+        }
+        self.columns_mut(0..columns)
+    }
+}
 
 /// A' B (m x k) of tall blocks A (n x m) and B (n x k).
 ///
@@ -43,6 +107,29 @@ pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 pub fn column_products(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Vec<f64> {
     assert_eq!(a.ncols(), b.ncols(), "columns of a product by columns");
     (0..a.ncols()).map(|j| gram(a.subcols(j, 1), b.subcols(j, 1))[(0, 0)]).collect()
+}
+
+/// Norms between these are those of their squares.
+const SQUARES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+
+/// Euclidean norms of the columns of a tall block.
+pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
+    let chunks = a.nrows().div_ceil(ROWS);
+    let squares = |k: usize| -> f64 {
+        let (chunk, column) = (k % chunks, k / chunks);
+        let part = a.col(column).subrows(chunk * ROWS, ROWS.min(a.nrows() - chunk * ROWS));
+        let part = part.try_as_col_major().expect("blocks are column-major").as_slice();
+        let (lanes, rest) = part.as_chunks::<8>();
+        let mut sums = [0.0; 8];
+        lanes.iter().for_each(|x| (0..8).for_each(|w| sums[w] += x[w] * x[w]));
+        sums.iter().sum::<f64>() + rest.iter().map(|x| x * x).sum::<f64>()
+    };
+    let parts: Vec<f64> = (0..chunks * a.ncols()).into_par_iter().map(squares).collect();
+    let norm = |j: usize| {
+        let norm = parts[j * chunks..(j + 1) * chunks].iter().sum::<f64>().sqrt();
+        if SQUARES.contains(&norm) { norm } else { a.col(j).norm_l2() }
+    };
+    (0..a.ncols()).map(norm).collect()
 }
 
 /// Sum of equal-shaped matrices, pairwise: error grows with the logarithm of their number.
@@ -91,6 +178,35 @@ pub fn combine_into(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) 
     add_product(w, Accum::Replace, v, h, 1.0);
 }
 
+/// V <- V H in its first columns, for tall V (n x m) and small H (m x k) with k <= m.
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
+    assert!(v.ncols() == h.nrows() && h.ncols() <= h.nrows(), "tall product in place");
+    let chunks = v.nrows().div_ceil(ROWS);
+    split_rows(v, chunks).into_par_iter().for_each(|mut part| {
+        let mut combined = Mat::zeros(part.nrows(), h.ncols());
+        matmul(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0, Par::Seq);
+        part.rb_mut().subcols_mut(0, h.ncols()).copy_from(combined);
+    });
+}
+
+/// y_j -= s_j x_j for the columns of equal-shaped blocks.
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn subtract_columns(y: MatMut<'_, f64>, scales: &[f64], x: MatRef<'_, f64>) {
+    assert!(
+        y.nrows() == x.nrows() && y.ncols() == x.ncols() && x.ncols() == scales.len(),
+        "columns to subtract"
+    );
+    let columns: Vec<_> = y.col_iter_mut().zip(x.col_iter()).zip(scales).collect();
+    columns.into_par_iter().for_each(|((y, x), scale)| {
+        y.iter_mut().zip(x.iter()).for_each(|(y, x)| *y -= scale * x);
+    });
+}
+
 /// The columns of all blocks, in their order.
 ///
 /// # Panics
@@ -121,4 +237,52 @@ fn split_rows(mut w: MatMut<'_, f64>, chunks: usize) -> Vec<MatMut<'_, f64>> {
         w = tail;
     }
     pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(rows: usize, columns: usize) -> Tall {
+        let mut block = Tall::zeros(rows, columns);
+        let mut all = block.as_mut();
+        (0..columns).for_each(|j| (0..rows).for_each(|i| all[(i, j)] = ((i * 7 + j * 13) as f64).sin()));
+        block
+    }
+
+    #[test]
+    fn norms_are_those_of_the_columns_at_any_size() {
+        let rows = ROWS + 13;
+        for size in [1.0, 1e-200, 1e200] {
+            let mut a = block(rows, 3);
+            a.as_mut().col_iter_mut().for_each(|mut column| column *= faer::Scale(size));
+            for (norm, column) in column_norms(a.as_ref()).into_iter().zip(a.as_ref().col_iter()) {
+                assert!((norm / column.norm_l2() - 1.0).abs() < 1e-13, "{norm:e}");
+            }
+        }
+        assert_eq!(column_norms(Tall::zeros(5, 2).as_ref()), [0.0, 0.0]);
+        let mut a = block(rows, 1);
+        a.as_mut()[(rows - 1, 0)] = f64::NAN;
+        assert!(column_norms(a.as_ref())[0].is_nan());
+    }
+
+    #[test]
+    fn combinations_in_place_are_combinations() {
+        let mut v = block(2 * ROWS + 5, 4);
+        let h = Mat::from_fn(4, 3, |i, j| (i as f64 - 1.5) * (j as f64 + 0.5));
+        let expected = combine(v.as_ref(), h.as_ref());
+        let last = v.columns(3..4).to_owned();
+        combine_in_place(v.as_mut(), h.as_ref());
+        assert_eq!(v.first(3), expected);
+        assert_eq!(v.columns(3..4), last, "what is not written stays");
+    }
+
+    #[test]
+    fn multiples_of_columns_are_subtracted() {
+        let (x, mut y) = (block(9, 2), block(9, 2));
+        subtract_columns(y.as_mut(), &[1.0, -2.0], x.as_ref());
+        for i in 0..9 {
+            assert_eq!((y.as_ref()[(i, 0)], y.as_ref()[(i, 1)]), (0.0, 3.0 * x.as_ref()[(i, 1)]));
+        }
+    }
 }

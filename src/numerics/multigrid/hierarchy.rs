@@ -3,7 +3,9 @@
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
 use super::level::{Coarse, Level};
-use crate::numerics::linalg::{Pencil, Solve, dense_cholesky, gram, largest, solve_lower, solve_upper};
+use crate::numerics::linalg::{
+    Pencil, Solve, combine, dense_cholesky, dense_inverse, gram, largest, solve_lower,
+};
 use faer::prelude::ReborrowMut;
 use faer::{ColMut, Mat, MatMut, MatRef};
 use rayon::prelude::*;
@@ -58,8 +60,8 @@ pub fn levels(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>, tau: f64) -> Option<B
 struct Hierarchy<const B: usize, const C: usize> {
     fine: Level<B, C>,
     coarser: Vec<Level<C, C>>,
-    /// Lower Cholesky factor of the matrix of the coarsest level.
-    bottom: Mat<f64>,
+    /// The inverse of the matrix of the coarsest level.
+    inverse_of_bottom: Mat<f64>,
     /// Masses of its groups.
     masses: Vec<Block<C, C>>,
     /// Largest diagonal entry of K: divided by it, numbers stay within single precision in any units.
@@ -132,8 +134,8 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             coarser.push(level);
             next = after;
         }
-        let bottom = dense_cholesky(dense(&next.a))?;
-        Some(Self { fine, coarser, bottom, masses: next.masses, size, tau })
+        let inverse_of_bottom = dense_inverse(dense(&next.a))?;
+        Some(Self { fine, coarser, inverse_of_bottom, masses: next.masses, size, tau })
     }
 
     /// One cycle for (K + tau M) / size x = b.
@@ -148,16 +150,12 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
 
     fn solve_bottom(&self, b: &[Rows<C>]) -> Vec<Rows<C>> {
         let dense = Mat::from_fn(b.len() * C, WIDTH, |i, w| f64::from(b[i / C][i % C][w]));
-        packed(self.inverse_of_bottom(&dense).as_ref())
-    }
-
-    fn inverse_of_bottom(&self, b: &Mat<f64>) -> Mat<f64> {
-        solve_upper(&self.bottom, &solve_lower(&self.bottom, b))
+        packed(combine(self.inverse_of_bottom.as_ref(), dense.as_ref()).as_ref())
     }
 
     /// The lowest modes of the coarsest level, by inverse iterations from random vectors.
     fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
-        let n = self.bottom.nrows();
+        let n = self.inverse_of_bottom.nrows();
         let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
         for _ in 0..ROUGH_ROUNDS {
             let product = |i: usize, j: usize| -> f64 {
@@ -167,7 +165,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             let force = Mat::from_fn(n, x.ncols(), product);
             let l = dense_cholesky(gram(x.as_ref(), force.as_ref()))?;
             let orthonormal = solve_lower(&l, &force.transpose().to_owned()).transpose().to_owned();
-            x = unit_columns(self.inverse_of_bottom(&orthonormal));
+            x = unit_columns(combine(self.inverse_of_bottom.as_ref(), orthonormal.as_ref()));
         }
         Some(x)
     }
@@ -367,8 +365,11 @@ mod tests {
         let (pencil, tau) = (lattice.pencil(), 1e-3);
         let levels = Hierarchy::<3, 6>::new(&pencil, lattice.rigid().as_ref(), tau).expect("levels");
         let coarser = levels.coarser.iter().map(|level| 6 * level.nodes());
-        let rows: Vec<usize> =
-            [3 * levels.fine.nodes()].into_iter().chain(coarser).chain([levels.bottom.nrows()]).collect();
+        let rows: Vec<usize> = [3 * levels.fine.nodes()]
+            .into_iter()
+            .chain(coarser)
+            .chain([levels.inverse_of_bottom.nrows()])
+            .collect();
         assert!(rows.len() == 3 && rows.is_sorted_by(|a, b| a > &(4 * b)), "{rows:?}");
         // Eight columns and two that leave most of a width empty.
         let mut x = noise(pencil.n(), 10);

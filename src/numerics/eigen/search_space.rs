@@ -1,0 +1,156 @@
+//! The search space of a Davidson method: a basis that grows by blocks, with its products by K, its Gram
+//! matrices and its Ritz pairs.
+
+use super::counters::Counters;
+use super::failure::EigenFailure;
+use super::problem::EigenProblem;
+use super::refine::{independent, small_ritz};
+use crate::numerics::linalg::{
+    Tall, column_norms, combine, combine_in_place, combine_into, gram, subtract_columns, subtract_combination,
+};
+use faer::{Mat, MatRef};
+use std::ops::Range;
+
+/// A basis M-orthogonal to the rigid modes, nearly M-orthonormal.
+pub(super) struct SearchSpace<'a> {
+    problem: &'a EigenProblem<'a>,
+    /// M times the rigid modes.
+    m_rigid: Mat<f64>,
+    /// The basis and K times it: the first columns of blocks with room for more.
+    x: Tall,
+    kx: Tall,
+    used: usize,
+    /// X'M X and X'K X.
+    gm: Mat<f64>,
+    gk: Mat<f64>,
+    /// Ritz values, ascending.
+    pub lambda: Vec<f64>,
+    /// Coefficients of the Ritz vectors, which are M-orthonormal.
+    ritz: Mat<f64>,
+    /// Vectors in work, and M times them: kept, since memory that is taken anew is cleared first.
+    work: Tall,
+    m_work: Tall,
+}
+
+impl<'a> SearchSpace<'a> {
+    /// The span of `x`, made M-orthogonal to the rigid modes, with room for so many vectors.
+    pub(super) fn new(
+        problem: &'a EigenProblem<'a>,
+        x: Mat<f64>,
+        room: usize,
+        counters: &mut Counters,
+    ) -> Result<Self, EigenFailure> {
+        let n = problem.pencil.n();
+        let mut own = Self {
+            problem,
+            m_rigid: problem.pencil.apply_mass(problem.rigid),
+            x: Tall::zeros(n, room),
+            kx: Tall::zeros(n, room),
+            used: 0,
+            gm: Mat::zeros(0, 0),
+            gk: Mat::zeros(0, 0),
+            lambda: Vec::new(),
+            ritz: Mat::zeros(0, 0),
+            work: Tall::zeros(n, x.ncols()),
+            m_work: Tall::zeros(n, x.ncols()),
+        };
+        let mut first = Tall::copied(x.as_ref());
+        drop(x);
+        own.extend(&mut first, 1, counters)?;
+        Ok(own)
+    }
+
+    /// Vectors that there is room for beside those that it holds.
+    pub(super) fn room(&self) -> usize {
+        self.x.ncols() - self.used
+    }
+
+    /// Adds the span of `d`, made M-orthogonal to the rigid modes and to the basis in so many passes and
+    /// M-orthonormal in itself. Directions that are only rounding are left out.
+    ///
+    /// # Panics
+    /// Where there is no room for it.
+    pub(super) fn extend(
+        &mut self,
+        d: &mut Tall,
+        passes: usize,
+        counters: &mut Counters,
+    ) -> Result<(), EigenFailure> {
+        let Self { problem, m_rigid, x, kx, used, gm, gk, .. } = self;
+        let (pencil, columns) = (&problem.pencil, d.ncols());
+        counters.mass_columns += (columns * (passes + 1)) as u64;
+        for _ in 0..passes {
+            let along = gram(m_rigid.as_ref(), d.as_ref());
+            subtract_combination(d.as_mut(), problem.rigid, along.as_ref());
+            pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
+            let along = gram(x.first(*used), self.m_work.first(columns));
+            subtract_combination(d.as_mut(), x.first(*used), along.as_ref());
+        }
+        pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
+        let orthonormal = independent(&gram(d.as_ref(), self.m_work.first(columns)))?;
+        let added = *used..*used + orthonormal.ncols();
+        counters.mass_columns += added.len() as u64;
+        counters.stiffness_columns += added.len() as u64;
+        combine_into(x.columns_mut(added.clone()), d.as_ref(), orthonormal.as_ref());
+        pencil.mass_times(x.columns(added.clone()), self.m_work.first_mut(added.len()));
+        pencil.stiffness_times(x.columns(added.clone()), kx.columns_mut(added.clone()));
+        let bordered_by = |corner: &Mat<f64>, products: MatRef<'_, f64>| {
+            bordered(corner, &gram(x.first(*used), products), &gram(x.columns(added.clone()), products))
+        };
+        *gm = bordered_by(gm, self.m_work.first(added.len()));
+        *gk = bordered_by(gk, kx.columns(added.clone()));
+        *used = added.end;
+        (self.lambda, self.ritz) = small_ritz(gm, gk)?;
+        Ok(())
+    }
+
+    /// Keeps the span of the lowest Ritz vectors, so many of them where there are more.
+    pub(super) fn contract(&mut self, kept: usize) {
+        let kept = kept.min(self.lambda.len());
+        let lowest = self.ritz.as_ref().subcols(0, kept);
+        for block in [&mut self.x, &mut self.kx] {
+            combine_in_place(block.columns_mut(0..self.used), lowest);
+        }
+        self.used = kept;
+        self.lambda.truncate(kept);
+        self.gm = Mat::identity(kept, kept);
+        self.gk = Mat::from_fn(kept, kept, |i, j| if i == j { self.lambda[i] } else { 0.0 });
+        self.ritz = Mat::identity(kept, kept);
+    }
+
+    /// Some of the Ritz vectors (N x k).
+    pub(super) fn vectors(&self, which: Range<usize>) -> Mat<f64> {
+        combine(self.x.first(self.used), self.ritz.as_ref().subcols(which.start, which.len()))
+    }
+
+    /// What some Ritz pairs leave unbalanced, K x - lambda M x, and its norm beside |K x| + |lambda M x|.
+    pub(super) fn unbalanced(&mut self, which: Range<usize>, counters: &mut Counters) -> (Tall, Vec<f64>) {
+        let Self { problem, x, kx, used, lambda, ritz, work, m_work, .. } = self;
+        let (count, lambda) = (which.len(), &lambda[which.clone()]);
+        let ritz = ritz.as_ref().subcols(which.start, count);
+        counters.mass_columns += count as u64;
+        combine_into(work.first_mut(count), x.first(*used), ritz);
+        problem.pencil.mass_times(work.first(count), m_work.first_mut(count));
+        let mut forces = Tall::zeros(problem.pencil.n(), count);
+        combine_into(forces.as_mut(), kx.first(*used), ritz);
+        let (stiff, heavy) = (column_norms(forces.as_ref()), column_norms(m_work.first(count)));
+        subtract_columns(forces.as_mut(), lambda, m_work.first(count));
+        let rest = column_norms(forces.as_ref());
+        let relative = |j: usize| {
+            let size = stiff[j] + lambda[j].abs() * heavy[j];
+            if size == 0.0 { 0.0 } else { rest[j] / size }
+        };
+        (forces, (0..count).map(relative).collect())
+    }
+}
+
+/// [A, B; B', C].
+fn bordered(a: &Mat<f64>, b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
+    let m = a.ncols();
+    Mat::from_fn(m + c.ncols(), m + c.ncols(), |i, j| match (i < m, j < m) {
+        (true, true) => a[(i, j)],
+        (true, false) => b[(i, j - m)],
+        (false, true) => b[(j, i - m)],
+        (false, false) => c[(i - m, j - m)],
+    })
+}
