@@ -212,7 +212,10 @@ impl<'a> TradeFacts<'a> {
             cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
         };
         let names = facts.names();
-        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words()).into_iter();
+        let rounds = worst_lacks(lacks);
+        let is_nodal = trade.cases.iter().any(|case| case.nodal.is_some());
+        let lacking = rounds.last().filter(|own| !is_nodal && !own.is_reference());
+        let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), lacking).into_iter();
         facts.verdict = lines.map(|(label, text)| VerdictLine { label, text }).collect();
         facts
     }

@@ -1,15 +1,18 @@
 //! A trade study in five lines: what was asked, what to take, why, the error, and what it saves.
 
 use super::errors_in_words::errors_in_words;
+use super::lacks::LackFacts;
 use super::numbers::{duration, plain, significant};
+use crate::study::reference::ReferenceError;
 use crate::study::trade::{InCase, Measured, Recommendation, Row, Trade};
 
 /// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in
-/// words.
+/// words; `lacking`: a reference that lacks too much of its model.
 pub(super) fn verdict_lines(
     trade: &Trade,
     names: &[String],
     tolerances: &str,
+    lacking: Option<&ReferenceError>,
 ) -> Vec<(&'static str, String)> {
     let asked = format!("{}: {}", trade.scene, asked(trade, tolerances));
     let Some(at) = trade.recommended.row() else {
@@ -22,7 +25,7 @@ pub(super) fn verdict_lines(
         ("Asked", asked),
         ("Take", taken(&names[at], row)),
         ("Why", why(trade, names, measured)),
-        ("Error", error(trade, measured)),
+        ("Error", error(trade, measured, lacking)),
         ("Saves", whole.map_or_else(String::new, |whole| saves(whole, measured))),
     ]
 }
@@ -92,7 +95,7 @@ fn in_case(trade: &Trade, measured: &Measured) -> String {
     name.map_or_else(String::new, |name| format!(" in case {}", plain(name)))
 }
 
-fn error(trade: &Trade, measured: &Measured) -> String {
+fn error(trade: &Trade, measured: &Measured, lacking: Option<&ReferenceError>) -> String {
     let InCase { errors, worst, growth } = measured.deciding();
     let growth = growth.map_or_else(String::new, |growth| {
         format!(
@@ -102,7 +105,11 @@ fn error(trade: &Trade, measured: &Measured) -> String {
     });
     let worst = significant(100.0 * worst, 2);
     let case = in_case(trade, measured);
-    format!("{}: {worst} % of what is allowed{case}{growth}", errors_in_words(errors))
+    let lacking = lacking.map_or_else(String::new, |own| {
+        let parts = LackFacts::new(own).parts();
+        format!("; the reference itself lacks {parts} of the FE model (estimated), too much to be measured against")
+    });
+    format!("{}: {worst} % of what is allowed{case}{growth}{lacking}", errors_in_words(errors))
 }
 
 fn saves(whole: &Measured, own: &Measured) -> String {

@@ -10,7 +10,7 @@ const LEAST: usize = 120;
 
 /// Intervals at the most, and rows times intervals: seconds of products with the matrices.
 const MOST: usize = 20_000;
-const MOST_NUMBERS: usize = 20_000_000;
+const MOST_NUMBERS: usize = 60_000_000;
 
 /// Intervals in the period of the fastest motion that counts, and the fewest that show it: a spline through
 /// so many values of an oscillation has its second derivative to 2 %, and to 5 %.
