@@ -61,7 +61,9 @@ not ours. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `python
 * **Error**: `flexbody trade MODEL --modes N` simulates candidate bodies and measures each against a reference: 2N modes with residual vectors, enriched with the static
   responses to the forces that the equations of all nodes leave unbalanced along the motion ([theory](theory.md), (8.16)). What the reference itself lacks of the FE model is
   estimated by the same forces and told beside. Where that is more than is allowed (**bold**), `trade` warns (FB548) and exits with 1: errors of such a scene are those against its
-  reference, and the FE model is known no better. A bracket thrown with its full spin begins with a shock that no number of modes follows.
+  reference, and the FE model is known no better. The tumbling bracket is
+  thrown undeformed with its full spin, which is a shock: it rings at all its frequencies, and those of a body drift from those of the nodes. With `[initial] deformation = "static"`
+  its reference lacks 0.0022 % of the stress, and 4 modes with W1 are within the tolerances.
 * **Seconds**: of the processor, medians of {turns} runs in turns. *Exudyn*: generalised alpha with one step for all candidates of a scene, {per_period} steps per period of the highest
   frequency that the scene asks about. *C*: the header of `export --to embedded` in a Runge-Kutta program of order 4, whose step is as long as that frequency and the highest mode of the
   body allow: a high mode that is not needed costs steps.

@@ -4,7 +4,7 @@ use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
 use crate::numerics::linalg::{
-    Solve, combine, dense_cholesky, gram, solve_lower, subtract_combination, uniform,
+    Solve, Tall, combine, copy_columns, dense_cholesky, gram, solve_lower, subtract_combination, uniform,
 };
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
@@ -21,10 +21,8 @@ const VANISHED: f64 = 1e-13;
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
-    /// Grows with the basis inside memory reserved for `capacity` columns: what is not reached is never
-    /// touched.
-    v: Mat<f64>,
-    capacity: usize,
+    /// Its first columns, of as many as the basis may have: what is not reached is not touched.
+    v: Tall,
     m: usize,
     t: Mat<f64>,
     /// Columns of the newest block, not yet multiplied by the operator.
@@ -52,13 +50,10 @@ impl<'a> Krylov<'a> {
     /// An empty basis for at most `capacity` vectors.
     pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a dyn Solve, capacity: usize) -> Self {
         let n = problem.pencil.n();
-        let mut v = Mat::with_capacity(n, capacity);
-        v.resize_with(n, 0, |_, _| 0.0);
         Self {
             problem,
             factor,
-            v,
-            capacity,
+            v: Tall::zeros(n, capacity),
             m: 0,
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
@@ -82,7 +77,7 @@ impl<'a> Krylov<'a> {
 
     /// Room left for new vectors.
     pub(super) fn room(&self) -> usize {
-        self.capacity - self.m
+        self.v.ncols() - self.m
     }
 
     /// Whether the newest block is empty: the basis spans an invariant subspace.
@@ -114,12 +109,12 @@ impl<'a> Krylov<'a> {
         let coefficients = Mat::from_fn(size + residual.nrows(), s.ncols(), |i, j| {
             if i < size { s[(i, j)] } else { residual[(i - size, j)] / theta[j] }
         });
-        combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref())
+        combine(self.v.first(self.m), coefficients.as_ref())
     }
 
     /// V S for S (projected x k).
     pub(super) fn combination(&self, s: MatRef<'_, f64>) -> Mat<f64> {
-        combine(self.v.as_ref().subcols(0, self.projected()), s)
+        combine(self.v.first(self.projected()), s)
     }
 
     /// Appends `x` (any block), orthonormalised; columns dependent on the basis are dropped.
@@ -196,14 +191,13 @@ impl<'a> Krylov<'a> {
             (false, false) => f64::from(i - size == j - k),
             _ => 0.0,
         });
-        let basis = combine(self.v.as_ref().subcols(0, self.m), coefficients.as_ref());
+        let basis = combine(self.v.first(self.m), coefficients.as_ref());
         (basis, combine(self.coupling.as_ref(), s.subrows(size - last, last)))
     }
 
     /// Fills the empty basis with the first `k` Ritz vectors of a snapshot and its newest block.
     pub(super) fn take_up(&mut self, start: &Snapshot, shift: f64, k: usize, counters: &mut Counters) {
         let (given, width) = (start.eigenvalues.len(), start.coupling.nrows());
-        self.v.resize_with(self.problem.pencil.n(), k + width, |_, _| 0.0);
         self.v.as_mut().subcols_mut(0, k).copy_from(start.basis.as_ref().subcols(0, k));
         let newest = start.basis.as_ref().subcols(given, width);
         self.v.as_mut().subcols_mut(k, width).copy_from(newest);
@@ -219,9 +213,7 @@ impl<'a> Krylov<'a> {
 
     fn push(&mut self, block: Block) {
         let width = block.w.ncols();
-        let columns = self.v.ncols().max(self.m + width);
-        self.v.resize_with(self.problem.pencil.n(), columns, |_, _| 0.0);
-        self.v.as_mut().subcols_mut(self.m, width).copy_from(&block.w);
+        copy_columns(self.v.columns_mut(self.m..self.m + width), block.w.as_ref());
         self.m += width;
         self.fresh = width;
         self.m_fresh = block.mw;
@@ -234,7 +226,7 @@ impl<'a> Krylov<'a> {
     fn orthonormalise(&self, mut w: Mat<f64>, reach: usize, counters: &mut Counters) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
-        let basis = self.v.as_ref().subcols(0, self.m);
+        let basis = self.v.first(self.m);
         let mut h = Mat::zeros(self.m, width);
         let mut b = Mat::<f64>::identity(width, width);
         let mut mw = Mat::zeros(0, 0);

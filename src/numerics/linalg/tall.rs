@@ -27,8 +27,7 @@ impl Tall {
     /// A copy, made by all threads.
     pub fn copied(x: MatRef<'_, f64>) -> Self {
         let mut own = Self::zeros(x.nrows(), x.ncols());
-        let columns: Vec<_> = own.as_mut().col_iter_mut().zip(x.col_iter()).collect();
-        columns.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
+        copy_columns(own.as_mut(), x);
         own
     }
 
@@ -190,6 +189,12 @@ pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
         matmul(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0, Par::Seq);
         part.rb_mut().subcols_mut(0, h.ncols()).copy_from(combined);
     });
+}
+
+/// Y = X for equal-shaped blocks, by all threads.
+pub fn copy_columns(y: MatMut<'_, f64>, x: MatRef<'_, f64>) {
+    let columns: Vec<_> = y.col_iter_mut().zip(x.col_iter()).collect();
+    columns.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
 }
 
 /// y_j -= s_j x_j for the columns of equal-shaped blocks.
