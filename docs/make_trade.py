@@ -69,6 +69,7 @@ not ours. `flexbody {version}`, Exudyn {exudyn}; {processor}. Written by `python
   body allow: a high mode that is not needed costs steps.
 * Timed are the candidates near the tolerances that no other is as cheap and as accurate as, the recommended one and the whole body, and once the reference. Lumped masses and other sets of terms take what the exact body with as many
   modes takes.
+* **Figures**: the largest relative error of deflection, stress and reaction; where these may differ by different amounts, the dashed line is the least of them.
 * **Whole body**: N free modes with residual vectors and all terms, what one would convert without knowing the scene. Where its error is beyond the tolerances (**bold**),
   the body to take is better as well, and may cost more. Seconds in the table are those of the whole body and of the body to take.
 

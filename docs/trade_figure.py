@@ -27,9 +27,10 @@ def fastest(points):
 
 
 def figure(title, points, allowed):
-    """`points`: [(seconds, error in per cent, name, lumped, recommended)]; `allowed`: the tolerance in per cent."""
+    """`points`: [(seconds, error in per cent, name, lumped, recommended)]; `allowed`: the least of the tolerances in per cent."""
     seconds, errors = [point[0] for point in points], [point[1] for point in points] + [allowed]
     (x0, x1), (y0, y1) = decades(seconds, 1), decades(errors, 2)
+    taken = "".join(f" (ring: {name})" for _, _, name, _, recommended in points if recommended)
 
     def x(value):
         return LEFT + (WIDTH - LEFT - RIGHT) * (math.log10(value) - x0) / (x1 - x0)
@@ -40,7 +41,7 @@ def figure(title, points, allowed):
     out = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">',
         f'<title>{escape(title)}</title><style>{STYLE}</style><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>',
-        f'<text x="{LEFT}" y="18">{escape(title)}</text>',
+        f'<text x="{LEFT}" y="18">{escape(title + taken)}</text>',
     ]
     for power in range(x0, x1 + 1):
         at = x(10**power)
@@ -50,7 +51,7 @@ def figure(title, points, allowed):
         at = y(10**power)
         out.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/><text class="tick" x="{LEFT - 8}" y="{at + 4:.1f}" text-anchor="end">{10.0**power:g} %</text>')
     at = y(allowed)
-    out.append(f'<line class="allowed" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/><text x="{WIDTH - RIGHT + 8}" y="{at + 4:.1f}">allowed: {allowed:g} %</text>')
+    out.append(f'<line class="allowed" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/><text x="{WIDTH - RIGHT + 8}" y="{at + 4:.1f}">least allowed: {allowed:g} %</text>')
     front = fastest(points)
     if len(front) > 1:
         out.append('<polyline class="front" points="' + " ".join(f"{x(point[0]):.1f},{y(point[1]):.1f}" for point in front) + '"/>')
@@ -58,7 +59,7 @@ def figure(title, points, allowed):
         shape = f'<rect class="lumped" x="{x(second) - 4:.1f}" y="{y(error) - 4:.1f}" width="8" height="8">' if lumped else f'<circle class="exact" cx="{x(second):.1f}" cy="{y(error):.1f}" r="4">'
         out.append(f"{shape}<title>{escape(name)}: {second:.3g} s, {error:.3g} %</title></{'rect' if lumped else 'circle'}>")
         if recommended:
-            out.append(f'<circle class="ring" cx="{x(second):.1f}" cy="{y(error):.1f}" r="9"/><text x="{WIDTH - RIGHT + 8}" y="{y(error) + 4:.1f}">ring: {escape(name)}</text>')
+            out.append(f'<circle class="ring" cx="{x(second):.1f}" cy="{y(error):.1f}" r="9"/>')
     out.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 12}" text-anchor="middle">seconds of the simulation in Exudyn</text>')
     out.append(f'<text transform="translate(18 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" text-anchor="middle">largest error, % of its largest value</text>')
     out.append(f'<circle class="exact" cx="{WIDTH - RIGHT + 14}" cy="{HEIGHT - BOTTOM - 24}" r="4"/><text x="{WIDTH - RIGHT + 26}" y="{HEIGHT - BOTTOM - 20}">exact invariants</text>')
