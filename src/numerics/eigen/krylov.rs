@@ -3,9 +3,7 @@
 use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
-use crate::numerics::linalg::{
-    Solve, Tall, combine, copy_columns, dense_cholesky, gram, solve_lower, subtract_combination, uniform,
-};
+use crate::numerics::linalg::{Solve, Tall, combine, copy_columns, gram, subtract_combination, uniform};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
@@ -246,9 +244,7 @@ impl<'a> Krylov<'a> {
                 let rows = w.iter().zip(&self.mass_diagonal);
                 UNSEEN * rows.map(|(w, m)| w * w * m).sum::<f64>()
             };
-            let turned = orthonormal_by_cholesky(&mut w, &mut mw, &norms, &unseen)
-                .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
-            b = combine(turned.as_ref(), b.as_ref());
+            b = combine(gram_schmidt(&mut w, &mut mw, &norms, &unseen).as_ref(), b.as_ref());
         }
         let room = self.room();
         if w.ncols() > room {
@@ -263,35 +259,6 @@ impl<'a> Krylov<'a> {
 /// w_i' (M w)_j.
 fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
     gram(w.as_ref().subcols(i, 1), mw.as_ref().subcols(j, 1))[(0, 0)]
-}
-
-/// Part of a vector's M-norm that is left of it beside the others of its block, above which its Cholesky
-/// factor makes the block orthonormal to 1e-6, which a second pass makes rounding.
-const INDEPENDENT: f64 = 1e-5;
-
-/// What [`gram_schmidt`] does, by the Cholesky factor of W'M W: all columns at once. `None`, and nothing is
-/// changed, where a column depends too nearly on the others, or may have to be dropped.
-fn orthonormal_by_cholesky(
-    w: &mut Mat<f64>,
-    mw: &mut Mat<f64>,
-    norms: &[f64],
-    unseen: &dyn Fn(faer::ColRef<'_, f64>) -> f64,
-) -> Option<Mat<f64>> {
-    let products = gram(w.as_ref(), mw.as_ref());
-    let own: Vec<f64> = (0..w.ncols()).map(|j| products[(j, j)].max(0.0).sqrt()).collect();
-    let lower = dense_cholesky(products)?;
-    let stays = |j: usize| {
-        let left = lower[(j, j)];
-        left > INDEPENDENT * own[j] && left > VANISHED * norms[j] && left * left > unseen(w.col(j))
-    };
-    if !(0..w.ncols()).all(stays) {
-        return None;
-    }
-    let inverse = solve_lower(&lower, &Mat::identity(w.ncols(), w.ncols()));
-    for block in [w, mw] {
-        *block = combine(block.as_ref(), inverse.transpose());
-    }
-    Some(lower.transpose().to_owned())
 }
 
 /// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`]

@@ -79,28 +79,45 @@ pub(super) fn rayleigh_ritz(
 /// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
 /// matrices with M and with K. Directions in which the basis is dependent are left out.
 pub(super) fn small_ritz(gm: &Mat<f64>, gk: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
-    let orthonormal = independent(gm)?;
-    let symmetric = Mat::from_fn(gk.nrows(), gk.ncols(), |i, j| 0.5 * (gk[(i, j)] + gk[(j, i)]));
-    let projected = gram(orthonormal.as_ref(), combine(symmetric.as_ref(), orthonormal.as_ref()).as_ref());
+    let scale = scales(gm)?;
+    let orthonormal = independent_directions(&scaled(gm, &scale))?;
+    let projected =
+        gram(orthonormal.as_ref(), combine(scaled(gk, &scale).as_ref(), orthonormal.as_ref()).as_ref());
     let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
-    Ok((ritz.values, combine(orthonormal.as_ref(), ritz.vectors.as_ref())))
+    let coefficients = combine(orthonormal.as_ref(), ritz.vectors.as_ref());
+    Ok((ritz.values, scaled_rows(&coefficients, &scale)))
 }
 
 /// Coefficients of M-orthonormal vectors that span what a basis with this Gram matrix spans, less the
 /// directions in which it is dependent.
 pub(super) fn independent(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
-    // A column that nothing is left of spans nothing.
+    let scale = scales(gm)?;
+    Ok(scaled_rows(&independent_directions(&scaled(gm, &scale))?, &scale))
+}
+
+/// One over the M-norm of each vector of a basis; zero where nothing is left of it, which spans nothing.
+fn scales(gm: &Mat<f64>) -> Result<Vec<f64>, EigenFailure> {
     let scale: Vec<f64> =
         (0..gm.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
-    if scale.iter().any(|s| !s.is_finite()) {
-        return Err(EigenFailure::MassIndefinite);
-    }
-    let scaled =
-        Mat::from_fn(gm.nrows(), gm.ncols(), |i, j| 0.5 * (gm[(i, j)] + gm[(j, i)]) * scale[i] * scale[j]);
-    let eigen = symmetric_eigen(scaled.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let all_finite = scale.iter().all(|s| s.is_finite());
+    if all_finite { Ok(scale) } else { Err(EigenFailure::MassIndefinite) }
+}
+
+/// The Gram matrix of scaled vectors, made symmetric.
+fn scaled(g: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
+    Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
+}
+
+fn scaled_rows(a: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)])
+}
+
+/// V / sqrt(Lambda) of a Gram matrix with a diagonal of one, for the eigenvalues that are no rounding.
+fn independent_directions(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
+    let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
     let first = eigen.values.partition_point(|&v| v < DEPENDENT);
     Ok(Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
-        scale[i] * eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
+        eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
     }))
 }
 
