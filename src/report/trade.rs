@@ -189,6 +189,7 @@ impl<'a> TradeFacts<'a> {
     pub fn new(trade: &'a Trade, lacks: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
         let row = |(at, row): (usize, &'a Row)| RowFacts::new(at + 1, row, &trade.cases);
         let rows: Vec<RowFacts<'a>> = trade.rows.iter().enumerate().map(row).collect();
+        let rounds = worst_lacks(lacks);
         let mut facts = Self {
             format: "flexbody-trade",
             format_major: 2,
@@ -198,7 +199,7 @@ impl<'a> TradeFacts<'a> {
             body: &trade.body,
             reference: trade.reference,
             nodal: trade.cases[0].nodal.as_ref().map(NodalFacts::new),
-            reference_lacks: worst_lacks(lacks).iter().map(LackFacts::new).collect(),
+            reference_lacks: rounds.iter().map(LackFacts::new).collect(),
             tolerance: least_tolerance(trade),
             allowed_multiplications: trade.allowed,
             verdict: Vec::new(),
@@ -212,7 +213,6 @@ impl<'a> TradeFacts<'a> {
             cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
         };
         let names = facts.names();
-        let rounds = worst_lacks(lacks);
         let is_nodal = trade.cases.iter().any(|case| case.nodal.is_some());
         let lacking = rounds.last().filter(|own| !is_nodal && !own.is_reference());
         let lines = verdict_lines(trade, &names, &facts.tolerances_in_words(), lacking).into_iter();

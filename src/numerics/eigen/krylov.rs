@@ -169,9 +169,9 @@ impl<'a> Krylov<'a> {
     pub(super) fn restart(&mut self, s: MatRef<'_, f64>, theta: &[f64]) {
         let kept = self.combination(s);
         let k = kept.ncols();
-        let fresh = self.v.as_ref().subcols(self.projected(), self.fresh).to_owned();
-        self.v.as_mut().subcols_mut(0, k).copy_from(&kept);
-        self.v.as_mut().subcols_mut(k, self.fresh).copy_from(&fresh);
+        let fresh = self.v.columns(self.projected()..self.m).to_owned();
+        self.v.columns_mut(0..k).copy_from(&kept);
+        self.v.columns_mut(k..k + self.fresh).copy_from(&fresh);
         self.t.fill(0.0);
         for (i, &value) in theta.iter().enumerate() {
             self.t[(i, i)] = value;
@@ -196,9 +196,9 @@ impl<'a> Krylov<'a> {
     /// Fills the empty basis with the first `k` Ritz vectors of a snapshot and its newest block.
     pub(super) fn take_up(&mut self, start: &Snapshot, shift: f64, k: usize, counters: &mut Counters) {
         let (given, width) = (start.eigenvalues.len(), start.coupling.nrows());
-        self.v.as_mut().subcols_mut(0, k).copy_from(start.basis.as_ref().subcols(0, k));
+        self.v.columns_mut(0..k).copy_from(start.basis.as_ref().subcols(0, k));
         let newest = start.basis.as_ref().subcols(given, width);
-        self.v.as_mut().subcols_mut(k, width).copy_from(newest);
+        self.v.columns_mut(k..k + width).copy_from(newest);
         for (i, lambda) in start.eigenvalues[..k].iter().enumerate() {
             self.t[(i, i)] = (lambda + shift).recip();
         }

@@ -138,17 +138,30 @@ pub(super) fn residuals(
     pencil.mass_times(x, mx.as_mut());
     let m_rigid = pencil.apply_mass(problem.rigid);
     combine_into(rigid.as_mut(), m_rigid.as_ref(), gram(problem.rigid, kx.as_ref()).as_ref());
-    let (stiff, heavy) = (column_norms(kx.as_ref()), column_norms(mx.as_ref()));
-    subtract_columns(kx.as_mut(), eigenvalues, mx.as_ref());
-    let (rest, rigid) = (column_norms(kx.as_ref()), column_norms(rigid.as_ref()));
-    let rounding = rounding_residual(pencil.stiffness(), x);
-    let scale = |j: usize| stiff[j] + eigenvalues[j].abs() * heavy[j];
-    let beside = |size: f64, scale: f64| if scale == 0.0 { 0.0 } else { size / scale };
-    let modes = 0..eigenvalues.len();
-    (
-        modes.clone().map(|j| beside(rest[j], scale(j))).collect(),
-        modes.map(|j| beside(rounding[j] + rigid[j], scale(j))).collect(),
-    )
+    let (sizes, residuals) = leave_unbalanced(&mut kx, mx.as_ref(), eigenvalues);
+    let rounding = rounding_residual(pencil.stiffness(), x).into_iter().zip(column_norms(rigid.as_ref()));
+    let floors = rounding.zip(sizes).map(|((rounding, rigid), size)| beside(rounding + rigid, size));
+    (residuals, floors.collect())
+}
+
+/// Turns K X into what the pairs leave unbalanced, K x - lambda M x. The sizes |K x| + |lambda M x|, and the
+/// norm of what is left beside them.
+pub(super) fn leave_unbalanced(
+    kx: &mut Tall,
+    mx: MatRef<'_, f64>,
+    eigenvalues: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let norms = column_norms(kx.as_ref()).into_iter().zip(column_norms(mx)).zip(eigenvalues);
+    let sizes: Vec<f64> = norms.map(|((stiff, heavy), lambda)| stiff + lambda.abs() * heavy).collect();
+    subtract_columns(kx.as_mut(), eigenvalues, mx);
+    let left = column_norms(kx.as_ref()).into_iter().zip(&sizes);
+    let residuals = left.map(|(left, size)| beside(left, *size)).collect();
+    (sizes, residuals)
+}
+
+/// A part of a size; none of zero.
+fn beside(part: f64, size: f64) -> f64 {
+    if size == 0.0 { 0.0 } else { part / size }
 }
 
 /// |K psi| + |lambda| |M psi|.
@@ -159,8 +172,7 @@ pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f6
 /// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros, NaN for
 /// one that is no number.
 pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
-    let scale = residual_scale(k_psi, m_psi, lambda);
-    if scale == 0.0 { 0.0 } else { (k_psi - m_psi * faer::Scale(lambda)).norm_l2() / scale }
+    beside((k_psi - m_psi * faer::Scale(lambda)).norm_l2(), residual_scale(k_psi, m_psi, lambda))
 }
 
 impl Refined {

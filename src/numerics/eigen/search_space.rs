@@ -4,10 +4,8 @@
 use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
-use super::refine::{independent, small_ritz};
-use crate::numerics::linalg::{
-    Tall, column_norms, combine, combine_in_place, combine_into, gram, subtract_columns, subtract_combination,
-};
+use super::refine::{independent, leave_unbalanced, small_ritz};
+use crate::numerics::linalg::{Tall, combine, combine_in_place, combine_into, gram, subtract_combination};
 use faer::{Mat, MatRef};
 use std::ops::Range;
 
@@ -78,10 +76,14 @@ impl<'a> SearchSpace<'a> {
     ) -> Result<(), EigenFailure> {
         let Self { problem, m_rigid, x, kx, used, gm, gk, .. } = self;
         let (pencil, columns) = (&problem.pencil, d.ncols());
-        counters.mass_columns += (columns * (passes + 1)) as u64;
+        counters.mass_columns += columns as u64;
         for _ in 0..passes {
             let along = gram(m_rigid.as_ref(), d.as_ref());
             subtract_combination(d.as_mut(), problem.rigid, along.as_ref());
+            if *used == 0 {
+                continue;
+            }
+            counters.mass_columns += columns as u64;
             pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
             let along = gram(x.first(*used), self.m_work.first(columns));
             subtract_combination(d.as_mut(), x.first(*used), along.as_ref());
@@ -133,14 +135,8 @@ impl<'a> SearchSpace<'a> {
         problem.pencil.mass_times(work.first(count), m_work.first_mut(count));
         let mut forces = Tall::zeros(problem.pencil.n(), count);
         combine_into(forces.as_mut(), kx.first(*used), ritz);
-        let (stiff, heavy) = (column_norms(forces.as_ref()), column_norms(m_work.first(count)));
-        subtract_columns(forces.as_mut(), lambda, m_work.first(count));
-        let rest = column_norms(forces.as_ref());
-        let relative = |j: usize| {
-            let size = stiff[j] + lambda[j].abs() * heavy[j];
-            if size == 0.0 { 0.0 } else { rest[j] / size }
-        };
-        (forces, (0..count).map(relative).collect())
+        let (_, residuals) = leave_unbalanced(&mut forces, m_work.first(count), lambda);
+        (forces, residuals)
     }
 }
 
