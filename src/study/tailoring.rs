@@ -9,9 +9,11 @@ use crate::body::convert::{Condensation, Conversion, ConvertSettings, ModalModel
 use crate::body::flex_body::FlexBody;
 use crate::input::{LoadSource, read_shapes};
 use crate::model::FeModel;
-use crate::motion::scene::{Measure, OtherModes, OutputErrors, Scene, trace, trace_at};
+use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, Resume, Wanted};
-use crate::study::reference::{Enriched, EnrichedForCases, MotionShapes, ReferenceError, enrich_for_cases};
+use crate::study::reference::{
+    Enriched, EnrichedForCases, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich_for_cases,
+};
 use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
 use faer::Mat;
 
@@ -105,26 +107,22 @@ impl Tailoring {
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
             return Ok(EnrichedForCases { made: reference, rounds });
         }
-        let (motion, _) = trace(&reference.body, scene, self.settings.modes.memory, |_| ())?;
-        let measure = Measure::new(&reference.body, &motion);
-        let lacks = own.map_or(0.0, |own| own.worst);
-        let shapes = MotionShapes::new(model, &reference.body, scene, &motion)?;
-        let counts =
-            shapes.as_ref().map_or(Vec::new(), |shapes| shapes.counts(&scene.requirements.tolerance));
-        for (shapes, count) in
-            shapes.iter().flat_map(|shapes| counts.iter().map(move |count| (shapes, *count)))
-        {
-            let settings = self.settings_of_shapes(shapes.basis(count));
+        let bodies = MotionBodies::new(model, &reference.body, scene, self.settings.modes.memory)?;
+        let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
+            let settings = self.settings_of_shapes(bodies.basis(count));
             let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
             let condensed = condense(&modal)?;
             let mut made = modal.finish(condensed, watch)?;
-            made.body = shapes.damped(model, made.body)?;
-            let Some(errors) = errors_beside(&made.body, &measure, model, scene)? else { break };
-            let worst = lacks + errors.worst(&scene.requirements.tolerance);
-            let own = ReferenceError { modes: made.body.n_modes(), errors, worst, time: 0.0 };
-            if own.is_reference() {
-                return Ok(EnrichedForCases { made, rounds: vec![vec![own]] });
-            }
+            made.body = bodies.damped(made.body)?;
+            Ok(made)
+        };
+        let lacks = own.map_or(0.0, |own| own.worst);
+        let most = MOST_LACKING - lacks;
+        let fewest =
+            bodies.as_ref().map(|bodies| bodies.fewest(most, |count| make(bodies, count), |made| &made.body));
+        if let Some(Fewest { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
+            let own = ReferenceError { modes: made.body.n_modes(), errors, worst: lacks + worst, time: 0.0 };
+            return Ok(EnrichedForCases { made, rounds: vec![vec![own]] });
         }
         let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
@@ -172,23 +170,6 @@ impl Tailoring {
             found => found,
         }
     }
-}
-
-/// The largest errors of the motion of `body` in `scene` beside that of another body of `model`, which
-/// `measure` holds; `None` where the two cannot be compared.
-fn errors_beside(
-    body: &FlexBody,
-    measure: &Measure<'_>,
-    model: &FeModel,
-    scene: &Scene,
-) -> Result<Option<OutputErrors>> {
-    let shared = body.stiffness_beside(measure.body(), model);
-    let modes = shared.and_then(|shared| OtherModes::new(body, measure.body(), shared.as_ref()));
-    let Some(modes) = modes else { return Ok(None) };
-    let mut scene = scene.clone();
-    scene.run.scheme = measure.trace().scheme;
-    let motion = trace_at(body, &scene, &measure.trace().time, None)?;
-    Ok(Some(measure.of_other(&motion, &modes).largest()))
 }
 
 /// Loads whose static responses join the modes where nobody names others: those `stated` with the model;

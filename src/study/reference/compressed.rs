@@ -8,7 +8,7 @@ use faer::Mat;
 const LEFT_OUT: f64 = 1e-12;
 
 /// Combinations at the most.
-const MOST: usize = 32;
+pub(super) const MOST_FORCES: usize = 32;
 
 /// A basis B (N x k) of forces F that is orthonormal where each row counts by one over the diagonal of K:
 /// about the energy that a force does work with at that row alone.
@@ -30,7 +30,8 @@ impl Compressed {
             Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| weights[i] * forces[(i, j)])
         };
         let weighted = weigh(forces);
-        let (directions, values) = principal(gram(weighted.as_ref(), weighted.as_ref()), LEFT_OUT, MOST)?;
+        let (directions, values) =
+            principal(gram(weighted.as_ref(), weighted.as_ref()), LEFT_OUT, MOST_FORCES)?;
         let scaled =
             Mat::from_fn(directions.nrows(), directions.ncols(), |i, j| directions[(i, j)] / values[j]);
         let basis = combine(forces.as_ref(), scaled.as_ref());

@@ -15,7 +15,7 @@ use faer::Mat;
 pub const PART_OF_REFERENCE: f64 = 0.1;
 
 /// Part of the tolerances that a body may lack of the model and still be a reference: others get the rest.
-const MOST_LACKING: f64 = 0.5;
+pub const MOST_LACKING: f64 = 0.5;
 
 /// The elastic energy of what the body lacks, after so many responses of the motion joined it, is below this
 /// part of what is allowed.
@@ -97,7 +97,7 @@ impl Estimate {
         let carrier = scene.carried.as_ref().map(|carried| nodal_point(model, &carried.by)).transpose()?;
         let Some(view) = NodalView::new(model, body, loads, carrier.as_ref()) else { return Ok(None) };
         let (motion, _) = trace(body, scene, memory, |_| ())?;
-        let grid = Grid::new(body, scene, &motion, model.rows().len(), duration);
+        let grid = Grid::new(body, scene, &motion, duration);
         if carrier.is_some() && !grid.is_fine {
             return Ok(None);
         }

@@ -1,5 +1,6 @@
 //! The instants that a motion is looked at, to see what the body lacks along it.
 
+use super::compressed::MOST_FORCES;
 use crate::body::flex_body::FlexBody;
 use crate::motion::scene::{Scene, Trace, fastest_history};
 use std::f64::consts::TAU;
@@ -8,9 +9,9 @@ use std::ops::Range;
 /// Intervals at the least.
 const LEAST: usize = 120;
 
-/// Intervals at the most, and rows times intervals: seconds of products with the matrices.
-const MOST: usize = 20_000;
-const MOST_NUMBERS: usize = 60_000_000;
+/// Amplitudes of modes and compressed forces at all instants at the most: about 1.5 GB with their rates,
+/// their accelerations and what is made of them.
+const MOST_AMPLITUDES: usize = 15_000_000;
 
 /// Intervals in the period of the fastest motion that counts, and the fewest that show it: a spline through
 /// so many values of an oscillation has its second derivative to 2 %, and to 5 %.
@@ -42,11 +43,11 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// For the `motion` of a `body` with so many `rows` in its model.
-    pub fn new(body: &FlexBody, scene: &Scene, motion: &Trace, rows: usize, duration: f64) -> Self {
+    /// For the `motion` of a `body`.
+    pub fn new(body: &FlexBody, scene: &Scene, motion: &Trace, duration: f64) -> Self {
         let frequency = (fastest(body, scene, motion) / TAU).max(fastest_history(scene, duration));
         let wanted = PER_PERIOD * frequency * duration;
-        let most = (MOST_NUMBERS / rows.max(1)).clamp(LEAST, MOST);
+        let most = (MOST_AMPLITUDES / (body.n_modes() + MOST_FORCES)).max(LEAST);
         let is_fine = FEWEST_PER_PERIOD / PER_PERIOD * wanted <= most as f64;
         let intervals = wanted.clamp(LEAST as f64, most as f64);
         let (mut times, mut pieces) = (Vec::new(), Vec::new());

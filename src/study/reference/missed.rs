@@ -2,7 +2,8 @@
 
 use super::compressed::{Compressed, principal};
 use super::grid::Grid;
-use super::residual::{BLOCK, NodalView};
+use super::projected::{Projected, UnbalancedAmplitudes};
+use super::residual::NodalView;
 use crate::base::error::Result;
 use crate::body::basis::free_static_responses;
 use crate::body::flex_body::FlexBody;
@@ -38,18 +39,8 @@ impl Missed {
         let model = view.model;
         let few: Vec<Instant> = grid.few().into_iter().map(|i| motion[i].clone()).collect();
         let compressed = Compressed::new(model, &view.residual(&few));
-        let count = compressed.as_ref().map_or(0, |compressed| compressed.basis.ncols());
-        let mut amplitudes = Mat::zeros(count, motion.len());
-        let mut in_modes = Mat::zeros(view.vectors.ncols(), motion.len());
-        for first in (0..motion.len()).step_by(BLOCK) {
-            let block = &motion[first..motion.len().min(first + BLOCK)];
-            let own = view.unbalanced(block);
-            in_modes.as_mut().subcols_mut(first, block.len()).copy_from(own.in_modes);
-            if let Some(compressed) = &compressed {
-                let along = compressed.amplitudes(&own.forces);
-                amplitudes.as_mut().subcols_mut(first, block.len()).copy_from(along);
-            }
-        }
+        let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
+            Projected::new(view, compressed.as_ref()).amplitudes(motion);
         let Some(compressed) = compressed else {
             let nothing = || Mat::zeros(view.vectors.nrows(), 0);
             let (forces, responses) = (nothing(), nothing());

@@ -9,11 +9,14 @@ mod grid;
 mod held;
 mod lack;
 mod missed;
+mod motion_bodies;
 mod motion_shapes;
+mod projected;
 mod reaction;
 mod residual;
 mod turning;
 
 pub use enrich::{Enriched, EnrichedForCases, enrich, enrich_for_cases};
-pub use estimate::{PART_OF_REFERENCE, ReferenceError};
+pub use estimate::{MOST_LACKING, PART_OF_REFERENCE, ReferenceError};
+pub use motion_bodies::{Fewest, MotionBodies};
 pub use motion_shapes::MotionShapes;

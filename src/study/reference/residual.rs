@@ -17,9 +17,10 @@ pub(super) const BLOCK: usize = 32;
 /// A body in its frame, seen from the rows of its model.
 pub(super) struct NodalView<'m> {
     pub model: &'m FeModel,
-    /// Psi (N x nf) and M Psi, rows and axes of the model.
+    /// Psi (N x nf), M Psi and D Psi, rows and axes of the model.
     pub vectors: Mat<f64>,
-    weighted: Mat<f64>,
+    pub weighted: Mat<f64>,
+    pub damped: Mat<f64>,
     /// m_ff = Psi'M Psi, and its Cholesky factor.
     pub modal_mass: Mat<f64>,
     lower: Mat<f64>,
@@ -79,8 +80,9 @@ impl<'m> NodalView<'m> {
             Some(point) => Some(Held::new(model, point, &rigid)?),
             None => None,
         };
-        Some(Self {
+        let mut view = Self {
             model,
+            damped: Mat::new(),
             vectors,
             weighted,
             modal_mass,
@@ -91,7 +93,9 @@ impl<'m> NodalView<'m> {
             axes: body.frame().axes,
             loads,
             held,
-        })
+        };
+        view.damped = view.damping_of_modes();
+        Some(view)
     }
 
     /// r = f - K u - D u' - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with
@@ -105,8 +109,13 @@ impl<'m> NodalView<'m> {
         let Inertia { momentum, change: mut taken } = self.inertia(motion, &field);
         self.add_turned(motion, |now| self.axes * now.omega, &momentum, &mut taken);
         taken += self.model.pencil().apply_stiffness(field.u.as_ref());
-        taken += self.damping_forces(motion, &field.ud);
-        let mut forces = self.loads_of(motion) - taken;
+        let rates = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| motion[i].qd[j]);
+        taken += combine(self.damped.as_ref(), rates.as_ref());
+        self.part(self.loads_of(motion) - taken)
+    }
+
+    /// Parts forces as those that are left unbalanced: what they do to the modes, and the rest.
+    pub fn part(&self, mut forces: Mat<f64>) -> Unbalanced {
         let mut in_modes = gram(self.vectors.as_ref(), forces.as_ref());
         subtract_combination(forces.as_mut(), self.weighted.as_ref(), self.over_mass(&in_modes).as_ref());
         if let Some(held) = &self.held {
@@ -133,27 +142,23 @@ impl<'m> NodalView<'m> {
         solve_upper(&self.lower, &solve_lower(&self.lower, x))
     }
 
-    /// D u', as the equations of all nodes have it: that of the model, else that of the modes on the nodes
+    /// D Psi, as the equations of all nodes have it: that of the model, else that of the modes on the nodes
     /// (theory 6.15).
-    fn damping_forces(&self, motion: &[Instant], ud: &Mat<f64>) -> Mat<f64> {
+    fn damping_of_modes(&self) -> Mat<f64> {
         match self.model.damping() {
             Some(Damping::Rayleigh { alpha, beta }) => {
-                let pencil = self.model.pencil();
-                let (of_mass, of_stiffness) =
-                    (pencil.apply_mass(ud.as_ref()), pencil.apply_stiffness(ud.as_ref()));
-                Mat::from_fn(ud.nrows(), ud.ncols(), |i, j| {
-                    alpha * of_mass[(i, j)] + beta * of_stiffness[(i, j)]
+                let of_stiffness = self.model.pencil().apply_stiffness(self.vectors.as_ref());
+                Mat::from_fn(self.vectors.nrows(), self.vectors.ncols(), |i, j| {
+                    alpha * self.weighted[(i, j)] + beta * of_stiffness[(i, j)]
                 })
             }
             Some(Damping::Matrix(damping)) => {
-                let mut forces = Mat::zeros(ud.nrows(), ud.ncols());
-                multiply(damping, 1, ud.as_ref(), forces.as_mut());
+                let mut forces = Mat::zeros(self.vectors.nrows(), self.vectors.ncols());
+                multiply(damping, 1, self.vectors.as_ref(), forces.as_mut());
                 forces
             }
             None | Some(Damping::Ratio(_) | Damping::Bands(_)) => {
-                let rates = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| motion[i].qd[j]);
-                let forces = combine(self.modal_damping.as_ref(), rates.as_ref());
-                combine(self.weighted.as_ref(), self.over_mass(&forces).as_ref())
+                combine(self.weighted.as_ref(), self.over_mass(&self.modal_damping).as_ref())
             }
         }
     }
@@ -189,7 +194,7 @@ impl<'m> NodalView<'m> {
     }
 
     /// A linear and an angular vector in the coordinates of the model, a column for every instant.
-    fn along_model(
+    pub fn along_model(
         &self,
         motion: &[Instant],
         of: impl Fn(&Instant) -> (Vector3<f64>, Vector3<f64>),
@@ -225,10 +230,14 @@ impl<'m> NodalView<'m> {
     pub fn loads_of(&self, motion: &[Instant]) -> Mat<f64> {
         let mut forces = Mat::zeros(self.vectors.nrows(), motion.len());
         for (at, columns) in self.loads.iter().enumerate() {
-            let amplitudes = self.along_model(motion, |now| now.loads[at]);
-            let known = amplitudes.as_ref().subrows(0, columns.ncols());
-            forces += combine(columns.as_ref(), known.to_owned().as_ref());
+            forces += combine(columns.as_ref(), self.load_amplitudes(motion, at).as_ref());
         }
         forces
+    }
+
+    /// Force and torque of one of the loads, as many of their components as act on its point.
+    pub fn load_amplitudes(&self, motion: &[Instant], at: usize) -> Mat<f64> {
+        let amplitudes = self.along_model(motion, |now| now.loads[at]);
+        amplitudes.as_ref().subrows(0, self.loads[at].ncols()).to_owned()
     }
 }

@@ -7,10 +7,12 @@ use crate::base::progress::Watch;
 use crate::body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use crate::body::convert::{ConvertSettings, Lumping, convert};
 use crate::model::FeModel;
-use crate::motion::scene::{Scene, trace};
+use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, Wanted};
-use crate::study::reference::{EnrichedForCases, MotionShapes, ReferenceError, enrich_for_cases};
+use crate::study::reference::{EnrichedForCases, MotionBodies, ReferenceError, enrich_for_cases};
 use faer::Mat;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -86,7 +88,9 @@ pub fn conversions_for_cases(
         sources.push(beside.expect(OF_THE_MODEL));
     }
     if let [scene] = scenes {
-        for source in making.make_of_motion(&sources[0], scene)? {
+        let lacking =
+            lacks.iter().filter_map(|rounds| rounds.last()).map(|own| own.worst).fold(0.0, f64::max);
+        for source in making.make_of_motion(&sources[0], scene, 1.0 - lacking)? {
             sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
         }
     }
@@ -110,6 +114,10 @@ fn warnings(scenes: &[Scene], lacks: &[Vec<ReferenceError>]) -> Vec<Diagnostic> 
     };
     scenes.iter().zip(lacks).filter_map(of).collect()
 }
+
+/// Part of what is left of the tolerances that bodies of the fewest shapes may take: the rest is for terms
+/// that are left out beside.
+const SHARE_OF_SHAPES: f64 = 0.9;
 
 const OF_THE_MODEL: &str = "bodies that were made of the model";
 
@@ -221,26 +229,37 @@ impl<'m> Making<'m> {
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
 
-    /// Bodies of the [`MotionShapes`] of `reference` in `scene`; each takes the time of the reference and its
-    /// motion besides.
-    fn make_of_motion(&self, reference: &Source, scene: &Scene) -> Result<Vec<Source>> {
+    /// Bodies of the shapes of the motion of `reference` in `scene`: of the numbers worth trying, and of the
+    /// fewest that are good enough where `most` times the tolerances are left to them. Each takes the time of
+    /// the reference and its motion besides.
+    fn make_of_motion(&self, reference: &Source, scene: &Scene, most: f64) -> Result<Vec<Source>> {
         if scene.run.duration.is_none() {
             return Ok(Vec::new());
         }
         let start = Instant::now();
-        let (motion, _) = trace(reference.body(), scene, self.memory, |_| ())?;
-        let Some(shapes) = MotionShapes::new(self.model, reference.body(), scene, &motion)? else {
+        let Some(bodies) = MotionBodies::new(self.model, reference.body(), scene, self.memory)? else {
             return Ok(Vec::new());
         };
         let before = start.elapsed().as_secs_f64() + reference.preprocessing().unwrap_or(0.0);
-        let make = |count: usize| {
-            let start = Instant::now();
-            let settings = ConvertSettings { basis: shapes.basis(count), ..self.settings(usize::MAX) };
-            let body = shapes.damped(self.model, convert(self.model, &settings, self.watch)?.body)?;
-            let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
-            Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
+        let mut made = BTreeMap::new();
+        let mut make = |count: usize| match made.entry(count) {
+            Entry::Occupied(known) => Ok(Source::clone(known.get())),
+            Entry::Vacant(new) => Ok(new.insert(self.of_shapes(&bodies, count, before)?).clone()),
         };
-        shapes.counts(&scene.requirements.tolerance).into_iter().map(make).collect()
+        let mut counts = bodies.counts();
+        counts.iter().try_for_each(|count| make(*count).map(drop))?;
+        let fewest = bodies.fewest(SHARE_OF_SHAPES * most, make, Source::body)?;
+        counts.extend(fewest.map(|own| own.count));
+        Ok(made.into_iter().filter(|(count, _)| counts.contains(count)).map(|(_, own)| own).collect())
+    }
+
+    /// The body of so many shapes of a motion that took `before` seconds.
+    fn of_shapes(&self, bodies: &MotionBodies<'_>, count: usize, before: f64) -> Result<Source> {
+        let start = Instant::now();
+        let settings = ConvertSettings { basis: bodies.basis(count), ..self.settings(usize::MAX) };
+        let body = bodies.damped(convert(self.model, &settings, self.watch)?.body)?;
+        let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
+        Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
     }
 
     /// The same of the model with its whole mass lumped; the reason where this has no modes.
