@@ -14,11 +14,16 @@ pub struct Trade {
     inner: flexbody::Trade,
 }
 
-/// What is asked of a study; `reference` is `full` or `nodal`.
+/// What is asked of a study; `reference` is `full`, `fine` or `nodal`.
 pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOptions> {
     let options = TradeOptions::default().modes(modes).repeat(repeat);
-    let nodal = one_of("reference", reference, [("full", false), ("nodal", true)])?;
-    Ok(if nodal { options.against_all_nodes() } else { options })
+    let choices: [(&str, fn(TradeOptions) -> TradeOptions); 3] = [
+        ("full", |options| options),
+        ("fine", TradeOptions::against_a_fine_body),
+        ("nodal", TradeOptions::against_all_nodes),
+    ];
+    let against = one_of("reference", reference, choices)?;
+    Ok(against(options))
 }
 
 impl Trade {

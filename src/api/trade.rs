@@ -8,7 +8,9 @@ use crate::base::progress::Watch;
 use crate::body::basis::ModeSettings;
 use crate::report::{TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{self, ReferenceKind, Settings, Source, conversions_for_cases};
+use crate::study::trade::{
+    self, Allowed, ReferenceKind, Settings, Source, WantedBodies, conversions_for_cases,
+};
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
 /// everything that it has, the median time of 3 simulations of each candidate.
@@ -16,12 +18,20 @@ use crate::study::trade::{self, ReferenceKind, Settings, Source, conversions_for
 pub struct TradeOptions {
     modes: usize,
     repeat: usize,
-    nodal: bool,
+    reference: Against,
+}
+
+/// What errors are measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Against {
+    Body,
+    FineBody,
+    Nodes,
 }
 
 impl Default for TradeOptions {
     fn default() -> Self {
-        Self { modes: ModeSettings::DEFAULT_COUNT, repeat: 3, nodal: false }
+        Self { modes: ModeSettings::DEFAULT_COUNT, repeat: 3, reference: Against::Body }
     }
 }
 
@@ -40,7 +50,15 @@ impl TradeOptions {
 
     /// Measures errors against the motion of all nodes of the model.
     pub fn against_all_nodes(mut self) -> Self {
-        self.nodal = true;
+        self.reference = Against::Nodes;
+        self
+    }
+
+    /// Measures errors against a body that is enriched until what it lacks of the motion of all nodes is
+    /// estimated at no more than a hundredth of the tolerances: what can be had of large models and long
+    /// scenes. Where that is not reached a warning says so.
+    pub fn against_a_fine_body(mut self) -> Self {
+        self.reference = Against::FineBody;
         self
     }
 }
@@ -79,9 +97,11 @@ impl Model {
     ) -> Result<Trade> {
         let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
         heard(listener, |watch| {
-            let made = conversions_for_cases(&self.checked, &scenes, options.modes, None, None, watch)?;
-            let nodal = options.nodal.then_some(&self.checked);
-            let reserved = trade::reserved(&made.lacks, options.nodal);
+            let fine = options.reference == Against::FineBody;
+            let wanted = WantedBodies { modes: options.modes, fine };
+            let made = conversions_for_cases(&self.checked, &scenes, wanted, Allowed::default(), watch)?;
+            let nodal = (options.reference == Against::Nodes).then_some(&self.checked);
+            let reserved = trade::reserved(&made.lacks, nodal.is_some());
             let settings =
                 Settings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
             let study = trade::trade_for_cases(&made.sources, &scenes, nodal, &settings, watch)?;
@@ -111,8 +131,9 @@ impl FlexBody {
         options: &TradeOptions,
         listener: Listener<'_>,
     ) -> Result<Trade> {
-        if options.nodal {
-            let message = "errors against all nodes need the matrices: ask the model, not the body";
+        if options.reference != Against::Body {
+            let message =
+                "errors against all nodes, or a finer body, need the matrices: ask the model, not the body";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();

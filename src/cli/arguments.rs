@@ -272,6 +272,9 @@ pub struct TradeArguments {
 pub enum ReferenceName {
     /// The largest body
     Full,
+    /// A body that is enriched until it lacks no more than a hundredth of the tolerances of the motion of all
+    /// nodes, by the estimate
+    Fine,
     /// The unreduced equations of all nodes
     Nodal,
 }

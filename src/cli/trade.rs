@@ -15,7 +15,9 @@ use crate::body::basis::ModeSettings;
 use crate::formats::flex_body_file;
 use crate::report::{Format, RunData, TradeFacts, trade_csv};
 use crate::study::reference::ReferenceError;
-use crate::study::trade::{Row, Settings, Source, Trade, conversions_for_cases, reserved, trade_for_cases};
+use crate::study::trade::{
+    Allowed, Row, Settings, Source, Trade, WantedBodies, conversions_for_cases, reserved, trade_for_cases,
+};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
@@ -38,9 +40,10 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
-        let longest = longest(arguments.allow_long);
+        let wanted = WantedBodies { modes, fine: arguments.reference == ReferenceName::Fine };
+        let allowed = Allowed { memory, longest: longest(arguments.allow_long) };
         let watch = |event: Event<'_>| watcher.hear(event);
-        let made = conversions_for_cases(&checked.model, &scenes, modes, memory, longest, &watch)
+        let made = conversions_for_cases(&checked.model, &scenes, wanted, allowed, &watch)
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
         (Some(checked.model), made.sources, made.lacks)
@@ -113,6 +116,9 @@ fn refuse_contradictions(arguments: &TradeArguments, is_model: bool) -> Result<(
         _ if is_model => return Ok(()),
         TradeArguments { reference: ReferenceName::Nodal, .. } => {
             "--reference nodal needs the matrices: give the model"
+        }
+        TradeArguments { reference: ReferenceName::Fine, .. } => {
+            "--reference fine is made of the matrices: give the model"
         }
         TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the model",
         _ => return Ok(()),

@@ -12,7 +12,8 @@ use crate::model::FeModel;
 use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, Resume, Wanted};
 use crate::study::reference::{
-    Enriched, EnrichedForCases, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich_for_cases,
+    Enriched, EnrichedForCases, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError,
+    enrich_for_cases,
 };
 use crate::study::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
 use faer::Mat;
@@ -83,7 +84,8 @@ impl Tailoring {
         let Self { settings, .. } = self;
         let grows = settings.modes.accuracy != Accuracy::Certified
             && settings.basis.with_motion(&Mat::new()).is_some();
-        enrich_for_cases(model, scenes, settings.modes.memory, grows, watch, make, |made| &made.body)
+        let enrichment = Enrichment { memory: settings.modes.memory, grows, is_fine: false };
+        enrich_for_cases(model, scenes, enrichment, watch, make, |made| &made.body)
     }
 
     /// The body of the fewest [`MotionShapes`] that leave half of the tolerances to others, in place of the

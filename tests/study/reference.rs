@@ -16,7 +16,7 @@ use flexbody::motion::scene::{
     Spin, Stage, VectorHistory, simulate, trace,
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
-use flexbody::study::reference::{Enriched, PART_OF_REFERENCE, ReferenceError, enrich};
+use flexbody::study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, ReferenceError, enrich};
 use flexbody::study::tailoring::{Tailoring, convert_for_scene};
 use flexbody::study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
@@ -86,8 +86,15 @@ fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: V
 
 /// The estimate for a body as it is.
 fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError {
-    let found =
-        enrich(model, scene, None, false, SILENT, |_| Ok(body.clone()), |body| body).expect("an estimate");
+    let found = enrich(
+        model,
+        scene,
+        Enrichment { memory: None, grows: false, is_fine: false },
+        SILENT,
+        |_| Ok(body.clone()),
+        |body| body,
+    )
+    .expect("an estimate");
     found.error().expect("an estimate").clone()
 }
 
@@ -238,6 +245,22 @@ proptest! {
         prop_assert!((0.7..1.4).contains(&effectivity), "stress: {:?} is {} of {}", lack, effectivity, stress);
         let effectivity = lack.errors.deflection.expect("a deformed body") / deflection;
         prop_assert!((0.7..1.4).contains(&effectivity), "deflection: {:?} is {} of {}", lack, effectivity, deflection);
+    }
+}
+
+/// Instants of a thousand periods, ten times as many as were followed once.
+#[test]
+#[ignore = "slow"]
+fn a_long_run_is_followed() {
+    let model = model();
+    let mut scene = pulled(&model, 7, Vector3::new(1e-5, 2e-5, -1e-5), 0.7, Vector3::zeros());
+    scene.run.duration = scene.run.duration.map(|periods| 500.0 * periods);
+    let body = body(&model, 6);
+    let lack = estimated(&model, &body, &scene);
+    let [deflection, stress] = true_errors(&model, &body, &scene);
+    for (own, found) in [(lack.errors.deflection, deflection), (lack.errors.stress, stress)] {
+        let effectivity = own.expect("a deformed body") / found;
+        assert!((0.7..1.4).contains(&effectivity), "{effectivity} of {found}: {lack:?}");
     }
 }
 

@@ -15,10 +15,11 @@ use flexbody::body::invariants::BodyFrame;
 use flexbody::model::FeModel;
 use flexbody::motion::scene::{Axes, Initial, ModeStart, Scene, Scheme, Tolerance, simulate};
 use flexbody::numerics::eigen::Wanted;
+use flexbody::study::reference::PART_OF_FINE;
 use flexbody::study::selection::select;
 use flexbody::study::trade::{
-    Conversions, Kind, LumpedMass, Measured, Recommendation, ReferenceKind, Row, Settings, Source, Trade,
-    conversions, front, trade, trade_for_cases,
+    Allowed, Conversions, Kind, LumpedMass, Measured, Recommendation, ReferenceKind, Row, Settings, Source,
+    Trade, WantedBodies, conversions, front, trade, trade_for_cases,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -216,11 +217,16 @@ fn model() -> FeModel {
     FeModel::from_raw(mesh.assemble(&rubber, MassRule::Consistent).raw_model()).expect("a body").model
 }
 
+/// A usual study.
+fn wanted(modes: usize) -> WantedBodies {
+    WantedBodies { modes, fine: false }
+}
+
 /// Conversions of which nothing is known that they are for.
 fn without_scene(model: &FeModel, modes: usize) -> Conversions {
     let mut scene = tumble(1.0, 1.0);
     scene.run.duration = None;
-    conversions(model, &scene, modes, None, None, SILENT).expect("bodies")
+    conversions(model, &scene, wanted(modes), Allowed::default(), SILENT).expect("bodies")
 }
 
 #[test]
@@ -228,7 +234,7 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
     let model = model();
     let rate = first_rate(without_scene(&model, 4).sources[0].body());
     let scene = tumble(0.15 * rate, 0.5);
-    let made = conversions(&model, &scene, 4, None, None, SILENT).expect("bodies");
+    let made = conversions(&model, &scene, wanted(4), Allowed::default(), SILENT).expect("bodies");
     let [lacks] = &made.lacks[..] else { panic!("one scene: {:?}", made.lacks) };
     let (first, own) = (&lacks[0], lacks.last().expect("an estimate"));
     assert_eq!(own.modes, made.sources[0].body().n_modes());
@@ -277,6 +283,27 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
         both += 1;
     }
     assert!(both > 20, "{both} candidates of both studies");
+}
+
+#[test]
+fn a_fine_reference_stands_for_the_motion_of_all_nodes() {
+    let model = model();
+    let rate = first_rate(without_scene(&model, 4).sources[0].body());
+    let mut scene = tumble(0.05 * rate, 0.5);
+    scene.initial.settled = true;
+    scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
+    let lacking = |fine: bool| {
+        let wanted = WantedBodies { modes: 4, fine };
+        let made = conversions(&model, &scene, wanted, Allowed::default(), SILENT).expect("bodies");
+        (made.lacks[0].last().expect("an estimate").worst, made.sources)
+    };
+    let (usual, _) = lacking(false);
+    let (fine, sources) = lacking(true);
+    assert!(fine <= PART_OF_FINE && usual > PART_OF_FINE, "{fine} {usual}");
+    // As all nodes tell, whom nobody asked.
+    let found = trade(&sources[..1], &scene, Some(&model), &QUICK, SILENT).expect("a study");
+    let whole = found.rows[0].outcome.as_ref().expect("a motion").worst();
+    assert!((0.3..3.0).contains(&(fine / whole)), "{fine} {whole}");
 }
 
 #[test]

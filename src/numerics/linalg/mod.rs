@@ -39,7 +39,7 @@ pub use ldl::SparseLdl;
 pub use matrix_sum::{MatrixSum, Scalar};
 pub use ordering::connected_components;
 pub use pencil::Pencil;
-pub use product::{multiply, multiply_vector, sum_terms};
+pub use product::{multiply, multiply_vector, quadratic_form, sum_terms};
 pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};

@@ -39,14 +39,43 @@ pub fn multiply_vector(a: &SymmetricMatrix, block: usize, x: &[f64], y: &mut [f6
 
 fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
     let x = x.as_chunks::<B>().0;
-    for (i, y) in y.as_chunks_mut::<B>().0.iter_mut().enumerate() {
-        let (columns, values) = a.row(i);
-        let mut sum = [0.0; B];
-        for (&j, v) in columns.iter().zip(values) {
-            sum.iter_mut().zip(&x[j as usize]).for_each(|(sum, x)| *sum += v * x);
+    Arch::new().dispatch(|| {
+        for (i, y) in y.as_chunks_mut::<B>().0.iter_mut().enumerate() {
+            let (columns, values) = a.row(i);
+            *y = row_times(columns, values, x);
         }
-        *y = sum;
+    });
+}
+
+/// x'A x: by one thread, nothing allocated.
+///
+/// # Panics
+/// When `x` has not as many entries as A has rows.
+pub fn quadratic_form(a: &SymmetricMatrix, x: &[f64]) -> f64 {
+    assert_eq!(x.len(), a.n(), "one entry for each row");
+    let (entries, _) = x.as_chunks::<1>();
+    let product = |(i, x): (usize, &f64)| {
+        let (columns, values) = a.row(i);
+        x * row_times(columns, values, entries)[0]
+    };
+    Arch::new().dispatch(|| x.iter().enumerate().map(product).sum())
+}
+
+/// The product of a row, in several sums that do not wait for each other.
+#[inline(always)] // compiled once per instruction set
+fn row_times<const B: usize>(columns: &[u32], values: &[f64], x: &[[f64; B]]) -> [f64; B] {
+    const SUMS: usize = 4;
+    let mut sums = [[0.0; B]; SUMS];
+    let mut add = |sum: usize, column: u32, value: f64| {
+        sums[sum].iter_mut().zip(&x[column as usize]).for_each(|(sum, x)| *sum += value * x);
+    };
+    let (columns, last_columns) = columns.as_chunks::<SUMS>();
+    let (values, last_values) = values.as_chunks::<SUMS>();
+    for (columns, values) in columns.iter().zip(values) {
+        (0..SUMS).for_each(|k| add(k, columns[k], values[k]));
     }
+    last_columns.iter().zip(last_values).for_each(|(column, value)| add(0, *column, *value));
+    std::array::from_fn(|b| sums.iter().map(|sum| sum[b]).sum())
 }
 
 /// y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] for other sums of the

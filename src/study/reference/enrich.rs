@@ -1,6 +1,6 @@
 //! A body that is enriched for a scene until what it lacks of its model no longer counts.
 
-use super::estimate::{Estimate, PART_OF_REFERENCE, ReferenceError};
+use super::estimate::{Estimate, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::FlexBody;
@@ -13,8 +13,35 @@ use faer::Mat;
 /// responses may leave most of what has inertia to those of the next round.
 const WORTH: f64 = 0.9;
 
-/// How often a body is enriched at the most.
+/// How often a body is enriched at the most, and one that has to come close to the model.
 const MOST_ROUNDS: usize = 4;
+const MOST_ROUNDS_OF_FINE: usize = 12;
+
+/// How far a body is enriched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Enrichment {
+    /// Bytes that there are; `None` where it is not known.
+    pub memory: Option<u64>,
+    /// Whether it can be enriched at all: what it lacks is estimated in any case.
+    pub grows: bool,
+    /// Whether it has to come within [`PART_OF_FINE`] of the tolerances instead of [`PART_OF_REFERENCE`].
+    pub is_fine: bool,
+}
+
+impl Enrichment {
+    /// Part of the tolerances that the body may lack of its model.
+    pub fn enough(&self) -> f64 {
+        if self.is_fine { PART_OF_FINE } else { PART_OF_REFERENCE }
+    }
+
+    fn most_rounds(&self) -> usize {
+        match (self.grows, self.is_fine) {
+            (false, _) => 0,
+            (true, false) => MOST_ROUNDS,
+            (true, true) => MOST_ROUNDS_OF_FINE,
+        }
+    }
+}
 
 /// A body with what it lacks of its model in a scene.
 #[derive(Debug, Clone)]
@@ -43,24 +70,22 @@ pub struct EnrichedForCases<B> {
 }
 
 /// Makes a body of `model` with `make`, which gets nodal forces (N x k) whose static responses the body shall
-/// have beside its modes, none at first. As long as the body lacks more than [`PART_OF_REFERENCE`] of the
+/// have beside its modes, none at first. As long as the body lacks more than [`Enrichment::enough`] of the
 /// tolerances of `scene` in its own motion, the forces that its motion leaves unbalanced at the nodes join
-/// these, while that pays. `grows`: whether `make` can follow.
+/// these, while that pays.
 ///
 /// # Errors
 /// Those of `make` and of [`trace`](crate::motion::scene::trace).
 pub fn enrich<B>(
     model: &FeModel,
     scene: &Scene,
-    memory: Option<u64>,
-    grows: bool,
+    enrichment: Enrichment,
     watch: Watch<'_>,
     make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
 ) -> Result<Enriched<B>> {
     let scenes = std::slice::from_ref(scene);
-    let EnrichedForCases { made, rounds } =
-        enrich_for_cases(model, scenes, memory, grows, watch, make, body)?;
+    let EnrichedForCases { made, rounds } = enrich_for_cases(model, scenes, enrichment, watch, make, body)?;
     Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
 }
 
@@ -72,8 +97,7 @@ pub fn enrich<B>(
 pub fn enrich_for_cases<B>(
     model: &FeModel,
     scenes: &[Scene],
-    memory: Option<u64>,
-    grows: bool,
+    enrichment: Enrichment,
     watch: Watch<'_>,
     mut make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
@@ -82,9 +106,10 @@ pub fn enrich_for_cases<B>(
     let mut made = make(&loads)?;
     let mut cases = vec![Asking::default(); scenes.len()];
     let mut poorer = None;
-    for round in 0..=MOST_ROUNDS {
+    let (enough, most_rounds) = (enrichment.enough(), enrichment.most_rounds());
+    for round in 0..=most_rounds {
         watch(Event::Phase("what the body lacks of the model"));
-        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, PART_OF_REFERENCE, memory);
+        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, enrichment.memory);
         let estimates = scenes.iter().map(estimate).collect::<Result<Vec<_>>>()?;
         if estimates.iter().all(Option::is_none) {
             break;
@@ -97,11 +122,11 @@ pub fn enrich_for_cases<B>(
         }
         let mut wanted = vec![loads];
         for (case, estimate) in cases.iter_mut().zip(estimates) {
-            wanted.extend(estimate.and_then(|estimate| case.hear(estimate)));
+            wanted.extend(estimate.and_then(|estimate| case.hear(estimate, enough)));
         }
         let is_done = wanted.len() == 1;
         loads = side_by_side(&wanted.iter().map(Mat::as_ref).collect::<Vec<_>>());
-        if is_done || !grows || round == MOST_ROUNDS {
+        if is_done || round == most_rounds {
             break;
         }
         poorer = Some(std::mem::replace(&mut made, make(&loads)?));
@@ -133,11 +158,12 @@ impl Asking {
         now.worst > WORTH * before.worst
     }
 
-    /// Notes what the body lacks, and answers the forces whose responses this case asks for.
-    fn hear(&mut self, estimate: Estimate) -> Option<Mat<f64>> {
+    /// Notes what the body lacks, and answers the forces whose responses this case asks for where that is more
+    /// than `enough`.
+    fn hear(&mut self, estimate: Estimate, enough: f64) -> Option<Mat<f64>> {
         let Estimate { error, missing } = estimate;
         self.gave_up |= self.asked && self.rounds.last().is_some_and(|before| Self::in_vain(before, &error));
-        self.asked = error.worst > PART_OF_REFERENCE && missing.ncols() > 0 && !self.gave_up;
+        self.asked = error.worst > enough && missing.ncols() > 0 && !self.gave_up;
         self.rounds.push(error);
         self.asked.then_some(missing)
     }

@@ -14,6 +14,9 @@ use faer::Mat;
 /// Part of the tolerances that the reference of a study may lack of the model without a word.
 pub const PART_OF_REFERENCE: f64 = 0.1;
 
+/// The same of a reference that stands for the motion of all nodes.
+pub const PART_OF_FINE: f64 = 0.01;
+
 /// Part of the tolerances that a body may lack of the model and still be a reference: others get the rest.
 pub const MOST_LACKING: f64 = 0.5;
 
@@ -43,9 +46,9 @@ impl ReferenceError {
         self.worst <= MOST_LACKING
     }
 
-    /// The warning about a body that lacks what counts.
-    pub fn warning(&self, scene: &Scene) -> Option<Diagnostic> {
-        if self.worst <= PART_OF_REFERENCE {
+    /// The warning about a body that lacks more than `enough` of the tolerances.
+    pub fn warning(&self, scene: &Scene, enough: f64) -> Option<Diagnostic> {
+        if self.worst <= enough {
             return None;
         }
         let message = format!(

@@ -2,7 +2,7 @@
 
 use super::compressed::MOST_FORCES;
 use crate::body::flex_body::FlexBody;
-use crate::motion::scene::{Scene, Trace, fastest_history};
+use crate::motion::scene::{Scene, Trace, fastest_history, liveliest_rate};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -26,9 +26,6 @@ const COUNTS: f64 = 0.1;
 const SHORTEST: f64 = 1e-6;
 const MOST_BREAKS: usize = 40;
 
-/// Distances of places that differ by more than this are not of one stretch: the places stand at a break.
-const UNEVEN: f64 = 8.0;
-
 /// How far before a break the motion is looked at, as a part of the run.
 const BEFORE: f64 = 1e-9;
 
@@ -45,7 +42,8 @@ pub(super) struct Grid {
 impl Grid {
     /// For the `motion` of a `body`.
     pub fn new(body: &FlexBody, scene: &Scene, motion: &Trace, duration: f64) -> Self {
-        let frequency = (fastest(body, scene, motion) / TAU).max(fastest_history(scene, duration));
+        let frequency =
+            (liveliest_rate(body, scene, motion, COUNTS) / TAU).max(fastest_history(scene, duration));
         let wanted = PER_PERIOD * frequency * duration;
         let most = (MOST_AMPLITUDES / (body.n_modes() + MOST_FORCES)).max(LEAST);
         let is_fine = FEWEST_PER_PERIOD / PER_PERIOD * wanted <= most as f64;
@@ -89,36 +87,6 @@ fn stretches(breaks: &[f64], duration: f64) -> Vec<(f64, f64)> {
     }
     ends.push(duration);
     ends.windows(2).map(|pair| (pair[0], pair[1])).collect()
-}
-
-/// The largest circular frequency of the modes that count in the motion; those of a body that is carried
-/// are not above those of the free body. A mode that follows slow forces has no motion of its own, however
-/// high it is: what counts is the amplitude q'' / omega^2 that its acceleration has at its own frequency.
-fn fastest(body: &FlexBody, scene: &Scene, motion: &Trace) -> f64 {
-    let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
-    let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
-    let tolerance = &scene.requirements.tolerance;
-    let part = COUNTS * tolerance.stress.min(tolerance.deflection);
-    let least = part * roots.fold(0.0, f64::max);
-    let own = accelerations(motion, rates.len());
-    let counts = |j: &usize| own[*j] > 0.0 && own[*j] / rates[*j] >= least;
-    (0..rates.len()).rev().find(counts).map_or(0.0, |last| rates[last])
-}
-
-/// The largest |q''| of every mode, by differences between places that are about as far from each other.
-fn accelerations(motion: &Trace, modes: usize) -> Vec<f64> {
-    let mut largest = vec![0.0f64; modes];
-    for (times, q) in motion.time.windows(3).zip(motion.q.windows(3)) {
-        let (before, after) = (times[1] - times[0], times[2] - times[1]);
-        if !(before > 0.0 && after > 0.0 && before < UNEVEN * after && after < UNEVEN * before) {
-            continue;
-        }
-        for (j, largest) in largest.iter_mut().enumerate() {
-            let slopes = [(q[1][j] - q[0][j]) / before, (q[2][j] - q[1][j]) / after];
-            *largest = largest.max(2.0 * (slopes[1] - slopes[0]).abs() / (before + after));
-        }
-    }
-    largest
 }
 
 #[cfg(test)]

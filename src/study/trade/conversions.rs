@@ -1,6 +1,6 @@
 //! Bodies that the settings of a conversion make of one model.
 
-use super::Source;
+use super::{Allowed, Source};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::Watch;
@@ -9,7 +9,7 @@ use crate::body::convert::{ConvertSettings, Lumping, convert};
 use crate::model::FeModel;
 use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, Wanted};
-use crate::study::reference::{EnrichedForCases, MotionBodies, ReferenceError, enrich_for_cases};
+use crate::study::reference::{EnrichedForCases, Enrichment, MotionBodies, ReferenceError, enrich_for_cases};
 use faer::Mat;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -27,11 +27,20 @@ pub struct Conversions {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// What a study is to be made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WantedBodies {
+    /// Free modes of a usual conversion.
+    pub modes: usize,
+    /// Whether the reference stands for the motion of all nodes: [`Enrichment::is_fine`].
+    pub fine: bool,
+}
+
 /// Every conversion of a study in `scene`.
 ///
-/// The reference has twice as many `modes`, residual vectors of spin and interfaces, and what
-/// [`enrich_for_cases`] finds lacking. Beside it stand `modes`, their half and their quarter with residual
-/// vectors and without, `modes` at the other levels of accuracy, bodies of the shapes that the motion of the
+/// The reference has twice as many modes as are wanted, residual vectors of spin and interfaces, and what
+/// [`enrich_for_cases`] finds lacking. Beside it stand as many as are wanted, their half and their quarter with residual
+/// vectors and without, the same at the other levels of accuracy, bodies of the shapes that the motion of the
 /// reference is made of, and what the settings of the reference make of the model with its whole mass lumped.
 /// Each is timed.
 ///
@@ -41,12 +50,11 @@ pub struct Conversions {
 pub fn conversions(
     model: &FeModel,
     scene: &Scene,
-    modes: usize,
-    memory: Option<u64>,
-    longest: Option<f64>,
+    wanted: WantedBodies,
+    allowed: Allowed,
     watch: Watch<'_>,
 ) -> Result<Conversions> {
-    conversions_for_cases(model, std::slice::from_ref(scene), modes, memory, longest, watch)
+    conversions_for_cases(model, std::slice::from_ref(scene), wanted, allowed, watch)
 }
 
 /// The same for the load cases `scenes`: the reference has what it lacks in any of them. Shapes are made of
@@ -57,12 +65,12 @@ pub fn conversions(
 pub fn conversions_for_cases(
     model: &FeModel,
     scenes: &[Scene],
-    modes: usize,
-    memory: Option<u64>,
-    longest: Option<f64>,
+    wanted: WantedBodies,
+    allowed: Allowed,
     watch: Watch<'_>,
 ) -> Result<Conversions> {
-    let making = Making::new(model, memory, longest, watch);
+    let making = Making::new(model, allowed, watch);
+    let WantedBodies { modes, fine } = wanted;
     let finest =
         Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard, lumped: None };
     let mut responses = Mat::new();
@@ -70,9 +78,10 @@ pub fn conversions_for_cases(
         responses.clone_from(loads);
         making.make(&finest, loads, ConvertSettings::default().lumped)
     };
-    let enriched = enrich_for_cases(model, scenes, memory, true, watch, make, |(made, _)| made.body())?;
+    let enrichment = Enrichment { memory: allowed.memory, grows: true, is_fine: fine };
+    let enriched = enrich_for_cases(model, scenes, enrichment, watch, make, |(made, _)| made.body())?;
     let EnrichedForCases { made: (reference, mut diagnostics), rounds: lacks } = enriched;
-    diagnostics.extend(warnings(scenes, &lacks));
+    diagnostics.extend(warnings(scenes, &lacks, enrichment.enough()));
     let mut sources = vec![reference];
     for wish in wishes(modes) {
         let source = match making.make(&wish, &Mat::new(), Vec::new()) {
@@ -104,9 +113,9 @@ pub fn conversions_for_cases(
 }
 
 /// Warnings about what the reference lacks, each with its load case where there are several.
-fn warnings(scenes: &[Scene], lacks: &[Vec<ReferenceError>]) -> Vec<Diagnostic> {
+fn warnings(scenes: &[Scene], lacks: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
     let of = |(scene, rounds): (&Scene, &Vec<ReferenceError>)| {
-        let warning = rounds.last()?.warning(scene)?;
+        let warning = rounds.last()?.warning(scene, enough)?;
         Some(match scene.case_name().filter(|_| scenes.len() > 1) {
             Some(name) => warning.about(format!("case `{name}`")),
             None => warning,
@@ -179,18 +188,17 @@ struct Making<'m> {
     model: &'m FeModel,
     /// Loads of the residual vectors.
     loads: Vec<Loads>,
-    memory: Option<u64>,
-    longest: Option<f64>,
+    allowed: Allowed,
     watch: Watch<'m>,
 }
 
 impl<'m> Making<'m> {
-    fn new(model: &'m FeModel, memory: Option<u64>, longest: Option<f64>, watch: Watch<'m>) -> Self {
+    fn new(model: &'m FeModel, allowed: Allowed, watch: Watch<'m>) -> Self {
         let mut loads = vec![Loads::Centrifugal];
         if !model.interfaces().is_empty() {
             loads.push(Loads::Interfaces);
         }
-        Self { model, loads, memory, longest, watch }
+        Self { model, loads, allowed, watch }
     }
 
     /// Settings of a conversion with so many modes, without lumped comparators.
@@ -198,8 +206,8 @@ impl<'m> Making<'m> {
         ConvertSettings {
             modes: ModeSettings {
                 wanted: Wanted::Lowest(modes),
-                memory: self.memory,
-                longest: self.longest,
+                memory: self.allowed.memory,
+                longest: self.allowed.longest,
                 ..ModeSettings::default()
             },
             lumped: Vec::new(),
@@ -237,7 +245,8 @@ impl<'m> Making<'m> {
             return Ok(Vec::new());
         }
         let start = Instant::now();
-        let Some(bodies) = MotionBodies::new(self.model, reference.body(), scene, self.memory)? else {
+        let Some(bodies) = MotionBodies::new(self.model, reference.body(), scene, self.allowed.memory)?
+        else {
             return Ok(Vec::new());
         };
         let before = start.elapsed().as_secs_f64() + reference.preprocessing().unwrap_or(0.0);

@@ -12,7 +12,7 @@ mod study;
 mod timing;
 
 pub use candidate::{Candidate, Kind, LumpedMass};
-pub use conversions::{Conversions, conversions, conversions_for_cases};
+pub use conversions::{Conversions, WantedBodies, conversions, conversions_for_cases};
 pub use front::{Recommendation, front};
 pub use nodal::{Allowed, NodalIntegration, NodalReference};
 pub use row::{Failed, InCase, Measured, Row, Timed};

@@ -3,6 +3,7 @@
 use super::NodalError;
 use super::equations::NodalEquations;
 use crate::motion::dynamics::{EulerParameters, Orientation};
+use crate::numerics::linalg::quadratic_form;
 use nalgebra::Vector3;
 
 /// Largest rigid motion in displacements that is rounding, relative to the largest of them.
@@ -94,11 +95,7 @@ impl NodalEquations<'_> {
 
     /// u'K u / 2.
     pub(super) fn elastic_energy(&self, u: &[f64]) -> f64 {
-        let row = |(i, ui): (usize, &f64)| {
-            let (columns, values) = self.stiffness().row(i);
-            ui * columns.iter().zip(values).map(|(&j, k)| k * u[j as usize]).sum::<f64>()
-        };
-        0.5 * u.iter().enumerate().map(row).sum::<f64>()
+        0.5 * quadratic_form(self.stiffness(), u)
     }
 }
 

@@ -35,6 +35,9 @@ const FIRST_ANGLE: f64 = 1.5;
 /// Order of implicit steps that the scene does not ask for.
 pub(super) const ORDER: usize = 6;
 
+/// Parts at the most that a step is divided into.
+const MOST_PARTS: u32 = 1024;
+
 /// Times that implicit steps are halved at the least, to see what they were worth: relative to the first
 /// ones, 1 + 2.
 const RUNS: f64 = 3.0;
@@ -104,6 +107,12 @@ impl Effort {
         let steps = (self.duration / step).max(1.0) * runs;
         let one = ITERATIONS * (stages * self.evaluation + solves * self.solve);
         steps * one + self.pieces * (1.0 + COMPLEX) * self.factorisation
+    }
+
+    /// Whether implicit steps may be divided into so many parts.
+    pub fn is_allowed(&self, order: usize, step: f64, parts: u32, longest: Option<f64>) -> bool {
+        let seconds = self.implicit(order, step, f64::from(parts));
+        parts <= MOST_PARTS && longest.is_none_or(|longest| seconds <= longest)
     }
 
     /// How to integrate what a scene asks for by `scheme`, with circular frequencies up to `liveliest` that

@@ -8,7 +8,7 @@ use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::{FlexBody, LoadKind};
 use crate::model::FeModel;
-use crate::motion::scene::{ErrorHistory, Scene, Scheme, Trace, nodal_point};
+use crate::motion::scene::{ErrorHistory, Scene, Scheme, Trace, liveliest_rate, nodal_point};
 
 /// Tolerance of the explicit integration unless the scene has one: errors of reduced models that are smaller
 /// are not told.
@@ -99,7 +99,9 @@ impl<'m> NodalReference<'m> {
         watch: Watch<'_>,
     ) -> Result<Self> {
         let effort = Effort::new(model, scene, body.n_modes());
-        let (way, seconds) = effort.plan(scene, motion.scheme, liveliest(body, scene, motion));
+        // Modes that count less need no steps of their own to begin with.
+        let liveliest = liveliest_rate(body, scene, motion, 1.0).max(body.modes().eigenvalue[0].sqrt());
+        let (way, seconds) = effort.plan(scene, motion.scheme, liveliest);
         effort.refuse_long(seconds, allowed.longest)?;
         let instants = match way {
             Way::Explicit => motion.time.len() as f64,
@@ -122,7 +124,9 @@ impl<'m> NodalReference<'m> {
                 whole(staged.explicit(tolerance, &motion.time, &mut told)?, None)
             }
             (Way::Implicit { order, step, given: true }, _) => {
-                whole(staged.implicit(order, step, 1, end, &mut told)?, None)
+                let is_allowed = |parts| effort.is_allowed(order, step, parts, allowed.longest);
+                let in_parts = |parts| staged.implicit(order, step, parts, end, &mut told);
+                whole(divided(in_parts, is_allowed)?.0, None)
             }
             (Way::Implicit { step, .. }, _) => {
                 let halving = Halving { model, staged: &staged, effort, longest: allowed.longest, end };
@@ -185,8 +189,10 @@ impl Halving<'_, '_> {
     /// twice their length changes of it over the tolerances of the scene.
     fn run(&self, step: f64, told: &mut dyn FnMut(f64)) -> Result<(Seen, f64)> {
         let tolerance = &self.staged.scene.requirements.tolerance;
-        let mut coarse = self.staged.implicit(ORDER, step, 1, self.end, told)?;
-        let mut refinement = 2;
+        let is_allowed = |parts| self.effort.is_allowed(ORDER, step, parts, self.longest);
+        let in_parts = |parts| self.staged.implicit(ORDER, step, parts, self.end, told);
+        let (mut coarse, parts) = divided(in_parts, is_allowed)?;
+        let mut refinement = 2 * parts;
         loop {
             let mut fine = self.staged.implicit(ORDER, step, refinement, self.end, told)?;
             // Ends of the same steps, whose times differ by rounding.
@@ -194,8 +200,7 @@ impl Halving<'_, '_> {
             let scale = fine.largest_deflection(self.model);
             let own = |first: usize, count: usize| coarse.displacements().subcols(first, count).to_owned();
             let error = fine.errors(self.model, &coarse.trace, scale, own).largest().worst(tolerance);
-            let next = self.effort.implicit(ORDER, step, f64::from(2 * refinement));
-            if error <= PART_OF_STEPS || self.longest.is_some_and(|longest| next > longest) {
+            if error <= PART_OF_STEPS || !is_allowed(2 * refinement) {
                 return Ok((fine, error));
             }
             coarse = fine;
@@ -204,12 +209,17 @@ impl Halving<'_, '_> {
     }
 }
 
-/// The largest circular frequency of the modes whose root of the elastic energy, relative to the largest, is
-/// above the tolerance of the stress: others need no steps of their own to begin with.
-fn liveliest(body: &FlexBody, scene: &Scene, motion: &Trace) -> f64 {
-    let roots = body.modes().eigenvalue.iter().zip(&motion.extremes.amplitudes);
-    let roots: Vec<f64> = roots.map(|(lambda, amplitude)| lambda.sqrt() * amplitude.abs()).collect();
-    let least = scene.requirements.tolerance.stress * roots.iter().copied().fold(0.0, f64::max);
-    let lively = roots.iter().rposition(|root| *root >= least).unwrap_or(0);
-    body.modes().eigenvalue[lively].sqrt()
+/// The motion `in_parts` of a step, as few as can be solved for and do not take longer than is allowed, and
+/// how many these are.
+fn divided(
+    mut in_parts: impl FnMut(u32) -> Result<Seen>,
+    is_allowed: impl Fn(u32) -> bool,
+) -> Result<(Seen, u32)> {
+    let mut parts = 1;
+    loop {
+        match in_parts(parts) {
+            Err(error) if error.has(Code::SimulationStopped) && is_allowed(2 * parts) => parts *= 2,
+            motion => return motion.map(|motion| (motion, parts)),
+        }
+    }
 }
