@@ -88,28 +88,29 @@ impl Tailoring {
         enrich_for_cases(model, scenes, enrichment, watch, make, |made| &made.body)
     }
 
-    /// The body of the fewest [`MotionShapes`] that leave half of the tolerances to others, in place of the
-    /// `whole` one whose motion they are made of; that one where no number of them does.
+    /// The body of the fewest shapes of its motions that leave half of the tolerances to others, in place of
+    /// the `whole` one whose motions they are; that one where no number of them does.
     ///
     /// # Errors
-    /// Those of [`trace`] and of the conversion.
+    /// Those of [`trace`](crate::motion::scene::trace) and of the conversion.
     fn of_motion(
         &self,
         model: &FeModel,
-        scene: &Scene,
+        scenes: &[Scene],
         whole: EnrichedForCases<Conversion>,
         watch: Watch<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<EnrichedForCases<Conversion>> {
         let EnrichedForCases { made: mut reference, rounds } = whole;
-        let own = rounds.first().and_then(|rounds| rounds.last());
-        if own.is_some_and(|own| !own.is_reference()) {
+        let own = || rounds.iter().map(|rounds| rounds.last());
+        if own().flatten().any(|own| !own.is_reference()) {
             let message =
                 "the body whose motion shapes would be made of lacks more than half of the tolerances itself";
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
             return Ok(EnrichedForCases { made: reference, rounds });
         }
-        let bodies = MotionBodies::new(model, &reference.body, scene, self.settings.modes.memory)?;
+        let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
+        let bodies = MotionBodies::new(model, &reference.body, scenes, self.settings.modes.memory)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
             let settings = self.settings_of_shapes(bodies.basis(count));
             let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
@@ -118,13 +119,16 @@ impl Tailoring {
             made.body = bodies.damped(made.body)?;
             Ok(made)
         };
-        let lacks = own.map_or(0.0, |own| own.worst);
-        let most = MOST_LACKING - lacks;
-        let fewest =
-            bodies.as_ref().map(|bodies| bodies.fewest(most, |count| make(bodies, count), |made| &made.body));
+        let most: Vec<f64> = lacks.iter().map(|lacks| MOST_LACKING - lacks).collect();
+        let fewest = bodies
+            .as_ref()
+            .map(|bodies| bodies.fewest(&most, |count| make(bodies, count), |made| &made.body));
         if let Some(Fewest { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
-            let own = ReferenceError { modes: made.body.n_modes(), errors, worst: lacks + worst, time: 0.0 };
-            return Ok(EnrichedForCases { made, rounds: vec![vec![own]] });
+            let modes = made.body.n_modes();
+            let own = errors.into_iter().zip(worst).zip(lacks).map(|((errors, worst), lacks)| {
+                vec![ReferenceError { modes, errors, worst: lacks + worst, time: 0.0 }]
+            });
+            return Ok(EnrichedForCases { rounds: own.collect(), made });
         }
         let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
@@ -243,7 +247,7 @@ pub fn convert_for_cases(
     };
     let mut enriched = tailoring.enriched(model, scenes, resume, watch, condense)?;
     if tailoring.of_motion {
-        enriched = tailoring.of_motion(model, &scenes[0], enriched, watch, condense)?;
+        enriched = tailoring.of_motion(model, scenes, enriched, watch, condense)?;
     }
     let EnrichedForCases { made: mut conversion, rounds } = enriched;
     let selection = select_for_cases(&conversion.body, &rounds, scenes, memory, watch)?;
@@ -264,10 +268,6 @@ pub fn convert_for_cases(
 fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
     if !tailoring.of_motion {
         return Ok(());
-    }
-    if scenes.len() > 1 {
-        let message = "--basis scene: shapes are made of one motion, and the scene has several load cases";
-        return Err(Diagnostic::new(Code::SceneCase, message).into());
     }
     let message = if scenes.iter().any(|scene| !scene.initial.modes.is_empty()) {
         "--basis scene: the scene starts modes by their number, which a body made of its motion does not have"

@@ -17,7 +17,7 @@ use flexbody::motion::scene::{
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
 use flexbody::study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, ReferenceError, enrich};
-use flexbody::study::tailoring::{Tailoring, convert_for_scene};
+use flexbody::study::tailoring::{Tailoring, convert_for_cases, convert_for_scene};
 use flexbody::study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -327,6 +327,32 @@ fn shapes_of_the_motion_hold_the_tolerances_and_are_no_more_than_free_modes() {
     // What every body has to fulfil.
     accept(&own.body).expect("the identities");
     assert_eq!(own.body.source().settings["basis"], "scene");
+}
+
+/// A body of the shapes of two motions serves both; one of the shapes of either does not serve the other.
+#[test]
+fn shapes_of_several_motions_serve_all_of_them() {
+    let model = model();
+    let pull = |direction: Vector3<f64>, node: usize| {
+        let mut scene = pulled(&model, node, direction, 0.7, Vector3::zeros());
+        scene.requirements.tolerance.stress = 0.05;
+        scene.requirements.tolerance.deflection = 0.05;
+        scene
+    };
+    let cases = [pull(Vector3::z() * 2e-4, 7), pull(Vector3::x() * 2e-4, 16)];
+    let made = |cases: &[Scene]| {
+        let tailoring = Tailoring { settings: settings(12), by_band: false, of_motion: true };
+        convert_for_cases(&model, &tailoring, cases, Resume::default(), SILENT).expect("a body")
+    };
+    let holds = |body: &FlexBody| {
+        cases.each_ref().map(|case| true_errors(&model, body, case).iter().all(|error| *error < 0.05))
+    };
+    let (both, selection) = made(&cases);
+    assert!(selection.holds(), "{selection:?}");
+    assert_eq!(both.body.source().settings["basis"], "scene");
+    assert_eq!(holds(&both.body), [true, true]);
+    let [first, second] = cases.each_ref().map(|case| made(std::slice::from_ref(case)).0.body);
+    assert_eq!((holds(&first), holds(&second)), ([true, false], [false, true]));
 }
 
 #[test]

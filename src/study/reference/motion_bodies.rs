@@ -1,4 +1,4 @@
-//! Bodies of the shapes that a motion is made of, measured beside that motion.
+//! Bodies of the shapes that motions are made of, measured beside these motions.
 
 use super::motion_shapes::MotionShapes;
 use crate::base::error::Result;
@@ -6,16 +6,22 @@ use crate::body::basis::BasisChoice;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
 use crate::motion::scene::{Measure, OtherModes, OutputErrors, Scene, Stage, Trace, trace, trace_at};
+use faer::Mat;
 
-/// A motion of a body, and what bodies of its shapes make of it.
+/// The motions of a body in one or several scenes, and what bodies of their shapes make of them.
 pub struct MotionBodies<'m> {
     model: &'m FeModel,
     reference: &'m FlexBody,
+    cases: Vec<Case<'m>>,
+    shapes: MotionShapes,
+}
+
+/// A scene with the motion of the reference in it.
+struct Case<'m> {
+    scene: &'m Scene,
     /// The reference in the frame of the scene.
     staged: FlexBody,
-    scene: &'m Scene,
     motion: Trace,
-    shapes: MotionShapes,
 }
 
 /// The body of the fewest shapes with small enough errors.
@@ -24,32 +30,36 @@ pub struct Fewest<B> {
     pub count: usize,
     /// What it was made as.
     pub made: B,
-    /// Its errors.
-    pub errors: OutputErrors,
-    /// The largest of them over its tolerance.
-    pub worst: f64,
+    /// Its errors in each case.
+    pub errors: Vec<OutputErrors>,
+    /// The largest of them over its tolerance, in each case.
+    pub worst: Vec<f64>,
 }
 
 impl<'m> MotionBodies<'m> {
-    /// Of the motion of `reference`, made of `model`, in `scene`. `None` where there are no shapes of it.
+    /// Of the motions of `reference`, made of `model`, in `scenes`. `None` where there are no shapes of them.
     ///
     /// # Errors
     /// Those of [`trace`].
     pub fn new(
         model: &'m FeModel,
         reference: &'m FlexBody,
-        scene: &'m Scene,
+        scenes: &'m [Scene],
         memory: Option<u64>,
     ) -> Result<Option<Self>> {
-        let (motion, _) = trace(reference, scene, memory, |_| ())?;
-        let shapes = MotionShapes::new(model, reference, scene, &motion)?;
-        let staged = Stage::new(reference, scene)?.body.into_owned();
-        Ok(shapes.map(|shapes| Self { model, reference, staged, scene, motion, shapes }))
+        let case = |scene: &'m Scene| -> Result<Case<'m>> {
+            let (motion, _) = trace(reference, scene, memory, |_| ())?;
+            Ok(Case { scene, staged: Stage::new(reference, scene)?.body.into_owned(), motion })
+        };
+        let cases = scenes.iter().map(case).collect::<Result<Vec<_>>>()?;
+        let motions: Vec<_> = cases.iter().map(|case| (case.scene, &case.motion)).collect();
+        let shapes = MotionShapes::new(model, reference, &motions)?;
+        Ok(shapes.map(|shapes| Self { model, reference, cases, shapes }))
     }
 
     /// Numbers of shapes worth trying, ascending.
     pub fn counts(&self) -> Vec<usize> {
-        self.shapes.counts(&self.scene.requirements.tolerance)
+        self.shapes.counts()
     }
 
     /// The basis of the first `count` shapes.
@@ -65,30 +75,33 @@ impl<'m> MotionBodies<'m> {
         self.shapes.damped(self.model, made)
     }
 
-    /// The fewest shapes, each number made with `make`, whose errors are no more than `most` times the
-    /// tolerances. More shapes are nearly always better: the numbers worth trying are tried in turn, and
-    /// between the first that is good enough and the one before it there is a bisection. `None` where none
-    /// is, or bodies cannot be compared.
+    /// The fewest shapes, each number made with `make`, whose errors are in no case more than `most` of it
+    /// times the tolerances. More shapes are nearly always better: the numbers worth trying are tried in
+    /// turn, and between the first that is good enough and the one before it there is a bisection. `None`
+    /// where none is, or bodies cannot be compared.
     ///
     /// # Errors
     /// Those of `make`, and of the simulation of what it made.
     pub fn fewest<B>(
         &self,
-        most: f64,
+        most: &[f64],
         mut make: impl FnMut(usize) -> Result<B>,
         body: impl Fn(&B) -> &FlexBody,
     ) -> Result<Option<Fewest<B>>> {
-        let measure = Measure::new(&self.staged, &self.motion);
+        let measures: Vec<Measure<'_>> = self.cases.iter().map(Case::measure).collect();
         let mut tried = |count: usize| -> Result<Option<Fewest<B>>> {
             let made = make(count)?;
-            let errors = self.errors(&measure, body(&made))?;
-            let worst = |errors: &OutputErrors| errors.worst(&self.scene.requirements.tolerance);
-            Ok(errors.map(|errors| Fewest { count, made, worst: worst(&errors), errors }))
+            let Some(errors) = self.errors(&measures, body(&made))? else { return Ok(None) };
+            let worst =
+                |(case, errors): (&Case<'_>, &OutputErrors)| errors.worst(&case.scene.requirements.tolerance);
+            let worst = self.cases.iter().zip(&errors).map(worst).collect();
+            Ok(Some(Fewest { count, made, errors, worst }))
         };
+        let is_enough = |own: &Fewest<B>| own.worst.iter().zip(most).all(|(worst, most)| worst <= most);
         let (mut too_few, mut found) = (0, None);
         for count in self.counts() {
             let Some(own) = tried(count)? else { return Ok(None) };
-            if own.worst <= most {
+            if is_enough(&own) {
                 found = Some(own);
                 break;
             }
@@ -97,25 +110,43 @@ impl<'m> MotionBodies<'m> {
         let Some(mut found) = found else { return Ok(None) };
         while too_few + 1 < found.count {
             let count = too_few.midpoint(found.count);
-            match tried(count)? {
-                Some(own) if own.worst <= most => found = own,
-                _ => too_few = count,
+            match tried(count)?.filter(is_enough) {
+                Some(own) => found = own,
+                None => too_few = count,
             }
         }
         Ok(Some(found))
     }
 
-    /// The largest errors of the motion of `body`; `None` where it cannot be compared with the reference, or
-    /// where the scene starts modes of that by their number.
-    fn errors(&self, measure: &Measure<'_>, body: &FlexBody) -> Result<Option<OutputErrors>> {
+    /// The largest errors of the motion of `body` in each case; `None` where it cannot be compared with the
+    /// reference, or where a scene starts modes of that by their number.
+    fn errors(&self, measures: &[Measure<'_>], body: &FlexBody) -> Result<Option<Vec<OutputErrors>>> {
+        // Rigid motions that the frame of a scene adds to the modes have no stiffness.
+        let Some(shared) = body.stiffness_beside(self.reference, self.model) else { return Ok(None) };
+        self.cases.iter().zip(measures).map(|(case, measure)| case.errors(measure, body, &shared)).collect()
+    }
+}
+
+impl Case<'_> {
+    /// What the motion is measured by.
+    fn measure(&self) -> Measure<'_> {
+        Measure::new(&self.staged, &self.motion)
+    }
+
+    /// The largest errors of the motion of `body`, which shares the stiffness Psi'K Psi_r with the reference.
+    fn errors(
+        &self,
+        measure: &Measure<'_>,
+        body: &FlexBody,
+        shared: &Mat<f64>,
+    ) -> Result<Option<OutputErrors>> {
         if !self.scene.initial.modes.is_empty() {
             return Ok(None);
         }
-        // Rigid motions that the frame of a scene adds to the modes have no stiffness.
-        let shared = body.stiffness_beside(self.reference, self.model);
         let stage = Stage::new(body, self.scene)?;
-        let modes = shared.and_then(|shared| OtherModes::new(&stage.body, &self.staged, shared.as_ref()));
-        let Some(modes) = modes else { return Ok(None) };
+        let Some(modes) = OtherModes::new(&stage.body, &self.staged, shared.as_ref()) else {
+            return Ok(None);
+        };
         let mut scene = stage.scene.into_owned();
         scene.run.scheme = self.motion.scheme;
         let motion = trace_at(&stage.body, &scene, &self.motion.time, None)?;

@@ -1,4 +1,5 @@
-//! Shapes made of a motion: what a body does in a scene, by as few shapes as that takes.
+//! Shapes made of motions: what a body does in a scene, or in several load cases, by as few shapes as that
+//! takes.
 
 use super::compressed::principal;
 use crate::base::error::Result;
@@ -6,8 +7,10 @@ use crate::body::basis::{BasisChoice, ImportedShapes};
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::symmetric_part;
 use crate::model::FeModel;
-use crate::motion::scene::{Scene, Stage, Tolerance, Trace, damped};
-use crate::numerics::linalg::{combine, dense_cholesky, gram, larger, solve_lower, solve_upper};
+use crate::motion::scene::{Scene, Stage, Trace, damped};
+use crate::numerics::linalg::{
+    combine, dense_cholesky, gram, larger, side_by_side, solve_lower, solve_upper,
+};
 use faer::Mat;
 
 /// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth
@@ -21,19 +24,19 @@ const MOST: usize = 120;
 /// The part of the sum of energies that no shape is made for.
 const LEFT_OUT: f64 = 1e-16;
 
-/// Principal directions of a motion in elastic energy (proper orthogonal decomposition): with K_ff = L L' and
-/// y = L' q of the instants of the motion, the eigenvectors u of the mean of y y' give the shapes Psi L'^-1
-/// u. Of all sets of as many shapes the first r leave out the least of the elastic energy, on average over
-/// the motion.
+/// Principal directions of motions in elastic energy (proper orthogonal decomposition): with K_ff = L L' and
+/// y = L' q of the instants of a motion, over the largest |y| of that motion and what its scene allows, the
+/// eigenvectors u of the mean of y y' give the shapes Psi L'^-1 u. Of all sets of as many shapes the first r
+/// leave out the least of the elastic energy, on average over each motion.
 #[derive(Debug, Clone)]
 pub struct MotionShapes {
     /// N x k, rows and axes of the model.
     shapes: Mat<f64>,
-    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of the
-    /// motion, for r = 0 to k.
+    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of its
+    /// motion, over what the scene of that motion allows, for r = 0 to k.
     left: Vec<f64>,
-    /// The damping that the scene gives the modes of the motion; `None` where the model says it, or there is
-    /// none.
+    /// The damping that the scene, the first of several, gives the modes of the motion; `None` where the
+    /// model says it, or there is none.
     damping: Option<GivenDamping>,
 }
 
@@ -47,12 +50,13 @@ struct GivenDamping {
 }
 
 impl MotionShapes {
-    /// Of the `motion` of `body`, made of `model`, in `scene`. `None` where the body has other rows than the
-    /// model, or nothing deforms.
+    /// Of motions of `body`, made of `model`, each with its scene. `None` where there are none, where the
+    /// body has other rows than the model, or where nothing deforms.
     ///
     /// # Errors
     /// Those of [`Stage::new`].
-    pub fn new(model: &FeModel, body: &FlexBody, scene: &Scene, motion: &Trace) -> Result<Option<Self>> {
+    pub fn new(model: &FeModel, body: &FlexBody, motions: &[(&Scene, &Trace)]) -> Result<Option<Self>> {
+        let Some((scene, _)) = motions.first() else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
         let undamped = stage.body.modes().damping_ratio.iter().all(|ratio| *ratio == 0.0);
         let body = &*damped(&stage.body, &stage.scene)?;
@@ -60,13 +64,14 @@ impl MotionShapes {
         let (Some(vectors), Some(lower)) = (body.vectors_of(model), dense_cholesky(stiffness)) else {
             return Ok(None);
         };
-        let instants = Mat::from_fn(body.n_modes(), motion.q.len(), |j, i| motion.q[i][j]);
-        let weighted = gram(lower.as_ref(), instants.as_ref());
-        let Some((directions, _)) = principal(mean_of_products(&weighted, &motion.time), LEFT_OUT, MOST)
-        else {
-            return Ok(None);
-        };
-        let left = left_out(&weighted, &directions);
+        let weighted: Vec<Mat<f64>> =
+            motions.iter().map(|(scene, motion)| weighed(&lower, scene, motion)).collect();
+        let products = weighted.iter().zip(motions);
+        let mut sum = Mat::zeros(body.n_modes(), body.n_modes());
+        products.for_each(|(weighted, (_, motion))| sum += mean_of_products(weighted, &motion.time));
+        let Some((directions, _)) = principal(sum, LEFT_OUT, MOST) else { return Ok(None) };
+        let all = side_by_side(&weighted.iter().map(Mat::as_ref).collect::<Vec<_>>());
+        let left = left_out(&all, &directions);
         let combinations = solve_upper(&lower, &directions);
         let given = undamped && body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0);
         let damping = given.then(|| {
@@ -99,12 +104,10 @@ impl MotionShapes {
         FlexBody::new(parts)
     }
 
-    /// Numbers of shapes worth trying where errors may be so large, ascending.
-    pub fn counts(&self, tolerance: &Tolerance) -> Vec<usize> {
-        let allowed = tolerance.stress.min(tolerance.deflection);
+    /// Numbers of shapes worth trying, ascending.
+    pub fn counts(&self) -> Vec<usize> {
         let most = self.shapes.ncols();
-        let count =
-            |part: f64| self.left.iter().position(|left| *left <= part * allowed).unwrap_or(most).max(1);
+        let count = |part: f64| self.left.iter().position(|left| *left <= part).unwrap_or(most).max(1);
         let mut counts: Vec<usize> = PARTS.map(count).to_vec();
         counts.dedup();
         counts
@@ -116,25 +119,34 @@ impl MotionShapes {
     }
 }
 
+/// y of the instants of a motion, in columns: relative to the largest of it, over what its scene allows.
+fn weighed(lower: &Mat<f64>, scene: &Scene, motion: &Trace) -> Mat<f64> {
+    let instants = Mat::from_fn(lower.nrows(), motion.q.len(), |j, i| motion.q[i][j]);
+    let weighted = gram(lower.as_ref(), instants.as_ref());
+    let largest = (0..weighted.ncols()).map(|i| weighted.col(i).norm_l2()).fold(0.0, larger);
+    let tolerance = &scene.requirements.tolerance;
+    let unit = largest * tolerance.stress.min(tolerance.deflection);
+    // Of a body that stays rigid there is nothing to be left out.
+    if unit > 0.0 { weighted * faer::Scale(unit.recip()) } else { weighted }
+}
+
 /// The mean over the time of a motion of y y', for the columns y of `weighted`.
 fn mean_of_products(weighted: &Mat<f64>, time: &[f64]) -> Mat<f64> {
     let last = time.len() - 1;
-    let share = |i: usize| 0.5 * (time[(i + 1).min(last)] - time[i.saturating_sub(1)]);
+    let whole = time[last] - time[0];
+    let share = |i: usize| 0.5 * (time[(i + 1).min(last)] - time[i.saturating_sub(1)]) / whole;
     let shared = Mat::from_fn(time.len(), weighted.nrows(), |i, j| share(i) * weighted[(j, i)]);
     symmetric_part(&combine(weighted.as_ref(), shared.as_ref()))
 }
 
-/// What the first r of the `directions` leave out of the motion at the most, relative to the largest of it,
-/// for every r.
+/// The largest that the first r of the `directions` leave out of any of the columns of `weighted`, for every
+/// r.
 fn left_out(weighted: &Mat<f64>, directions: &Mat<f64>) -> Vec<f64> {
     let parts = gram(directions.as_ref(), weighted.as_ref());
     let rests = weighted - directions * &parts;
-    let square = |a: &Mat<f64>, i: usize| a.col(i).squared_norm_l2();
-    let mut largest = 0.0;
     let mut left = vec![0.0f64; directions.ncols() + 1];
     for i in 0..weighted.ncols() {
-        largest = larger(largest, square(weighted, i));
-        let mut rest = square(&rests, i);
+        let mut rest = rests.col(i).squared_norm_l2();
         for r in (0..left.len()).rev() {
             left[r] = larger(left[r], rest);
             if r > 0 {
@@ -142,5 +154,5 @@ fn left_out(weighted: &Mat<f64>, directions: &Mat<f64>) -> Vec<f64> {
             }
         }
     }
-    left.into_iter().map(|left| (left / largest).sqrt()).collect()
+    left.into_iter().map(f64::sqrt).collect()
 }

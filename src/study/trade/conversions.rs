@@ -57,8 +57,8 @@ pub fn conversions(
     conversions_for_cases(model, std::slice::from_ref(scene), wanted, allowed, watch)
 }
 
-/// The same for the load cases `scenes`: the reference has what it lacks in any of them. Shapes are made of
-/// one motion, and there are none for several.
+/// The same for the load cases `scenes`: the reference has what it lacks in any of them, and shapes are made
+/// of the motions in all of them.
 ///
 /// # Errors
 /// As [`conversions`].
@@ -96,12 +96,10 @@ pub fn conversions_for_cases(
         let beside = source.beside(sources[0].body(), model);
         sources.push(beside.expect(OF_THE_MODEL));
     }
-    if let [scene] = scenes {
-        let lacking =
-            lacks.iter().filter_map(|rounds| rounds.last()).map(|own| own.worst).fold(0.0, f64::max);
-        for source in making.make_of_motion(&sources[0], scene, 1.0 - lacking)? {
-            sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
-        }
+    let lacking = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
+    let left: Vec<f64> = lacks.iter().map(|rounds| 1.0 - lacking(rounds)).collect();
+    for source in making.make_of_motion(&sources[0], scenes, &left)? {
+        sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
     }
     for lumping in lumpings(model) {
         match making.make_lumped(&finest, &responses, &lumping)? {
@@ -237,15 +235,15 @@ impl<'m> Making<'m> {
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
 
-    /// Bodies of the shapes of the motion of `reference` in `scene`: of the numbers worth trying, and of the
-    /// fewest that are good enough where `most` times the tolerances are left to them. Each takes the time of
-    /// the reference and its motion besides.
-    fn make_of_motion(&self, reference: &Source, scene: &Scene, most: f64) -> Result<Vec<Source>> {
-        if scene.run.duration.is_none() {
+    /// Bodies of the shapes of the motion of `reference` in `scenes`: of the numbers worth trying, and of the
+    /// fewest that are good enough where the parts `left` of the tolerances are left to them. Each takes the
+    /// time of the reference and its motion besides.
+    fn make_of_motion(&self, reference: &Source, scenes: &[Scene], left: &[f64]) -> Result<Vec<Source>> {
+        if scenes.iter().any(|scene| scene.run.duration.is_none()) {
             return Ok(Vec::new());
         }
         let start = Instant::now();
-        let Some(bodies) = MotionBodies::new(self.model, reference.body(), scene, self.allowed.memory)?
+        let Some(bodies) = MotionBodies::new(self.model, reference.body(), scenes, self.allowed.memory)?
         else {
             return Ok(Vec::new());
         };
@@ -257,7 +255,8 @@ impl<'m> Making<'m> {
         };
         let mut counts = bodies.counts();
         counts.iter().try_for_each(|count| make(*count).map(drop))?;
-        let fewest = bodies.fewest(SHARE_OF_SHAPES * most, make, Source::body)?;
+        let most: Vec<f64> = left.iter().map(|left| SHARE_OF_SHAPES * left).collect();
+        let fewest = bodies.fewest(&most, make, Source::body)?;
         counts.extend(fewest.map(|own| own.count));
         Ok(made.into_iter().filter(|(count, _)| counts.contains(count)).map(|(_, own)| own).collect())
     }
