@@ -77,8 +77,9 @@ impl<'m> MotionBodies<'m> {
 
     /// The fewest shapes, each number made with `make`, whose errors are in no case more than `most` of it
     /// times the tolerances. More shapes are nearly always better: the numbers worth trying are tried in
-    /// turn, and between the first that is good enough and the one before it there is a bisection. `None`
-    /// where none is, or bodies cannot be compared.
+    /// turn, then twice as many each time, since reactions may take more than deformations; between the first
+    /// that is good enough and the one before it there is a bisection. `None` where none is, or bodies cannot
+    /// be compared.
     ///
     /// # Errors
     /// Those of `make`, and of the simulation of what it made.
@@ -99,7 +100,7 @@ impl<'m> MotionBodies<'m> {
         };
         let is_enough = |own: &Fewest<B>| own.worst.iter().zip(most).all(|(worst, most)| worst <= most);
         let (mut too_few, mut found) = (0, None);
-        for count in self.counts() {
+        for count in self.shapes.more_and_more() {
             let Some(own) = tried(count)? else { return Ok(None) };
             if is_enough(&own) {
                 found = Some(own);

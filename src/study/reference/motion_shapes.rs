@@ -113,6 +113,15 @@ impl MotionShapes {
         counts
     }
 
+    /// These numbers, then twice as many each time up to all shapes.
+    pub fn more_and_more(&self) -> Vec<usize> {
+        let (mut counts, most) = (self.counts(), self.shapes.ncols());
+        while let Some(last) = counts.last().filter(|last| **last < most) {
+            counts.push((2 * last).min(most));
+        }
+        counts
+    }
+
     /// The basis of the first `count` shapes.
     pub fn basis(&self, count: usize) -> BasisChoice {
         BasisChoice::Imported(ImportedShapes::of_motion(self.shapes.as_ref().subcols(0, count).to_owned()))
