@@ -23,6 +23,9 @@ if [ "${1:-}" = --no-wheel ]; then
 fi
 out="${1:-target/release-files}"
 target=x86_64-unknown-linux-musl
+# Instructions of a function that is inlined (225 without a word), and bytes that the program may have.
+INLINED=40
+MOST=15000000
 version="$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)"
 built="${CARGO_TARGET_DIR:-target}"
 work="$(mktemp -d)"
@@ -51,7 +54,15 @@ step "build"
 [ -n "${FLEXBODY:-}" ] || cargo build --release --locked
 # The two usual compilers are found without being told.
 [ -z "${MUSL_CC:-}" ] || export CC_x86_64_unknown_linux_musl="$MUSL_CC"
-cargo build --profile dist --locked --target "$target"
+# Size: nothing unwinds, and there are no tables for it; only small functions are inlined (conversions and simulations take 4 % longer, and the program
+# is 1.5 MB smaller); no relocations; equal functions once, by the linker that Rust brings along.
+linkers="$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/^host: //p')/bin/gcc-ld"
+[ -x "$linkers/ld.lld" ] || fail "this Rust brings no linker along ($linkers)" "take Rust from rustup"
+echo 'SECTIONS { /DISCARD/ : { *(.eh_frame) } } INSERT AFTER .rodata;' >"$work/no-tables.ld"
+flags="-C force-unwind-tables=no -C llvm-args=-inline-threshold=$INLINED -C relocation-model=static"
+flags="$flags -C link-arg=-fuse-ld=lld -C link-arg=-B$linkers -C link-arg=-Wl,--icf=all -C link-arg=-Wl,-T,$work/no-tables.ld"
+CFLAGS_x86_64_unknown_linux_musl="-fno-asynchronous-unwind-tables -fno-unwind-tables" CARGO_TARGET_X86_64_UNKNOWN_LINUX_MUSL_RUSTFLAGS="$flags" \
+    cargo build --profile dist --locked --target "$target"
 ordinary="$(realpath "${FLEXBODY:-$built/release/flexbody}")"
 static="$(realpath "$built/$target/dist/flexbody")"
 
@@ -62,6 +73,9 @@ fi
 # ldd knows such files too; it exits with 1 for some of them.
 (ldd "$static" 2>&1 || true) | sed 's/^/   ldd: /'
 "$static" --version
+size="$(stat -c %s "$static")"
+echo "   $size bytes"
+[ "$size" -lt "$MOST" ] || fail "$static has more than $MOST bytes" "look for what has grown (cargo bloat), or take a lower INLINED"
 # Without anything from outside: no environment, and no file but its own.
 env -i "$static" doctor | sed 's/^/   /'
 
