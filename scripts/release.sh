@@ -58,9 +58,8 @@ step "build"
 # is 1.5 MB smaller); no relocations; equal functions once, by the linker that Rust brings along.
 linkers="$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/^host: //p')/bin/gcc-ld"
 [ -x "$linkers/ld.lld" ] || fail "this Rust brings no linker along ($linkers)" "take Rust from rustup"
-echo 'SECTIONS { /DISCARD/ : { *(.eh_frame) } } INSERT AFTER .rodata;' >"$work/no-tables.ld"
 flags="-C force-unwind-tables=no -C llvm-args=-inline-threshold=$INLINED -C relocation-model=static"
-flags="$flags -C link-arg=-fuse-ld=lld -C link-arg=-B$linkers -C link-arg=-Wl,--icf=all -C link-arg=-Wl,-T,$work/no-tables.ld"
+flags="$flags -C link-arg=-fuse-ld=lld -C link-arg=-B$linkers -C link-arg=-Wl,--icf=all -C link-arg=-Wl,-T,$PWD/scripts/static.ld"
 CFLAGS_x86_64_unknown_linux_musl="-fno-asynchronous-unwind-tables -fno-unwind-tables" CARGO_TARGET_X86_64_UNKNOWN_LINUX_MUSL_RUSTFLAGS="$flags" \
     cargo build --profile dist --locked --target "$target"
 ordinary="$(realpath "${FLEXBODY:-$built/release/flexbody}")"

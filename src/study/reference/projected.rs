@@ -57,7 +57,7 @@ impl<'v> Projected<'v> {
         parts.push(project(heavy.clone()));
         for &a in turns {
             let heavy_turned = weigh(&turned(a, &view.vectors));
-            parts.extend([&turned(a, &view.weighted), &turned(a, &heavy)].map(|own| project(own.clone())));
+            parts.extend([turned(a, &view.weighted), turned(a, &heavy)].map(&project));
             parts.extend(turns.iter().map(|&b| project(turned(b, &heavy_turned))));
             parts.push(project(heavy_turned));
         }
