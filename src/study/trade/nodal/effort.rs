@@ -149,7 +149,7 @@ impl Effort {
             "--reference nodal: the motion of {} rows over a time of {:.3e} takes about {seconds:.1e} s at the least ({:.1e} entries in a factor), {longest:.0} s are allowed",
             self.rows, self.duration, self.entries
         );
-        let help = "take --reference full, a shorter `duration`, method = \"conserving\" with a longer `step`, or say --allow-long";
+        let help = "take --reference fine, a shorter `duration`, method = \"conserving\" with a longer `step`, or say --allow-long";
         Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into())
     }
 
@@ -168,7 +168,7 @@ impl Effort {
             Way::Implicit { .. } => (2.0, FACTORS * self.entries),
         };
         let needed = DOUBLE * runs * instants * self.rows + factors;
-        let help = "take --reference full, or simulate a shorter `duration`";
+        let help = "take --reference fine, or simulate a shorter `duration`";
         refuse_beyond(memory, needed, "the motion of all nodes", help)
     }
 
