@@ -48,7 +48,7 @@ pub struct NodalEvaluation<'e> {
     /// Where motion of the frame is given.
     pub(super) drive: Option<Drive>,
     pub(super) first: Vec<f64>,
-    second: Vec<f64>,
+    pub(super) second: Vec<f64>,
     pub(super) room: Room,
     amplitudes: Amplitudes,
 }

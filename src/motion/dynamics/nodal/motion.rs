@@ -111,6 +111,11 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         }
     }
 
+    /// [`NodalEvaluation::loaded_displacements`] at the state that was seen last.
+    pub fn loaded_displacements(&mut self) -> &[f64] {
+        self.evaluation.loaded_displacements()
+    }
+
     /// The evaluation at the state that was seen last.
     pub fn evaluation(&self) -> &NodalEvaluation<'e> {
         &self.evaluation

@@ -26,6 +26,19 @@ impl NodalEvaluation<'_> {
         &self.u
     }
 
+    /// u (N), model axes, with what the forces of the loads and of inertia do to motions without mass, which
+    /// u of the state leaves out (theory 6.13). The rates and accelerations of before are lost.
+    pub fn loaded_displacements(&mut self) -> &[f64] {
+        let body = self.equations;
+        if body.massless.is_empty() {
+            return &self.u;
+        }
+        self.find_forces();
+        self.second.copy_from_slice(&self.u);
+        body.massless.add_static(&self.first, &mut self.second, &mut self.room);
+        &self.second
+    }
+
     /// u' (N), model axes, C u' = 0.
     pub fn displacement_rates(&self) -> &[f64] {
         &self.ud

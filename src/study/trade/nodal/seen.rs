@@ -60,9 +60,10 @@ impl Seen {
             }
             None => drop(motion.evaluate(time, state)?),
         }
-        let evaluation = motion.evaluation();
-        let u = evaluation.displacements();
+        let u = motion.loaded_displacements();
         self.displacements.extend_from_slice(u);
+        let u = &self.displacements[self.displacements.len() - self.rows..];
+        let evaluation = motion.evaluation();
         let to_frame = evaluation.equations().frame().axes.transpose();
         for (path, point) in trace.deflections.iter_mut().zip(watched) {
             path.push(to_frame * point.displacement(u));
