@@ -8,8 +8,8 @@ const UNEVEN: f64 = 8.0;
 
 /// The largest circular frequency of the modes that count in the motion, whose root of the elastic energy is
 /// not below this `part` of the tolerances; those of a body that is carried are not above those of the free
-/// body. A mode that follows slow forces has no motion of its own, however
-/// high it is: what counts is the amplitude q'' / omega^2 that its acceleration has at its own frequency.
+/// body. A mode that follows slow forces has no motion of its own, however high it is: what counts is the
+/// amplitude q'' / omega^2 that its acceleration has at its own frequency.
 pub fn liveliest_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
     let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());

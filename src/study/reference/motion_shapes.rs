@@ -66,9 +66,10 @@ impl MotionShapes {
         };
         let weighted: Vec<Mat<f64>> =
             motions.iter().map(|(scene, motion)| weighed(&lower, scene, motion)).collect();
-        let products = weighted.iter().zip(motions);
         let mut sum = Mat::zeros(body.n_modes(), body.n_modes());
-        products.for_each(|(weighted, (_, motion))| sum += mean_of_products(weighted, &motion.time));
+        for (weighted, (_, motion)) in weighted.iter().zip(motions) {
+            sum += mean_of_products(weighted, &motion.time);
+        }
         let Some((directions, _)) = principal(sum, LEFT_OUT, MOST) else { return Ok(None) };
         let all = side_by_side(&weighted.iter().map(Mat::as_ref).collect::<Vec<_>>());
         let left = left_out(&all, &directions);

@@ -39,10 +39,10 @@ pub struct WantedBodies {
 /// Every conversion of a study in `scene`.
 ///
 /// The reference has twice as many modes as are wanted, residual vectors of spin and interfaces, and what
-/// [`enrich_for_cases`] finds lacking. Beside it stand as many as are wanted, their half and their quarter with residual
-/// vectors and without, the same at the other levels of accuracy, bodies of the shapes that the motion of the
-/// reference is made of, and what the settings of the reference make of the model with its whole mass lumped.
-/// Each is timed.
+/// [`enrich_for_cases`] finds lacking. Beside it stand as many as are wanted, their half and their quarter
+/// with residual vectors and without, the same at the other levels of accuracy, bodies of the shapes that the
+/// motion of the reference is made of, and what the settings of the reference make of the model with its
+/// whole mass lumped. Each is timed.
 ///
 /// # Errors
 /// Those of [`convert`] and [`enrich_for_cases`]. Accuracy `certified` is left out where it does not cover the
