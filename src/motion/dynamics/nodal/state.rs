@@ -93,8 +93,11 @@ impl NodalEquations<'_> {
         (frame, u, w)
     }
 
-    /// u'K u / 2.
-    pub(super) fn elastic_energy(&self, u: &[f64]) -> f64 {
+    /// u'K u / 2 of displacements u (N), model axes.
+    ///
+    /// # Panics
+    /// When `u` does not have N entries.
+    pub fn elastic_energy(&self, u: &[f64]) -> f64 {
         0.5 * quadratic_form(self.stiffness(), u)
     }
 }

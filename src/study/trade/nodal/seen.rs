@@ -70,7 +70,7 @@ impl Seen {
         }
         let now = evaluation.configuration();
         let flight = 0.5 * evaluation.momenta().0.norm_squared() / trace.size.0;
-        let energy = evaluation.elastic_energy();
+        let energy = evaluation.equations().elastic_energy(u);
         self.spin.see(time, now.omega.norm());
         self.internal.see(time, (evaluation.kinetic_energy() - flight + energy).max(0.0).sqrt());
         trace.time.push(time);
