@@ -54,7 +54,7 @@ Since 1.4 the root attribute `digests` has a line `SHA-256  path` (two spaces, a
 file, entries that this page does not know included, in the order of the bytes of their paths; the root group is `/`. The root attribute `sha256` is the SHA-256 of this text in UTF-8, in
 lowercase hexadecimal like all others. A reader refuses a file whose content has other digests (FB712) and names what was changed, added or
 removed. The digests see numbers, shapes, types and attributes; they do not see how HDF5 lays these out: chunks, compression, byte order, storage of texts, and the order of
-members and attributes.
+members and attributes. flexbody writes nothing compressed; `h5repack -m 100000 -f SHUF -f GZIP=1 body.flex.h5 smaller.flex.h5` makes large files 5 to 30 % smaller, and they stay valid.
 
 The digest of a dataset is the SHA-256 of its record followed by the records of its attributes, by name in the order of their bytes; that of a group has
 its attributes alone, the root without `digests` and `sha256`. A record is the line
