@@ -6,9 +6,10 @@
 //! are (Phi_t, B_x + sum_j q_j B_j, Psi) times (V, omega, qd).
 
 use super::{GeneralTerms, Groups, Invariants, PrimaryData};
-use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
-use faer::{Mat, MatRef};
+use crate::numerics::linalg::{SymmetricMatrix, Tall, gram, multiply};
+use faer::{ColMut, Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Columns of X that are multiplied by M at a time.
@@ -106,27 +107,32 @@ impl<'a> GeneralColumns<'a> {
         self.rigid() + (self.axes().len() + 1) * self.shapes.ncols()
     }
 
-    fn get(&self, row: usize, column: usize) -> f64 {
-        let Some(after) = column.checked_sub(self.rigid()) else { return self.motion.fields[(row, column)] };
-        let nf = self.shapes.ncols();
-        let (block, j) = (after / nf, after % nf);
-        if block == self.axes().len() {
-            return self.shapes[(row, j)];
-        }
-        if row >= self.motion.displacements {
-            return 0.0;
-        }
-        let d = if self.rigid() == 3 { 2 } else { 3 };
-        let (first, k) = (row / d * d, row % d);
-        let axis = self.motion.axes.column(self.axes().start + block);
-        let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-        let along = |k: usize| if k < d { self.shapes[(first + k, j)] } else { 0.0 };
-        axis[l] * along(m) - axis[m] * along(l)
+    /// Some of the columns, each filled by one thread.
+    fn block(&self, columns: Range<usize>) -> Tall {
+        let mut block = Tall::zeros(self.shapes.nrows(), columns.len());
+        let targets: Vec<_> = columns.zip(block.as_mut().col_iter_mut()).collect();
+        targets.into_par_iter().for_each(|(column, to)| self.fill(column, to));
+        block
     }
 
-    fn block(&self, columns: Range<usize>) -> Mat<f64> {
-        let start = columns.start;
-        Mat::from_fn(self.shapes.nrows(), columns.len(), |row, c| self.get(row, start + c))
+    /// Fills zeros with a column of X.
+    fn fill(&self, column: usize, mut to: ColMut<'_, f64>) {
+        let Some(after) = column.checked_sub(self.rigid()) else {
+            return to.copy_from(self.motion.fields.col(column));
+        };
+        let (block, j) = (after / self.shapes.ncols(), after % self.shapes.ncols());
+        let shape = self.shapes.col(j);
+        if block == self.axes().len() {
+            return to.copy_from(shape);
+        }
+        // e_b x psi of every displacement psi.
+        let axis = Vector3::from(self.motion.axes.column(self.axes().start + block));
+        let d = if self.rigid() == 3 { 2 } else { 3 };
+        for first in (0..self.motion.displacements).step_by(d) {
+            let psi = Vector3::from_fn(|k, _| if k < d { shape[first + k] } else { 0.0 });
+            let turned = axis.cross(&psi);
+            (0..d).for_each(|k| to[first + k] = turned[k]);
+        }
     }
 
     /// The rows and columns of X' M X of rigid motion, and I for the modes; zero elsewhere.
@@ -157,10 +163,14 @@ impl<'a> GeneralColumns<'a> {
         let mut all = Mat::zeros(count, count);
         for (right, columns) in blocks.iter().enumerate() {
             let x = self.block(columns.clone());
-            let mut y = Mat::zeros(x.nrows(), x.ncols());
+            let mut y = Tall::zeros(self.shapes.nrows(), x.ncols());
             multiply(mass, 1, x.as_ref(), y.as_mut());
             for rows in &blocks[..=right] {
-                let part = gram(self.block(rows.clone()).as_ref(), y.as_ref());
+                let part = if rows == columns {
+                    gram(x.as_ref(), y.as_ref())
+                } else {
+                    gram(self.block(rows.clone()).as_ref(), y.as_ref())
+                };
                 for (c, column) in columns.clone().enumerate() {
                     for (r, row) in rows.clone().enumerate().take_while(|(_, row)| *row <= column) {
                         all[(row, column)] = part[(r, c)];

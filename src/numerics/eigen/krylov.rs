@@ -3,7 +3,7 @@
 use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
-use crate::numerics::linalg::{Solve, Tall, combine, copy_columns, gram, subtract_combination, uniform};
+use crate::numerics::linalg::{Solve, Tall, combine, gram, subtract_combination, uniform};
 use faer::prelude::IntoConst;
 use faer::{Mat, MatRef};
 
@@ -19,9 +19,9 @@ const VANISHED: f64 = 1e-13;
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
-    /// Its first columns, of as many as the basis may have: what is not reached is not touched.
     v: Tall,
-    m: usize,
+    /// Vectors that the basis may have: so many columns as V has room for, and rows as T has.
+    capacity: usize,
     t: Mat<f64>,
     /// Columns of the newest block, not yet multiplied by the operator.
     fresh: usize,
@@ -51,8 +51,8 @@ impl<'a> Krylov<'a> {
         Self {
             problem,
             factor,
-            v: Tall::zeros(n, capacity),
-            m: 0,
+            v: Tall::with_room(n, capacity),
+            capacity,
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
             m_fresh: Mat::zeros(0, 0),
@@ -70,12 +70,17 @@ impl<'a> Krylov<'a> {
 
     /// Vectors that the operator has been applied to: the size of T that is valid.
     pub(super) fn projected(&self) -> usize {
-        self.m - self.fresh
+        self.size() - self.fresh
+    }
+
+    /// Vectors of the basis.
+    fn size(&self) -> usize {
+        self.v.ncols()
     }
 
     /// Room left for new vectors.
     pub(super) fn room(&self) -> usize {
-        self.v.ncols() - self.m
+        self.capacity - self.size()
     }
 
     /// Whether the newest block is empty: the basis spans an invariant subspace.
@@ -107,7 +112,7 @@ impl<'a> Krylov<'a> {
         let coefficients = Mat::from_fn(size + residual.nrows(), s.ncols(), |i, j| {
             if i < size { s[(i, j)] } else { residual[(i - size, j)] / theta[j] }
         });
-        combine(self.v.first(self.m), coefficients.as_ref())
+        combine(self.v.as_ref(), coefficients.as_ref())
     }
 
     /// V S for S (projected x k).
@@ -143,14 +148,14 @@ impl<'a> Krylov<'a> {
     /// One Lanczos step: applies the operator to the newest block and appends what is new.
     pub(super) fn step(&mut self, counters: &mut Counters) {
         let old = self.fresh;
-        let at = self.m - old;
+        let at = self.size() - old;
         let mut w = std::mem::replace(&mut self.m_fresh, Mat::zeros(0, 0));
         counters.solved_columns += old as u64;
         self.factor.solve_in_place(w.as_mut());
         let block = self.orthonormalise(w, self.reach, counters);
         self.reach = at;
         for j in 0..old {
-            for i in 0..self.m {
+            for i in 0..self.size() {
                 // The diagonal block of h is symmetric up to rounding; the mean keeps T exactly symmetric.
                 let value = if i >= at {
                     0.5 * (block.h[(i, j)] + block.h[(at + j, i - at)])
@@ -168,15 +173,14 @@ impl<'a> Krylov<'a> {
     /// Thick restart: keeps the Ritz vectors V S (S: projected x k) with values theta, and the newest block.
     pub(super) fn restart(&mut self, s: MatRef<'_, f64>, theta: &[f64]) {
         let kept = self.combination(s);
-        let k = kept.ncols();
-        let fresh = self.v.columns(self.projected()..self.m).to_owned();
-        self.v.columns_mut(0..k).copy_from(&kept);
-        self.v.columns_mut(k..k + self.fresh).copy_from(&fresh);
+        let fresh = self.v.columns(self.projected()..self.size()).to_owned();
+        self.v.truncate(0);
+        self.v.push(kept.as_ref());
+        self.v.push(fresh.as_ref());
         self.t.fill(0.0);
         for (i, &value) in theta.iter().enumerate() {
             self.t[(i, i)] = value;
         }
-        self.m = k + self.fresh;
         self.reach = 0;
     }
 
@@ -184,36 +188,33 @@ impl<'a> Krylov<'a> {
     /// F C.
     pub(super) fn state(&self, s: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
         let (size, k, last) = (self.projected(), s.ncols(), self.coupling.ncols());
-        let coefficients = Mat::from_fn(self.m, k + self.fresh, |i, j| match (i < size, j < k) {
+        let coefficients = Mat::from_fn(self.size(), k + self.fresh, |i, j| match (i < size, j < k) {
             (true, true) => s[(i, j)],
             (false, false) => f64::from(i - size == j - k),
             _ => 0.0,
         });
-        let basis = combine(self.v.first(self.m), coefficients.as_ref());
+        let basis = combine(self.v.as_ref(), coefficients.as_ref());
         (basis, combine(self.coupling.as_ref(), s.subrows(size - last, last)))
     }
 
     /// Fills the empty basis with the first `k` Ritz vectors of a snapshot and its newest block.
     pub(super) fn take_up(&mut self, start: &Snapshot, shift: f64, k: usize, counters: &mut Counters) {
         let (given, width) = (start.eigenvalues.len(), start.coupling.nrows());
-        self.v.columns_mut(0..k).copy_from(start.basis.as_ref().subcols(0, k));
+        self.v.push(start.basis.as_ref().subcols(0, k));
         let newest = start.basis.as_ref().subcols(given, width);
-        self.v.columns_mut(k..k + width).copy_from(newest);
+        self.v.push(newest);
         for (i, lambda) in start.eigenvalues[..k].iter().enumerate() {
             self.t[(i, i)] = (lambda + shift).recip();
         }
         self.coupling = start.coupling.as_ref().subcols(0, if width > 0 { k } else { 0 }).to_owned();
-        self.m = k + width;
         self.fresh = width;
         counters.mass_columns += width as u64;
         self.m_fresh = self.problem.pencil.apply_mass(newest);
     }
 
     fn push(&mut self, block: Block) {
-        let width = block.w.ncols();
-        copy_columns(self.v.columns_mut(self.m..self.m + width), block.w.as_ref());
-        self.m += width;
-        self.fresh = width;
+        self.fresh = block.w.ncols();
+        self.v.push(block.w.as_ref());
         self.m_fresh = block.mw;
     }
 
@@ -224,12 +225,12 @@ impl<'a> Krylov<'a> {
     fn orthonormalise(&self, mut w: Mat<f64>, reach: usize, counters: &mut Counters) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
-        let basis = self.v.first(self.m);
-        let mut h = Mat::zeros(self.m, width);
+        let basis = self.v.as_ref();
+        let mut h = Mat::zeros(self.size(), width);
         let mut b = Mat::<f64>::identity(width, width);
         let mut mw = Mat::zeros(0, 0);
         for from in [reach, 0] {
-            let basis = basis.subcols(from, self.m - from);
+            let basis = basis.subcols(from, self.size() - from);
             counters.mass_columns += 2 * w.ncols() as u64;
             mw = pencil.apply_mass(w.as_ref());
             let norms: Vec<f64> = (0..w.ncols()).map(|j| dot(&w, &mw, j, j).max(0.0).sqrt()).collect();
@@ -237,7 +238,7 @@ impl<'a> Krylov<'a> {
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
             subtract_combination(w.as_mut(), basis, part.as_ref());
-            let mut h = h.as_mut().subrows_mut(from, self.m - from);
+            let mut h = h.as_mut().subrows_mut(from, self.size() - from);
             h += combine(part.as_ref(), b.as_ref());
             mw = pencil.apply_mass(w.as_ref());
             let unseen = |w: faer::ColRef<'_, f64>| {
@@ -276,12 +277,17 @@ fn gram_schmidt(
     for j in 0..width {
         // Twice, as in any Gram-Schmidt that may lose digits.
         for _ in 0..2 {
-            for i in 0..kept {
-                let along = dot(w, mw, i, j);
-                t[(i, j)] += along;
-                subtract_column(w, j, i, along);
-                subtract_column(mw, j, i, along);
+            let along = gram(w.as_ref().subcols(0, kept), mw.as_ref().subcols(j, 1));
+            for block in [&mut *w, &mut *mw] {
+                let (done, rest) = block.as_mut().split_at_col_mut(j);
+                subtract_combination(
+                    rest.subcols_mut(0, 1),
+                    done.into_const().subcols(0, kept),
+                    along.as_ref(),
+                );
             }
+            let mut column = t.as_mut().submatrix_mut(0, j, kept, 1);
+            column += along;
         }
         let square = dot(w, mw, j, j);
         let norm = square.max(0.0).sqrt();
@@ -290,23 +296,12 @@ fn gram_schmidt(
         }
         t[(kept, j)] = norm;
         for block in [&mut *w, &mut *mw] {
-            for row in 0..block.nrows() {
-                block[(row, kept)] = block[(row, j)] / norm;
-            }
+            let column: Vec<f64> = block.col(j).iter().map(|x| x / norm).collect();
+            block.col_mut(kept).iter_mut().zip(column).for_each(|(to, from)| *to = from);
         }
         kept += 1;
     }
     *w = w.as_ref().subcols(0, kept).to_owned();
     *mw = mw.as_ref().subcols(0, kept).to_owned();
     t.as_ref().subrows(0, kept).to_owned()
-}
-
-/// Column `target` -= factor * column `source`, for source < target.
-fn subtract_column(block: &mut Mat<f64>, target: usize, source: usize, factor: f64) {
-    let (left, right) = block.as_mut().split_at_col_mut(target);
-    let from = left.into_const().col(source).try_as_col_major().expect("blocks are column-major").as_slice();
-    let to = right.col_mut(0).try_as_col_major_mut().expect("blocks are column-major").as_slice_mut();
-    for (t, s) in to.iter_mut().zip(from) {
-        *t -= factor * s;
-    }
 }

@@ -62,14 +62,15 @@ pub(super) fn rayleigh_ritz(
     let pencil = &problem.pencil;
     let k = x.ncols() as u64;
     counters.mass_columns += k;
-    let mx = pencil.apply_mass(x.as_ref());
+    let [mut mx, mut kx] = [(); 2].map(|()| Tall::zeros(x.nrows(), x.ncols()));
+    pencil.mass_times(x.as_ref(), mx.as_mut());
     let along = gram(problem.rigid, mx.as_ref());
     subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
     // Unit M-norms first: inverse iteration scales the columns by theta.
     counters.mass_columns += k;
     counters.stiffness_columns += k;
-    let mx = pencil.apply_mass(x.as_ref());
-    let kx = pencil.apply_stiffness(x.as_ref());
+    pencil.mass_times(x.as_ref(), mx.as_mut());
+    pencil.stiffness_times(x.as_ref(), kx.as_mut());
     let gm = gram(x.as_ref(), mx.as_ref());
     let gk = gram(x.as_ref(), kx.as_ref());
     let (values, coefficients) = small_ritz(&gm, &gk)?;

@@ -14,10 +14,11 @@ pub(super) struct SearchSpace<'a> {
     problem: &'a EigenProblem<'a>,
     /// M times the rigid modes.
     m_rigid: Mat<f64>,
-    /// The basis and K times it: the first columns of blocks with room for more.
+    /// The basis and K times it.
     x: Tall,
     kx: Tall,
-    used: usize,
+    /// Vectors that there is room for.
+    capacity: usize,
     /// X'M X and X'K X.
     gm: Mat<f64>,
     gk: Mat<f64>,
@@ -42,15 +43,15 @@ impl<'a> SearchSpace<'a> {
         let mut own = Self {
             problem,
             m_rigid: problem.pencil.apply_mass(problem.rigid),
-            x: Tall::zeros(n, room),
-            kx: Tall::zeros(n, room),
-            used: 0,
+            x: Tall::with_room(n, room),
+            kx: Tall::with_room(n, room),
+            capacity: room,
             gm: Mat::zeros(0, 0),
             gk: Mat::zeros(0, 0),
             lambda: Vec::new(),
             ritz: Mat::zeros(0, 0),
-            work: Tall::zeros(n, x.ncols()),
-            m_work: Tall::zeros(n, x.ncols()),
+            work: Tall::with_room(n, x.ncols()),
+            m_work: Tall::with_room(n, x.ncols()),
         };
         let mut first = Tall::copied(x.as_ref());
         drop(x);
@@ -60,7 +61,7 @@ impl<'a> SearchSpace<'a> {
 
     /// Vectors that there is room for beside those that it holds.
     pub(super) fn room(&self) -> usize {
-        self.x.ncols() - self.used
+        self.capacity - self.x.ncols()
     }
 
     /// Adds the span of `d`, made M-orthogonal to the rigid modes and to the basis in so many passes and
@@ -74,34 +75,35 @@ impl<'a> SearchSpace<'a> {
         passes: usize,
         counters: &mut Counters,
     ) -> Result<(), EigenFailure> {
-        let Self { problem, m_rigid, x, kx, used, gm, gk, .. } = self;
-        let (pencil, columns) = (&problem.pencil, d.ncols());
+        let Self { problem, m_rigid, x, kx, gm, gk, .. } = self;
+        let (pencil, columns, used) = (&problem.pencil, d.ncols(), x.ncols());
         counters.mass_columns += columns as u64;
         for _ in 0..passes {
             let along = gram(m_rigid.as_ref(), d.as_ref());
             subtract_combination(d.as_mut(), problem.rigid, along.as_ref());
-            if *used == 0 {
+            if used == 0 {
                 continue;
             }
             counters.mass_columns += columns as u64;
             pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
-            let along = gram(x.first(*used), self.m_work.first(columns));
-            subtract_combination(d.as_mut(), x.first(*used), along.as_ref());
+            let along = gram(x.as_ref(), self.m_work.first(columns));
+            subtract_combination(d.as_mut(), x.as_ref(), along.as_ref());
         }
         pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
         let orthonormal = independent(&gram(d.as_ref(), self.m_work.first(columns)))?;
-        let added = *used..*used + orthonormal.ncols();
+        let added = used..used + orthonormal.ncols();
         counters.mass_columns += added.len() as u64;
         counters.stiffness_columns += added.len() as u64;
+        x.add_zeros(added.len());
+        kx.add_zeros(added.len());
         combine_into(x.columns_mut(added.clone()), d.as_ref(), orthonormal.as_ref());
         pencil.mass_times(x.columns(added.clone()), self.m_work.first_mut(added.len()));
         pencil.stiffness_times(x.columns(added.clone()), kx.columns_mut(added.clone()));
         let bordered_by = |corner: &Mat<f64>, products: MatRef<'_, f64>| {
-            bordered(corner, &gram(x.first(*used), products), &gram(x.columns(added.clone()), products))
+            bordered(corner, &gram(x.first(used), products), &gram(x.columns(added.clone()), products))
         };
         *gm = bordered_by(gm, self.m_work.first(added.len()));
         *gk = bordered_by(gk, kx.columns(added.clone()));
-        *used = added.end;
         (self.lambda, self.ritz) = small_ritz(gm, gk)?;
         Ok(())
     }
@@ -111,9 +113,9 @@ impl<'a> SearchSpace<'a> {
         let kept = kept.min(self.lambda.len());
         let lowest = self.ritz.as_ref().subcols(0, kept);
         for block in [&mut self.x, &mut self.kx] {
-            combine_in_place(block.columns_mut(0..self.used), lowest);
+            combine_in_place(block.as_mut(), lowest);
+            block.truncate(kept);
         }
-        self.used = kept;
         self.lambda.truncate(kept);
         self.gm = Mat::identity(kept, kept);
         self.gk = Mat::from_fn(kept, kept, |i, j| if i == j { self.lambda[i] } else { 0.0 });
@@ -122,19 +124,19 @@ impl<'a> SearchSpace<'a> {
 
     /// Some of the Ritz vectors (N x k).
     pub(super) fn vectors(&self, which: Range<usize>) -> Mat<f64> {
-        combine(self.x.first(self.used), self.ritz.as_ref().subcols(which.start, which.len()))
+        combine(self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()))
     }
 
     /// What some Ritz pairs leave unbalanced, K x - lambda M x, and its norm beside |K x| + |lambda M x|.
     pub(super) fn unbalanced(&mut self, which: Range<usize>, counters: &mut Counters) -> (Tall, Vec<f64>) {
-        let Self { problem, x, kx, used, lambda, ritz, work, m_work, .. } = self;
+        let Self { problem, x, kx, lambda, ritz, work, m_work, .. } = self;
         let (count, lambda) = (which.len(), &lambda[which.clone()]);
         let ritz = ritz.as_ref().subcols(which.start, count);
         counters.mass_columns += count as u64;
-        combine_into(work.first_mut(count), x.first(*used), ritz);
+        combine_into(work.first_mut(count), x.as_ref(), ritz);
         problem.pencil.mass_times(work.first(count), m_work.first_mut(count));
         let mut forces = Tall::zeros(problem.pencil.n(), count);
-        combine_into(forces.as_mut(), kx.first(*used), ritz);
+        combine_into(forces.as_mut(), kx.as_ref(), ritz);
         let (_, residuals) = leave_unbalanced(&mut forces, m_work.first(count), lambda);
         (forces, residuals)
     }

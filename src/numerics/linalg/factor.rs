@@ -7,8 +7,9 @@ use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
 use super::tree_walk::{Needs, Walk};
 use super::{Pencil, SymmetricMatrix};
-use faer::MatMut;
 use faer::prelude::ReborrowMut;
+use faer::{MatMut, MatRef};
+use rayon::prelude::*;
 use std::convert::Infallible;
 
 /// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
@@ -229,20 +230,12 @@ impl<'a, T: Real> Cholesky<'a, T> {
 pub(super) fn substitute<T: Real, const K: usize>(
     analysis: &Analysis,
     scale: &[f64],
-    mut x: MatMut<'_, f64>,
+    x: MatMut<'_, f64>,
     forward: impl Fn(usize, &mut [[T; K]]) + Sync,
     backward: impl Fn(usize, &mut [[T; K]]) + Sync,
 ) {
     let (tree, block) = (&analysis.tree, analysis.block);
-    // Row of the pencil at each row of the elimination order.
-    let row = |i: usize| tree.order()[i / block] as usize * block + i % block;
-    let mut values = vec![[T::default(); K]; x.nrows()];
-    for (i, to) in values.iter_mut().enumerate() {
-        let from = row(i);
-        for (j, to) in to.iter_mut().take(x.ncols()).enumerate() {
-            *to = T::of(x[(from, j)] * scale[from]);
-        }
-    }
+    let mut values: Vec<[T; K]> = in_elimination_order(analysis, scale, x.as_ref());
     let mut slots: Vec<&mut [[T; K]]> = Vec::with_capacity(tree.len());
     let mut rest = values.as_mut_slice();
     for s in 0..tree.len() {
@@ -282,12 +275,34 @@ pub(super) fn substitute<T: Real, const K: usize>(
         tree.children(s).iter().map(|&c| message(c)).collect()
     };
     analysis.walk.down(tree, &mut slots, &down);
-    for (i, from) in values.iter().enumerate() {
-        let to = row(i);
-        for (j, from) in from.iter().take(x.ncols()).enumerate() {
-            x[(to, j)] = from.wide() * scale[to];
+    let columns: Vec<_> = x.col_iter_mut().collect();
+    columns.into_par_iter().enumerate().for_each(|(j, mut to)| {
+        for (&vertex, from) in tree.order().iter().zip(values.chunks_exact(block)) {
+            for (row, from) in (vertex as usize * block..).zip(from) {
+                to[row] = from[j].wide() * scale[row];
+            }
         }
-    }
+    });
+}
+
+/// The scaled rows of at most `K` columns of `x` in the order in which they are eliminated.
+fn in_elimination_order<T: Real, const K: usize>(
+    analysis: &Analysis,
+    scale: &[f64],
+    x: MatRef<'_, f64>,
+) -> Vec<[T; K]> {
+    /// Rows of a task: far more than it takes to start it.
+    const ROWS: usize = 4096;
+    let (order, block) = (analysis.tree.order(), analysis.block);
+    let scaled = |i: usize| {
+        let row = order[i / block] as usize * block + i % block;
+        let mut values = [T::default(); K];
+        for (j, value) in values.iter_mut().take(x.ncols()).enumerate() {
+            *value = T::of(x[(row, j)] * scale[row]);
+        }
+        values
+    };
+    (0..x.nrows()).into_par_iter().with_min_len(ROWS).map(scaled).collect()
 }
 
 /// Columns solved at once: the factor is streamed once for all of them.

@@ -10,8 +10,8 @@ use std::ops::Range;
 /// Rows per partial product.
 const ROWS: usize = 4096;
 
-/// A tall block of zeros that is written by parts: its memory is taken from the system by whoever writes it
-/// first, where a [`Mat`] is filled by one thread, which takes longer than most of what is done with it.
+/// A tall block that grows by columns, whose memory is first touched as they come, by all threads: a [`Mat`] is
+/// filled with zeros by one thread, which takes longer than most of what is done with it.
 #[derive(Debug, Clone, Default)]
 pub struct Tall {
     entries: Vec<f64>,
@@ -21,17 +21,46 @@ pub struct Tall {
 impl Tall {
     /// Zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
-        Self { entries: vec![0.0; rows * columns], rows }
+        let mut own = Self::with_room(rows, columns);
+        own.add_zeros(columns);
+        own
+    }
+
+    /// No columns yet, with room for some that is not touched before they come.
+    pub fn with_room(rows: usize, columns: usize) -> Self {
+        Self { entries: Vec::with_capacity(rows * columns), rows }
     }
 
     /// A copy, made by all threads.
     pub fn copied(x: MatRef<'_, f64>) -> Self {
-        let mut own = Self::zeros(x.nrows(), x.ncols());
-        copy_columns(own.as_mut(), x);
+        let mut own = Self::with_room(x.nrows(), x.ncols());
+        own.push(x);
         own
     }
 
-    /// Columns that there is room for.
+    /// Appends columns, copied by all threads.
+    ///
+    /// # Panics
+    /// When the row counts differ.
+    pub fn push(&mut self, x: MatRef<'_, f64>) {
+        assert_eq!(x.nrows(), self.rows, "rows of columns to append");
+        for column in x.col_iter() {
+            let column = column.try_as_col_major().expect("blocks are column-major").as_slice();
+            self.entries.par_extend(column.par_iter().copied());
+        }
+    }
+
+    /// Appends columns of zeros.
+    pub fn add_zeros(&mut self, columns: usize) {
+        self.entries.par_extend(rayon::iter::repeat_n(0.0, self.rows * columns));
+    }
+
+    /// Keeps the first columns, so many of them where there are more; the memory of the others stays.
+    pub fn truncate(&mut self, columns: usize) {
+        self.entries.truncate(self.rows * columns);
+    }
+
+    /// Columns that are there.
     pub fn ncols(&self) -> usize {
         self.entries.len() / self.rows.max(1)
     }
@@ -269,6 +298,20 @@ mod tests {
         let mut a = block(rows, 1);
         a.as_mut()[(rows - 1, 0)] = f64::NAN;
         assert!(column_norms(a.as_ref())[0].is_nan());
+    }
+
+    #[test]
+    fn columns_come_and_go() {
+        let given = block(ROWS + 3, 3);
+        let mut grown = Tall::with_room(ROWS + 3, 4);
+        assert_eq!(grown.ncols(), 0);
+        grown.push(given.first(2));
+        grown.push(given.columns(2..3));
+        assert_eq!(grown.as_ref(), given.as_ref());
+        grown.truncate(1);
+        grown.add_zeros(1);
+        assert_eq!((grown.ncols(), grown.first(1)), (2, given.first(1)));
+        assert!(grown.columns(1..2).col(0).iter().all(|x| *x == 0.0));
     }
 
     #[test]
