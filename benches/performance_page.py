@@ -248,9 +248,8 @@ def tier_lines(tiers):
             way = "cycles" if own["without_factor"] else "factor"
             proof = "proved" if own["completeness"].startswith("proved") else "not proved"
             rows.append((case if tier == "fast" else "", f"`{tier}`", number(own["wall_s"]), number(own["cpu_s"]), number(own["memory_mb"]), way, f"{own['residual']:.0e}", proof, *errors))
-    first = next(iter(tiers.values()))
-    commits = ", ".join(f"{case} at commit {found['commit']}" for case, found in tiers.items())
-    said = (f"Whole processes on two threads, from Matrix Market text to the file, in turns (`python3 benches/tiers.py`; {first['machine']['processor']}; {commits}). Errors are "
+    commits = ", ".join(f"{case} on {found['machine']['processor']} at commit {found['commit']}" for case, found in tiers.items())
+    said = (f"Whole processes on two threads, from Matrix Market text to the file, in turns (`python3 benches/tiers.py`; {commits}). Errors are "
             "those beside the last tier of the case: the largest relative difference of a frequency, and of an invariant in the norms of `compare`.")
     head = ("case", "`--accuracy`", "wall, s", "CPU, s", "memory, MB", "modes by", "residual", "completeness", "frequencies", "invariants")
     return ["## Tiers", "", said, "", *table(head, rows), ""]
