@@ -20,8 +20,7 @@ pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
     v: Tall,
-    /// Vectors that the basis may have: so many columns as V has room for, and rows as T has.
-    capacity: usize,
+    /// Has as many rows as the basis may have vectors.
     t: Mat<f64>,
     /// Columns of the newest block, not yet multiplied by the operator.
     fresh: usize,
@@ -52,7 +51,6 @@ impl<'a> Krylov<'a> {
             problem,
             factor,
             v: Tall::with_room(n, capacity),
-            capacity,
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
             m_fresh: Mat::zeros(0, 0),
@@ -80,7 +78,7 @@ impl<'a> Krylov<'a> {
 
     /// Room left for new vectors.
     pub(super) fn room(&self) -> usize {
-        self.capacity - self.size()
+        self.t.nrows() - self.size()
     }
 
     /// Whether the newest block is empty: the basis spans an invariant subspace.

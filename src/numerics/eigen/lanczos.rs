@@ -79,7 +79,7 @@ fn better_shift(
         return Ok(None);
     }
     let (lambda, vectors) = best(krylov, &ritz, wanted.max(1), tau);
-    let Some(&lowest) = lambda.first() else { return Ok(None) };
+    let lowest = lambda[0];
     let noise = NOISE_FACTOR
         * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
     if lowest.abs() <= noise {

@@ -224,6 +224,9 @@ impl<'a, T: Real> Cholesky<'a, T> {
     }
 }
 
+/// Rows that a task reorders: that takes far longer than to start it.
+const ROWS: usize = 4096;
+
 /// Substitution over the tree, up and down, for the columns of `x`, of which there are at most `K`, with the
 /// scale of each row. `forward` eliminates the leading rows of the front of a supernode, `backward` finds
 /// them from those below.
@@ -275,8 +278,9 @@ pub(super) fn substitute<T: Real, const K: usize>(
         tree.children(s).iter().map(|&c| message(c)).collect()
     };
     analysis.walk.down(tree, &mut slots, &down);
+    let columns_per_task = (ROWS / x.nrows().max(1)).max(1);
     let columns: Vec<_> = x.col_iter_mut().collect();
-    columns.into_par_iter().enumerate().for_each(|(j, mut to)| {
+    columns.into_par_iter().with_min_len(columns_per_task).enumerate().for_each(|(j, mut to)| {
         for (&vertex, from) in tree.order().iter().zip(values.chunks_exact(block)) {
             for (row, from) in (vertex as usize * block..).zip(from) {
                 to[row] = from[j].wide() * scale[row];
@@ -291,8 +295,6 @@ fn in_elimination_order<T: Real, const K: usize>(
     scale: &[f64],
     x: MatRef<'_, f64>,
 ) -> Vec<[T; K]> {
-    /// Rows of a task: far more than it takes to start it.
-    const ROWS: usize = 4096;
     let (order, block) = (analysis.tree.order(), analysis.block);
     let scaled = |i: usize| {
         let row = order[i / block] as usize * block + i % block;

@@ -44,6 +44,6 @@ pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use tall::{
-    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into,
-    copy_columns, gram, side_by_side, subtract_columns, subtract_combination,
+    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, gram,
+    side_by_side, subtract_columns, subtract_combination,
 };

@@ -46,13 +46,13 @@ impl Tall {
         assert_eq!(x.nrows(), self.rows, "rows of columns to append");
         for column in x.col_iter() {
             let column = column.try_as_col_major().expect("blocks are column-major").as_slice();
-            self.entries.par_extend(column.par_iter().copied());
+            self.entries.par_extend(column.par_iter().copied().with_min_len(ROWS));
         }
     }
 
     /// Appends columns of zeros.
     pub fn add_zeros(&mut self, columns: usize) {
-        self.entries.par_extend(rayon::iter::repeat_n(0.0, self.rows * columns));
+        self.entries.par_extend(rayon::iter::repeat_n(0.0, self.rows * columns).with_min_len(ROWS));
     }
 
     /// Keeps the first columns, so many of them where there are more; the memory of the others stays.
@@ -218,12 +218,6 @@ pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
         matmul(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0, Par::Seq);
         part.rb_mut().subcols_mut(0, h.ncols()).copy_from(combined);
     });
-}
-
-/// Y = X for equal-shaped blocks, by all threads.
-pub fn copy_columns(y: MatMut<'_, f64>, x: MatRef<'_, f64>) {
-    let columns: Vec<_> = y.col_iter_mut().zip(x.col_iter()).collect();
-    columns.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
 }
 
 /// y_j -= s_j x_j for the columns of equal-shaped blocks.
