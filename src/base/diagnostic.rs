@@ -88,7 +88,7 @@ codes! {
     DeckSupports = "FB116", Note, Done, "input deck supports the body", "matrices that are written before the supports are applied (KGG, MGG) are free; for others take the supports out";
     RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids";
     DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
-    JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all grids (KGG, MGG) where it matters how the inertia changes with the deformation";
+    JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all nodes (of Nastran KGG and MGG) where it matters how the inertia changes with the deformation";
     MeshPartial = "FB124", Note, Done, "surface to draw the body by is not whole", "nothing to do for the results; connectors and springs are not drawn";
     MeshForeign = "FB125", Error, BadInput, "mesh is not that of the nodes", "give the mesh that the matrices were computed on, in the same units, or leave `mesh` out";
     ModesDiffer = "FB127", Warning, Done, "modes of the file are not those of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";

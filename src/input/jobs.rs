@@ -3,6 +3,7 @@
 
 mod abaqus;
 mod abaqus_rows;
+mod abaqus_substructure;
 mod calculix;
 mod coordinate_files;
 mod deck;
@@ -167,7 +168,15 @@ fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
     }
 }
 
-/// FB109: a file of a job is missing.
+/// FB119: what is exact of a body whose matrices are condensed to some of its nodes.
+fn condensed(nodes: usize, stiffness: &Path) -> Diagnostic {
+    let message = format!(
+        "the matrices are condensed to {nodes} nodes: mass, I0, C1, C2 and frequencies are those of the condensed model, W0 to W3 know only how these nodes move"
+    );
+    Diagnostic::new(Code::JobCondensed, message).in_file(stiffness)
+}
+
+/// FB109: a part of a job is missing.
 fn missing(path: &Path, what: &str, help: &str) -> Diagnostic {
     Diagnostic::new(Code::JobIncomplete, format!("{what} is missing")).in_file(path).with_help(help)
 }

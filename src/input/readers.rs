@@ -60,6 +60,16 @@ const NOT_READ: &[(&[u8], &str, &str)] = &[
         "printed by MFEM's SparseMatrix::PrintMatlab",
         "write it by A.PrintMM(file), which is Matrix Market",
     ),
+    (
+        b"**\n** GENERATION OF SUBSTRUCTURE",
+        "a substructure of Abaqus",
+        "give the deck that names it: flexbody convert job.inp",
+    ),
+    (
+        b"**\r\n** GENERATION OF SUBSTRUCTURE",
+        "a substructure of Abaqus",
+        "give the deck that names it: flexbody convert job.inp",
+    ),
     (b"BZh", "compressed by bzip2", "unpack it, or compress it by gzip or zstd"),
     (b"\xfd7zXZ", "compressed by xz", "unpack it, or compress it by gzip or zstd"),
     (b"\x1f\x8b", "compressed twice", "unpack it once"),

@@ -258,7 +258,7 @@ proptest! {
 
     /// Damaged files of jobs and meshes are read or refused, nothing else.
     #[test]
-    fn damaged_jobs_never_panic(of in 0..13usize, damages in proptest::collection::vec(damage(), 1..4)) {
+    fn damaged_jobs_never_panic(of in 0..14usize, damages in proptest::collection::vec(damage(), 1..4)) {
         let (folder, file) = [
             ("calculix", "job.inp"),
             ("calculix", "nodes.inp"),
@@ -267,6 +267,7 @@ proptest! {
             ("abaqus", "job.inp"),
             ("abaqus", "job_STIF1.mtx"),
             ("abaqus_labels", "job_MASS1.mtx"),
+            ("abaqus_substructure", "ends.mtx"),
             ("meshes", "block41.msh"),
             ("nastran", "job.bdf"),
             ("nastran", "grids.bdf"),

@@ -20,3 +20,4 @@ mod open_matrices;
 mod plane;
 mod plausibility;
 mod split;
+mod substructures;

@@ -24,7 +24,7 @@ import common
 from common import ROOT, Absent, Row
 
 VENV = ROOT / "target/peers"
-PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "pyNastran==1.4.1", "welib==4.2.0", "h5py", "numpy", "scipy", "scikit-fem==12.0.2", "ngsolve==6.2.2608", "mfem==4.10.0.1", "pyvista", "meshio", "trimesh", "pygltflib"]
+PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "pyNastran==1.4.1", "abaqus-mtx-parser==1.1.4", "welib==4.2.0", "h5py", "numpy", "scipy", "scikit-fem==12.0.2", "ngsolve==6.2.2608", "mfem==4.10.0.1", "pyvista", "meshio", "trimesh", "pygltflib"]
 NPM = ["gltf-validator@2.0.0-dev.3.10"]
 APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "calculix-ccx"]
 # Packages of modules for Debian's own Python.
@@ -70,6 +70,15 @@ def nastran(flexbody, folder):
     return rows
 
 
+def abaqus(flexbody, folder):
+    """Substructures that Abaqus has written: a table of the same page."""
+    import abaqus as substructures
+
+    rows = substructures.rows(flexbody, folder)
+    TABLES["docs/fe_programs.md", "abaqus"] = table(rows, [])
+    return rows
+
+
 def cluster(flexbody, folder):
     """SLEPc over MPI: a table of its own page."""
     import cluster as slepc
@@ -109,6 +118,7 @@ PEERS = [
     ("CalculiX", "suite.calculix", True),
     ("open FE codes", "suite.recipes", True),
     ("pyNastran, pyYeti", "suite.nastran", True),
+    ("abaqus-mtx-parser", "suite.abaqus", True),
     ("SLEPc over MPI", "suite.cluster", True),
 ]
 
@@ -193,7 +203,7 @@ def main():
     rows, absent = measure(args.flexbody.resolve(), args.small)
     bad = [row for row in rows if not row.good()]
     if args.write and not (bad or args.small):
-        elsewhere = ("CalculiX", "pyNastran", "pyYeti", "NX Nastran")
+        elsewhere = ("CalculiX", "Abaqus", "pyNastran", "pyYeti", "NX Nastran")
         of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith(("recipe", "cluster")))]
         TABLES["docs/export.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():

@@ -1,16 +1,20 @@
 //! Jobs of Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` and `*MATRIX OUTPUT` write `job_STIF1.mtx` and
 //! `job_MASS1.mtx` beside the deck `job.inp`, as `row column value` (FORMAT=COORDINATE) or with the node and
-//! the direction of row and column (FORMAT=MATRIX INPUT, LABELS).
+//! the direction of row and column (FORMAT=MATRIX INPUT, LABELS). Instead of them the matrices may be those of a
+//! substructure.
 
 use super::abaqus_rows::{labels, other_rows};
+use super::abaqus_substructure::{self, Substructure};
 use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::labelled_lines::{has_labels, labelled};
-use super::{Found, JobModel, JobReader, both, is_deck, missing, siblings};
+use super::{Found, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::reader::MatrixRole;
-use crate::model::{DofLabel, Nodes, RawMatrix};
+use crate::input::table::integer;
+use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The reader of Abaqus jobs.
@@ -25,38 +29,98 @@ impl JobReader for Abaqus {
     }
 
     fn needs(&self) -> &'static str {
-        "job.inp with job_STIF1.mtx and job_MASS1.mtx beside it"
+        "job.inp with job_STIF1.mtx and job_MASS1.mtx beside it, or with the file of its substructure"
     }
 
     fn recognises(&self, path: &Path) -> bool {
-        is_deck(path) && Matrices::beside(path).is_ok()
+        is_deck(path)
+            && (Matrices::beside(path).is_ok()
+                || Deck::read(path).is_ok_and(|deck| abaqus_substructure::file_of(&deck, path).is_some()))
     }
 
     fn read(&self, path: &Path) -> Found<JobModel> {
-        let Matrices { stiffness, mass, note } = Matrices::beside(path)?;
+        let matrices = Matrices::beside(path);
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::of(&deck)?;
-        let (dofs, matrices) = if has_labels(&stiffness)? {
-            labelled([&stiffness, &mass])?
-        } else {
-            numbered(&mesh, path, [&stiffness, &mass])?
+        let (rows, note) = match (matrices, abaqus_substructure::file_of(&deck, path)) {
+            (Ok(matrices), _) => (Rows::of_model(&matrices, &mesh, path)?, matrices.note),
+            (Err(_), Some((file, note))) => (Rows::of_substructure(&file, &deck, &mesh)?, note),
+            (Err(missing), None) => return Err(missing),
         };
-        let [stiffness_matrix, mass_matrix] = matrices;
         let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
-        let mut files: Vec<(&'static str, PathBuf)> =
-            deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
-        files.extend([("stiffness", stiffness), ("mass", mass)]);
+        let deck_files = deck.paths().map(|path| ("deck", path.to_path_buf()));
         Ok(JobModel {
-            stiffness: stiffness_matrix,
-            mass: mass_matrix,
+            stiffness: rows.stiffness,
+            mass: rows.mass,
             nodes: Nodes { ids, positions },
-            dofs,
-            elements: mesh.drawn(),
+            dofs: rows.labels,
+            // Condensed matrices leave no element all of its nodes.
+            elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
             sets: mesh.sets,
-            files,
-            diagnostics: mesh.notes.into_iter().chain(note).collect(),
+            files: deck_files.chain(rows.files).collect(),
+            diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
         })
     }
+}
+
+/// Matrices and what their rows stand for.
+struct Rows {
+    labels: Vec<DofLabel>,
+    stiffness: RawMatrix,
+    mass: RawMatrix,
+    /// Role and path of the files.
+    files: Vec<(&'static str, PathBuf)>,
+    /// FB119, of matrices that are condensed.
+    condensed: Option<Diagnostic>,
+}
+
+impl Rows {
+    fn of_model(files: &Matrices, mesh: &DeckMesh, deck: &Path) -> Found<Self> {
+        let Matrices { stiffness, mass, .. } = files;
+        let (labels, matrices) = if has_labels(stiffness)? {
+            labelled([stiffness, mass])?
+        } else {
+            numbered(mesh, deck, [stiffness, mass])?
+        };
+        let files = vec![("stiffness", stiffness.clone()), ("mass", mass.clone())];
+        let [stiffness, mass] = matrices;
+        Ok(Self { labels, stiffness, mass, files, condensed: None })
+    }
+
+    /// FB111 for rows whose nodes are not in the deck, or stand along the axes of a `*TRANSFORM`.
+    fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Found<Self> {
+        let Substructure { labels, stiffness, mass } = Substructure::read(file)?;
+        let nodes: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
+        if let Some(node) = nodes.iter().find(|node| !mesh.nodes.contains_key(node)) {
+            let message = format!(
+                "node {node} of the substructure is not in the deck: the shape of a retained mode is not in the matrices"
+            );
+            let help =
+                "leave *SELECT EIGENMODES out, or give K and M of all nodes with --basis craig-bampton";
+            let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(file);
+            return Err(vec![diagnostic.with_help(help)]);
+        }
+        if let Some(refused) = turned(deck, mesh, &nodes) {
+            return Err(vec![refused]);
+        }
+        let condensed = Some(condensed(nodes.len(), file));
+        Ok(Self { labels, stiffness, mass, files: vec![("matrices", file.to_path_buf())], condensed })
+    }
+}
+
+/// FB111 for retained nodes whose rows stand along axes of their own.
+fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diagnostic> {
+    let members = |name: &str| -> Vec<i64> {
+        let set = mesh.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
+        set.map_or_else(|| integer(name.as_bytes()).into_iter().collect(), |(_, nodes)| nodes.clone())
+    };
+    let transforms = deck.cards().iter().filter(|card| card.keyword == "TRANSFORM");
+    transforms.filter_map(|card| Some((card, card.parameter("NSET")?))).find_map(|(card, set)| {
+        let node = members(set).into_iter().find(|node| retained.contains(node))?;
+        let message = format!("*TRANSFORM turns the rows of node {node}, which is retained");
+        let help = "take *TRANSFORM off the retained nodes";
+        Some(deck.about(card, Code::DeckUnsupported, message).with_help(help))
+    })
 }
 
 /// The files of the two matrices.

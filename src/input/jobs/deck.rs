@@ -66,10 +66,14 @@ impl Deck {
         self.files.iter().map(InputFile::path)
     }
 
+    /// What stands below a card as it is written, comments included, and the number of its first line.
+    pub(super) fn text(&self, card: &Card) -> (usize, &[u8]) {
+        (card.first, &self.files[card.file].bytes()[card.data.clone()])
+    }
+
     /// Lines of data of a card with their numbers, without comments and blank lines.
     pub(super) fn data<'d>(&'d self, card: &Card) -> impl Iterator<Item = (usize, &'d [u8])> + use<'d> {
-        let bytes = &self.files[card.file].bytes()[card.data.clone()];
-        let first = card.first;
+        let (first, bytes) = self.text(card);
         let lines = bytes.split(|&b| b == b'\n').enumerate();
         lines
             .map(move |(k, line)| (first + k, line.trim_ascii()))

@@ -9,7 +9,7 @@ mod rows;
 mod sets;
 mod systems;
 
-use super::{Found, JobModel, JobReader, NodeSets, both, missing, siblings};
+use super::{Found, JobModel, JobReader, NodeSets, both, condensed, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::is_bulk_data;
 use crate::input::bytes::InputFile;
@@ -58,7 +58,7 @@ impl JobReader for Nastran {
         let matrices = matrices.turned(&axes)?.without_empty_rows(&mut diagnostics);
         matrices.refuse_modal(&bulk)?;
         if bulk.is_condensed() {
-            diagnostics.push(matrices.condensed(&bulk));
+            diagnostics.push(condensed(matrices.grids(&bulk), &matrices.stiffness.path));
         }
         let sets = bulk.sets.of(&bulk.grids);
         let mut files: Vec<(&'static str, PathBuf)> =
@@ -277,15 +277,10 @@ impl Matrices {
         Err(vec![diagnostic.with_help(help)])
     }
 
-    /// FB119: what is exact of a body of condensed matrices.
-    fn condensed(&self, bulk: &Bulk) -> Diagnostic {
+    /// Number of the grids that have rows.
+    fn grids(&self, bulk: &Bulk) -> usize {
         let named = self.labels.iter().map(|label| label.node);
-        let grids: HashSet<i64> = named.filter(|node| bulk.grids.contains_key(node)).collect();
-        let message = format!(
-            "the matrices are condensed to {} grids: mass, I0, C1, C2 and frequencies are those of the condensed model, W0 to W3 know only how these grids move",
-            grids.len()
-        );
-        Diagnostic::new(Code::JobCondensed, message).in_file(&self.stiffness.path)
+        named.filter(|node| bulk.grids.contains_key(node)).collect::<HashSet<i64>>().len()
     }
 }
 
