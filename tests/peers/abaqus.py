@@ -21,7 +21,7 @@ def places(stiffness, nodes):
     # Columns 3 to 5: the body turns about the first node, u = e x r.
     turn = rigid[:, 3:].reshape(nodes, 6, 3)
     assert np.abs(turn[:, 3:] - np.eye(3)).max() < 1e-6
-    return [(u[1, 2] - u[2, 1], u[2, 0] - u[0, 2], u[0, 1] - u[1, 0]) for u in -turn[:, :3] / 2]
+    return [(u[1, 2] - u[2, 1], u[2, 0] - u[0, 2], u[0, 1] - u[1, 0]) for u in turn[:, :3] / 2]
 
 
 def rows(flexbody, folder):
@@ -50,7 +50,6 @@ def rows(flexbody, folder):
             own, mass = made["modes/eigenvalue"][()], float(np.ravel(made["invariants/mass"][()])[0])
         expected = scipy.linalg.eigh(stiffness, theirs.mass, eigvals_only=True)[6 : 6 + MODES]
         ahead = np.tile([1.0, 0, 0, 0, 0, 0], len(theirs.nodes))
-        # Eigenvalues have an error of a rounding of the largest one.
         found.append(Row(program, "substructure", f"{name}: eigenvalues of {MODES} modes beside scipy's", np.abs(own / expected - 1).max(), LIMIT))
         found.append(Row(program, "substructure", f"{name}: mass", abs(mass / (ahead @ theirs.mass @ ahead) - 1), LIMIT))
     return found
