@@ -16,7 +16,7 @@ mod text;
 
 use line::BadLine;
 pub(in crate::input) use line::{Limits, real};
-pub(in crate::input) use text::{Blocks, line_aligned};
+pub(in crate::input) use text::{Blocks, line_aligned, lines, most_entries};
 
 /// Number of bad lines that are reported one by one.
 const SHOWN: usize = 5;

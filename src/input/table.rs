@@ -213,6 +213,10 @@ impl Separator {
 
 /// A whole number; `3.0` and `3e0` as numerical tools write it count too.
 pub(super) fn integer(field: &[u8]) -> Option<i64> {
+    // Up to 18 digits alone, as nearly all fields are.
+    if (1..=18).contains(&field.len()) && field.iter().all(u8::is_ascii_digit) {
+        return Some(field.iter().fold(0, |number, digit| 10 * number + i64::from(digit - b'0')));
+    }
     let text = std::str::from_utf8(field).ok()?;
     text.parse().ok().or_else(|| {
         let value = fast_float2::parse::<f64, _>(field).ok()?;

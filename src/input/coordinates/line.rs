@@ -1,7 +1,7 @@
 //! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect
 //! and says what is wrong.
 
-use super::{Entry, excerpt, written_digits};
+use super::{Entry, excerpt, most_entries, written_digits};
 use crate::base::diagnostic::Code;
 
 /// What the header says about every line.
@@ -41,7 +41,7 @@ const COUNTED: usize = 512;
 
 /// Parses whole lines.
 pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
-    let mut piece = Piece { entries: Vec::with_capacity(text.len() / 24 + 1), ..Piece::default() };
+    let mut piece = Piece { entries: Vec::with_capacity(most_entries(text)), ..Piece::default() };
     let mut at = 0;
     while at < text.len() {
         piece.lines += 1;

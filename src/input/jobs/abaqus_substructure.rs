@@ -6,7 +6,7 @@ use super::deck::{Card, Deck, fields};
 use super::{Found, both, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Storage, assemble, check_size};
-use crate::input::coordinates::{excerpt, line_aligned, real};
+use crate::input::coordinates::{excerpt, line_aligned, lines, real};
 use crate::input::digits::written_digits;
 use crate::input::table::integer;
 use crate::model::{DofLabel, RawMatrix};
@@ -212,7 +212,7 @@ struct Piece {
 impl Piece {
     fn parse(text: &[u8]) -> Self {
         let mut piece = Self { values: Vec::with_capacity(text.len() / 20), ..Self::default() };
-        for line in text.split_inclusive(|&b| b == b'\n').map(<[u8]>::trim_ascii) {
+        for line in lines(text) {
             if !(line.is_empty() || line.starts_with(b"**")) {
                 let before = piece.values.len();
                 for field in fields(line) {

@@ -6,7 +6,7 @@ use super::{Found, both};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
 use crate::input::bytes::InputFile;
-use crate::input::coordinates::{excerpt, line_aligned, real};
+use crate::input::coordinates::{excerpt, line_aligned, lines, most_entries, real};
 use crate::input::digits::written_digits;
 use crate::input::recent::Recent;
 use crate::input::table::integer;
@@ -16,6 +16,9 @@ use std::path::Path;
 
 /// Bad lines of a file that are told one by one.
 const SHOWN: usize = 5;
+
+/// Entries of a piece whose written digits are counted.
+const COUNTED: usize = 512;
 
 /// Pieces of a file that are read before its pages are given back.
 const PIECES_AT_ONCE: usize = 64;
@@ -111,16 +114,18 @@ struct Piece {
 
 impl Piece {
     fn parse(text: &[u8]) -> Self {
-        let mut piece = Self { entries: Vec::with_capacity(text.len() / 40), ..Self::default() };
+        let mut piece = Self { entries: Vec::with_capacity(most_entries(text)), ..Self::default() };
         let mut recent = Recent::new();
-        for line in text.split_inclusive(|&b| b == b'\n').map(<[u8]>::trim_ascii) {
+        for line in lines(text) {
             piece.lines += 1;
             if !is_data(line) {
                 continue;
             }
             match labelled_line(line) {
-                Some((row, col, value, digits)) => {
-                    piece.written = piece.written.max(digits);
+                Some((row, col, value, number)) => {
+                    if piece.entries.len() < COUNTED {
+                        piece.written = piece.written.max(written_digits(number));
+                    }
                     let mut place = |label: DofLabel| {
                         recent.place(label, (label.node, label.direction), &mut piece.labels)
                     };
@@ -145,8 +150,8 @@ impl Piece {
     }
 }
 
-/// Row, column, value and its written digits.
-fn labelled_line(text: &[u8]) -> Option<(DofLabel, DofLabel, f64, u8)> {
+/// Row, column, value and the value as written.
+fn labelled_line(text: &[u8]) -> Option<(DofLabel, DofLabel, f64, &[u8])> {
     let mut parts = fields(text);
     let mut label = || {
         let node = integer(parts.next()?)?;
@@ -156,7 +161,7 @@ fn labelled_line(text: &[u8]) -> Option<(DofLabel, DofLabel, f64, u8)> {
     let (row, column) = (label()?, label()?);
     let number = parts.next()?;
     let value = real(number).filter(|value| value.is_finite())?;
-    parts.next().is_none().then(|| (row, column, value, written_digits(number)))
+    parts.next().is_none().then_some((row, column, value, number))
 }
 
 #[cfg(test)]
