@@ -34,7 +34,7 @@ pub(super) fn file_of(deck: &Deck, path: &Path) -> Option<(PathBuf, Option<Diagn
             .filter(|card| card.keyword == "SUBSTRUCTURE MATRIX OUTPUT")
             .filter_map(|card| card.parameter("FILENAME"))
     };
-    let name = requests().last()?;
+    let name = requests().next_back()?;
     let file = path.with_file_name(format!("{name}.mtx"));
     let note = (requests().count() > 1).then(|| {
         let message = format!("of {} substructures the last one, {name}, is taken", requests().count());
