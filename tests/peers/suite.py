@@ -3,7 +3,7 @@
 
     python3 tests/peers/suite.py --install --write
 
-installs Exudyn, welib, open FE codes, h5py, scipy and readers of pictures by pip and npm into target/peers, Octave, GetFEM, FEniCSx and an ARM compiler by apt-get (as root; else it says the command), runs every
+installs Exudyn, welib, open FE codes, h5py, scipy and readers of pictures by pip and npm into target/peers, Octave, GetFEM, FEniCSx, CalculiX, SLEPc and an ARM compiler by apt-get (as root; else it says the command), runs every
 peer with target/release/flexbody and writes the table of docs/export.md and that of docs/formats/embedded.md. Some minutes. Without options it runs what is
 installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
 FEMBEAM (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
@@ -29,6 +29,8 @@ NPM = ["gltf-validator@2.0.0-dev.3.10"]
 APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "calculix-ccx"]
 # Packages of modules for Debian's own Python.
 APT_MODULES = {"python3-getfem": "getfem", "python3-dolfinx-real": "dolfinx"}
+# Debian keeps these where its Python does not look by itself.
+APT_CLUSTER = ["python3-petsc4py-real", "python3-slepc4py-real"]
 
 
 def other_libraries(flexbody, folder):
@@ -178,6 +180,8 @@ def install():
     missing = [name for name, tool in zip(APT, ["octave-cli", "g++", "arm-none-eabi-gcc", "arm-none-eabi-gcc", "ccx"]) if not shutil.which(tool)]
     debian = "/usr/bin/python3"
     missing += [name for name, module in APT_MODULES.items() if subprocess.run([debian, "-c", f"import {module}"], capture_output=True).returncode]
+    if shutil.which("dpkg"):
+        missing += [name for name in APT_CLUSTER if subprocess.run(["dpkg", "--status", name], capture_output=True).returncode]
     if missing:
         command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
         if shutil.which("apt-get") and os.geteuid() == 0:
