@@ -35,12 +35,16 @@ pub struct JobFile {
 }
 
 impl JobFile {
-    /// The main file and the files beside it that have its name, which a run must not replace.
+    /// The main file, the files beside it that have its name, and that of the substructure which it names: a
+    /// run must not replace them.
     pub(super) fn family(&self) -> Vec<PathBuf> {
         const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx", ".pch", ".op4"];
         let is_matrix = |rest: &str| MATRICES.iter().any(|extension| rest.ends_with(extension));
         let matrices = siblings(&self.path).filter(|(rest, _)| is_matrix(rest)).map(|(_, path)| path);
-        let mut family: Vec<PathBuf> = std::iter::once(self.path.clone()).chain(matrices).collect();
+        let deck = is_deck(&self.path).then(|| Deck::read(&self.path).ok()).flatten();
+        let substructure = deck.and_then(|deck| abaqus_substructure::file_of(&deck, &self.path));
+        let others = matrices.chain(substructure.map(|(file, _)| file));
+        let mut family: Vec<PathBuf> = std::iter::once(self.path.clone()).chain(others).collect();
         family.sort();
         family
     }

@@ -1,6 +1,7 @@
 //! Substructures of Abaqus: the same condensed block as the superelement of Nastran, and files that are not one.
 
 use crate::jobs::{assert_has_inertia_of_the_block, body, job, set, small};
+use crate::support::program::flexbody;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::error::Error;
 use flexbody::input::{ModelFiles, read_model};
@@ -161,4 +162,15 @@ fn what_is_no_substructure_is_refused_with_its_place() {
         assert_eq!((found.code(), found.line()), (code, line), "{error}");
         assert!(found.message().contains(part), "{error}");
     }
+}
+
+#[test]
+fn no_output_replaces_the_file_of_the_substructure() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["job.inp", "ends.mtx"] {
+        fs::copy(small(FOLDER).with_file_name(name), folder.path().join(name)).expect("copied");
+    }
+    let run = flexbody(folder.path(), &["convert", "job.inp", "--modes", "2", "-o", "ends.mtx"]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("is an input"));
 }
