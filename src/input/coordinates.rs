@@ -4,7 +4,7 @@
 
 use super::assemble::{Entry, Sides};
 use super::compression::{Compression, broken};
-use super::digits::written_digits;
+use super::digits::{COUNTED, written_digits};
 use super::reader::MatrixSource;
 use crate::base::diagnostic::Diagnostic;
 use rayon::prelude::*;

@@ -45,6 +45,9 @@ fn shortest(v: f64, text: &mut String) -> u8 {
     mantissa.bytes().filter(u8::is_ascii_digit).count() as u8
 }
 
+/// Numbers of a piece of a file whose written digits are counted.
+pub(super) const COUNTED: usize = 512;
+
 /// Significant digits of a number as written: leading zeros and the exponent do not count.
 pub(super) fn written_digits(number: &[u8]) -> u8 {
     let mantissa = number.iter().take_while(|b| matches!(b, b'0'..=b'9' | b'.' | b'+' | b'-'));

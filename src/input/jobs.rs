@@ -41,9 +41,9 @@ impl JobFile {
         const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx", ".pch", ".op4"];
         let is_matrix = |rest: &str| MATRICES.iter().any(|extension| rest.ends_with(extension));
         let matrices = siblings(&self.path).filter(|(rest, _)| is_matrix(rest)).map(|(_, path)| path);
-        let deck = is_deck(&self.path).then(|| Deck::read(&self.path).ok()).flatten();
-        let substructure = deck.and_then(|deck| abaqus_substructure::file_of(&deck, &self.path));
-        let others = matrices.chain(substructure.map(|(file, _)| file));
+        let is_complete = Calculix.recognises(&self.path);
+        let substructure = if is_complete { None } else { abaqus::substructure_of(&self.path) };
+        let others = matrices.chain(substructure);
         let mut family: Vec<PathBuf> = std::iter::once(self.path.clone()).chain(others).collect();
         family.sort();
         family

@@ -118,7 +118,7 @@ def refusals(flexbody, folder):
 
 def rows(flexbody, folder):
     """Everything; `Absent` where the packages are not there."""
-    return agreement(flexbody, folder) + killed(flexbody, folder) + refusals(flexbody, folder)
+    return agreement(flexbody, folder) + killed(flexbody, folder) + refusals(flexbody, folder) + one_command(flexbody, folder)
 
 
 def one_command(flexbody, folder):

@@ -45,51 +45,6 @@ def other_libraries(flexbody, folder):
     return [Row(program, "json, npz, simscape, chrono", "every array is that of the body, rigid motion has its inertia (1: no)", 0.0, 0.0)]
 
 
-def calculix(flexbody, folder):
-    """Jobs in, bodies out: a table of its own page."""
-    import calculix as jobs
-
-    rows = jobs.rows(flexbody, folder)
-    TABLES["docs/fe_programs.md", "calculix"] = table(rows, [])
-    return rows
-
-
-def recipes(flexbody, folder):
-    """Matrices of open FE codes: a table of its own page."""
-    import open_codes
-
-    rows = open_codes.rows(flexbody, folder)
-    TABLES["docs/recipes.md", "recipes"] = table(rows, [])
-    return rows
-
-
-def nastran(flexbody, folder):
-    """Files of Nastran that other libraries write and read: a table of the same page."""
-    import nastran as files
-
-    rows = files.rows(flexbody, folder)
-    TABLES["docs/fe_programs.md", "nastran"] = table(rows, [])
-    return rows
-
-
-def abaqus(flexbody, folder):
-    """Substructures that Abaqus has written: a table of the same page."""
-    import abaqus as substructures
-
-    rows = substructures.rows(flexbody, folder)
-    TABLES["docs/fe_programs.md", "abaqus"] = table(rows, [])
-    return rows
-
-
-def cluster(flexbody, folder):
-    """SLEPc over MPI: a table of its own page."""
-    import cluster as slepc
-
-    rows = slepc.rows(flexbody, folder) + slepc.one_command(flexbody, folder)
-    TABLES["docs/cluster.md", "cluster"] = table(rows, [])
-    return rows
-
-
 def arm_table(flexbody, folder):
     import compilers
 
@@ -101,6 +56,14 @@ def arm_table(flexbody, folder):
 
 # Pages and the marked places in them that `--write` fills.
 TABLES = {}
+# Those of the peers that have a table of their own.
+PLACES = {
+    "calculix.rows": ("docs/fe_programs.md", "calculix"),
+    "nastran.rows": ("docs/fe_programs.md", "nastran"),
+    "abaqus.rows": ("docs/fe_programs.md", "abaqus"),
+    "open_codes.rows": ("docs/recipes.md", "recipes"),
+    "cluster.rows": ("docs/cluster.md", "cluster"),
+}
 # Name, module and function, whether it needs seconds only.
 PEERS = [
     ("Exudyn", "exudyn_bodies.rows", False),
@@ -117,11 +80,11 @@ PEERS = [
     ("meshio", "pictures.meshio", True),
     ("trimesh, pygltflib", "pictures.gltf", True),
     ("validator of glTF", "pictures.validator", True),
-    ("CalculiX", "suite.calculix", True),
-    ("open FE codes", "suite.recipes", True),
-    ("pyNastran, pyYeti", "suite.nastran", True),
-    ("abaqus-mtx-parser", "suite.abaqus", True),
-    ("SLEPc over MPI", "suite.cluster", True),
+    ("CalculiX", "calculix.rows", True),
+    ("open FE codes", "open_codes.rows", True),
+    ("pyNastran, pyYeti", "nastran.rows", True),
+    ("abaqus-mtx-parser", "abaqus.rows", True),
+    ("SLEPc over MPI", "cluster.rows", True),
 ]
 
 
@@ -150,6 +113,8 @@ def measure(flexbody, small):
                 rows = [Row(name, where, "runs (1: no)", 1.0, 0.0)]
         for row in rows:
             print(f"  {'good' if row.good() else 'BAD '} {row.found:8.1e} (limit {row.limit:.0e}) {row.what}", flush=True)
+        if where in PLACES:
+            TABLES[PLACES[where]] = table(rows, [])
         found += rows
     return found, absent
 

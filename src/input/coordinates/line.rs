@@ -1,7 +1,7 @@
 //! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect
 //! and says what is wrong.
 
-use super::{Entry, excerpt, most_entries, written_digits};
+use super::{COUNTED, Entry, excerpt, most_entries, written_digits};
 use crate::base::diagnostic::Code;
 
 /// What the header says about every line.
@@ -35,9 +35,6 @@ pub(super) struct Piece {
     /// Largest number of significant digits of a value as written, of the first entries of the piece.
     pub written: u8,
 }
-
-/// Entries per piece whose written digits are counted.
-const COUNTED: usize = 512;
 
 /// Parses whole lines.
 pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {

@@ -33,9 +33,7 @@ impl JobReader for Abaqus {
     }
 
     fn recognises(&self, path: &Path) -> bool {
-        is_deck(path)
-            && (Matrices::beside(path).is_ok()
-                || Deck::read(path).is_ok_and(|deck| abaqus_substructure::file_of(&deck, path).is_some()))
+        is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
     }
 
     fn read(&self, path: &Path) -> Found<JobModel> {
@@ -61,6 +59,16 @@ impl JobReader for Abaqus {
             diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
         })
     }
+}
+
+/// The file of the substructure that a deck names, which is read where the matrices of the whole model are not
+/// there.
+pub(super) fn substructure_of(path: &Path) -> Option<PathBuf> {
+    if !is_deck(path) || Matrices::beside(path).is_ok() {
+        return None;
+    }
+    let deck = Deck::read(path).ok()?;
+    abaqus_substructure::file_of(&deck, path).map(|(file, _)| file)
 }
 
 /// Matrices and what their rows stand for.

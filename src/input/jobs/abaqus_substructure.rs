@@ -7,16 +7,13 @@ use super::{Found, both, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Storage, assemble, check_size};
 use crate::input::coordinates::{excerpt, line_aligned, lines, real};
-use crate::input::digits::written_digits;
+use crate::input::digits::{COUNTED, written_digits};
 use crate::input::table::integer;
 use crate::model::{DofLabel, RawMatrix};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 const HELP: &str = "write it with *SUBSTRUCTURE MATRIX OUTPUT, STIFFNESS=YES, MASS=YES, OUTPUT FILE=USER DEFINED, FILE NAME=part (without .mtx)";
-
-/// Values of a piece of a file whose digits are counted.
-const COUNTED: usize = 512;
 
 /// A model condensed to some of its nodes.
 pub(super) struct Substructure {

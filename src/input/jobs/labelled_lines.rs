@@ -7,7 +7,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::{excerpt, line_aligned, lines, most_entries, real};
-use crate::input::digits::written_digits;
+use crate::input::digits::{COUNTED, written_digits};
 use crate::input::recent::Recent;
 use crate::input::table::integer;
 use crate::model::{DofLabel, RawMatrix};
@@ -16,9 +16,6 @@ use std::path::Path;
 
 /// Bad lines of a file that are told one by one.
 const SHOWN: usize = 5;
-
-/// Entries of a piece whose written digits are counted.
-const COUNTED: usize = 512;
 
 /// Pieces of a file that are read before its pages are given back.
 const PIECES_AT_ONCE: usize = 64;
