@@ -23,10 +23,10 @@ from elements import shell_rectangle
 from make_block import write_manifest
 from make_tet10 import write_lower
 
-RADIUS, ANGLE, THICKNESS = 1.0, 2 * np.pi / 3, 0.005
+RADIUS, ANGLE = 1.0, 2 * np.pi / 3
 
 
-def panel(cells):
+def panel(cells, thickness):
     """Nodes along the arc first, and strips: nodes of their elements, stiffness and mass of one."""
     angles = np.linspace(-ANGLE / 2, ANGLE / 2, cells + 1)
     arc = RADIUS * np.column_stack([np.sin(angles), np.cos(angles)])
@@ -40,7 +40,7 @@ def panel(cells):
         along = np.array([chord[0], 0.0, chord[1]]) / length
         across = np.array([0.0, 1.0, 0.0])
         axes = np.array([along, across, np.cross(along, across)])
-        matrices = shell_rectangle((length, width), axes, THICKNESS, (2.1e11, 0.3, 7850.0))
+        matrices = shell_rectangle((length, width), axes, thickness, (2.1e11, 0.3, 7850.0))
         first = i + (cells + 1) * np.arange(cells)
         nodes = np.stack([first, first + 1, first + cells + 2, first + cells + 1], axis=1)
         strips.append((nodes, *matrices))
@@ -64,9 +64,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--dofs", type=int, default=6000, help="about this many degrees of freedom")
+    parser.add_argument("--thickness", type=float, default=0.005, help="in metres; the radius is one")
     args = parser.parse_args()
     began = time.perf_counter()
-    points, strips = panel(max(1, round((args.dofs / 6) ** 0.5) - 1))
+    points, strips = panel(max(1, round((args.dofs / 6) ** 0.5) - 1), args.thickness)
     size = 6 * len(points)
     args.folder.mkdir(parents=True, exist_ok=True)
     name = args.folder.resolve().name

@@ -4,8 +4,8 @@
     mpiexec -n 64 python3 driver.py DIR [--solver mumps|slices|gamg] [--keep-every N] [PETSc options]
 
 reads K, M and the rigid modes in PETSc's binary form, finds the modes that `prepared.jsonl` asks for, counts by the
-inertia of K - sigma M whether one is missing, and writes `modes.petsc` and `result.jsonl`, from which `flexbody
-assemble DIR` makes the body. Converged modes are kept in `checkpoint.jsonl` on the way: the same command goes on from
+inertia of K - sigma M whether one is missing, multiplies modes, rigid modes and turned modes by M and with each other,
+and writes `modes.petsc`, `condensed.petsc` and `result.jsonl`, from which `flexbody assemble DIR` makes the body. Converged modes are kept in `checkpoint.jsonl` on the way: the same command goes on from
 them. Every other option goes to PETSc, as `-st_mat_mumps_icntl_14 50`.
 
     mumps   Krylov-Schur, shift-invert, one factor of K + tau M by MUMPS
@@ -30,6 +30,7 @@ EXTRA = 4  # eigenvalues beyond the wanted ones: they show where the last cluste
 SEARCHED = 0.1  # part of the promised residual that the driver aims at
 ATTEMPTS = 4  # searches for modes that the count misses
 SLICE = 60  # modes in one part of the spectrum
+PANEL = 64  # columns that are multiplied by M at a time
 
 
 def import_packages():
@@ -587,11 +588,13 @@ def complete(run, wanted, counted):
 
 
 def write_result(run, end, count, wanted):
-    digest = run.write_vectors("modes.petsc", run.found[:end])
+    modes = run.found[:end]
+    condensed = run.write_vectors("condensed.petsc", spread(condense(run, modes)))
+    digest = run.write_vectors("modes.petsc", modes)
     version = ".".join(map(str, PETSc.Sys.getVersion()))
     if count:
         count["by"] = f"MUMPS of PETSc {version}"
-    run.time("writing")
+    run.time("condensation and writing")
     beyond = run.eigenvalues[end:]
     content = {
         "matrices": run.prepared["matrices"],
@@ -599,6 +602,7 @@ def write_result(run, end, count, wanted):
         "modes": end,
         "index_bytes": run.prepared["index_bytes"],
         "modes_sha256": digest,
+        "condensed_sha256": condensed,
         "eigenvalues": run.eigenvalues[:end],
         "residuals": run.residuals[:end],
         "next_eigenvalue": beyond[0] if beyond else None,
@@ -616,6 +620,36 @@ def write_result(run, end, count, wanted):
         for part in run.parts:
             run.remove(part["file"])
     PETSc.COMM_WORLD.barrier()
+
+
+def condense(run, modes):
+    """X' M X of X = [rigid modes, T_b modes for each axis b, modes]; T_b turns displacements about b. Every product runs on all ranks."""
+    x = list(run.rigid)
+    for name in run.prepared["turns"]:
+        turn = run.matrix(name, run.prepared["block_size"])
+        for mode in modes:
+            turned = run.stiffness.createVecRight()
+            turn.mult(mode, turned)
+            x.append(turned)
+        turn.destroy()
+    x += modes
+    block, count = block_of(x), len(x)
+    products = np.zeros((count, count))
+    for first in range(0, count, PANEL):
+        panel = product(run.mass, block_of(x[first : first + PANEL]))
+        products[:, first : first + PANEL] = x_dot(block, panel).getDenseArray()
+    return 0.5 * (products + products.T)
+
+
+def spread(columns):
+    """The columns of an array that every rank has, as vectors of all ranks."""
+    vectors = []
+    for column in columns.T:
+        vector = PETSc.Vec().createMPI(len(column), comm=PETSc.COMM_WORLD)
+        own = slice(*vector.getOwnershipRange())
+        vector.getArray()[:] = column[own]
+        vectors.append(vector)
+    return vectors
 
 
 def hertz(run):

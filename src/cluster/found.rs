@@ -1,5 +1,6 @@
-//! What a cluster found: `result.jsonl` and `modes.petsc`, held to the model and to what was prepared.
+//! What a cluster found: `result.jsonl`, `modes.petsc` and `condensed.petsc`, held to the model and to what was prepared.
 
+use super::condensed::{CONDENSED_ROUNDING, Condensed};
 use super::petsc::{IndexBytes, read_vector};
 use super::prepare::{index_bytes, matrices_of};
 use super::prepared::Prepared;
@@ -8,9 +9,9 @@ use super::sealed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, sha256_of_file};
-use crate::body::basis::{CountElsewhere, SolvedModes};
+use crate::body::basis::{CountElsewhere, SolvedModes, rigid_modes};
 use crate::model::FeModel;
-use faer::Mat;
+use faer::{Mat, MatRef};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,6 +21,7 @@ use std::path::Path;
 const RESULT: &str = "result.jsonl";
 const CHECKPOINT: &str = "checkpoint.jsonl";
 const MODES: &str = "modes.petsc";
+const CONDENSED: &str = "condensed.petsc";
 
 /// What the driver writes.
 #[derive(Debug, Clone, Deserialize)]
@@ -28,6 +30,8 @@ struct ResultFile {
     modes: usize,
     index_bytes: u64,
     modes_sha256: String,
+    /// Not in the results of earlier programs.
+    condensed_sha256: Option<String>,
     eigenvalues: Vec<f64>,
     next_eigenvalue: Option<f64>,
     count: Option<CountFile>,
@@ -79,7 +83,8 @@ pub struct Found {
 /// # Errors
 /// [`ClusterForeign`](Code::ClusterForeign) where the matrices are others,
 /// [`ClusterUnfinished`](Code::ClusterUnfinished) where there is no result,
-/// [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable).
+/// [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable),
+/// [`ClusterInaccurate`](Code::ClusterInaccurate) where its products of condensation are not those of M.
 pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bool) -> Result<Found> {
     let order = RowOrder::of(model);
     let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
@@ -108,7 +113,13 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         let by = format!("{by} ({} ranks)", result.ranks);
         CountElsewhere { negative, zero, shift, by }
     });
-    let vectors = read_modes(&folder.join(MODES), &result, model, &order)?;
+    let n = model.stiffness().n();
+    let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
+    let vectors = file.read((n, result.modes), index_bytes(result.index_bytes)?)?;
+    let vectors = order.to_internal(vectors.as_ref());
+    if let Some(digest) = &result.condensed_sha256 {
+        hold_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
+    }
     let told = format!(
         "SLEPc {}, PETSc {}, solver `{}` on {} ranks",
         result.slepc, result.petsc, result.solver, result.ranks
@@ -137,28 +148,57 @@ fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
     Diagnostic::new(Code::ClusterUnfinished, message).in_file(folder).into()
 }
 
-/// The vectors of a file, by internal rows, whose bytes are those that the driver wrote.
-fn read_modes(path: &Path, result: &ResultFile, model: &FeModel, order: &RowOrder) -> Result<Mat<f64>> {
-    let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
-    let digest = sha256_of_file(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
-    if digest != result.modes_sha256 {
-        let message = "the modes are not those that the result was written with";
-        return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(path).into());
+/// Refuses products of condensation that are not those of M.
+fn hold_condensation(
+    path: &Path,
+    digest: &str,
+    result: &ResultFile,
+    model: &FeModel,
+    order: &RowOrder,
+    modes: MatRef<'_, f64>,
+) -> Result<()> {
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let condensed = Condensed { model, order, rigid: rigid.as_ref(), modes };
+    let (columns, file) = (condensed.columns(), Vectors { path, digest, of: "products of condensation" });
+    let products = file.read((columns, columns), index_bytes(result.index_bytes)?)?;
+    let difference = condensed.difference(products.as_ref());
+    if difference <= CONDENSED_ROUNDING {
+        return Ok(());
     }
-    let (index, n) = (index_bytes(result.index_bytes)?, model.stiffness().n());
-    let file = File::open(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
-    columns(BufReader::with_capacity(1 << 20, file), result.modes, n, order, index)
-        .map_err(|e| unreadable(format!("file cannot be read: {e}")))?
-        .ok_or_else(|| {
-            unreadable(format!("file does not hold {} vectors of {n} finite numbers", result.modes))
-        })
+    let message = format!(
+        "the products of condensation are not those of the mass matrix: they differ by {difference:.0e}, rounding explains {CONDENSED_ROUNDING:.0e}"
+    );
+    Err(Diagnostic::new(Code::ClusterInaccurate, message).in_file(path).into())
+}
+
+/// A file of vectors whose bytes have to be those that the driver wrote.
+struct Vectors<'a> {
+    path: &'a Path,
+    digest: &'a str,
+    /// What the vectors are, in words.
+    of: &'static str,
+}
+
+impl Vectors<'_> {
+    /// So many columns of so many rows, as they stand in the file.
+    fn read(&self, (n, count): (usize, usize), index: IndexBytes) -> Result<Mat<f64>> {
+        let unreadable =
+            |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(self.path));
+        let failed = |e: std::io::Error| unreadable(format!("file cannot be read: {e}"));
+        if sha256_of_file(self.path).map_err(failed)? != self.digest {
+            let message = format!("the {} are not those that the result was written with", self.of);
+            return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
+        }
+        let file = File::open(self.path).map_err(failed)?;
+        columns(BufReader::with_capacity(1 << 20, file), (n, count), index)
+            .map_err(failed)?
+            .ok_or_else(|| unreadable(format!("file does not hold {count} vectors of {n} finite numbers")))
+    }
 }
 
 fn columns(
     mut file: impl Read,
-    count: usize,
-    n: usize,
-    order: &RowOrder,
+    (n, count): (usize, usize),
     index: IndexBytes,
 ) -> std::io::Result<Option<Mat<f64>>> {
     let mut all = Mat::zeros(n, count);
@@ -167,7 +207,7 @@ fn columns(
         if column.iter().any(|value| !value.is_finite()) {
             return Ok(None);
         }
-        order.to_internal(&column, |row, value| all[(row, j)] = value);
+        column.iter().enumerate().for_each(|(i, value)| all[(i, j)] = *value);
     }
     Ok(Some(all))
 }

@@ -1,7 +1,6 @@
 //! Matrices and vectors in PETSc's binary form: written as `MatLoad` and `VecLoad` read them, vectors read as
 //! `VecView` writes them. All numbers are big-endian.
 
-use super::row_order::WrittenRows;
 use crate::base::provenance::Fingerprint;
 use faer::MatRef;
 use std::io::{BufWriter, Read, Result, Write};
@@ -95,8 +94,20 @@ fn sealing<W: Write>(out: W, fill: impl FnOnce(&mut BufWriter<Sealing<W>>) -> Re
     Ok(sealing.fingerprint.hex())
 }
 
+/// A square matrix, told row by row.
+pub(super) trait Rows {
+    /// Number of rows.
+    fn n(&self) -> usize;
+
+    /// Number of entries of all rows.
+    fn entries(&self) -> u64;
+
+    /// Columns, ascending, and values of a row, in place of what `entries` held.
+    fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>);
+}
+
 /// Writes a matrix, one row after the other, without a copy of it; the SHA-256 of the bytes.
-pub(super) fn write_matrix(out: impl Write, rows: &WrittenRows<'_>, index: IndexBytes) -> Result<String> {
+pub(super) fn write_matrix(out: impl Write, rows: &impl Rows, index: IndexBytes) -> Result<String> {
     let (n, mut entries) = (rows.n(), Vec::new());
     sealing(out, |to| {
         for number in [MATRIX, n as i64, n as i64, rows.entries() as i64] {

@@ -1,10 +1,10 @@
-//! K, M, rigid modes, what is wanted and the driver, in a folder that is all a cluster needs.
+//! K, M, rigid modes, matrices that turn displacements, what is wanted and the driver, in a folder that is all a cluster needs.
 
-use super::petsc::{IndexBytes, write_matrix, write_vectors};
+use super::petsc::{IndexBytes, Rows, write_matrix, write_vectors};
 use super::prepared::{
-    DRIVER, FORMAT, MASS, ModelReference, PREPARED, Prepared, RIGID, STIFFNESS, WantedModes,
+    DRIVER, FORMAT, MASS, ModelReference, PREPARED, Prepared, RIGID, STIFFNESS, WantedModes, turn_file,
 };
-use super::row_order::{RowOrder, WrittenRows};
+use super::row_order::{RowOrder, TurnedRows, WrittenRows};
 use super::sealed::seal;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -78,6 +78,10 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
     writing.file(STIFFNESS, |file| write_matrix(file, &stiffness, index))?;
     writing.file(MASS, |file| write_matrix(file, &mass, index))?;
     writing.file(RIGID, |file| write_vectors(file, order.to_written(rigid.as_ref()).as_ref(), index))?;
+    let turned = TurnedRows::of(model, &order);
+    for (axis, rows) in &turned {
+        writing.file(&turn_file(*axis), |file| write_matrix(file, rows, index))?;
+    }
     writing.text(DRIVER, DRIVER_SOURCE)?;
     let units = model.units();
     let prepared = Prepared {
@@ -97,6 +101,7 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
         residual: settings.accuracy.residual(),
         cluster_gap: CLUSTER_GAP,
         shift,
+        turns: turned.iter().map(|(axis, _)| turn_file(*axis)).collect(),
         matrices: matrices(&writing.files[STIFFNESS], &writing.files[MASS]),
         files: writing.files.clone(),
     };

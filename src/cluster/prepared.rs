@@ -17,6 +17,11 @@ pub(super) const MASS: &str = "mass.petsc";
 pub(super) const RIGID: &str = "rigid.petsc";
 pub(super) const DRIVER: &str = "driver.py";
 
+/// Name of the file of the matrix that turns displacements about an axis.
+pub(super) fn turn_file(axis: usize) -> String {
+    format!("turn-{}.petsc", ["x", "y", "z"][axis])
+}
+
 /// Where a model is read from again, when its body is made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ModelReference {
@@ -95,6 +100,9 @@ pub struct Prepared {
     pub cluster_gap: f64,
     /// tau of K + tau M, positive.
     pub shift: f64,
+    /// Files of the matrices T_b that turn displacements about the axes b; none in folders of earlier programs.
+    #[serde(default)]
+    pub turns: Vec<String>,
     /// SHA-256 of each file.
     pub files: BTreeMap<String, String>,
     /// Fingerprint of K and M together.

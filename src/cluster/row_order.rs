@@ -1,6 +1,7 @@
 //! The order of rows in files for other solvers: node by node, with the rotations of a node behind its
 //! displacements. Rows of one node then lie on one rank, and multigrid sees blocks.
 
+use super::petsc::Rows;
 use crate::model::FeModel;
 use crate::numerics::linalg::SymmetricMatrix;
 use faer::{Mat, MatRef};
@@ -45,11 +46,55 @@ impl RowOrder {
         Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| columns[(self.internal[i] as usize, j)])
     }
 
-    /// A column in the order of the files, by internal rows.
-    pub fn to_internal(&self, written: &[f64], mut internal: impl FnMut(usize, f64)) {
-        for (&to, &value) in self.internal.iter().zip(written) {
-            internal(to as usize, value);
+    /// Columns in the order of the files by internal rows.
+    pub fn to_internal(&self, columns: MatRef<'_, f64>) -> Mat<f64> {
+        Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| columns[(self.written[i] as usize, j)])
+    }
+}
+
+/// The matrix that turns displacements by one radian about an axis b: psi becomes e_b x psi at every node, and
+/// other rows become zero. The turned shapes T_b Psi carry what the invariants have beside M and the moments of
+/// the rigid modes: their products with M are the integrals of psi_k psi_l that W2 and W3 are made of.
+pub(super) struct TurnedRows<'a> {
+    order: &'a RowOrder,
+    axis: usize,
+    dimension: usize,
+    displacements: usize,
+}
+
+impl<'a> TurnedRows<'a> {
+    /// About every axis about which a body of this model turns: about the third alone in the plane.
+    pub fn of(model: &FeModel, order: &'a RowOrder) -> Vec<(usize, Self)> {
+        let (dimension, displacements) = (model.dimension(), model.rows().displacements());
+        let axes = if dimension == 2 { 2..3 } else { 0..3 };
+        axes.map(|axis| (axis, Self { order, axis, dimension, displacements })).collect()
+    }
+
+    /// Which internal row a row takes its value from, and with which sign; `None` for rows of zeros.
+    pub fn source(&self, internal: usize) -> Option<(usize, f64)> {
+        let (vertex, to) = (internal / self.dimension, internal % self.dimension);
+        if internal >= self.displacements || to == self.axis {
+            return None;
         }
+        // (e_b x psi)_k = psi_l where (k, b, l) is cyclic, and -psi_l where it is not.
+        let sign = if self.axis == (to + 1) % 3 { 1.0 } else { -1.0 };
+        Some((vertex * self.dimension + 3 - self.axis - to, sign))
+    }
+}
+
+impl Rows for TurnedRows<'_> {
+    fn n(&self) -> usize {
+        self.order.internal.len()
+    }
+
+    fn entries(&self) -> u64 {
+        (0..self.n()).filter(|&row| self.source(row).is_some()).count() as u64
+    }
+
+    fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
+        entries.clear();
+        let source = self.source(self.order.internal[row] as usize);
+        entries.extend(source.map(|(from, sign)| (self.order.written[from], sign)));
     }
 }
 
@@ -60,15 +105,13 @@ pub(super) struct WrittenRows<'a> {
     pub order: &'a RowOrder,
 }
 
-impl WrittenRows<'_> {
-    /// Number of rows.
-    pub fn n(&self) -> usize {
+impl Rows for WrittenRows<'_> {
+    fn n(&self) -> usize {
         self.matrix.n() * self.block
     }
 
-    /// Columns and values of a row, ascending. The diagonal is there even where it is zero, since solvers
-    /// need its place.
-    pub fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
+    /// The diagonal is there even where it is zero, since solvers need its place.
+    fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
         entries.clear();
         let internal = self.order.internal[row] as usize;
         let (vertex, component) = (internal / self.block, internal % self.block);
@@ -83,8 +126,7 @@ impl WrittenRows<'_> {
         }
     }
 
-    /// Number of entries that are written.
-    pub fn entries(&self) -> u64 {
+    fn entries(&self) -> u64 {
         let matrix = self.matrix;
         let stored = |i: usize| {
             let (columns, _) = matrix.row(i);

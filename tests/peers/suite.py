@@ -63,6 +63,7 @@ PLACES = {
     "abaqus.rows": ("docs/fe_programs.md", "abaqus"),
     "open_codes.rows": ("docs/recipes.md", "recipes"),
     "cluster.rows": ("docs/cluster.md", "cluster"),
+    "cluster.large": ("docs/cluster.md", "cluster-large"),
 }
 # Name, module and function, whether it needs seconds only.
 PEERS = [
@@ -85,6 +86,7 @@ PEERS = [
     ("pyNastran, pyYeti", "nastran.rows", True),
     ("abaqus-mtx-parser", "abaqus.rows", True),
     ("SLEPc over MPI", "cluster.rows", True),
+    ("SLEPc over MPI, large bodies", "cluster.large", False),
 ]
 
 

@@ -6,11 +6,12 @@ use crate::support::program::{fixtures, flexbody, members};
 use faer::Mat;
 use flexbody::base::progress::SILENT;
 use flexbody::base::provenance::sha256_hex;
-use flexbody::body::basis::{ModeSettings, free_surface};
+use flexbody::body::basis::{ModeSettings, free_surface, rigid_modes};
 use flexbody::cluster::Budget;
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::FeModel;
 use flexbody::numerics::eigen::Wanted;
+use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,7 @@ struct Job {
     place: TempDir,
     vectors: Mat<f64>,
     result: Value,
+    model: FeModel,
 }
 
 fn manifest(model: &str) -> PathBuf {
@@ -39,6 +41,35 @@ fn sealed(format: &str, content: &Value) -> String {
 fn content(path: &Path) -> Value {
     let text = fs::read_to_string(path).expect("a file");
     serde_json::from_str(text.lines().nth(1).expect("two lines")).expect("JSON")
+}
+
+/// X' M X of X = [rigid modes, e_b x modes for each axis b, modes] of a solid.
+fn condensed(model: &FeModel, modes: &Mat<f64>) -> Mat<f64> {
+    let rigid = rigid_modes(model, &model.pencil()).expect("rigid modes");
+    let (n, count, first) = (modes.nrows(), modes.ncols(), rigid.ncols());
+    let x = Mat::from_fn(n, first + 4 * count, |row, j| {
+        match j.checked_sub(first).map(|j| (j / count, j % count)) {
+            None => rigid[(row, j)],
+            Some((3, mode)) => modes[(row, mode)],
+            Some((axis, mode)) => {
+                let node = row - row % 3;
+                let shape = Vector3::from_fn(|k, _| modes[(node + k, mode)]);
+                Vector3::ith(axis, 1.0).cross(&shape)[row % 3]
+            }
+        }
+    });
+    x.transpose() * model.pencil().apply_mass(x.as_ref())
+}
+
+/// Columns as PETSc writes vectors.
+fn petsc(columns: &Mat<f64>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for j in 0..columns.ncols() {
+        bytes.extend(1_211_214_i32.to_be_bytes());
+        bytes.extend((columns.nrows() as i32).to_be_bytes());
+        columns.col(j).iter().for_each(|value| bytes.extend(value.to_be_bytes()));
+    }
+    bytes
 }
 
 impl Job {
@@ -61,7 +92,7 @@ impl Job {
             "count": { "negative": completeness.negative_pivots, "zero": 0, "shift": completeness.shift, "by": "the tests" },
             "solver": "mumps", "slepc": "0", "petsc": "0", "ranks": 2, "seconds": {}, "factor": {},
         });
-        Self { place, vectors: found.vectors, result }
+        Self { place, vectors: found.vectors, result, model }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -70,14 +101,17 @@ impl Job {
 
     /// Writes the result as it stands.
     fn write(&mut self) {
-        let mut bytes = Vec::new();
-        for j in 0..self.vectors.ncols() {
-            bytes.extend(1_211_214_i32.to_be_bytes());
-            bytes.extend((self.vectors.nrows() as i32).to_be_bytes());
-            self.vectors.col(j).iter().for_each(|value| bytes.extend(value.to_be_bytes()));
-        }
+        let bytes = petsc(&self.vectors);
         self.result["modes_sha256"] = sha256_hex(&bytes).into();
         fs::write(self.path("modes.petsc"), bytes).expect("written");
+        self.write_condensed(&condensed(&self.model, &self.vectors));
+    }
+
+    /// Writes the result with these products of condensation.
+    fn write_condensed(&mut self, products: &Mat<f64>) {
+        let bytes = petsc(products);
+        self.result["condensed_sha256"] = sha256_hex(&bytes).into();
+        fs::write(self.path("condensed.petsc"), bytes).expect("written");
         fs::write(self.path("result.jsonl"), sealed("flexbody-result", &self.result)).expect("written");
     }
 
@@ -102,8 +136,10 @@ impl Job {
 fn a_body_of_a_cluster_is_that_of_the_built_in_engine() {
     let mut job = Job::new("bracket_hex20");
     job.write();
-    let names = ["driver.py", "mass.petsc", "modes.petsc", "prepared.jsonl", "result.jsonl", "rigid.petsc"];
-    assert_eq!(members(&job.path("")), [&names[..], &["stiffness.petsc"]].concat());
+    let names =
+        ["condensed.petsc", "driver.py", "mass.petsc", "modes.petsc", "prepared.jsonl", "result.jsonl"];
+    let more = ["rigid.petsc", "stiffness.petsc", "turn-x.petsc", "turn-y.petsc", "turn-z.petsc"];
+    assert_eq!(members(&job.path("")), [&names[..], &more].concat());
     let (exit, said) = job.assemble(&[]);
     assert_eq!(exit, 0, "{said}");
     assert!(said.contains("by the tests (2 ranks)") && said.contains("not recomputed"), "{said}");
@@ -170,6 +206,32 @@ fn what_the_model_or_the_result_contradicts_is_refused() {
     job.result["count"]["negative"] = counted.into();
     job.write();
     assert_eq!(job.assemble(&[]).0, 0, "the result as it was is taken");
+}
+
+#[test]
+fn products_of_condensation_are_held_to_the_mass_matrix() {
+    let mut job = Job::new("bracket_hex20");
+    job.write();
+    let whole = condensed(&job.model, &job.vectors);
+    let last = whole.ncols() - 1;
+    for (i, j) in [(0, 0), (3, last), (8, 8), (last, last)] {
+        let mut products = whole.clone();
+        products[(i, j)] += 1e-9 * whole[(i, i)].abs().max(1e-3);
+        job.write_condensed(&products);
+        job.refused(&[], "FB764", 3, "products of condensation are not those of the mass matrix");
+    }
+    job.write_condensed(&whole.subcols(0, last).to_owned());
+    job.refused(&[], "FB760", 2, "cannot be read");
+    job.write_condensed(&whole);
+    assert_eq!(job.assemble(&[]).0, 0);
+    let mut bytes = fs::read(job.path("condensed.petsc")).expect("a file");
+    bytes[100] ^= 1;
+    fs::write(job.path("condensed.petsc"), &bytes).expect("written");
+    job.refused(&[], "FB761", 1, "the products of condensation are not those");
+    // Drivers of earlier programs did not make them.
+    job.result.as_object_mut().expect("a table").remove("condensed_sha256");
+    fs::write(job.path("result.jsonl"), sealed("flexbody-result", &job.result)).expect("written");
+    assert_eq!(job.assemble(&[]).0, 0);
 }
 
 #[test]

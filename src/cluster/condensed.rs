@@ -1,0 +1,85 @@
+//! The products of condensation that a cluster makes: G = X' M X of X = [Phi, T_b Psi for each axis b, Psi], where
+//! Phi are the rigid modes, Psi the modes and T_b turns displacements about the axis b. G holds every integral of
+//! positions and shapes that the invariants are made of. They are computed anew from M here;
+//! G is held to M, so that a cluster that multiplied wrongly does not go unnoticed.
+
+use super::row_order::{RowOrder, TurnedRows};
+use crate::model::FeModel;
+use crate::numerics::linalg::uniform;
+use faer::{Mat, MatRef};
+
+/// Columns of random numbers by which G is tried.
+const TRIALS: usize = 2;
+const SEED: u64 = 21;
+
+/// Largest difference of G v and X' M X v that rounding explains, relative to the norms of the columns of X and of
+/// X v in the mass.
+pub(super) const CONDENSED_ROUNDING: f64 = 1e-11;
+
+/// X, without its columns.
+pub(super) struct Condensed<'a> {
+    pub model: &'a FeModel,
+    pub order: &'a RowOrder,
+    pub rigid: MatRef<'a, f64>,
+    pub modes: MatRef<'a, f64>,
+}
+
+impl Condensed<'_> {
+    /// Number of columns of X.
+    pub fn columns(&self) -> usize {
+        let turns = TurnedRows::of(self.model, self.order).len();
+        self.rigid.ncols() + (turns + 1) * self.modes.ncols()
+    }
+
+    /// Largest difference of G v and X' M X v for random columns v, relative to sqrt(max G_ii) sqrt(v' G v):
+    /// by Cauchy and Schwarz, the largest that an entry of G v can be.
+    pub fn difference(&self, g: MatRef<'_, f64>) -> f64 {
+        let v = Mat::from_fn(self.columns(), TRIALS, |i, j| uniform(SEED, i as u64, j as u64));
+        let momentum = self.model.pencil().apply_mass(self.combined(v.as_ref()).as_ref());
+        let (own, given) = (self.projected(momentum.as_ref()), g * &v);
+        let largest = (0..g.nrows()).map(|i| g[(i, i)]).fold(0.0, f64::max);
+        let mut worst = 0.0_f64;
+        for j in 0..TRIALS {
+            let size = (largest * (v.col(j).transpose() * own.col(j))).sqrt();
+            let relative = (given.col(j) - own.col(j)).norm_max() / size;
+            worst = if relative.is_finite() { worst.max(relative) } else { f64::INFINITY };
+        }
+        worst
+    }
+
+    /// Where the columns of X that are no rigid modes begin: one block of turned modes for each axis, then the modes.
+    fn block(&self, of: usize) -> usize {
+        self.rigid.ncols() + of * self.modes.ncols()
+    }
+
+    /// X v.
+    fn combined(&self, v: MatRef<'_, f64>) -> Mat<f64> {
+        let (turns, count) = (TurnedRows::of(self.model, self.order), self.modes.ncols());
+        let part = |of: usize| self.modes * v.subrows(self.block(of), count);
+        let mut sum = self.rigid * v.subrows(0, self.rigid.ncols()) + part(turns.len());
+        for (of, (_, turned)) in turns.iter().enumerate() {
+            let shapes = part(of);
+            for row in 0..sum.nrows() {
+                let Some((from, sign)) = turned.source(row) else { continue };
+                (0..v.ncols()).for_each(|j| sum[(row, j)] += sign * shapes[(from, j)]);
+            }
+        }
+        sum
+    }
+
+    /// X' w.
+    fn projected(&self, w: MatRef<'_, f64>) -> Mat<f64> {
+        let (turns, count) = (TurnedRows::of(self.model, self.order), self.modes.ncols());
+        let mut all = Mat::zeros(self.columns(), w.ncols());
+        all.subrows_mut(0, self.rigid.ncols()).copy_from(self.rigid.transpose() * w);
+        for (of, (_, turned)) in turns.iter().enumerate() {
+            // The transpose of T_b is -T_b.
+            let back = Mat::from_fn(w.nrows(), w.ncols(), |row, j| {
+                turned.source(row).map_or(0.0, |(from, sign)| -sign * w[(from, j)])
+            });
+            all.subrows_mut(self.block(of), count).copy_from(self.modes.transpose() * back);
+        }
+        all.subrows_mut(self.block(turns.len()), count).copy_from(self.modes.transpose() * w);
+        all
+    }
+}
