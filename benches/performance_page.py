@@ -76,9 +76,9 @@ class Results:
         """Of the factor, by its bytes per entry."""
         return "f32" if self.factor_bytes(case) < 6 * self.counter(case, "factor_len") else "f64"
 
-    def tier(self, case, tier):
-        """Wall seconds of a tier."""
-        return self.tiers.get(case, {}).get("tiers", {}).get(tier, {}).get("wall_s")
+    def tier(self, case, tier, what="wall_s"):
+        """A figure of a tier."""
+        return self.tiers.get(case, {}).get("tiers", {}).get(tier, {}).get(what)
 
     def factor_rate(self, case, threads):
         """GF/s of the factorisation, and its part of the matrix product's rate."""
@@ -116,6 +116,9 @@ def targets(r):
     ]
     for case, tier, seconds in TIER_SECONDS:
         found.append((f"{case}, `{tier}`: wall s", seconds, r.tier(case, tier), False))
+    many = over(r.tier("block-100k-200-modes", "standard"), r.tier("block-100k", "standard"))
+    found.append(("block-100k, `standard`: wall with 200 modes over 20", 4, many, False))
+    found.append(("cube-3m, `fast`: peak memory, MB", 24000, r.tier("cube-3m", "fast", "memory_mb"), False))
     for case in r.cases:
         if (r.dofs(case) or 0) > 90000:
             found.append((f"{case}: wall, 1 thread over 2", 1.6, over(ours(case, "wall_s", 1), ours(case, "wall_s")), True))

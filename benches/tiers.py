@@ -13,6 +13,7 @@ import argparse
 import json
 import shutil
 import subprocess
+from dataclasses import dataclass
 from statistics import median
 
 import performance
@@ -20,21 +21,30 @@ import performance_page
 
 # What `compare` calls the constants of the equations of motion that hang on the modes.
 INVARIANTS = ("C1", "Ibar (W1, C2)", "S (W2, W3, m_ff)")
-# Tiers that are run: a million rows have no certified bounds in the memory of a workstation, rotations of nodes have none at all.
+
+
+@dataclass(frozen=True)
+class Case:
+    model: performance.Case
+    tiers: tuple
+    modes: int = performance.MODES
+
+
+ALL = ("fast", "standard", "certified")
+# Without certified bounds: a million rows have no room for them in a workstation, rotations of nodes have none at all.
+MODES_ALONE = ("fast", "standard")
 CASES = {
-    "block-100k": ("fast", "standard", "certified"),
-    "cube-100k": ("fast", "standard", "certified"),
-    "tet10-100k": ("fast", "standard", "certified"),
-    "plate-50k": ("fast", "standard", "certified"),
-    "cube-300k": ("fast", "standard", "certified"),
-    "shell-200k": ("fast", "standard"),
-    "cube-1m": ("fast", "standard"),
+    **{name: Case(performance.CASES[name], ALL) for name in ("block-100k", "cube-100k", "tet10-100k", "plate-50k", "cube-300k")},
+    "block-100k-200-modes": Case(performance.CASES["block-100k"], MODES_ALONE, modes=200),
+    "shell-200k": Case(performance.CASES["shell-200k"], MODES_ALONE),
+    "cube-1m": Case(performance.CASES["cube-1m"], MODES_ALONE),
+    "cube-3m": Case(performance.Case("make_block.py", (*performance.CUBE, "--cells", "99", "99", "99"), 3000000), MODES_ALONE),
 }
 
 
-def convert(args, folder, tier):
+def convert(args, folder, tier, modes):
     body = folder / f"{tier}.flex.h5"
-    words = [args.program, "convert", folder / "model.toml", "-o", body, "--modes", performance.MODES, "--threads", 2, "--accuracy", tier, "--json", "--quiet"]
+    words = [args.program, "convert", folder / "model.toml", "-o", body, "--modes", modes, "--threads", 2, "--accuracy", tier, "--json", "--quiet"]
     text, run = performance.measured(words)
     told = performance.parsed(text)["results"]
     phases = {phase["name"]: round(phase["wall_seconds"], 2) for phase in told["run"]["phases"]}
@@ -52,13 +62,13 @@ def beside(args, folder, tier, reference):
 
 
 def measure(args, name):
-    tiers, folder = CASES[name], args.models / name
-    model = performance.make_model(args, performance.CASES[name], folder)
+    case, folder = CASES[name], args.models / name
+    tiers, model = case.tiers, performance.make_model(args, case.model, folder)
     runs, told = {tier: [] for tier in tiers}, {}
     try:
         for turn in range(1 if model["dofs"] > 500000 else args.runs):
             for tier in tiers if turn % 2 == 0 else reversed(tiers):
-                run, told[tier] = convert(args, folder, tier)
+                run, told[tier] = convert(args, folder, tier, case.modes)
                 runs[tier].append(run)
                 performance.log(f"  {tier}: {run['cpu_s']:.1f} CPU s, {run['wall_s']:.1f} s, {run['memory_mb']:.0f} MB")
         reference = tiers[-1]
@@ -81,7 +91,7 @@ def main():
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES), metavar="CASE", help=f"of {', '.join(CASES)} (default: all)")
     parser.add_argument("--runs", type=int, default=3, help="runs of each tier; a million rows make one (default: 3)")
     parser.add_argument("--keep", action="store_true", help="leave the models where they are")
-    parser.add_argument("--models", type=performance.Path, default=target / "bench-models", help="folder for the models (needs 2 GB)")
+    parser.add_argument("--models", type=performance.Path, default=target / "bench-models", help="folder for the models (needs 6 GB)")
     parser.add_argument("--program", type=performance.Path, default=target / "release" / "flexbody", help="flexbody (default: the release build)")
     parser.add_argument("--python", default=str(target / "peers" / "bin" / "python"), help="interpreter with numpy (default: target/peers)")
     args = parser.parse_args()

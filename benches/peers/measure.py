@@ -58,9 +58,7 @@ def read_matrix(folder, name):
 
 
 def read_model(folder):
-    """K, M (CSR, rows node by node: x y z, with nodal rotations rx ry rz after them) and node positions (n x 3), in the order of
-    dofs.csv; from peers.npz where pack.py made it.
-    """
+    """K, M (CSR, rows node by node, x y z) and node positions (n x 3), in the order of dofs.csv; from peers.npz where pack.py made it."""
     folder = Path(folder)
     if (folder / PACKED).exists():
         with np.load(folder / PACKED) as stored:
@@ -79,8 +77,7 @@ def node_order(folder):
     with open(Path(folder) / files["dofs"]) as table:
         labels = [(int(r["node"]), int(r["dir"])) for r in csv.DictReader(table)]
     nodes = list(dict.fromkeys(node for node, _ in labels))
-    directions = range(1, len(labels) // len(nodes) + 1)
-    assert len(directions) in (3, 6) and labels == [(n, d) for n in nodes for d in directions], "rows must run node by node, x y z or x y z rx ry rz"
+    assert labels == [(n, d) for n in nodes for d in (1, 2, 3)], "rows must run node by node, x y z"
     return nodes
 
 

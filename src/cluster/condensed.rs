@@ -1,7 +1,7 @@
-//! The products of condensation that a cluster makes: G = X' M X of X = [Phi, T_b Psi for each axis b, Psi], where
-//! Phi are the rigid modes, Psi the modes and T_b turns displacements about the axis b. G holds every integral of
-//! positions and shapes that the invariants are made of. They are computed anew from M here;
-//! G is held to M, so that a cluster that multiplied wrongly does not go unnoticed.
+//! The products of condensation that a cluster makes: G = X' M X of X = [Phi, T_b Psi for each axis b, Psi], with
+//! the rigid modes Phi, the modes Psi and the matrix T_b that turns displacements about the axis b. G holds every
+//! integral of positions and shapes that the invariants are made of. They are computed anew from M here; G is held
+//! to M, so that a cluster that multiplied wrongly does not go unnoticed.
 
 use super::row_order::{RowOrder, TurnedRows};
 use crate::model::FeModel;
@@ -12,8 +12,7 @@ use faer::{Mat, MatRef};
 const TRIALS: usize = 2;
 const SEED: u64 = 21;
 
-/// Largest difference of G v and X' M X v that rounding explains, relative to the norms of the columns of X and of
-/// X v in the mass.
+/// Largest difference of G v and X' M X v that rounding explains, as [`Condensed::difference`] has it.
 pub(super) const CONDENSED_ROUNDING: f64 = 1e-11;
 
 /// X, without its columns.
@@ -47,7 +46,7 @@ impl Condensed<'_> {
         worst
     }
 
-    /// Where the columns of X that are no rigid modes begin: one block of turned modes for each axis, then the modes.
+    /// Where a block of columns of X begins, after the rigid modes: turned modes for each axis, then the modes.
     fn block(&self, of: usize) -> usize {
         self.rigid.ncols() + of * self.modes.ncols()
     }

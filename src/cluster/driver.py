@@ -4,9 +4,10 @@
     mpiexec -n 64 python3 driver.py DIR [--solver mumps|slices|gamg] [--keep-every N] [PETSc options]
 
 reads K, M and the rigid modes in PETSc's binary form, finds the modes that `prepared.jsonl` asks for, counts by the
-inertia of K - sigma M whether one is missing, multiplies modes, rigid modes and turned modes by M and with each other,
-and writes `modes.petsc`, `condensed.petsc` and `result.jsonl`, from which `flexbody assemble DIR` makes the body. Converged modes are kept in `checkpoint.jsonl` on the way: the same command goes on from
-them. Every other option goes to PETSc, as `-st_mat_mumps_icntl_14 50`.
+inertia of K - sigma M whether one is missing, multiplies modes, rigid modes and turned modes by M and with each
+other, and writes `modes.petsc`, `condensed.petsc` and `result.jsonl`, from which `flexbody assemble DIR` makes the
+body. Converged modes are kept in `checkpoint.jsonl` on the way: the same command goes on from them. Every other option
+goes to PETSc, as `-st_mat_mumps_icntl_14 50`.
 
     mumps   Krylov-Schur, shift-invert, one factor of K + tau M by MUMPS
     slices  spectrum slicing: one factor for each part of the spectrum; hundreds of modes
@@ -200,6 +201,9 @@ class Run:
         if os.path.exists(self.path(name)):
             os.remove(self.path(name))
 
+    def hertz(self, eigenvalue):
+        return max(eigenvalue, 0.0) ** 0.5 / (2 * np.pi) * self.prepared["hertz"]
+
     def time(self, phase):
         now = time.perf_counter()
         self.clock[phase] = self.clock.get(phase, 0.0) + now - getattr(self, "last", self.begun)
@@ -252,7 +256,7 @@ class Run:
         def converged(eps, its, nconv, eigenvalues, errors):
             # Locked columns are eigenvectors already.
             if kept[0] < nconv < count and self.options.solver != "lobpcg":
-                self.keep([self.column(eps, j) for j in range(kept[0], nconv)])
+                self.keep([self.column(eps.getBV(), j) for j in range(kept[0], nconv)])
                 kept[0] = nconv
 
         eps.cancelMonitor()
@@ -265,7 +269,7 @@ class Run:
             eps.getEigenpair(j, vector)
             new.append(vector)
         # Behind those that were kept on the way: pairs come in another order than columns.
-        self.keep([self.column(eps, j) for j in range(kept[0], given)] if kept[0] else new)
+        self.keep([self.column(eps.getBV(), j) for j in range(kept[0], given)] if kept[0] else new)
         self.found += new
         self.time("search")
         self.say(f"{given} of {count} modes converged in {eps.getIterationNumber()} restarts")
@@ -283,9 +287,9 @@ class Run:
             self.solvers.append(eps)
         return self.solvers[-1]
 
-    def column(self, eps, j):
+    def column(self, block, j):
         vector = self.stiffness.createVecRight()
-        eps.getBV().copyVec(j, vector)
+        block.copyVec(j, vector)
         return vector
 
     def solver(self, eps):
@@ -316,11 +320,7 @@ class Run:
         """The rigid motions, orthonormal, which multigrid has to keep on every level."""
         basis = block_of(self.rigid)
         basis.orthogonalize(None)
-        vectors = []
-        for j in range(len(self.rigid)):
-            vector = self.stiffness.createVecRight()
-            basis.copyVec(j, vector)
-            vectors.append(vector)
+        vectors = [self.column(basis, j) for j in range(len(self.rigid))]
         return PETSc.NullSpace().create(vectors=vectors, comm=PETSc.COMM_WORLD)
 
     # Refining.
@@ -432,8 +432,12 @@ def product(matrix, block):
 
 
 def block_of(vectors):
+    return filled(vectors, vectors[0], len(vectors))
+
+
+def filled(vectors, like, count):
     block = SLEPc.BV().create(PETSc.COMM_WORLD)
-    block.setSizesFromVec(vectors[0], len(vectors))
+    block.setSizesFromVec(like, count)
     block.setFromOptions()
     for j, vector in enumerate(vectors):
         block.insertVec(j, vector)
@@ -451,11 +455,7 @@ def gram(left, right):
 
 
 def dense(array):
-    matrix = PETSc.Mat().createDense(array.shape, comm=PETSc.COMM_SELF)
-    matrix.setUp()
-    matrix.getDenseArray()[:, :] = array
-    matrix.assemble()
-    return matrix
+    return PETSc.Mat().createDense(array.shape, array=array.ravel(order="F"), comm=PETSc.COMM_SELF)
 
 
 def mumps_facts(matrix):
@@ -624,41 +624,40 @@ def write_result(run, end, count, wanted):
 
 def condense(run, modes):
     """X' M X of X = [rigid modes, T_b modes for each axis b, modes]; T_b turns displacements about b. Every product runs on all ranks."""
-    x = list(run.rigid)
-    for name in run.prepared["turns"]:
-        turn = run.matrix(name, run.prepared["block_size"])
-        for mode in modes:
-            turned = run.stiffness.createVecRight()
-            turn.mult(mode, turned)
-            x.append(turned)
-        turn.destroy()
-    x += modes
-    block, count = block_of(x), len(x)
-    products = np.zeros((count, count))
+
+    def columns():
+        yield from run.rigid
+        turned = run.stiffness.createVecRight()
+        for name in run.prepared["turns"]:
+            turn = run.matrix(name, run.prepared["block_size"])
+            for mode in modes:
+                turn.mult(mode, turned)
+                yield turned
+            turn.destroy()
+        yield from modes
+
+    count = len(run.rigid) + (len(run.prepared["turns"]) + 1) * len(modes)
+    x, products = filled(columns(), modes[0], count), np.zeros((count, count))
     for first in range(0, count, PANEL):
-        panel = product(run.mass, block_of(x[first : first + PANEL]))
-        products[:, first : first + PANEL] = x_dot(block, panel).getDenseArray()
+        last = min(first + PANEL, count)
+        panel = filled([], modes[0], last - first)
+        x.setActiveColumns(first, last)
+        x.matMult(run.mass, panel)
+        x.setActiveColumns(0, count)
+        products[:, first:last] = x_dot(x, panel).getDenseArray()
     return 0.5 * (products + products.T)
 
 
 def spread(columns):
     """The columns of an array that every rank has, as vectors of all ranks."""
-    vectors = []
-    for column in columns.T:
-        vector = PETSc.Vec().createMPI(len(column), comm=PETSc.COMM_WORLD)
-        own = slice(*vector.getOwnershipRange())
-        vector.getArray()[:] = column[own]
-        vectors.append(vector)
+    vectors = [PETSc.Vec().createMPI(len(column), comm=PETSc.COMM_WORLD) for column in columns.T]
+    for vector, column in zip(vectors, columns.T):
+        vector.getArray()[:] = column[slice(*vector.getOwnershipRange())]
     return vectors
-
-
-def hertz(run):
-    return lambda eigenvalue: max(eigenvalue, 0.0) ** 0.5 / (2 * np.pi) * run.prepared["hertz"]
 
 
 def main():
     run = Run(OPTIONS)
-    run.hertz = hertz(run)
     run.resume()
     wanted, counted = wanted_modes(run)
     if run.options.solver == "slices":

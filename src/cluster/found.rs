@@ -1,4 +1,5 @@
-//! What a cluster found: `result.jsonl`, `modes.petsc` and `condensed.petsc`, held to the model and to what was prepared.
+//! What a cluster found: `result.jsonl`, `modes.petsc` and `condensed.petsc`, held to the model and to what was
+//! prepared.
 
 use super::condensed::{CONDENSED_ROUNDING, Condensed};
 use super::petsc::{IndexBytes, read_vector};

@@ -1,4 +1,5 @@
-//! K, M, rigid modes, matrices that turn displacements, what is wanted and the driver, in a folder that is all a cluster needs.
+//! K, M, rigid modes, matrices that turn displacements, what is wanted and the driver, in a folder that is all a
+//! cluster needs.
 
 use super::petsc::{IndexBytes, Rows, write_matrix, write_vectors};
 use super::prepared::{

@@ -38,7 +38,7 @@ def drive(folder, ranks, *options):
 def forget(folder):
     """Leaves what `prepare` has written."""
     for path in folder.iterdir():
-        if path.name.startswith(("result", "modes", "kept", "checkpoint")):
+        if path.name.startswith(("result", "modes", "condensed", "kept", "checkpoint")):
             path.unlink()
 
 
