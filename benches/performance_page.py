@@ -7,7 +7,7 @@ TITLES = {"flexbody": "flexbody", "exudyn": "Exudyn", "scipy": "scipy eigsh, Sup
 SCOPE = {"flexbody": "whole process", "exudyn": "whole conversion, arrays in", "scipy": "modes alone", "cholmod": "modes alone", "slepc": "modes alone"}
 LIBRARIES = {"faer": "faer", "openblas": "OpenBLAS of numpy"}
 MODES = 20
-SOLVE_BLOCK = 8  # columns that flexbody solves at a time
+SOLVE_BLOCK = {"f64": 4, "f32": 8}  # columns that flexbody solves at a time, by the precision of the factor
 HEAD = """<!-- Written by benches/performance.py; edit that -->
 
 # Performance
@@ -201,15 +201,16 @@ def floor_lines(r):
                   *table(("case", "threads", "factor", "GFLOP", "GF/s", "of matrix product"), rates), ""]
     passes = []
     for case in r.cases:
-        size, columns = r.factor_bytes(case), r.counter(case, "solved_columns")
+        # Of a search by multigrid there is no factor.
+        size, columns = r.counter(case, "factor_bytes"), r.counter(case, "solved_columns")
         for threads in (1, 2):
             wall = r.phase(case, f"flexbody-{threads}", "modes", "wall_seconds")
             if size and columns and wall:
-                moved = 2 * size * math.ceil(columns / SOLVE_BLOCK) / 1e9
+                moved = 2 * size * math.ceil(columns / SOLVE_BLOCK[r.precision(case)]) / 1e9
                 floor = moved / r.floors["faer"]["read"][threads - 1]
                 passes.append((case, threads, number(size / 1e9), columns, number(moved), number(floor), number(wall)))
     if passes:
-        lines += [f"Solves against reading memory: the factor passes through twice for {SOLVE_BLOCK} columns, which takes the floor's seconds; the phase `modes` is the "
+        lines += [f"Solves against reading memory: the factor passes through twice for {SOLVE_BLOCK['f64']} columns ({SOLVE_BLOCK['f32']} of single precision), which takes the floor's seconds; the phase `modes` is the "
                   "solves, the products, the orthogonalisation and the final refinement. Factors that fit in the cache go below the floor.", "",
                   *table(("case", "threads", "factor, GB", "columns", "read, GB", "floor, s", "modes, s"), passes), ""]
     return lines
