@@ -5,7 +5,7 @@
 
 use super::row_order::{RowOrder, TurnedRows};
 use crate::model::FeModel;
-use crate::numerics::linalg::uniform;
+use crate::numerics::linalg::{combine, gram, larger, uniform};
 use faer::{Mat, MatRef};
 
 /// Columns of random numbers by which G is tried.
@@ -17,17 +17,25 @@ pub(super) const CONDENSED_ROUNDING: f64 = 1e-11;
 
 /// X, without its columns.
 pub(super) struct Condensed<'a> {
-    pub model: &'a FeModel,
-    pub order: &'a RowOrder,
-    pub rigid: MatRef<'a, f64>,
-    pub modes: MatRef<'a, f64>,
+    model: &'a FeModel,
+    turns: Vec<TurnedRows<'a>>,
+    rigid: MatRef<'a, f64>,
+    modes: MatRef<'a, f64>,
 }
 
-impl Condensed<'_> {
+impl<'a> Condensed<'a> {
+    pub fn new(
+        model: &'a FeModel,
+        order: &'a RowOrder,
+        rigid: MatRef<'a, f64>,
+        modes: MatRef<'a, f64>,
+    ) -> Self {
+        Self { model, turns: TurnedRows::of(model, order), rigid, modes }
+    }
+
     /// Number of columns of X.
     pub fn columns(&self) -> usize {
-        let turns = TurnedRows::of(self.model, self.order).len();
-        self.rigid.ncols() + (turns + 1) * self.modes.ncols()
+        self.block(self.turns.len() + 1)
     }
 
     /// Largest difference of G v and X' M X v for random columns v, relative to sqrt(max G_ii) sqrt(v' G v):
@@ -37,13 +45,11 @@ impl Condensed<'_> {
         let momentum = self.model.pencil().apply_mass(self.combined(v.as_ref()).as_ref());
         let (own, given) = (self.projected(momentum.as_ref()), g * &v);
         let largest = (0..g.nrows()).map(|i| g[(i, i)]).fold(0.0, f64::max);
-        let mut worst = 0.0_f64;
-        for j in 0..TRIALS {
+        let relative = |j: usize| {
             let size = (largest * (v.col(j).transpose() * own.col(j))).sqrt();
-            let relative = (given.col(j) - own.col(j)).norm_max() / size;
-            worst = if relative.is_finite() { worst.max(relative) } else { f64::INFINITY };
-        }
-        worst
+            (given.col(j) - own.col(j)).norm_max() / size
+        };
+        (0..TRIALS).map(relative).fold(0.0, larger)
     }
 
     /// Where a block of columns of X begins, after the rigid modes: turned modes for each axis, then the modes.
@@ -53,10 +59,9 @@ impl Condensed<'_> {
 
     /// X v.
     fn combined(&self, v: MatRef<'_, f64>) -> Mat<f64> {
-        let (turns, count) = (TurnedRows::of(self.model, self.order), self.modes.ncols());
-        let part = |of: usize| self.modes * v.subrows(self.block(of), count);
-        let mut sum = self.rigid * v.subrows(0, self.rigid.ncols()) + part(turns.len());
-        for (of, (_, turned)) in turns.iter().enumerate() {
+        let part = |of: usize| combine(self.modes, v.subrows(self.block(of), self.modes.ncols()));
+        let mut sum = combine(self.rigid, v.subrows(0, self.rigid.ncols())) + part(self.turns.len());
+        for (of, turned) in self.turns.iter().enumerate() {
             let shapes = part(of);
             for row in 0..sum.nrows() {
                 let Some((from, sign)) = turned.source(row) else { continue };
@@ -68,17 +73,17 @@ impl Condensed<'_> {
 
     /// X' w.
     fn projected(&self, w: MatRef<'_, f64>) -> Mat<f64> {
-        let (turns, count) = (TurnedRows::of(self.model, self.order), self.modes.ncols());
+        let count = self.modes.ncols();
         let mut all = Mat::zeros(self.columns(), w.ncols());
-        all.subrows_mut(0, self.rigid.ncols()).copy_from(self.rigid.transpose() * w);
-        for (of, (_, turned)) in turns.iter().enumerate() {
+        all.subrows_mut(0, self.rigid.ncols()).copy_from(gram(self.rigid, w));
+        for (of, turned) in self.turns.iter().enumerate() {
             // The transpose of T_b is -T_b.
             let back = Mat::from_fn(w.nrows(), w.ncols(), |row, j| {
                 turned.source(row).map_or(0.0, |(from, sign)| -sign * w[(from, j)])
             });
-            all.subrows_mut(self.block(of), count).copy_from(self.modes.transpose() * back);
+            all.subrows_mut(self.block(of), count).copy_from(gram(self.modes, back.as_ref()));
         }
-        all.subrows_mut(self.block(turns.len()), count).copy_from(self.modes.transpose() * w);
+        all.subrows_mut(self.block(self.turns.len()), count).copy_from(gram(self.modes, w));
         all
     }
 }

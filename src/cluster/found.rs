@@ -116,8 +116,8 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     });
     let n = model.stiffness().n();
     let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
-    let vectors = file.read((n, result.modes), index_bytes(result.index_bytes)?)?;
-    let vectors = order.to_internal(vectors.as_ref());
+    let index = index_bytes(result.index_bytes)?;
+    let vectors = file.read((n, result.modes), index, |row| order.internal(row))?;
     if let Some(digest) = &result.condensed_sha256 {
         hold_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
     }
@@ -159,9 +159,9 @@ fn hold_condensation(
     modes: MatRef<'_, f64>,
 ) -> Result<()> {
     let rigid = rigid_modes(model, &model.pencil())?;
-    let condensed = Condensed { model, order, rigid: rigid.as_ref(), modes };
+    let condensed = Condensed::new(model, order, rigid.as_ref(), modes);
     let (columns, file) = (condensed.columns(), Vectors { path, digest, of: "products of condensation" });
-    let products = file.read((columns, columns), index_bytes(result.index_bytes)?)?;
+    let products = file.read((columns, columns), index_bytes(result.index_bytes)?, |row| row)?;
     let difference = condensed.difference(products.as_ref());
     if difference <= CONDENSED_ROUNDING {
         return Ok(());
@@ -181,8 +181,13 @@ struct Vectors<'a> {
 }
 
 impl Vectors<'_> {
-    /// So many columns of so many rows, as they stand in the file.
-    fn read(&self, (n, count): (usize, usize), index: IndexBytes) -> Result<Mat<f64>> {
+    /// So many columns of so many rows, each row where `place` says.
+    fn read(
+        &self,
+        (n, count): (usize, usize),
+        index: IndexBytes,
+        place: impl Fn(usize) -> usize,
+    ) -> Result<Mat<f64>> {
         let unreadable =
             |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(self.path));
         let failed = |e: std::io::Error| unreadable(format!("file cannot be read: {e}"));
@@ -191,7 +196,7 @@ impl Vectors<'_> {
             return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
         }
         let file = File::open(self.path).map_err(failed)?;
-        columns(BufReader::with_capacity(1 << 20, file), (n, count), index)
+        columns(BufReader::with_capacity(1 << 20, file), (n, count), index, place)
             .map_err(failed)?
             .ok_or_else(|| unreadable(format!("file does not hold {count} vectors of {n} finite numbers")))
     }
@@ -201,6 +206,7 @@ fn columns(
     mut file: impl Read,
     (n, count): (usize, usize),
     index: IndexBytes,
+    place: impl Fn(usize) -> usize,
 ) -> std::io::Result<Option<Mat<f64>>> {
     let mut all = Mat::zeros(n, count);
     for j in 0..count {
@@ -208,7 +214,7 @@ fn columns(
         if column.iter().any(|value| !value.is_finite()) {
             return Ok(None);
         }
-        column.iter().enumerate().for_each(|(i, value)| all[(i, j)] = *value);
+        column.iter().enumerate().for_each(|(i, value)| all[(place(i), j)] = *value);
     }
     Ok(Some(all))
 }

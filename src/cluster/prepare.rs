@@ -80,8 +80,8 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
     writing.file(MASS, |file| write_matrix(file, &mass, index))?;
     writing.file(RIGID, |file| write_vectors(file, order.to_written(rigid.as_ref()).as_ref(), index))?;
     let turned = TurnedRows::of(model, &order);
-    for (axis, rows) in &turned {
-        writing.file(&turn_file(*axis), |file| write_matrix(file, rows, index))?;
+    for rows in &turned {
+        writing.file(&turn_file(rows.axis), |file| write_matrix(file, rows, index))?;
     }
     writing.text(DRIVER, DRIVER_SOURCE)?;
     let units = model.units();
@@ -102,7 +102,7 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
         residual: settings.accuracy.residual(),
         cluster_gap: CLUSTER_GAP,
         shift,
-        turns: turned.iter().map(|(axis, _)| turn_file(*axis)).collect(),
+        turns: turned.iter().map(|rows| turn_file(rows.axis)).collect(),
         matrices: matrices(&writing.files[STIFFNESS], &writing.files[MASS]),
         files: writing.files.clone(),
     };

@@ -46,9 +46,9 @@ impl RowOrder {
         Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| columns[(self.internal[i] as usize, j)])
     }
 
-    /// Columns in the order of the files by internal rows.
-    pub fn to_internal(&self, columns: MatRef<'_, f64>) -> Mat<f64> {
-        Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| columns[(self.written[i] as usize, j)])
+    /// The internal row of a row of the files.
+    pub fn internal(&self, row: usize) -> usize {
+        self.internal[row] as usize
     }
 }
 
@@ -57,17 +57,17 @@ impl RowOrder {
 /// the rigid modes: their products with M are the integrals of psi_k psi_l that W2 and W3 are made of.
 pub(super) struct TurnedRows<'a> {
     order: &'a RowOrder,
-    axis: usize,
+    pub axis: usize,
     dimension: usize,
     displacements: usize,
 }
 
 impl<'a> TurnedRows<'a> {
     /// About every axis about which a body of this model turns: about the third alone in the plane.
-    pub fn of(model: &FeModel, order: &'a RowOrder) -> Vec<(usize, Self)> {
+    pub fn of(model: &FeModel, order: &'a RowOrder) -> Vec<Self> {
         let (dimension, displacements) = (model.dimension(), model.rows().displacements());
         let axes = if dimension == 2 { 2..3 } else { 0..3 };
-        axes.map(|axis| (axis, Self { order, axis, dimension, displacements })).collect()
+        axes.map(|axis| Self { order, axis, dimension, displacements }).collect()
     }
 
     /// Which internal row a row takes its value from, and with which sign; `None` for rows of zeros.
@@ -93,7 +93,7 @@ impl Rows for TurnedRows<'_> {
 
     fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
         entries.clear();
-        let source = self.source(self.order.internal[row] as usize);
+        let source = self.source(self.order.internal(row));
         entries.extend(source.map(|(from, sign)| (self.order.written[from], sign)));
     }
 }
@@ -113,7 +113,7 @@ impl Rows for WrittenRows<'_> {
     /// The diagonal is there even where it is zero, since solvers need its place.
     fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
         entries.clear();
-        let internal = self.order.internal[row] as usize;
+        let internal = self.order.internal(row);
         let (vertex, component) = (internal / self.block, internal % self.block);
         let (columns, values) = self.matrix.row(vertex);
         let column = |j: u32| self.order.written[j as usize * self.block + component];
