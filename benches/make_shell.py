@@ -5,12 +5,10 @@
     python benches/make_shell.py /tmp/shell200k --dofs 200000
 
 An arc of 120 degrees, as long as it is wide, of strips that each lie in a plane: membrane, bending and drilling are
-coupled in every node. The elements are those of fixtures/make/elements.py; isotropic, SI units. Values carry 17
-significant digits.
+coupled in every node. The elements are those of fixtures/make/elements.py; isotropic, SI units.
 """
 
 import argparse
-import json
 import sys
 import time
 from pathlib import Path
@@ -20,8 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fixtures/make"))
 
 from elements import shell_rectangle
-from make_block import write_manifest
-from make_tet10 import write_lower
+from nodal_model import write_model
 
 RADIUS, ANGLE = 1.0, 2 * np.pi / 3
 
@@ -47,19 +44,6 @@ def panel(cells, thickness):
     return points, strips
 
 
-def assembled(strips, which, size):
-    """Rows, columns and values of the sum of the elements' matrices."""
-    keys, values = [], []
-    for nodes, *matrices in strips:
-        rows = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), 24)
-        keys.append((rows[:, None, :] * size + rows[:, :, None]).ravel())
-        values.append(np.broadcast_to(matrices[which], (len(nodes), 24, 24)).ravel())
-    keys, values = np.concatenate(keys), np.concatenate(values)
-    order = np.argsort(keys, kind="stable")
-    keys, starts = np.unique(keys[order], return_index=True)
-    return keys % size, keys // size, np.add.reduceat(values[order], starts)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path)
@@ -68,17 +52,7 @@ def main():
     args = parser.parse_args()
     began = time.perf_counter()
     points, strips = panel(max(1, round((args.dofs / 6) ** 0.5) - 1), args.thickness)
-    size = 6 * len(points)
-    args.folder.mkdir(parents=True, exist_ok=True)
-    name = args.folder.resolve().name
-    entries = [write_lower(args.folder / f"{letter}.mtx", size, f"{what} of {name}", *assembled(strips, which, size))
-               for which, (letter, what) in enumerate([("K", "stiffness"), ("M", "consistent mass")])]
-    numbers = range(1, len(points) + 1)
-    (args.folder / "nodes.csv").write_text("node,x,y,z\n" + "".join([f"{n},{x!r},{y!r},{z!r}\n" for n, (x, y, z) in zip(numbers, points.tolist())]))
-    (args.folder / "dofs.csv").write_text("node,dir\n" + "".join([f"{n},{d}\n" for n in numbers for d in range(1, 7)]))
-    write_manifest(args.folder, name, "K.mtx", "M.mtx")
-    print(json.dumps({"folder": str(args.folder), "nodes": len(points), "dofs": size, "elements": sum(len(strip[0]) for strip in strips), "stiffness_entries": 2 * entries[0] - size,
-                      "mass_entries": 2 * entries[1] - size, "seconds": round(time.perf_counter() - began, 2)}))
+    write_model(args.folder, points, strips, began)
 
 
 if __name__ == "__main__":

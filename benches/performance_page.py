@@ -91,7 +91,8 @@ class Results:
 
 # Seconds that tiers are to take at most.
 TIER_SECONDS = [("block-100k", "standard", 4), ("block-100k", "fast", 2.5), ("cube-300k", "standard", 30), ("cube-300k", "fast", 12), ("cube-1m", "standard", 300),
-                ("cube-1m", "fast", 90), ("shell-200k", "standard", 6), ("shell-200k", "fast", 4)]
+                ("cube-1m", "fast", 90), ("shell-200k", "standard", 6), ("shell-200k", "fast", 4),
+                ("frame-200k", "standard", 6), ("frame-200k", "fast", 4)]
 
 
 def over(a, b):

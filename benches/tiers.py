@@ -37,6 +37,8 @@ CASES = {
     **{name: Case(performance.CASES[name], ALL) for name in ("block-100k", "cube-100k", "tet10-100k", "plate-50k", "cube-300k")},
     "block-100k-200-modes": Case(performance.CASES["block-100k"], MODES_ALONE, modes=200),
     "shell-200k": Case(performance.CASES["shell-200k"], MODES_ALONE),
+    "frame-200k": Case(performance.Case("make_frame.py", (), 220000), MODES_ALONE),
+    "lattice-200k": Case(performance.Case("make_frame.py", ("--elements", "1"), 200000), MODES_ALONE),
     "cube-1m": Case(performance.CASES["cube-1m"], MODES_ALONE),
     "cube-3m": Case(performance.Case("make_block.py", (*performance.CUBE, "--cells", "99", "99", "99"), 3000000), MODES_ALONE),
 }
