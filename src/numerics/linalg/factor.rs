@@ -1,9 +1,9 @@
 //! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu,
 //! SIAM Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
 
-use super::assembly_tree::{AssemblyTree, Graph};
+use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
-use super::ordering::{VertexGraph, nested_dissection, node_graph, smallest_graph, vertex_graph};
+use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
 use super::tree_walk::{Needs, Walk};
 use super::{Pencil, SymmetricMatrix};
@@ -11,10 +11,6 @@ use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 use std::convert::Infallible;
-
-/// Operations for each row up to which a factor of whole nodes is taken although one of single rows may take
-/// a third less: to order the rows takes longer than that (measured on frames: 7 to 11 microseconds a row).
-const LITTLE_WORK: f64 = 1e6;
 
 /// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
 #[derive(Debug)]
@@ -30,21 +26,7 @@ pub struct Analysis {
 impl Analysis {
     /// Orders and analyses the pencil; `None` when memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        Self::up_to(LITTLE_WORK * pencil.n() as f64, pencil)
-    }
-
-    /// Tries single rows where nodes are loosely coupled and take more than so many operations.
-    pub(super) fn up_to(flops: f64, pencil: &Pencil<'_>) -> Option<Self> {
-        let VertexGraph { graph, rows, is_loose } = smallest_graph(pencil)?;
-        let analysis = Self::of_graph(graph, rows)?;
-        if is_loose && analysis.flops() > flops {
-            return Self::of_graph(node_graph(pencil)?, pencil.block());
-        }
-        Some(analysis)
-    }
-
-    /// With `rows` rows to each vertex of a graph; `None` when memory runs out.
-    fn of_graph(mut graph: Graph, rows: usize) -> Option<Self> {
+        let (mut graph, rows) = smallest_graph(pencil)?;
         let order = nested_dissection(&mut graph)?;
         Some(Self::with_tree(AssemblyTree::new(&graph, &order, rows), rows))
     }

@@ -51,46 +51,27 @@ pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
 }
 
 /// Rows of a node with rotations, and of parts of it, that vertices may stand for where the pencil has rows
-/// alone.
-const NODE_ROWS: [usize; 3] = [6, 3, 2];
-
-/// Numbers of a graph of nodes, all rows of two neighbours taken as coupled, over those of K: up to here a
-/// node is one vertex. Rows that are coupled one by one are better told apart, as those of beams along the
-/// axes; but up to the second number it depends on the work.
-const MOST_FILL: f64 = 1.6;
-const LOOSE_FILL: f64 = 4.0;
-
-/// A graph whose vertices are nodes or their parts.
-pub(super) struct VertexGraph {
-    pub graph: Graph,
-    /// Rows of each vertex.
-    pub rows: usize,
-    /// Whether single rows have to be tried too: their factor may take less work.
-    pub is_loose: bool,
-}
+/// alone; beside them numbers of the graph, all rows of two neighbours taken as coupled, over those of K, up
+/// to which they do. Rows that are coupled one by one are better told apart; but three are the displacements
+/// of a node, or its rotations, which elimination couples soon: frames along the axes have three times the
+/// numbers, and less work than single rows would, which take ten times as long to be ordered.
+const NODE_ROWS: [(usize, f64); 3] = [(6, 1.6), (3, 4.0), (2, 1.6)];
 
 /// Graph whose vertices are nodes, also where the pencil has rows alone, and the rows of a vertex: rows one
 /// after the other that are coupled to the same ones are those of a node. The graph of rows of shells has 36
 /// times the edges and takes as much longer to be ordered. `None` as above.
-pub(super) fn smallest_graph(pencil: &Pencil<'_>) -> Option<VertexGraph> {
-    let mut loose = None;
+pub(super) fn smallest_graph(pencil: &Pencil<'_>) -> Option<(Graph, usize)> {
     if pencil.block() == 1 {
         let (n, entries) = (pencil.n(), pencil.stiffness().as_csc().nnz() as f64);
-        for rows in NODE_ROWS.into_iter().filter(|size| n > 0 && n % size == 0) {
-            let graph = vertex_graph(pencil, rows)?;
-            let fill = (rows * rows * (graph.neighbours.len() + graph.len())) as f64 / entries;
-            if fill <= MOST_FILL {
-                return Some(VertexGraph { graph, rows, is_loose: false });
-            }
-            if fill <= LOOSE_FILL && loose.is_none() {
-                loose = Some(VertexGraph { graph, rows, is_loose: true });
+        for (size, most) in NODE_ROWS.into_iter().filter(|(size, _)| n > 0 && n % size == 0) {
+            let graph = vertex_graph(pencil, size)?;
+            let coupled = (size * size * (graph.neighbours.len() + graph.len())) as f64;
+            if coupled <= most * entries {
+                return Some((graph, size));
             }
         }
     }
-    match loose {
-        Some(loose) => Some(loose),
-        None => Some(VertexGraph { graph: node_graph(pencil)?, rows: pencil.block(), is_loose: false }),
-    }
+    Some((node_graph(pencil)?, pencil.block()))
 }
 
 /// Graph with one vertex for every `size` rows.
@@ -279,32 +260,29 @@ mod tests {
         SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric")
     }
 
-    /// Six rows of a node become one vertex where they are coupled alike, and rows stay alone where they are
-    /// not and that spares work; the solution is the same.
+    /// Six rows of a node become one vertex where they are coupled alike, three where they are not, and rows
+    /// stay alone that are coupled one by one; the solution is the same.
     #[test]
     fn nodes_are_found_among_rows() {
-        for (holes, is_loose) in [(0, false), (1, false), (5, true)] {
-            let k = of_six_rows(60, holes);
-            let m = of_six_rows(60, 4);
+        let alone = scattered(60).0;
+        for (k, expected) in
+            [(of_six_rows(60, 0), 6), (of_six_rows(60, 1), 6), (of_six_rows(60, 5), 3), (alone, 1)]
+        {
+            let n = k.n();
+            let m = of_six_rows(n as u32 / 6, 4);
             let pencil = Pencil::new(&k, &m, 1);
-            let found = smallest_graph(&pencil).expect("small");
-            assert_eq!((found.rows, found.graph.len(), found.is_loose), (6, 60, is_loose), "{holes} holes");
-            for (flops, rows) in [(f64::INFINITY, 6), (0.0, if is_loose { 1 } else { 6 })] {
-                let analysis = Analysis::up_to(flops, &pencil).expect("small");
-                assert_eq!(analysis.block, rows, "{holes} holes");
-                assert_solves(&analysis, &pencil);
-                assert!(is_positive_semidefinite(&m, &analysis), "{holes} holes");
-            }
+            let (graph, rows) = smallest_graph(&pencil).expect("small");
+            assert_eq!((rows, graph.len()), (expected, n / expected));
+            let analysis = Analysis::new(&pencil).expect("small");
+            let factor = Cholesky::<f64>::new(&analysis, &pencil, 0.37).expect("definite");
+            let b = Mat::from_fn(n, 3, |i, j| ((i * 7 + j * 5) % 13) as f64 - 6.0);
+            let mut x = b.clone();
+            factor.solve_in_place(x.as_mut());
+            let product =
+                pencil.apply_stiffness(x.as_ref()) + pencil.apply_mass(x.as_ref()) * faer::Scale(0.37);
+            assert!((&product - &b).norm_max() < 1e-12, "{expected}");
+            assert!(is_positive_semidefinite(&m, &analysis), "{expected}");
         }
-    }
-
-    fn assert_solves(analysis: &Analysis, pencil: &Pencil<'_>) {
-        let factor = Cholesky::<f64>::new(analysis, pencil, 0.37).expect("definite");
-        let b = Mat::from_fn(pencil.n(), 3, |i, j| ((i * 7 + j * 5) % 13) as f64 - 6.0);
-        let mut x = b.clone();
-        factor.solve_in_place(x.as_mut());
-        let product = pencil.apply_stiffness(x.as_ref()) + pencil.apply_mass(x.as_ref()) * faer::Scale(0.37);
-        assert!((&product - &b).norm_max() < 1e-12);
     }
 
     #[test]
