@@ -1,7 +1,8 @@
 //! A file as bytes: mapped into memory, so that a gigabyte of matrix is parsed where it lies.
 
 // The one exception to `unsafe_code = "deny"` in this room: a memory map is sound only while nobody truncates
-// the file under it. We map input files for the length of one read and never write to them.
+// the file under it. We map input files for the length of one read, and files without a name that are our own,
+// and never write to them.
 #![allow(unsafe_code)]
 
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -39,8 +40,17 @@ impl InputFile {
         if metadata.len() == 0 {
             return Err(Diagnostic::new(Code::FileEmpty, "file has no bytes").in_file(path));
         }
+        Self::of(&file, path)
+    }
+
+    /// An opened file, called `path` in messages.
+    ///
+    /// # Errors
+    /// FB101 when it cannot be mapped.
+    pub(super) fn of(file: &File, path: &Path) -> Result<Self, Diagnostic> {
         // SAFETY: the map is private to this value and read-only; see the head of this file for truncation.
-        let map = unsafe { Mmap::map(&file) }.map_err(|e| unreadable(reason(&e)))?;
+        let map = unsafe { Mmap::map(file) }
+            .map_err(|e| Diagnostic::new(Code::FileUnreadable, reason(&e)).in_file(path))?;
         Ok(Self { path: path.to_path_buf(), map })
     }
 

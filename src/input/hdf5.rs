@@ -60,7 +60,7 @@ impl Reader for Hdf5 {
                 Some(name) => (name.to_owned(), named(&file, name)?),
                 None => search(&file, source.role)?,
             };
-            group::read(&group, &name, source.file)
+            group::read(&group, &name, source)
         };
         read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
     }

@@ -34,6 +34,9 @@ pub struct ModelFiles {
     pub residual_vectors: Vec<LoadSource>,
     /// The manifest, when there is one.
     pub manifest: Option<PathBuf>,
+    /// The folder in which the numbers of K and M are kept, in files that go with them, instead of in memory:
+    /// those of sorted compressed columns in HDF5. `None`: all are held in memory.
+    pub keep_in: Option<PathBuf>,
 }
 
 /// Where matrices, nodes and labels of a model come from.
@@ -237,6 +240,7 @@ impl ModelFiles {
             geometric_stiffness: Vec::new(),
             residual_vectors: Vec::new(),
             manifest: None,
+            keep_in: None,
         })
     }
 

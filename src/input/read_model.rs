@@ -26,7 +26,7 @@ const FEW_DIGITS: u8 = 10;
 /// # Errors
 /// FB101 to FB106 and FB301 to FB313, all that are found in the file.
 pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMatrix> {
-    read_opened(&InputFile::open(&location.path)?, location.group.as_deref(), role)
+    read_opened(&InputFile::open(&location.path)?, location.group.as_deref(), role, None)
 }
 
 /// Reads all files of a model and takes their fingerprints. The model is parsed, not yet checked: sizes,
@@ -186,7 +186,8 @@ impl Parsed {
     fn of(files: &ModelFiles, opened: &OpenFiles) -> Self {
         let matrix = |location: &MatrixLocation, role| {
             let file = opened.get(&location.path)?;
-            read_opened(file, location.group.as_deref(), role).map_err(Error::into_diagnostics)
+            read_opened(file, location.group.as_deref(), role, files.keep_in.as_deref())
+                .map_err(Error::into_diagnostics)
         };
         let matrices = match &files.source {
             ModelSource::Job(job) => Matrices::Job(Box::new(read_job(job).map(ModelMatrices::from))),
@@ -309,10 +310,15 @@ fn said_in(files: &ModelFiles, diagnostic: Diagnostic) -> Diagnostic {
     }
 }
 
-fn read_opened(file: &InputFile, group: Option<&str>, role: MatrixRole) -> Result<RawMatrix> {
+fn read_opened(
+    file: &InputFile,
+    group: Option<&str>,
+    role: MatrixRole,
+    keep_in: Option<&Path>,
+) -> Result<RawMatrix> {
     let compression = Compression::of(file.bytes());
     let reader = reader_for(file, compression)?;
-    reader.read(&MatrixSource { file, compression, group, role })
+    reader.read(&MatrixSource { file, compression, group, role, keep_in })
 }
 
 /// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass

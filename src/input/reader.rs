@@ -5,6 +5,7 @@ use super::compression::Compression;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::model::RawMatrix;
+use std::path::Path;
 
 /// The role of a matrix in the model. Files that hold several matrices tell them apart by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +58,8 @@ pub struct MatrixSource<'a> {
     pub group: Option<&'a str>,
     /// Role of the matrix in the model.
     pub role: MatrixRole,
+    /// The folder for files of its numbers where they are not to be held in memory, and a reader can do so.
+    pub keep_in: Option<&'a Path>,
 }
 
 impl<'a> MatrixSource<'a> {

@@ -15,6 +15,7 @@ mod front_door;
 mod how_to;
 mod interruption;
 mod json_output;
+mod kept_in_files;
 mod licences;
 mod limits;
 mod report;

@@ -2,21 +2,26 @@
 //! scipy, anndata, MATLAB and PETSc (`docs/input.md`).
 
 use super::super::assemble::{
-    ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, check_size, push, undeclared_triangle,
+    ColumnEntries, Entry, KeptColumns, Sides, Storage, assemble, assemble_columns, assembled, check_size,
+    push, undeclared_triangle,
 };
 use super::members::{Members, POINTERS};
 use super::values::{Found, Vector, integers_of, text_of, truth_of};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
+use crate::input::reader::MatrixSource;
 use crate::model::RawMatrix;
+use crate::numerics::linalg::CscMatrix;
 use hdf5_metno::Group;
+use std::path::Path;
 
 /// Entries read at a time.
 const PIECE: usize = 1 << 20;
 
 /// Reads the matrix in `group`, called `name` in messages.
-pub(super) fn read(group: &Group, name: &str, file: &InputFile) -> Found<RawMatrix> {
-    let reader = GroupReader { file, group, name, members: Members::of(group) };
+pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
+    let MatrixSource { file, keep_in, .. } = *source;
+    let reader = GroupReader { file, group, name, members: Members::of(group), keep_in };
     let declared = reader.declared_symmetry().map_err(|d| vec![d])?;
     let parsed = match reader.members.compressed() {
         Some(names) => reader.compressed(names)?,
@@ -45,14 +50,15 @@ pub(super) fn read(group: &Group, name: &str, file: &InputFile) -> Found<RawMatr
         }
         _ => Storage::Full,
     };
-    let assembled = match (parsed.entries, storage) {
+    let made = match (parsed.entries, storage) {
+        (Entries::Kept(matrix), _) => assembled(matrix, 17, file.path()),
         (Entries::Columns(columns), Storage::Full) => assemble_columns(columns, 17, file.path()),
         (Entries::Columns(columns), Storage::Triangle) => {
             assemble(parsed.n, columns.into_entries(), storage, 17, file.path())
         }
         (Entries::Listed(pieces), _) => assemble(parsed.n, pieces, storage, 17, file.path()),
     };
-    let mut raw = assembled.map_err(|d| vec![d])?;
+    let mut raw = made.map_err(|d| vec![d])?;
     if parsed.single_precision {
         raw.digits = raw.digits.min(7);
     }
@@ -80,8 +86,21 @@ struct Parsed {
 
 /// The entries of a matrix, in the order in which its group stores them.
 enum Entries {
+    /// Sorted columns of both triangles, in files.
+    Kept(CscMatrix),
     Columns(ColumnEntries),
     Listed(Vec<Vec<Entry>>),
+}
+
+/// Row and column of entry k from its index, where entries come in the order of the columns.
+fn by_major(pointers: &[i64]) -> impl FnMut(usize, [i64; 1]) -> (i64, i64) {
+    let mut major = 0;
+    move |k, [index]| {
+        while pointers[major + 1] <= k as i64 {
+            major += 1;
+        }
+        (index, major as i64)
+    }
 }
 
 struct GroupReader<'a> {
@@ -89,6 +108,8 @@ struct GroupReader<'a> {
     group: &'a Group,
     name: &'a str,
     members: Members,
+    /// The folder for a matrix that is not to be held in memory.
+    keep_in: Option<&'a Path>,
 }
 
 impl GroupReader<'_> {
@@ -124,19 +145,43 @@ impl GroupReader<'_> {
                 Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"),
             ]);
         }
+        if let Some(folder) = self.keep_in
+            && let Some(parsed) = self.kept(folder, (&values, &indices, &pointer_values), n)?
+        {
+            return Ok(parsed);
+        }
         // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to
         // say.
         let mut columns = ColumnEntries::with_room(n, entries);
-        let mut major = 0usize;
-        let place = |k: usize, [index]: [i64; 1]| {
-            while pointer_values[major + 1] <= k as i64 {
-                major += 1;
-            }
-            (index, major as i64)
-        };
+        let place = by_major(&pointer_values);
         let sides = self.visit(&values, &[&indices], n, place, |entry| columns.push(entry))?;
         let single_precision = values.is_single_precision();
         Ok(Parsed { n, entries: Entries::Columns(columns), sides, single_precision })
+    }
+
+    /// The matrix in files of `folder`; `None` where its columns are not sorted or one triangle is missing.
+    fn kept(
+        &self,
+        folder: &Path,
+        (values, indices, pointers): (&Vector, &Vector, &[i64]),
+        n: usize,
+    ) -> Found<Option<Parsed>> {
+        let mut columns = KeptColumns::new(folder, n).map_err(|d| vec![d])?;
+        let mut wrong = None;
+        let sides = self.visit(values, &[indices], n, by_major(pointers), |entry| {
+            if wrong.is_none() {
+                wrong = columns.push(entry).err();
+            }
+        })?;
+        if let Some(diagnostic) = wrong {
+            return Err(vec![diagnostic]);
+        }
+        if sides.lower != sides.upper {
+            return Ok(None);
+        }
+        let matrix = columns.compress().map_err(|d| vec![d])?;
+        let single_precision = values.is_single_precision();
+        Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Kept(matrix), sides, single_precision }))
     }
 
     fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {

@@ -29,7 +29,7 @@ impl CoordinateFile {
     pub(super) fn read(path: &Path, role: MatrixRole, n: u32) -> Found<Self> {
         let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
         let compression = Compression::of(file.bytes());
-        let source = MatrixSource { file: &file, compression, group: None, role };
+        let source = MatrixSource { file: &file, compression, group: None, role, keep_in: None };
         let in_file = |found: Vec<Diagnostic>| found.into_iter().map(|d| d.in_file(path)).collect::<Vec<_>>();
         let mut blocks = Blocks::new(compression, file.bytes());
         let mut body = Coordinates::new(Limits { n, integer: false }, None, 0);

@@ -20,6 +20,7 @@ mod pencil;
 mod product;
 mod random;
 mod sparse;
+mod stored;
 mod substitution;
 mod tall;
 mod tree_walk;
@@ -43,6 +44,7 @@ pub use product::{multiply, multiply_vector, quadratic_form, sum_terms};
 pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
+pub use stored::Stored;
 pub use tall::{
     Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, gram,
     side_by_side, subtract_columns, subtract_combination,

@@ -1,5 +1,6 @@
 //! Compressed sparse matrices: a general one as readers deliver it, and the symmetric one that all work uses.
 
+use super::stored::Stored;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -13,13 +14,13 @@ pub struct CscMatrix {
     n_rows: usize,
     n_cols: usize,
     col_ptr: Vec<usize>,
-    row_idx: Vec<u32>,
-    values: Vec<f64>,
+    row_idx: Stored<u32>,
+    values: Stored<f64>,
 }
 
 impl Default for CscMatrix {
     fn default() -> Self {
-        Self { n_rows: 0, n_cols: 0, col_ptr: vec![0], row_idx: Vec::new(), values: Vec::new() }
+        Self { n_rows: 0, n_cols: 0, col_ptr: vec![0], row_idx: Vec::new().into(), values: Vec::new().into() }
     }
 }
 
@@ -33,9 +34,10 @@ impl CscMatrix {
         n_rows: usize,
         n_cols: usize,
         col_ptr: Vec<usize>,
-        row_idx: Vec<u32>,
-        values: Vec<f64>,
+        row_idx: impl Into<Stored<u32>>,
+        values: impl Into<Stored<f64>>,
     ) -> Self {
+        let (row_idx, values) = (row_idx.into(), values.into());
         assert_eq!(col_ptr.len(), n_cols + 1, "column pointers");
         assert_eq!(col_ptr[0], 0, "first column pointer");
         assert_eq!(*col_ptr.last().expect("n_cols + 1 >= 1"), row_idx.len(), "entries");
@@ -85,7 +87,12 @@ impl CscMatrix {
             }
             col_ptr.push(row_idx.len());
         }
-        Self { n_rows, n_cols, col_ptr, row_idx, values }
+        Self::made(n_rows, n_cols, col_ptr, row_idx, values)
+    }
+
+    /// Of arrays that were made as they have to be.
+    fn made(n_rows: usize, n_cols: usize, col_ptr: Vec<usize>, row_idx: Vec<u32>, values: Vec<f64>) -> Self {
+        Self { n_rows, n_cols, col_ptr, row_idx: row_idx.into(), values: values.into() }
     }
 
     /// Takes a compressed matrix of the `sprs` crate (row or column storage).
@@ -107,6 +114,11 @@ impl CscMatrix {
     /// Number of columns.
     pub fn n_cols(&self) -> usize {
         self.n_cols
+    }
+
+    /// Whether its numbers are lent, as by a file that they stay in.
+    pub fn is_lent(&self) -> bool {
+        matches!((&self.row_idx, &self.values), (Stored::Lent(_), Stored::Lent(_)))
     }
 
     /// Number of stored entries.
@@ -173,7 +185,7 @@ impl CscMatrix {
                 }
             }
         });
-        Self { n_rows: n, n_cols: n, col_ptr, row_idx, values }
+        Self::made(n, n, col_ptr, row_idx, values)
     }
 
     /// Whether pattern and values are exactly symmetric.
@@ -216,7 +228,7 @@ impl CscMatrix {
     /// The transpose; for a symmetric matrix, an equal one.
     pub fn transpose(&self) -> Self {
         let mut col_ptr = vec![0usize; self.n_rows + 1];
-        for &r in &self.row_idx {
+        for &r in self.row_idx.iter() {
             col_ptr[r as usize + 1] += 1;
         }
         for i in 0..self.n_rows {
@@ -234,7 +246,7 @@ impl CscMatrix {
                 *at += 1;
             }
         }
-        Self { n_rows: self.n_cols, n_cols: self.n_rows, col_ptr, row_idx, values }
+        Self::made(self.n_cols, self.n_rows, col_ptr, row_idx, values)
     }
 }
 
@@ -244,20 +256,21 @@ impl CscMatrix {
         if self.values.iter().all(|value| *value != 0.0) {
             return;
         }
+        let (row_idx, values) = (self.row_idx.own(), self.values.own());
         let (mut from, mut to) = (0, 0);
         for j in 0..self.n_cols {
             let end = self.col_ptr[j + 1];
             while from < end {
-                if self.values[from] != 0.0 {
-                    (self.row_idx[to], self.values[to]) = (self.row_idx[from], self.values[from]);
+                if values[from] != 0.0 {
+                    (row_idx[to], values[to]) = (row_idx[from], values[from]);
                     to += 1;
                 }
                 from += 1;
             }
             self.col_ptr[j + 1] = to;
         }
-        self.row_idx.truncate(to);
-        self.values.truncate(to);
+        row_idx.truncate(to);
+        values.truncate(to);
     }
 }
 
@@ -293,9 +306,9 @@ impl SymmetricMatrix {
                     return Self::symmetrised_by_transpose(&matrix);
                 }
                 cursor[i] += 1;
-                let mean = 0.5 * (matrix.values[at] + matrix.values[mirrored]);
-                matrix.values[at] = mean;
-                matrix.values[mirrored] = mean;
+                let values = matrix.values.own();
+                let mean = 0.5 * (values[at] + values[mirrored]);
+                (values[at], values[mirrored]) = (mean, mean);
             }
             // What is left above the diagonal has no entry below it.
             let end = matrix.col_ptr[j + 1];
@@ -339,7 +352,7 @@ impl SymmetricMatrix {
             }
             col_ptr.push(row_idx.len());
         }
-        Self(CscMatrix { n_rows: n, n_cols: n, col_ptr, row_idx, values })
+        Self(CscMatrix::made(n, n, col_ptr, row_idx, values))
     }
 
     /// Number of rows and columns.
@@ -380,7 +393,7 @@ impl SymmetricMatrix {
             }
             col_ptr.push(row_idx.len());
         }
-        Self(CscMatrix { n_rows: n, n_cols: n, col_ptr, row_idx, values })
+        Self(CscMatrix::made(n, n, col_ptr, row_idx, values))
     }
 
     /// D A D for a diagonal D.
@@ -390,9 +403,10 @@ impl SymmetricMatrix {
     pub fn scaled(&self, diagonal: &[f64]) -> Self {
         assert_eq!(diagonal.len(), self.n(), "one factor per row");
         let mut matrix = self.0.clone();
+        let values = matrix.values.own();
         for j in 0..self.n() {
             let range = self.0.col_ptr[j]..self.0.col_ptr[j + 1];
-            for (&i, v) in self.0.row_idx[range.clone()].iter().zip(&mut matrix.values[range]) {
+            for (&i, v) in self.0.row_idx[range.clone()].iter().zip(&mut values[range]) {
                 // The product of the factors first: the same to the bit on both sides of the diagonal.
                 *v *= diagonal[i as usize] * diagonal[j];
             }
@@ -404,9 +418,10 @@ impl SymmetricMatrix {
     /// stored.
     pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut matrix = self.clone();
+        let values = matrix.0.values.own();
         for i in 0..self.n() {
             let at = self.0.col_ptr[i] + self.row(i).0.binary_search(&(i as u32)).ok()?;
-            matrix.0.values[at] = f(i, self.0.values[at]);
+            values[at] = f(i, self.0.values[at]);
         }
         Some(matrix)
     }

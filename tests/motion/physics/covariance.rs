@@ -120,7 +120,7 @@ fn a_body_assembled_a_million_lengths_away_keeps_the_digits_of_its_coordinates()
 /// The same body in units that are 1/length, 1/mass, 1/time as large.
 fn in_units(raw: &RawModel, length: f64, mass: f64, time: f64) -> RawModel {
     let scaled = |m: &CscMatrix, factor: f64| {
-        let values = m.values().iter().map(|v| v * factor).collect();
+        let values: Vec<f64> = m.values().iter().map(|v| v * factor).collect();
         CscMatrix::from_parts(m.n_rows(), m.n_cols(), m.col_ptr().to_vec(), m.row_idx().to_vec(), values)
     };
     let mut other = raw.clone();

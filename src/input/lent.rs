@@ -1,0 +1,82 @@
+//! Numbers of a matrix that are kept in a file instead of in memory. The system reads them when they are touched
+//! and forgets them when memory is short, so that a matrix may be larger than that.
+
+use super::bytes::InputFile;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::numerics::linalg::Stored;
+use bytemuck::{AnyBitPattern, NoUninit};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::marker::PhantomData;
+use std::panic::{RefUnwindSafe, UnwindSafe};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tempfile::tempfile_in;
+
+/// Bytes that are written at a time.
+const PIECE: usize = 1 << 20;
+
+/// What is kept so.
+pub(super) trait Number: AnyBitPattern + NoUninit + Send + Sync + UnwindSafe + RefUnwindSafe {}
+
+impl Number for u32 {}
+impl Number for f64 {}
+
+/// Numbers on their way into a file without a name, which goes when nobody needs it any more.
+pub(super) struct Kept<T> {
+    out: BufWriter<File>,
+    folder: PathBuf,
+    count: usize,
+    numbers: PhantomData<T>,
+}
+
+impl<T: Number> Kept<T> {
+    /// In a file in `folder`.
+    ///
+    /// # Errors
+    /// FB104 when none can be made there.
+    pub fn new(folder: &Path) -> Result<Self, Diagnostic> {
+        let file = tempfile_in(folder).map_err(|e| unwritable(folder, &e))?;
+        let out = BufWriter::with_capacity(PIECE, file);
+        Ok(Self { out, folder: folder.to_owned(), count: 0, numbers: PhantomData })
+    }
+
+    /// # Errors
+    /// FB104 when the disk is full.
+    pub fn push(&mut self, number: T) -> Result<(), Diagnostic> {
+        self.count += 1;
+        self.out.write_all(bytemuck::bytes_of(&number)).map_err(|e| unwritable(&self.folder, &e))
+    }
+
+    /// All of them, in the order in which they came.
+    ///
+    /// # Errors
+    /// FB104 when the disk is full, FB101 when the file cannot be read again.
+    pub fn lend(self) -> Result<Stored<T>, Diagnostic> {
+        if self.count == 0 {
+            return Ok(Vec::new().into());
+        }
+        let file = self.out.into_inner().map_err(|e| unwritable(&self.folder, e.error()))?;
+        let map = InputFile::of(&file, &self.folder)?;
+        Ok(Stored::Lent(Arc::new(Lent { map, _file: file, numbers: PhantomData })))
+    }
+}
+
+fn unwritable(folder: &Path, error: &std::io::Error) -> Diagnostic {
+    let message = format!("the numbers of a matrix cannot be kept in {}: {error}", folder.display());
+    Diagnostic::new(Code::OutputUnwritable, message)
+}
+
+/// A file of numbers.
+struct Lent<T> {
+    map: InputFile,
+    /// Open as long as it is mapped.
+    _file: File,
+    numbers: PhantomData<T>,
+}
+
+impl<T: Number> AsRef<[T]> for Lent<T> {
+    fn as_ref(&self) -> &[T] {
+        bytemuck::cast_slice(self.map.bytes())
+    }
+}
