@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod beyond_rounding;
 mod extremes;
 mod integration;
 mod memory;

@@ -16,6 +16,10 @@ use crate::numerics::eigen::{
 use crate::numerics::linalg::{Pencil, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{Mat, MatRef};
 
+/// Columns that are multiplied by K or M at a time where only products with others are wanted: as many as the
+/// product itself takes.
+const PANEL: usize = 8;
+
 /// The lowest free-surface modes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FreeSurface {
@@ -214,21 +218,36 @@ pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: Ma
             }
         }
     }
-    let mass = |fields: &Mat<f64>| gram(fields.as_ref(), pencil.apply_mass(fields.as_ref()).as_ref());
-    let before = mass(&fields);
+    let mass = |x: MatRef<'_, f64>| pencil.apply_mass(x);
+    let before = gram_in_panels(fields.as_ref(), fields.as_ref(), mass);
     for _ in 0..2 {
-        let along = gram(rigid, pencil.apply_mass(fields.as_ref()).as_ref());
+        let along = gram_in_panels(rigid, fields.as_ref(), mass);
         subtract_combination(fields.as_mut(), rigid, along.as_ref());
     }
-    let mut m = mass(&fields);
+    let mut m = gram_in_panels(fields.as_ref(), fields.as_ref(), mass);
     for i in 0..m.nrows() {
         // A rigid field, or one that a singular mass matrix does not see: rounding only.
         if m[(i, i)] < 1e-10 * before[(i, i)] {
             m[(i, i)] = 0.0;
         }
     }
-    let k = gram(fields.as_ref(), pencil.apply_stiffness(fields.as_ref()).as_ref());
+    let k = gram_in_panels(fields.as_ref(), fields.as_ref(), |x| pencil.apply_stiffness(x));
     smallest_ratio(&k, &m).unwrap_or_else(|| trace_ratio(pencil))
+}
+
+/// A' f(B), where f takes a few columns at a time: the products of all need no room at once.
+fn gram_in_panels(
+    a: MatRef<'_, f64>,
+    b: MatRef<'_, f64>,
+    product: impl Fn(MatRef<'_, f64>) -> Mat<f64>,
+) -> Mat<f64> {
+    let mut whole = Mat::zeros(a.ncols(), b.ncols());
+    for start in (0..b.ncols()).step_by(PANEL) {
+        let width = PANEL.min(b.ncols() - start);
+        let panel = gram(a, product(b.subcols(start, width)).as_ref());
+        whole.as_mut().subcols_mut(start, width).copy_from(&panel);
+    }
+    whole
 }
 
 /// Smallest eigenvalue of the small pencil (K, M) on the well-conditioned part of M.

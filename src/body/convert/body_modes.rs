@@ -7,7 +7,7 @@ use crate::body::invariants::{
 };
 use crate::model::{FeModel, rigid_count};
 use crate::numerics::eigen::canonical_basis;
-use crate::numerics::linalg::{SymmetricMatrix, gram, multiply};
+use crate::numerics::linalg::{SymmetricMatrix, gram, multiply, projection_compensated};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
@@ -41,6 +41,12 @@ pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64>
     let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
     multiply(a, 1, vectors, product.as_mut());
     symmetric_part(&gram(vectors, product.as_ref()))
+}
+
+/// [`reduced`], rounded once at its end.
+pub(super) fn reduced_in_twice_the_precision(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
+    let projection = projection_compensated(a, 1, vectors);
+    Mat::from_fn(vectors.ncols(), vectors.ncols(), |i, j| projection[i][j].hi)
 }
 
 /// The modes of a body.

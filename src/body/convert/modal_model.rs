@@ -1,6 +1,6 @@
 //! A model with its modes, in the frame of its body: the first stage of a conversion.
 
-use super::body_modes::reduced;
+use super::body_modes::{reduced, reduced_in_twice_the_precision};
 use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -58,6 +58,8 @@ impl<'m> ModalModel<'m> {
         let (frame, mass_properties) = body_frame(model, settings.frame)?;
         let place = NodesInFrame::new(model, frame);
         let modes = BodyModes::new(model, &place, &found.solution.vectors);
+        let twice = found.solution.is_noisy() && settings.modes.accuracy != Accuracy::Fast;
+        let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
         let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };

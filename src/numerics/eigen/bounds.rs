@@ -15,7 +15,7 @@ use super::problem::EigenProblem;
 use super::solution::EigenvalueBounds;
 use crate::numerics::linalg::{
     Analysis, Cholesky, CompensatedBlock, DoubleDouble, LANES, Pencil, Solve, gram_compensated, largest,
-    multiply_compensated, small_pencil_eigenvalues, sum_length,
+    multiply_compensated, small_pencil, sum_length,
 };
 use faer::{Mat, MatRef};
 
@@ -305,7 +305,7 @@ impl Trial {
                 }
             }
         }
-        let kappa = small_pencil_eigenvalues(p, &q)?;
+        let kappa = small_pencil(p, &q)?.values;
         let slack = p_slack.relative + q_slack.relative + (count as f64 + 10.0) * 2f64.powi(-96);
         let one = DoubleDouble::from(1.0);
         let bound = |kappa: DoubleDouble| {

@@ -30,6 +30,10 @@ const MAX_RESTARTS: u64 = 100;
 /// Basis vectors beyond two for each wanted mode: restarts are then rare.
 const SPARE: usize = 128;
 
+/// Part of the tolerance that estimates have to keep where rounding hides the true residuals: the modes are
+/// then good to what the estimates say.
+const BELOW_NOISE: f64 = 1e-2;
+
 /// A search is saved when at least so many more modes have converged, or a quarter of those wanted.
 const SAVED_AFTER: usize = 5;
 
@@ -395,6 +399,13 @@ impl<'a> Iteration<'a> {
             return Ok(Some(Search::Rough { vectors, wanted: last }));
         }
         let modes = Refined::new(self.problem, iterated(last), counters)?;
+        if !self.complete
+            && modes.is_noisy(self.goal.tolerance)
+            && self.asked > BELOW_NOISE * self.goal.tolerance
+        {
+            self.asked = BELOW_NOISE * self.goal.tolerance;
+            return Ok(None);
+        }
         let excess = modes.excess(self.goal.tolerance);
         // Another step costs a block, the refinement a column for each mode that needs it.
         let gains_nothing = excess.is_nan() || excess > 0.5 * self.least_excess;

@@ -6,8 +6,8 @@ use super::failure::EigenFailure;
 use super::noise::rounding_residual;
 use super::problem::EigenProblem;
 use crate::numerics::linalg::{
-    Solve, Tall, column_norms, combine, combine_into, gram, largest, subtract_columns, subtract_combination,
-    symmetric_eigen,
+    Solve, Tall, column_norms, combine, combine_into, gram, largest, projection_compensated, small_pencil,
+    subtract_columns, subtract_combination, symmetric_eigen,
 };
 use faer::{ColRef, Mat, MatRef};
 
@@ -190,6 +190,37 @@ impl Refined {
         }
         let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
         Ok(Self { eigenvalues, vectors, residuals, floors })
+    }
+
+    /// Whether rounding keeps a K-residual above `tolerance`, as in thin or fine shells: a part eps |K| |x| of
+    /// K x, divided by distances of eigenvalues, is then what plain projections turn modes into each other by.
+    pub(super) fn is_noisy(&self, tolerance: f64) -> bool {
+        self.floors.iter().any(|floor| *floor > tolerance)
+    }
+
+    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](Self::is_noisy): the Ritz
+    /// vectors are then those of the span to the rounding of vectors themselves. Their residuals stay what they
+    /// are in double precision.
+    pub(super) fn sharpened(
+        self,
+        problem: &EigenProblem<'_>,
+        tolerance: f64,
+        counters: &mut Counters,
+    ) -> Self {
+        if !self.is_noisy(tolerance) {
+            return self;
+        }
+        let (pencil, x) = (&problem.pencil, self.vectors.as_ref());
+        counters.mass_columns += x.ncols() as u64;
+        counters.stiffness_columns += x.ncols() as u64;
+        let stiffness = projection_compensated(pencil.stiffness(), 1, x);
+        let mass = projection_compensated(pencil.mass(), pencil.block(), x);
+        // Modes without strain energy, which are refused later, have no such projection.
+        let Some(ritz) = small_pencil(stiffness, &mass) else { return self };
+        let eigenvalues: Vec<f64> = ritz.values.iter().map(|lambda| lambda.hi).collect();
+        let vectors = combine(x, ritz.vectors.as_ref());
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        Self { eigenvalues, vectors, residuals, floors }
     }
 
     /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is

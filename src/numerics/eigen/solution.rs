@@ -66,4 +66,10 @@ impl EigenSolution {
         let pairs = self.residuals.iter().zip(&self.rounding_floors);
         pairs.filter(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()
     }
+
+    /// Whether rounding keeps a K-residual above what [`Accuracy::Standard`] promises: products with K in double
+    /// precision then cost digits of what is made of these modes.
+    pub fn is_noisy(&self) -> bool {
+        self.rounding_floors.iter().any(|floor| *floor > Accuracy::Standard.residual())
+    }
 }

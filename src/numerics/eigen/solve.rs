@@ -225,6 +225,7 @@ fn search_densely(
     let tau = spectrum.factor.shift();
     let found = Refined::new(problem, spectrum.vectors(last), counters)?;
     let refined = refine(problem, &spectrum.factor, found, tolerance, counters)?;
+    let refined = refined.sharpened(problem, tolerance, counters);
     check_zero_energy(problem, &refined)?;
     problem.resume.save(|| Snapshot {
         // That of an iterative search: it may go on from here when other modes are wanted.
@@ -281,6 +282,7 @@ impl Sparse<'_> {
             None => search_in_double(problem, analysis, &goal, watch, counters)?,
         };
         counters.factor_bytes = self.plan.factor_bytes;
+        let refined = refined.sharpened(problem, tolerance, counters);
         check_zero_energy(problem, &refined)?;
         Ok(Search { refined, next, tau })
     }

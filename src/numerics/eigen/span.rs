@@ -38,6 +38,8 @@ pub fn modes_of_span(
 ) -> Result<EigenSolution, EigenFailure> {
     let mut counters = Counters::default();
     let refined = Refined::new(problem, basis, &mut counters)?;
+    // Whatever is asked of the modes: nothing is searched, and they are no better than this makes them.
+    let refined = refined.sharpened(problem, Accuracy::Standard.residual(), &mut counters);
     check_zero_energy(problem, &refined)?;
     let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, &mut counters);
     let exact = modes.exact(settings.accuracy);

@@ -1,6 +1,7 @@
-//! Eigenvalues of small symmetric pencils in double-double arithmetic.
+//! Small symmetric eigenproblems in double-double arithmetic.
 
 use super::compensated::DoubleDouble;
+use faer::Mat;
 
 /// Sweeps of the Jacobi method: convergence is quadratic, and what comes in is nearly diagonal.
 const SWEEPS: usize = 30;
@@ -8,41 +9,77 @@ const SWEEPS: usize = 30;
 /// Off-diagonal entries below this part of the diagonal are zero.
 const ZERO: f64 = 1e-33;
 
-/// Eigenvalues kappa of P x = kappa Q x, ascending, for P and Q symmetric positive definite and scaled so
-/// that their diagonals dominate. Rows of full matrices. `None` when they are not positive definite or not
-/// finite.
+/// Rows of a full matrix.
+type Rows = Vec<Vec<DoubleDouble>>;
+
+/// Eigenpairs of a small pencil.
+#[derive(Debug, Clone)]
+pub struct SmallEigen {
+    /// Ascending.
+    pub values: Vec<DoubleDouble>,
+    /// One column for each, orthonormal in the second matrix; rounded.
+    pub vectors: Mat<f64>,
+}
+
+/// Eigenpairs of P x = kappa Q x, for P and Q symmetric positive definite and scaled so that their diagonals
+/// dominate. Rows of full matrices. `None` when they are not positive definite or not finite.
 ///
 /// Cholesky of Q, then Jacobi on L^-1 P L^-T. For such matrices both are accurate relative to every single
 /// eigenvalue (J. Demmel, K. Veselic, *Jacobi's method is more accurate than QR*, SIAM J. Matrix Anal. Appl.
 /// 13, 1992): the relative error is a small multiple of the order of the pencil times 2^-106.
-pub fn small_pencil_eigenvalues(
-    mut p: Vec<Vec<DoubleDouble>>,
-    q: &[Vec<DoubleDouble>],
-) -> Option<Vec<DoubleDouble>> {
+pub fn small_pencil(mut p: Rows, q: &Rows) -> Option<SmallEigen> {
     let n = q.len();
     let l = cholesky(q)?;
     // Rows, then columns, of P are solved with L.
     for _ in 0..2 {
-        for (i, factors) in l.iter().enumerate() {
-            let (above, below) = p.split_at_mut(i);
-            for (row, &factor) in above.iter().zip(factors) {
-                for (target, &value) in below[0].iter_mut().zip(row) {
-                    *target = *target - factor * value;
-                }
-            }
-            for value in &mut below[0] {
-                *value = *value / factors[i];
+        solve_lower(&l, &mut p);
+        p = transposed(&p);
+    }
+    // Rows of the transposed vectors.
+    let mut turned = identity(n);
+    jacobi(&mut p, &mut turned)?;
+    // X = L^-T J, and X' = J' L^-1.
+    let inverse = {
+        let mut columns = identity(n);
+        solve_lower(&l, &mut columns);
+        columns
+    };
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| p[a][a].hi.total_cmp(&p[b][b].hi).then(p[a][a].lo.total_cmp(&p[b][b].lo)));
+    let entry = |row: usize, place: usize| {
+        let terms = turned[order[place]].iter().zip(&inverse);
+        terms.fold(DoubleDouble::default(), |sum, (&j, inverse)| sum + j * inverse[row]).hi
+    };
+    let vectors = Mat::from_fn(n, n, entry);
+    Some(SmallEigen { values: order.iter().map(|&i| p[i][i]).collect(), vectors })
+}
+
+fn identity(n: usize) -> Rows {
+    let entry = |i: usize, j: usize| DoubleDouble::from(if i == j { 1.0 } else { 0.0 });
+    (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect()
+}
+
+fn transposed(a: &Rows) -> Rows {
+    (0..a.len()).map(|i| a.iter().map(|row| row[i]).collect()).collect()
+}
+
+/// A <- L^-1 A.
+fn solve_lower(l: &Rows, a: &mut Rows) {
+    for (i, factors) in l.iter().enumerate() {
+        let (above, below) = a.split_at_mut(i);
+        for (row, &factor) in above.iter().zip(factors) {
+            for (target, &value) in below[0].iter_mut().zip(row) {
+                *target = *target - factor * value;
             }
         }
-        p = (0..n).map(|i| p.iter().map(|row| row[i]).collect()).collect();
+        for value in &mut below[0] {
+            *value = *value / factors[i];
+        }
     }
-    let mut values = jacobi(p)?;
-    values.sort_by(|a, b| a.hi.total_cmp(&b.hi).then(a.lo.total_cmp(&b.lo)));
-    Some(values)
 }
 
 /// Lower Cholesky factor.
-fn cholesky(a: &[Vec<DoubleDouble>]) -> Option<Vec<Vec<DoubleDouble>>> {
+fn cholesky(a: &Rows) -> Option<Rows> {
     let n = a.len();
     let mut l = vec![vec![DoubleDouble::default(); n]; n];
     for i in 0..n {
@@ -62,8 +99,9 @@ fn cholesky(a: &[Vec<DoubleDouble>]) -> Option<Vec<Vec<DoubleDouble>>> {
     Some(l)
 }
 
-/// Diagonal after cyclic Jacobi rotations; `None` when they do not converge to positive numbers.
-fn jacobi(mut a: Vec<Vec<DoubleDouble>>) -> Option<Vec<DoubleDouble>> {
+/// Makes A diagonal by cyclic Jacobi rotations, which the rows of `turned` go through as well; `None` when
+/// they do not converge to positive numbers.
+fn jacobi(a: &mut Rows, turned: &mut Rows) -> Option<()> {
     let n = a.len();
     for _ in 0..SWEEPS {
         let mut rotated = false;
@@ -74,20 +112,24 @@ fn jacobi(mut a: Vec<Vec<DoubleDouble>>) -> Option<Vec<DoubleDouble>> {
                     return None;
                 }
                 if a[i][j].hi.abs() > ZERO * size {
-                    rotate(&mut a, i, j);
+                    let (c, s) = rotate(a, i, j);
+                    for k in 0..n {
+                        let (x, y) = (turned[i][k], turned[j][k]);
+                        (turned[i][k], turned[j][k]) = (c * x - s * y, s * x + c * y);
+                    }
                     rotated = true;
                 }
             }
         }
         if !rotated {
-            return Some((0..n).map(|i| a[i][i]).collect());
+            return Some(());
         }
     }
     None
 }
 
-/// One rotation of rows and columns i and j, which leaves a zero at (i, j).
-fn rotate(a: &mut [Vec<DoubleDouble>], i: usize, j: usize) {
+/// One rotation of rows and columns i and j, which leaves a zero at (i, j); its cosine and sine.
+fn rotate(a: &mut Rows, i: usize, j: usize) -> (DoubleDouble, DoubleDouble) {
     let one = DoubleDouble::from(1.0);
     let off = a[i][j];
     // t = tan(angle) solves t^2 + 2 z t - 1 = 0, the smaller root.
@@ -108,4 +150,5 @@ fn rotate(a: &mut [Vec<DoubleDouble>], i: usize, j: usize) {
         (a[k][i], a[i][k]) = (x, x);
         (a[k][j], a[j][k]) = (y, y);
     }
+    (c, s)
 }

@@ -108,6 +108,32 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
     total
 }
 
+/// X' (A kron I_block) X for X of `block * A.n()` rows, in panels of [`LANES`] columns: rows of a symmetric
+/// matrix.
+///
+/// # Panics
+/// When the shapes disagree.
+pub fn projection_compensated(
+    a: &SymmetricMatrix,
+    block: usize,
+    x: MatRef<'_, f64>,
+) -> Vec<Vec<DoubleDouble>> {
+    let count = x.ncols();
+    let mut projection = vec![vec![DoubleDouble::default(); count]; count];
+    for start in (0..count).step_by(LANES) {
+        let width = LANES.min(count - start);
+        let product = multiply_compensated(a, block, x.subcols(start, width));
+        let gram = gram_compensated(x.subcols(0, start + width), &product);
+        for c in 0..width {
+            for i in 0..=start + c {
+                projection[i][start + c] = gram[i][c];
+                projection[start + c][i] = gram[i][c];
+            }
+        }
+    }
+    projection
+}
+
 /// Additions that a term of a sum over `n` rows takes part in at most, with room for those around it.
 pub fn sum_length(n: usize) -> f64 {
     (ROWS.min(n) + n.div_ceil(ROWS) + 16) as f64

@@ -26,8 +26,10 @@ mod tall;
 mod tree_walk;
 
 pub use compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
-pub use compensated_pencil::small_pencil_eigenvalues;
-pub use compensated_product::{CompensatedBlock, LANES, gram_compensated, multiply_compensated, sum_length};
+pub use compensated_pencil::{SmallEigen, small_pencil};
+pub use compensated_product::{
+    CompensatedBlock, LANES, gram_compensated, multiply_compensated, projection_compensated, sum_length,
+};
 pub use dense::{SymmetricEigen, dense_cholesky, dense_inverse, solve_lower, solve_upper, symmetric_eigen};
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, Peaks, Solve, is_positive_semidefinite};

@@ -5,8 +5,8 @@ use super::exact::exact;
 use crate::support::random::Random;
 use faer::Mat;
 use flexbody::numerics::linalg::{
-    CscMatrix, DoubleDouble, SymmetricMatrix, gram_compensated, multiply_compensated,
-    small_pencil_eigenvalues, sum_length,
+    CscMatrix, DoubleDouble, SmallEigen, SymmetricMatrix, gram_compensated, multiply_compensated,
+    small_pencil, sum_length,
 };
 use num_rational::BigRational;
 use num_traits::{Signed, ToPrimitive, Zero};
@@ -119,7 +119,7 @@ fn small_pencils_have_the_eigenvalues_of_their_characteristic_polynomial() {
             *value = *value * 10f64.powi(2 * i as i32 + 2 * j as i32);
         }
     }
-    let kappa = small_pencil_eigenvalues(p.clone(), &q).expect("positive definite");
+    let SmallEigen { values: kappa, vectors } = small_pencil(p.clone(), &q).expect("positive definite");
     let determinant = |kappa: &BigRational| {
         let mut a: Vec<Vec<BigRational>> =
             (0..n).map(|i| (0..n).map(|j| value(p[i][j]) - kappa * value(q[i][j])).collect()).collect();
@@ -141,5 +141,19 @@ fn small_pencils_have_the_eigenvalues_of_their_characteristic_polynomial() {
         assert!((determinant(&around(-1.0)) * determinant(&around(1.0))).is_negative(), "eigenvalue {i}");
     }
     assert!(kappa.windows(2).all(|w| w[0].hi < w[1].hi));
-    assert!(small_pencil_eigenvalues(p, &vec![vec![DoubleDouble::from(-1.0); n]; n]).is_none());
+    // P x = kappa Q x and x'Qx = 1 to the rounding of x, where each row counts beside its own decades.
+    for j in 0..n {
+        let times = |a: &[Vec<DoubleDouble>], i: usize| {
+            (0..n).fold(DoubleDouble::default(), |sum, k| sum + a[i][k] * vectors[(k, j)])
+        };
+        let norm = (0..n).fold(DoubleDouble::default(), |sum, i| sum + times(&q, i) * vectors[(i, j)]);
+        assert!((norm.hi - 1.0).abs() < 1e-15, "vector {j}: {}", norm.hi);
+        for i in 0..n {
+            let size = (0..n).fold(0.0, |sum, k| sum + (p[i][k].hi * vectors[(k, j)]).abs());
+            let left = times(&p, i) - kappa[j] * times(&q, i);
+            let allowed = 4.0 * f64::EPSILON * (size + kappa[j].hi * vectors.col(j).norm_max());
+            assert!(left.hi.abs() < allowed, "row {i} of vector {j}: {:e} of {allowed:e}", left.hi);
+        }
+    }
+    assert!(small_pencil(p, &vec![vec![DoubleDouble::from(-1.0); n]; n]).is_none());
 }
