@@ -53,7 +53,8 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let schemes = lumping_schemes(&arguments.lumped)?;
     // What the command line says replaces what the manifest says.
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
-    let files = model_files(arguments)?;
+    let keep_in = elsewhere.keeps_in(&arguments.output);
+    let files = ModelFiles { keep_in, ..model_files(arguments)? };
     let asked_of = |path| asked_cases(path, arguments.case.as_deref());
     let scenes = arguments.scene.as_deref().map(asked_of).transpose()?.unwrap_or_default();
     let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, &scenes));

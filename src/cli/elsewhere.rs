@@ -52,6 +52,12 @@ impl Elsewhere {
         }
     }
 
+    /// Where matrices may be kept instead of in memory: beside the output, for bodies that are taken elsewhere
+    /// because of their size.
+    pub(super) fn keeps_in(&self, output: &Path) -> Option<PathBuf> {
+        (!matches!(self, Self::Nowhere)).then(|| folder_around(output))
+    }
+
     /// The modes of `model`; `None` where this program is to find them.
     pub(super) fn modes(
         &self,
@@ -90,6 +96,12 @@ impl Elsewhere {
             let _ = std::fs::remove_dir_all(folder);
         }
     }
+}
+
+/// The path itself where it is a folder, or the first folder around it that is there.
+pub(super) fn folder_around(path: &Path) -> PathBuf {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    whole.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new(".")).to_owned()
 }
 
 /// Does work in a folder, which is made where it is not there, and removed again where the work fails.

@@ -2,7 +2,7 @@
 
 use super::arguments::AccuracyName;
 use super::arguments::PrepareArguments;
-use super::elsewhere::in_made_folder;
+use super::elsewhere::{folder_around, in_made_folder};
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -12,7 +12,6 @@ use crate::cluster::{ModelReference, PrepareSettings, Prepared, prepare};
 use crate::input::read_model;
 use crate::model::{CheckedModel, FeModel};
 use crate::numerics::eigen::{Accuracy, Wanted};
-use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     let accuracy = match arguments.accuracy {
@@ -24,7 +23,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     };
     let mut files = of_manifest_or_job(&arguments.model, &arguments.job)?;
     files.allow_implausible |= arguments.allow_implausible;
-    files.keep_in = Some(existing(&arguments.output));
+    files.keep_in = Some(folder_around(&arguments.output));
     if !files.residual_vectors.is_empty() {
         return Err(usage("the manifest asks for residual vectors, which need the factor of this program"));
     }
@@ -55,12 +54,6 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     let text = text(arguments, &prepared, bytes);
     let json = serde_json::json!({ "folder": arguments.output.display().to_string(), "bytes": bytes, "prepared": prepared });
     Ok(Outcome { text, json: json.to_string(), diagnostics, passed: true })
-}
-
-/// The folder itself, or the first around it that is there.
-fn existing(folder: &Path) -> PathBuf {
-    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-    whole.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new(".")).to_owned()
 }
 
 fn usage(message: &str) -> crate::base::error::Error {

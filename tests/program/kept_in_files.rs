@@ -1,8 +1,10 @@
 //! Matrices that are kept in files instead of in memory: the same as others, and the same files for a cluster.
 
 use crate::support::program::{fixtures, flexbody, members};
+use flexbody::base::progress::SILENT;
+use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::input::{read_manifest, read_model};
-use flexbody::model::RawModel;
+use flexbody::model::{FeModel, RawModel};
 use flexbody::numerics::linalg::CscMatrix;
 use hdf5_metno as hdf5;
 use std::fs;
@@ -78,19 +80,24 @@ fn write_group(file: &hdf5::File, name: &str, matrix: &CscMatrix, layout: Layout
     }
 }
 
+/// Puts a copy, which nobody has locked, in the place of a file that was written here: a program that another
+/// test starts has the open files of this one, and their locks, until it runs.
+fn unlock(path: &Path) {
+    let copied = path.with_extension("copy");
+    fs::copy(path, &copied).expect("a copy");
+    fs::rename(&copied, path).expect("renamed");
+}
+
 /// The cube in a folder, its matrices in HDF5.
 fn model_in(folder: &Path, layout: Layout) {
     let own = fixtures().join("models/cube_hex8");
     let read = read_model(&read_manifest(own.join("model.toml")).expect("a manifest")).expect("a model");
-    let written = folder.join("written.h5");
-    let file = hdf5::File::create(&written).expect("a file");
+    let path = folder.join("matrices.h5");
+    let file = hdf5::File::create(&path).expect("a file");
     write_group(&file, "K", &read.stiffness.matrix, layout);
     write_group(&file, "M", &read.mass.matrix, layout);
     drop(file);
-    // A copy has no lock: a program that another test starts has this one's open files until it runs, and their
-    // locks with them.
-    fs::copy(&written, folder.join("matrices.h5")).expect("a copy");
-    fs::remove_file(written).expect("removed");
+    unlock(&path);
     for table in ["nodes.csv", "dofs.csv"] {
         fs::copy(own.join(table), folder.join(table)).expect("a copy");
     }
@@ -133,13 +140,15 @@ fn damage_is_told_alike() {
     for (dataset, at, wrong) in [("indices", 5, 1e6), ("data", 7, f64::NAN), ("indptr", 3, 1e6)] {
         let folder = tempfile::tempdir().expect("a folder");
         model_in(folder.path(), Layout::Plain);
+        let path = folder.path().join("matrices.h5");
         {
-            let file = hdf5::File::open_rw(folder.path().join("matrices.h5")).expect("a file");
+            let file = hdf5::File::open_rw(&path).expect("a file");
             let numbers = file.dataset(&format!("K/{dataset}")).expect("a dataset");
             let mut values = numbers.read_raw::<f64>().expect("numbers");
             values[at] = wrong;
             numbers.write(&values).expect("written");
         }
+        unlock(&path);
         let told = [false, true].map(|keep| {
             let mut files = read_manifest(folder.path().join("model.toml")).expect("a manifest");
             files.keep_in = keep.then(|| folder.path().to_owned());
@@ -164,4 +173,17 @@ fn a_cluster_gets_the_same_files() {
             ["text.job", "hdf5.job"].map(|job| fs::read(folder.path().join(job).join(name)).expect("a file"));
         assert!(text == hdf5, "{name}");
     }
+}
+
+/// `assemble` and `convert --engine slepc` make bodies of matrices that are kept.
+#[test]
+fn a_body_of_kept_matrices_is_that_of_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    model_in(folder.path(), Layout::Plain);
+    let [held, kept] = [false, true].map(|keep| {
+        let model = FeModel::from_raw(read(folder.path(), keep)).expect("a model").model;
+        assert_eq!(model.stiffness().as_csc().is_lent(), keep);
+        convert(&model, &ConvertSettings::default(), SILENT).expect("a body").body
+    });
+    assert_eq!(held, kept);
 }
