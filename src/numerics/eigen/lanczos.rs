@@ -10,13 +10,13 @@ use super::failure::EigenFailure;
 use super::krylov::Krylov;
 use super::noise::energy_noise;
 use super::problem::EigenProblem;
-use super::refine::Refined;
+use super::refine::{Refined, rounding_floors};
 use super::resume::Snapshot;
 use super::start::snapshot;
 use super::zero_energy::NOISE_FACTOR;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Solve, SymmetricEigen, symmetric_eigen};
-use faer::Mat;
+use faer::{Mat, MatRef};
 use std::ops::RangeInclusive;
 
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138
@@ -33,6 +33,9 @@ const SPARE: usize = 128;
 /// Part of the tolerance that estimates have to keep where rounding hides the true residuals: the modes are
 /// then good to what the estimates say.
 const BELOW_NOISE: f64 = 1e-2;
+
+/// Residuals below this are asked of no estimate: the solves have no more digits.
+const LEAST_ASKED: f64 = 1e-12;
 
 /// A search is saved when at least so many more modes have converged, or a quarter of those wanted.
 const SAVED_AFTER: usize = 5;
@@ -398,14 +401,12 @@ impl<'a> Iteration<'a> {
             let vectors = iterated((last + last / 2 + 2 * self.goal.block).min(size));
             return Ok(Some(Search::Rough { vectors, wanted: last }));
         }
-        let modes = Refined::new(self.problem, iterated(last), counters)?;
-        if !self.complete
-            && modes.is_noisy(self.goal.tolerance)
-            && self.asked > BELOW_NOISE * self.goal.tolerance
-        {
-            self.asked = BELOW_NOISE * self.goal.tolerance;
+        let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
+        if self.asked > below_noise && self.is_noisy(iterated(last.min(1)).as_ref(), counters) {
+            self.asked = below_noise;
             return Ok(None);
         }
+        let modes = Refined::new(self.problem, iterated(last), counters)?;
         let excess = modes.excess(self.goal.tolerance);
         // Another step costs a block, the refinement a column for each mode that needs it.
         let gains_nothing = excess.is_nan() || excess > 0.5 * self.least_excess;
@@ -417,6 +418,12 @@ impl<'a> Iteration<'a> {
         self.least_excess = excess;
         self.asked /= 1.2 * excess;
         Ok(None)
+    }
+
+    /// Whether rounding hides the true residual of the first mode, whose strain energy is least.
+    fn is_noisy(&self, first: MatRef<'_, f64>, counters: &mut Counters) -> bool {
+        let floors = rounding_floors(self.problem, first, counters);
+        !self.complete && floors.iter().any(|floor| *floor > self.goal.tolerance)
     }
 
     /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better

@@ -6,8 +6,8 @@ use super::failure::EigenFailure;
 use super::noise::rounding_residual;
 use super::problem::EigenProblem;
 use crate::numerics::linalg::{
-    Solve, Tall, column_norms, combine, combine_into, gram, largest, projection_compensated, small_pencil,
-    subtract_columns, subtract_combination, symmetric_eigen,
+    DoubleDouble, Solve, Tall, column_norms, column_products, combine, combine_into, gram, largest,
+    projection_compensated, small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
 };
 use faer::{ColRef, Mat, MatRef};
 
@@ -51,6 +51,10 @@ fn inverse_iteration(
 
 /// Squared M-norm, relative to that of the columns, below which a direction of their span is only rounding.
 const DEPENDENT: f64 = 1e-8;
+
+/// Modes of a span whose projections are taken in twice the precision: the time of small eigenproblems in that
+/// grows with the third power, and is a second with 200.
+const SHARPENED_AT_MOST: usize = 200;
 
 /// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz
 /// vectors in ascending order of lambda. Directions in which X is dependent are left out.
@@ -145,6 +149,21 @@ pub(super) fn residuals(
     (residuals, floors.collect())
 }
 
+/// The part of the K-residuals of rough modes that cannot be helped, as [`residuals`] has it.
+pub(super) fn rounding_floors(
+    problem: &EigenProblem<'_>,
+    x: MatRef<'_, f64>,
+    counters: &mut Counters,
+) -> Vec<f64> {
+    let pencil = &problem.pencil;
+    counters.mass_columns += x.ncols() as u64;
+    counters.stiffness_columns += x.ncols() as u64;
+    let energies = column_products(x, pencil.apply_stiffness(x).as_ref());
+    let masses = column_products(x, pencil.apply_mass(x).as_ref());
+    let quotients: Vec<f64> = energies.iter().zip(&masses).map(|(energy, mass)| energy / mass).collect();
+    residuals(problem, &quotients, x, counters).1
+}
+
 /// Turns K X into what the pairs leave unbalanced, K x - lambda M x. The sizes |K x| + |lambda M x|, and the
 /// norm of what is left beside them.
 pub(super) fn leave_unbalanced(
@@ -198,23 +217,26 @@ impl Refined {
         self.floors.iter().any(|floor| *floor > tolerance)
     }
 
-    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](Self::is_noisy): the Ritz
-    /// vectors are then those of the span to the rounding of vectors themselves. Their residuals stay what they
-    /// are in double precision.
+    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](Self::is_noisy) and has
+    /// [few modes enough](SHARPENED_AT_MOST): the Ritz vectors are then those of the span to the rounding of
+    /// vectors themselves. Their residuals stay what they are in double precision.
     pub(super) fn sharpened(
         self,
         problem: &EigenProblem<'_>,
         tolerance: f64,
         counters: &mut Counters,
     ) -> Self {
-        if !self.is_noisy(tolerance) {
+        if !self.is_noisy(tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
             return self;
         }
         let (pencil, x) = (&problem.pencil, self.vectors.as_ref());
         counters.mass_columns += x.ncols() as u64;
         counters.stiffness_columns += x.ncols() as u64;
         let stiffness = projection_compensated(pencil.stiffness(), 1, x);
-        let mass = projection_compensated(pencil.mass(), pencil.block(), x);
+        // Nothing cancels in products with M.
+        let mass = gram(x, pencil.apply_mass(x).as_ref());
+        let entry = |i: usize, j: usize| DoubleDouble::from(0.5 * (mass[(i, j)] + mass[(j, i)]));
+        let mass = (0..x.ncols()).map(|i| (0..x.ncols()).map(|j| entry(i, j)).collect()).collect();
         // Modes without strain energy, which are refused later, have no such projection.
         let Some(ritz) = small_pencil(stiffness, &mass) else { return self };
         let eigenvalues: Vec<f64> = ritz.values.iter().map(|lambda| lambda.hi).collect();

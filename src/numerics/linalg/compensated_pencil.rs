@@ -39,11 +39,8 @@ pub fn small_pencil(mut p: Rows, q: &Rows) -> Option<SmallEigen> {
     let mut turned = identity(n);
     jacobi(&mut p, &mut turned)?;
     // X = L^-T J, and X' = J' L^-1.
-    let inverse = {
-        let mut columns = identity(n);
-        solve_lower(&l, &mut columns);
-        columns
-    };
+    let mut inverse = identity(n);
+    solve_lower(&l, &mut inverse);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&a, &b| p[a][a].hi.total_cmp(&p[b][b].hi).then(p[a][a].lo.total_cmp(&p[b][b].lo)));
     let entry = |row: usize, place: usize| {
@@ -113,9 +110,9 @@ fn jacobi(a: &mut Rows, turned: &mut Rows) -> Option<()> {
                 }
                 if a[i][j].hi.abs() > ZERO * size {
                     let (c, s) = rotate(a, i, j);
-                    for k in 0..n {
-                        let (x, y) = (turned[i][k], turned[j][k]);
-                        (turned[i][k], turned[j][k]) = (c * x - s * y, s * x + c * y);
+                    let (above, below) = turned.split_at_mut(i);
+                    for (x, y) in below[0].iter_mut().zip(&mut above[j]) {
+                        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
                     }
                     rotated = true;
                 }
