@@ -50,8 +50,8 @@ after the body tumbled free for {turns} periods of its first mode at a twentieth
 16 stands for 16 or more. *told* are warnings and notes of the run; *refused* is an error with its exit code, and no file.
 
 Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in frequencies, I0 or W1, or from its files in W2 and W3,
-without a warning that says so. What `flexbody` itself leaves of W2 and W3 can be less where two modes differ by less than the digits of K resolve (bricks of 1 : 1e3): their span is
-right, and the motion with it. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. Written by
+without a warning that says so. Where rounding keeps the K-residuals above what `standard` promises, modes are projected in twice the precision ([theory](theory.md#8-modes), after (8.4)): most frequencies then keep
+all digits of the files, and W2 and W3 what the distance of the modes leaves. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. Written by
 `python3 docs/make_stability.py`, which fails if this is not so; `tests/numerics/extremes.rs` holds what is said here.
 
 ![digits kept against digits that the files hold](images/stability.svg)
