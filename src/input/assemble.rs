@@ -2,8 +2,6 @@
 //! entries that belong there in file order, so that the bits are the same for any number of tasks.
 
 use super::digits::significant_digits;
-#[cfg(feature = "hdf5")]
-use super::lent::Kept;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::memory::or_go_without;
 use crate::model::RawMatrix;
@@ -124,53 +122,6 @@ pub(super) fn assemble_columns(
 ) -> Result<RawMatrix, Diagnostic> {
     let digits = significant_digits(columns.values.len(), written, |k| columns.values[k]);
     finish(columns.counts.len() - 1, columns.compress(), digits, path)
-}
-
-/// Compressed columns on their way into files.
-#[cfg(feature = "hdf5")]
-pub(super) struct KeptColumns {
-    col_ptr: Vec<usize>,
-    rows: Kept<u32>,
-    values: Kept<f64>,
-    /// Column and row of the last entry.
-    last: Option<(u32, u32)>,
-    ascends: bool,
-}
-
-#[cfg(feature = "hdf5")]
-impl KeptColumns {
-    /// # Errors
-    /// As [`Kept::new`].
-    pub fn new(folder: &Path, n: usize) -> Result<Self, Diagnostic> {
-        let (rows, values) = (Kept::new(folder)?, Kept::new(folder)?);
-        Ok(Self { col_ptr: vec![0; n + 1], rows, values, last: None, ascends: true })
-    }
-
-    /// # Errors
-    /// As [`Kept::push`].
-    pub fn push(&mut self, entry: Entry) -> Result<(), Diagnostic> {
-        let at = Some((entry.col, entry.row));
-        self.ascends &= self.last < at;
-        self.last = at;
-        self.col_ptr[entry.col as usize + 1] += 1;
-        self.rows.push(entry.row)?;
-        self.values.push(entry.value)
-    }
-
-    /// The matrix; `None` where entries did not come sorted, or one came twice.
-    ///
-    /// # Errors
-    /// As [`Kept::lend`].
-    pub fn compress(mut self) -> Result<Option<CscMatrix>, Diagnostic> {
-        if !self.ascends {
-            return Ok(None);
-        }
-        let n = self.col_ptr.len() - 1;
-        for j in 0..n {
-            self.col_ptr[j + 1] += self.col_ptr[j];
-        }
-        Ok(Some(CscMatrix::from_parts(n, n, self.col_ptr, self.rows.lend()?, self.values.lend()?)))
-    }
 }
 
 /// A matrix that is complete.

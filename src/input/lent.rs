@@ -1,9 +1,10 @@
 //! Numbers of a matrix that are kept in a file instead of in memory. The system reads them when they are touched
 //! and forgets them when memory is short, so that a matrix may be larger than that.
 
+use super::assemble::Entry;
 use super::bytes::InputFile;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::numerics::linalg::Stored;
+use crate::numerics::linalg::{CscMatrix, Stored};
 use bytemuck::{AnyBitPattern, NoUninit};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -59,6 +60,51 @@ impl<T: Number> Kept<T> {
         let file = self.out.into_inner().map_err(|e| unwritable(&self.folder, e.error()))?;
         let map = InputFile::of(&file, &self.folder)?;
         Ok(Stored::Lent(Arc::new(Lent { map, _file: file, numbers: PhantomData })))
+    }
+}
+
+/// Compressed columns on their way into files.
+pub(super) struct KeptColumns {
+    col_ptr: Vec<usize>,
+    rows: Kept<u32>,
+    values: Kept<f64>,
+    /// Column and row of the last entry.
+    last: Option<(u32, u32)>,
+    ascends: bool,
+}
+
+impl KeptColumns {
+    /// # Errors
+    /// As [`Kept::new`].
+    pub fn new(folder: &Path, n: usize) -> Result<Self, Diagnostic> {
+        let (rows, values) = (Kept::new(folder)?, Kept::new(folder)?);
+        Ok(Self { col_ptr: vec![0; n + 1], rows, values, last: None, ascends: true })
+    }
+
+    /// # Errors
+    /// As [`Kept::push`].
+    pub fn push(&mut self, entry: Entry) -> Result<(), Diagnostic> {
+        let at = Some((entry.col, entry.row));
+        self.ascends &= self.last < at;
+        self.last = at;
+        self.col_ptr[entry.col as usize + 1] += 1;
+        self.rows.push(entry.row)?;
+        self.values.push(entry.value)
+    }
+
+    /// The matrix; `None` where entries did not come sorted, or one came twice.
+    ///
+    /// # Errors
+    /// As [`Kept::lend`].
+    pub fn compress(mut self) -> Result<Option<CscMatrix>, Diagnostic> {
+        if !self.ascends {
+            return Ok(None);
+        }
+        let n = self.col_ptr.len() - 1;
+        for j in 0..n {
+            self.col_ptr[j + 1] += self.col_ptr[j];
+        }
+        Ok(Some(CscMatrix::from_parts(n, n, self.col_ptr, self.rows.lend()?, self.values.lend()?)))
     }
 }
 

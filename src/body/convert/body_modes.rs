@@ -45,7 +45,7 @@ pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64>
 
 /// [`reduced`], rounded once at its end.
 pub(super) fn reduced_in_twice_the_precision(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
-    let projection = projection_compensated(a, 1, vectors);
+    let projection = projection_compensated(a, vectors);
     Mat::from_fn(vectors.ncols(), vectors.ncols(), |i, j| projection[i][j].hi)
 }
 

@@ -58,7 +58,8 @@ impl<'m> ModalModel<'m> {
         let (frame, mass_properties) = body_frame(model, settings.frame)?;
         let place = NodesInFrame::new(model, frame);
         let modes = BodyModes::new(model, &place, &found.solution.vectors);
-        let twice = found.solution.is_noisy() && settings.modes.accuracy != Accuracy::Fast;
+        // `certified` makes its own.
+        let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
         let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;

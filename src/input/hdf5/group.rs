@@ -2,13 +2,14 @@
 //! scipy, anndata, MATLAB and PETSc (`docs/input.md`).
 
 use super::super::assemble::{
-    ColumnEntries, Entry, KeptColumns, Sides, Storage, assemble, assemble_columns, assembled, check_size,
-    push, undeclared_triangle,
+    ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, assembled, check_size, push,
+    undeclared_triangle,
 };
 use super::members::{Members, POINTERS};
 use super::values::{Found, Vector, integers_of, text_of, truth_of};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
+use crate::input::lent::KeptColumns;
 use crate::input::reader::MatrixSource;
 use crate::model::RawMatrix;
 use crate::numerics::linalg::CscMatrix;

@@ -8,9 +8,9 @@ use super::canonical::cluster_end;
 use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::krylov::Krylov;
-use super::noise::energy_noise;
+use super::noise::{energy_noise, is_noisy};
 use super::problem::EigenProblem;
-use super::refine::{Refined, rounding_floors};
+use super::refine::{Refined, residuals};
 use super::resume::Snapshot;
 use super::start::snapshot;
 use super::zero_energy::NOISE_FACTOR;
@@ -402,7 +402,8 @@ impl<'a> Iteration<'a> {
             return Ok(Some(Search::Rough { vectors, wanted: last }));
         }
         let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
-        if self.asked > below_noise && self.is_noisy(iterated(last.min(1)).as_ref(), counters) {
+        let may_ask_more = !self.complete && self.asked > below_noise;
+        if may_ask_more && self.hides_residuals(ritz, iterated(last.min(1)).as_ref(), counters) {
             self.asked = below_noise;
             return Ok(None);
         }
@@ -421,9 +422,9 @@ impl<'a> Iteration<'a> {
     }
 
     /// Whether rounding hides the true residual of the first mode, whose strain energy is least.
-    fn is_noisy(&self, first: MatRef<'_, f64>, counters: &mut Counters) -> bool {
-        let floors = rounding_floors(self.problem, first, counters);
-        !self.complete && floors.iter().any(|floor| *floor > self.goal.tolerance)
+    fn hides_residuals(&self, ritz: &Ritz, first: MatRef<'_, f64>, counters: &mut Counters) -> bool {
+        let eigenvalues: Vec<f64> = (0..first.ncols()).map(|i| ritz.lambda(i)).collect();
+        is_noisy(&residuals(self.problem, &eigenvalues, first, counters).1, self.goal.tolerance)
     }
 
     /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better

@@ -25,6 +25,12 @@ pub fn rounding_residual(k: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<f64> {
     column_norms(row_sums(k, x, f64::abs).as_ref()).into_iter().map(|norm| f64::EPSILON * norm).collect()
 }
 
+/// Whether rounding keeps a K-residual above `tolerance`, as in thin or fine shells: a part eps |K| |x| of K x,
+/// divided by distances of eigenvalues, is then what plain projections turn modes into each other by.
+pub(super) fn is_noisy(floors: &[f64], tolerance: f64) -> bool {
+    floors.iter().any(|floor| *floor > tolerance)
+}
+
 /// sum_j f(K_ij x_j) for each row i and each column x.
 fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Copy + Sync) -> Tall {
     let mut sums = Tall::zeros(x.nrows(), x.ncols());

@@ -3,11 +3,11 @@
 
 use super::counters::Counters;
 use super::failure::EigenFailure;
-use super::noise::rounding_residual;
+use super::noise::{is_noisy, rounding_residual};
 use super::problem::EigenProblem;
 use crate::numerics::linalg::{
-    DoubleDouble, Solve, Tall, column_norms, column_products, combine, combine_into, gram, largest,
-    projection_compensated, small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
+    DoubleDouble, Solve, Tall, column_norms, combine, combine_into, gram, largest, projection_compensated,
+    small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
 };
 use faer::{ColRef, Mat, MatRef};
 
@@ -149,21 +149,6 @@ pub(super) fn residuals(
     (residuals, floors.collect())
 }
 
-/// The part of the K-residuals of rough modes that cannot be helped, as [`residuals`] has it.
-pub(super) fn rounding_floors(
-    problem: &EigenProblem<'_>,
-    x: MatRef<'_, f64>,
-    counters: &mut Counters,
-) -> Vec<f64> {
-    let pencil = &problem.pencil;
-    counters.mass_columns += x.ncols() as u64;
-    counters.stiffness_columns += x.ncols() as u64;
-    let energies = column_products(x, pencil.apply_stiffness(x).as_ref());
-    let masses = column_products(x, pencil.apply_mass(x).as_ref());
-    let quotients: Vec<f64> = energies.iter().zip(&masses).map(|(energy, mass)| energy / mass).collect();
-    residuals(problem, &quotients, x, counters).1
-}
-
 /// Turns K X into what the pairs leave unbalanced, K x - lambda M x. The sizes |K x| + |lambda M x|, and the
 /// norm of what is left beside them.
 pub(super) fn leave_unbalanced(
@@ -211,13 +196,7 @@ impl Refined {
         Ok(Self { eigenvalues, vectors, residuals, floors })
     }
 
-    /// Whether rounding keeps a K-residual above `tolerance`, as in thin or fine shells: a part eps |K| |x| of
-    /// K x, divided by distances of eigenvalues, is then what plain projections turn modes into each other by.
-    pub(super) fn is_noisy(&self, tolerance: f64) -> bool {
-        self.floors.iter().any(|floor| *floor > tolerance)
-    }
-
-    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](Self::is_noisy) and has
+    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](is_noisy) and has
     /// [few modes enough](SHARPENED_AT_MOST): the Ritz vectors are then those of the span to the rounding of
     /// vectors themselves. Their residuals stay what they are in double precision.
     pub(super) fn sharpened(
@@ -226,13 +205,13 @@ impl Refined {
         tolerance: f64,
         counters: &mut Counters,
     ) -> Self {
-        if !self.is_noisy(tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
+        if !is_noisy(&self.floors, tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
             return self;
         }
         let (pencil, x) = (&problem.pencil, self.vectors.as_ref());
         counters.mass_columns += x.ncols() as u64;
         counters.stiffness_columns += x.ncols() as u64;
-        let stiffness = projection_compensated(pencil.stiffness(), 1, x);
+        let stiffness = projection_compensated(pencil.stiffness(), x);
         // Nothing cancels in products with M.
         let mass = gram(x, pencil.apply_mass(x).as_ref());
         let entry = |i: usize, j: usize| DoubleDouble::from(0.5 * (mass[(i, j)] + mass[(j, i)]));

@@ -2,6 +2,7 @@
 
 use super::Completeness;
 use super::counters::Counters;
+use super::noise::is_noisy;
 use super::plan::Plan;
 use super::settings::{Accuracy, keeps};
 use faer::Mat;
@@ -70,6 +71,6 @@ impl EigenSolution {
     /// Whether rounding keeps a K-residual above what [`Accuracy::Standard`] promises: products with K in double
     /// precision then cost digits of what is made of these modes.
     pub fn is_noisy(&self) -> bool {
-        self.rounding_floors.iter().any(|floor| *floor > Accuracy::Standard.residual())
+        is_noisy(&self.rounding_floors, Accuracy::Standard.residual())
     }
 }

@@ -108,21 +108,16 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
     total
 }
 
-/// X' (A kron I_block) X for X of `block * A.n()` rows, in panels of [`LANES`] columns: rows of a symmetric
-/// matrix.
+/// X' A X in panels of [`LANES`] columns: rows of a symmetric matrix.
 ///
 /// # Panics
 /// When the shapes disagree.
-pub fn projection_compensated(
-    a: &SymmetricMatrix,
-    block: usize,
-    x: MatRef<'_, f64>,
-) -> Vec<Vec<DoubleDouble>> {
+pub fn projection_compensated(a: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<Vec<DoubleDouble>> {
     let count = x.ncols();
     let mut projection = vec![vec![DoubleDouble::default(); count]; count];
     for start in (0..count).step_by(LANES) {
         let width = LANES.min(count - start);
-        let product = multiply_compensated(a, block, x.subcols(start, width));
+        let product = multiply_compensated(a, 1, x.subcols(start, width));
         let gram = gram_compensated(x.subcols(0, start + width), &product);
         for c in 0..width {
             for i in 0..=start + c {
