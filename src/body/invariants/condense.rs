@@ -12,7 +12,7 @@ use crate::numerics::linalg::SymmetricMatrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{Matrix3, Vector3};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -304,7 +304,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
             let rows = CHUNK.min(nodes.end - first);
             let product = &mut product.get_mut()[..rows * width];
             let targets = product.as_chunks_mut::<LANE>().0;
-            arch.dispatch(|| mass_times(mass, first, x_lanes, lanes, targets));
+            arch.dispatch(MassTimes { mass, first, x: x_lanes, lanes, targets });
             // Rows of nodes are columns of the transpose.
             let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
             let product = transposed(product, width).transpose();
@@ -321,18 +321,25 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
     })
 }
 
-/// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for.
-#[inline(always)] // compiled once per instruction set
-pub(super) fn mass_times<M: NodalMass + ?Sized>(
-    mass: &M,
-    first: usize,
-    x: &[Lane],
-    lanes: usize,
-    targets: &mut [Lane],
-) {
-    for (k, row) in targets.chunks_exact_mut(lanes).enumerate() {
-        for (lane, target) in row.iter_mut().enumerate() {
-            *target = mass.row_times(first + k, x, lanes, lane);
+/// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for. (Not a closure, which may be
+/// compiled apart from the function that has the instruction set, without it.)
+pub(super) struct MassTimes<'a, M: ?Sized> {
+    pub mass: &'a M,
+    pub first: usize,
+    pub x: &'a [Lane],
+    pub lanes: usize,
+    pub targets: &'a mut [Lane],
+}
+
+impl<M: NodalMass + ?Sized> WithSimd for MassTimes<'_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (k, row) in self.targets.chunks_exact_mut(self.lanes).enumerate() {
+            for (lane, target) in row.iter_mut().enumerate() {
+                *target = self.mass.row_times(self.first + k, self.x, self.lanes, lane);
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 //! rigid motion alone.
 
 use super::condense::{
-    Aligned, CHUNK, LANE, Lane, NodalMass, SolidColumns, mass_times, rigid_part, sum_of_groups,
+    Aligned, CHUNK, LANE, Lane, MassTimes, NodalMass, SolidColumns, rigid_part, sum_of_groups,
 };
 use super::{Groups, Invariants, LumpedMasses, PrimaryData, s_of_modal_mass};
 use crate::numerics::linalg::{SymmetricMatrix, gram};
@@ -88,7 +88,7 @@ fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) ->
         for first in nodes.clone().step_by(CHUNK) {
             let rows = CHUNK.min(nodes.end - first);
             let product = &mut product[..rows];
-            arch.dispatch(|| mass_times(mass, first, &x, 1, product));
+            arch.dispatch(MassTimes { mass, first, x: &x, lanes: 1, targets: product });
             let own = &mut own.get_mut()[..rows * count];
             columns.by_node(first, 0..count, count, own);
             // Rows of nodes are columns of the transpose.

@@ -9,7 +9,7 @@ use super::random::normal;
 use super::substitution::WORTH_TASKS;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -119,13 +119,28 @@ fn subtract<const K: usize>(to: &mut [f64; K], factor: f64, from: &[f64; K]) {
 /// Rows of L that are taken together: what is read for them is read once.
 const TOGETHER: usize = 4;
 
-/// below -= L y, for rows of L.
-fn subtract_product<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut [[f64; K]]) {
-    Arch::new().dispatch(|| product_by_rows(l, y, below));
+/// One pass over rows of L, which are those of `below`; its columns are those of y.
+enum Pass<'a, T, const K: usize> {
+    /// below -= L y.
+    Product(&'a [T], &'a [[f64; K]], &'a mut [[f64; K]]),
+    /// y -= L' below.
+    Transposed(&'a [T], &'a [[f64; K]], &'a mut [[f64; K]]),
 }
 
-#[inline(always)]
-fn product_by_rows<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut [[f64; K]]) {
+impl<T: Real, const K: usize> WithSimd for Pass<'_, T, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        match self {
+            Self::Product(l, y, below) => subtract_product(l, y, below),
+            Self::Transposed(l, below, y) => subtract_transposed(l, below, y),
+        }
+    }
+}
+
+#[inline(always)] // compiled once per instruction set
+fn subtract_product<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut [[f64; K]]) {
     let width = y.len();
     let (groups, rest) = below.as_chunks_mut::<TOGETHER>();
     let (l, l_rest) = l.split_at(groups.len() * TOGETHER * width);
@@ -145,13 +160,8 @@ fn product_by_rows<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut
     }
 }
 
-/// y -= L' below, for rows of L.
+#[inline(always)] // compiled once per instruction set
 fn subtract_transposed<T: Real, const K: usize>(l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]) {
-    Arch::new().dispatch(|| transposed_by_rows(l, below, y));
-}
-
-#[inline(always)]
-fn transposed_by_rows<T: Real, const K: usize>(l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]) {
     let width = y.len();
     let (groups, rest) = below.as_chunks::<TOGETHER>();
     let (l, l_rest) = l.split_at(groups.len() * TOGETHER * width);
@@ -175,6 +185,7 @@ fn forward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
 ) {
+    let arch = Arch::new();
     for (p, block) in blocks.iter().enumerate() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
@@ -188,10 +199,10 @@ fn forward<T: Real, const K: usize>(
         own.copy_from_slice(&y);
         let l = &columns.panels[p][width * width..];
         if l.len() < WORTH_TASKS {
-            subtract_product(l, &y, below);
+            arch.dispatch(Pass::Product(l, &y, below));
         } else {
             let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
-            pieces.for_each(|(l, below)| subtract_product(l, &y, below));
+            pieces.for_each(|(l, below)| arch.dispatch(Pass::Product(l, &y, below)));
         }
     }
 }
@@ -201,6 +212,7 @@ fn backward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
 ) {
+    let arch = Arch::new();
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
@@ -213,12 +225,12 @@ fn backward<T: Real, const K: usize>(
         }
         let l = &columns.panels[p][width * width..];
         if l.len() < WORTH_TASKS {
-            subtract_transposed(l, below, &mut y);
+            arch.dispatch(Pass::Transposed(l, below, &mut y));
         } else {
             let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
             let parts = pieces.map(|(l, below)| {
                 let mut part = vec![[0.0; K]; width];
-                subtract_transposed(l, below, &mut part);
+                arch.dispatch(Pass::Transposed(l, below, &mut part));
                 part
             });
             for part in parts.collect::<Vec<_>>() {

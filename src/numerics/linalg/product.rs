@@ -7,7 +7,7 @@
 use super::SymmetricMatrix;
 use faer::prelude::ReborrowMut;
 use faer::{ColRef, MatMut, MatRef};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows per parallel task.
@@ -38,13 +38,29 @@ pub fn multiply_vector(a: &SymmetricMatrix, block: usize, x: &[f64], y: &mut [f6
 }
 
 fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
-    let x = x.as_chunks::<B>().0;
-    Arch::new().dispatch(|| {
-        for (i, y) in y.as_chunks_mut::<B>().0.iter_mut().enumerate() {
-            let (columns, values) = a.row(i);
-            *y = row_times(columns, values, x);
+    Arch::new().dispatch(VectorProduct::<B> { a, x: x.as_chunks().0, y: y.as_chunks_mut().0 });
+}
+
+// What is dispatched are structures: a closure may be compiled apart from the function that has the instruction
+// set, without it.
+
+/// y = (A kron I_B) x.
+struct VectorProduct<'a, const B: usize> {
+    a: &'a SymmetricMatrix,
+    x: &'a [[f64; B]],
+    y: &'a mut [[f64; B]],
+}
+
+impl<const B: usize> WithSimd for VectorProduct<'_, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (i, y) in self.y.iter_mut().enumerate() {
+            let (columns, values) = self.a.row(i);
+            *y = row_times(columns, values, self.x);
         }
-    });
+    }
 }
 
 /// x'A x: by one thread, nothing allocated.
@@ -53,12 +69,27 @@ fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
 /// When `x` has not as many entries as A has rows.
 pub fn quadratic_form(a: &SymmetricMatrix, x: &[f64]) -> f64 {
     assert_eq!(x.len(), a.n(), "one entry for each row");
-    let (entries, _) = x.as_chunks::<1>();
-    let product = |(i, x): (usize, &f64)| {
-        let (columns, values) = a.row(i);
-        x * row_times(columns, values, entries)[0]
-    };
-    Arch::new().dispatch(|| x.iter().enumerate().map(product).sum())
+    Arch::new().dispatch(QuadraticForm { a, x: x.as_chunks().0 })
+}
+
+/// x'A x.
+struct QuadraticForm<'a> {
+    a: &'a SymmetricMatrix,
+    x: &'a [[f64; 1]],
+}
+
+impl WithSimd for QuadraticForm<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut sum = 0.0;
+        for (i, [x]) in self.x.iter().enumerate() {
+            let (columns, values) = self.a.row(i);
+            sum += x * row_times(columns, values, self.x)[0];
+        }
+        sum
+    }
 }
 
 /// The product of a row, in several sums that do not wait for each other.
@@ -146,42 +177,49 @@ fn pass<const B: usize, const W: usize>(
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
     shares.into_par_iter().enumerate().for_each(|(chunk, share)| {
-        arch.dispatch(|| rows_times::<B, W>(a, chunk * ROWS, &packed, share, f));
+        arch.dispatch(RowProducts { a, first: chunk * ROWS, x: &packed, y: share, f });
     });
 }
 
 /// Rows `first`, `first + 1`, ... of the product, as many as `y` has room for.
-#[inline(always)] // compiled once per instruction set
-fn rows_times<const B: usize, const W: usize>(
-    a: &SymmetricMatrix,
+struct RowProducts<'a, F, const B: usize, const W: usize> {
+    a: &'a SymmetricMatrix,
     first: usize,
-    x: &[[[f64; W]; B]],
-    mut y: [&mut [f64]; W],
-    f: impl Fn(f64) -> f64,
-) {
-    // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the
-    // inner loop.
-    let mut tile = [[[0.0f64; W]; B]; TILE];
-    let rows = y[0].len() / B;
-    for start in (0..rows).step_by(TILE) {
-        let tile = &mut tile[..TILE.min(rows - start)];
-        for (r, target) in tile.iter_mut().enumerate() {
-            let (columns, values) = a.row(first + start + r);
-            let mut sum = [[0.0f64; W]; B];
-            for (&j, &v) in columns.iter().zip(values) {
-                let xj = &x[j as usize];
-                for b in 0..B {
-                    for c in 0..W {
-                        sum[b][c] += f(v * xj[b][c]);
+    x: &'a [[[f64; W]; B]],
+    y: [&'a mut [f64]; W],
+    f: F,
+}
+
+impl<F: Fn(f64) -> f64, const B: usize, const W: usize> WithSimd for RowProducts<'_, F, B, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { a, first, x, mut y, f } = self;
+        // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the
+        // inner loop.
+        let mut tile = [[[0.0f64; W]; B]; TILE];
+        let rows = y[0].len() / B;
+        for start in (0..rows).step_by(TILE) {
+            let tile = &mut tile[..TILE.min(rows - start)];
+            for (r, target) in tile.iter_mut().enumerate() {
+                let (columns, values) = a.row(first + start + r);
+                let mut sum = [[0.0f64; W]; B];
+                for (&j, &v) in columns.iter().zip(values) {
+                    let xj = &x[j as usize];
+                    for b in 0..B {
+                        for c in 0..W {
+                            sum[b][c] += f(v * xj[b][c]);
+                        }
                     }
                 }
+                *target = sum;
             }
-            *target = sum;
-        }
-        let tile = tile.as_flattened();
-        for (c, column) in y.iter_mut().enumerate() {
-            for (entry, row) in column[start * B..].iter_mut().zip(tile) {
-                *entry = row[c];
+            let tile = tile.as_flattened();
+            for (c, column) in y.iter_mut().enumerate() {
+                for (entry, row) in column[start * B..].iter_mut().zip(tile) {
+                    *entry = row[c];
+                }
             }
         }
     }

@@ -1,7 +1,8 @@
 //! Sparse matrices of small dense blocks in single precision, applied to eight columns at a time. Every row
 //! is one sum in storage order: the same bits on any number of threads.
 
-use pulp::Arch;
+use pulp::bytemuck::cast_slice;
+use pulp::{Arch, Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Columns that are worked on together: one vector of eight numbers in single precision.
@@ -75,41 +76,90 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         BlockMatrix { pointers, columns, blocks }
     }
 
-    /// Calls `take` with the number of each row, its rows of y and those of A x.
+    /// What `make` makes of each row, by its number, and of its rows of A x.
     pub(super) fn apply(
         &self,
         x: &[Rows<C>],
-        y: &mut [Rows<R>],
-        take: impl Fn(usize, &mut Rows<R>, &Rows<R>) + Sync,
-    ) {
+        make: impl Fn(usize, &Rows<R>) -> Rows<R> + Sync,
+    ) -> Vec<Rows<R>> {
         let arch = Arch::new();
-        y.par_chunks_mut(NODES).enumerate().for_each(|(task, y)| {
-            arch.dispatch(
-                #[inline(always)]
-                || {
-                    for (k, y) in y.iter_mut().enumerate() {
-                        let row = task * NODES + k;
-                        take(row, y, &self.row_times(row, x));
-                    }
-                },
-            );
-        });
+        let made = |row: usize| arch.dispatch(RowProduct { matrix: self, row, x, make: &make });
+        (0..self.n_rows()).into_par_iter().with_min_len(NODES).map(made).collect()
     }
+}
+
+/// [`BlockMatrix::apply`] for one row.
+struct RowProduct<'a, F, const R: usize, const C: usize> {
+    matrix: &'a BlockMatrix<R, C>,
+    row: usize,
+    x: &'a [Rows<C>],
+    make: &'a F,
+}
+
+// Neither a closure, which is compiled apart from the function that has the instruction set, nor loops over the
+// columns, which the compiler cuts into vectors of several lengths.
+impl<F, const R: usize, const C: usize> WithSimd for RowProduct<'_, F, R, C>
+where
+    F: Fn(usize, &Rows<R>) -> Rows<R>,
+{
+    type Output = Rows<R>;
 
     #[inline(always)]
-    fn row_times(&self, row: usize, x: &[Rows<C>]) -> Rows<R> {
-        let range = self.pointers[row]..self.pointers[row + 1];
-        let mut sum = [[0.0f32; WIDTH]; R];
-        for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
-            let x = &x[column as usize];
+    fn with_simd<S: Simd>(self, simd: S) -> Rows<R> {
+        match size_of::<[f32; WIDTH]>() / size_of::<S::f32s>() {
+            1 => self.run::<S, 1>(simd),
+            2 => self.run::<S, 2>(simd),
+            // Machines without vectors, or with longer ones.
+            _ => self.run::<Scalar, WIDTH>(Scalar),
+        }
+    }
+}
+
+/// A row of [`WIDTH`] columns as `N` vectors.
+type Row<S, const N: usize> = [<S as Simd>::f32s; N];
+
+impl<F, const R: usize, const C: usize> RowProduct<'_, F, R, C>
+where
+    F: Fn(usize, &Rows<R>) -> Rows<R>,
+{
+    #[inline(always)]
+    fn run<S: Simd, const N: usize>(self, simd: S) -> Rows<R> {
+        let x = cast_slice::<f32, S::f32s>(self.x.as_flattened().as_flattened());
+        let x: &[[Row<S, N>; C]] = x.as_chunks::<N>().0.as_chunks::<C>().0;
+        let product = row_times::<S, N, R, C>(simd, self.matrix, self.row, x);
+        let mut rows = [[0.0; WIDTH]; R];
+        rows.iter_mut().zip(&product).for_each(|(to, from)| to.copy_from_slice(cast_slice(from)));
+        (self.make)(self.row, &rows)
+    }
+}
+
+/// The product of a row. Short rows have three sums, which do not wait for each other.
+#[inline(always)]
+fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
+    simd: S,
+    matrix: &BlockMatrix<R, C>,
+    row: usize,
+    x: &[[Row<S, N>; C]],
+) -> [Row<S, N>; R] {
+    const SUMS: usize = 3;
+    let sums = if R > SUMS { 1 } else { SUMS };
+    let range = matrix.pointers[row]..matrix.pointers[row + 1];
+    let mut parts = [[[simd.splat_f32s(0.0); N]; R]; SUMS];
+    for (&column, block) in matrix.columns[range.clone()].iter().zip(&matrix.blocks[range]) {
+        let x = &x[column as usize];
+        for c in 0..C {
             for r in 0..R {
-                for c in 0..C {
-                    for w in 0..WIDTH {
-                        sum[r][w] += block[r][c] * x[c][w];
-                    }
-                }
+                let factor = simd.splat_f32s(block[r][c]);
+                let sum = &mut parts[c % sums][r];
+                (0..N).for_each(|n| sum[n] = simd.mul_add_f32s(factor, x[c][n], sum[n]));
             }
         }
-        sum
     }
+    let [mut total, others @ ..] = parts;
+    for part in &others[..sums - 1] {
+        for (total, part) in total.as_flattened_mut().iter_mut().zip(part.as_flattened()) {
+            *total = simd.add_f32s(*total, *part);
+        }
+    }
+    total
 }

@@ -61,10 +61,10 @@ impl<const B: usize, const C: usize> Level<B, C> {
         b: &[Rows<B>],
         solve_coarse: impl FnOnce(Vec<Rows<C>>) -> Vec<Rows<C>>,
     ) -> Vec<Rows<B>> {
-        let mut x = self.smoother.smoothed_from_zero(b);
+        let x = self.smoother.smoothed_from_zero(b);
         let coarse = solve_coarse(self.restricted(&self.smoother.residual(b, &x)));
-        self.add_prolonged(&mut x, &coarse);
-        self.smoother.smooth(b, x)
+        let x = self.p.apply(&coarse, |node, px| plus(&x[node], px));
+        self.smoother.smooth(b, &x)
     }
 
     /// M x with the masses of the nodes.
@@ -74,23 +74,18 @@ impl<const B: usize, const C: usize> Level<B, C> {
 
     /// P' x.
     pub(super) fn restricted(&self, x: &[Rows<B>]) -> Vec<Rows<C>> {
-        let mut coarse = vec![[[0.0; WIDTH]; C]; self.r.n_rows()];
-        self.r.apply(x, &mut coarse, |_, y, rx| *y = *rx);
-        coarse
+        self.r.apply(x, |_, rx| *rx)
     }
 
     /// P y.
     pub(super) fn prolonged(&self, coarse: &[Rows<C>]) -> Vec<Rows<B>> {
-        let mut x = vec![[[0.0; WIDTH]; B]; self.nodes()];
-        self.add_prolonged(&mut x, coarse);
-        x
+        self.p.apply(coarse, |_, px| *px)
     }
+}
 
-    fn add_prolonged(&self, x: &mut [Rows<B>], coarse: &[Rows<C>]) {
-        self.p.apply(coarse, x, |_, x, px| {
-            x.iter_mut().flatten().zip(px.iter().flatten()).for_each(|(x, px)| *x += px);
-        });
-    }
+#[inline(always)]
+fn plus<const B: usize>(x: &Rows<B>, y: &Rows<B>) -> Rows<B> {
+    std::array::from_fn(|i| std::array::from_fn(|w| x[i][w] + y[i][w]))
 }
 
 fn mass_times<const B: usize>(mass: &Block<B, B>, x: &Rows<B>) -> Rows<B> {

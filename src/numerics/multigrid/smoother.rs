@@ -68,8 +68,7 @@ impl<const B: usize> Smoother<B> {
             let length = products(&v, &u).map(f64::sqrt);
             let scale = length.map(|length| if length > 0.0 { (1.0 / length) as f32 } else { 0.0 });
             [&mut u, &mut v].into_iter().for_each(|x| scale_columns(x, &scale));
-            let mut next = vec![[[0.0; WIDTH]; B]; u.len()];
-            self.a.apply(&v, &mut next, |_, y, av| *y = *av);
+            let mut next = self.a.apply(&v, |_, av| *av);
             let along = products(&v, &next);
             let own = along.map(|along| along as f32);
             // The first has none before it.
@@ -104,35 +103,32 @@ impl<const B: usize> Smoother<B> {
         let scale = self.steps().first;
         let first = |(node, b)| self.divided(node, b).map(|row| row.map(|value| scale * value));
         let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES).enumerate().map(first).collect();
-        self.second_step(b, &x, &x)
+        self.second_step(b, &x, |node| x[node])
     }
 
     /// Two steps of the iteration for A x = b.
-    pub(super) fn smooth(&self, b: &[Rows<B>], mut x: Vec<Rows<B>>) -> Vec<Rows<B>> {
+    pub(super) fn smooth(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
         let scale = self.steps().first;
-        let mut step = vec![[[0.0; WIDTH]; B]; b.len()];
-        self.a.apply(&x, &mut step, |node, step, ax| {
-            *step = self.divided(node, &minus(&b[node], ax)).map(|row| row.map(|value| scale * value));
+        let once = self.a.apply(x, |node, ax| {
+            let force = self.divided(node, &minus(&b[node], ax));
+            std::array::from_fn(|i| std::array::from_fn(|w| x[node][i][w] + scale * force[i][w]))
         });
-        x.par_iter_mut().zip(&step).with_min_len(NODES).for_each(|(x, step)| {
-            x.iter_mut().flatten().zip(step.iter().flatten()).for_each(|(x, step)| *x += step);
-        });
-        self.second_step(b, &x, &step)
+        self.second_step(b, &once, |node| minus(&once[node], &x[node]))
     }
 
-    /// x + kept d + turned D^-1 (b - A x) for the step d that led to x.
-    fn second_step(&self, b: &[Rows<B>], x: &[Rows<B>], d: &[Rows<B>]) -> Vec<Rows<B>> {
+    /// x + kept d + turned D^-1 (b - A x) for the step d of each node that led to x.
+    fn second_step(
+        &self,
+        b: &[Rows<B>],
+        x: &[Rows<B>],
+        step: impl Fn(usize) -> Rows<B> + Sync,
+    ) -> Vec<Rows<B>> {
         let Steps { kept, second, .. } = self.steps();
-        let mut after = vec![[[0.0; WIDTH]; B]; b.len()];
-        self.a.apply(x, &mut after, |node, after, ax| {
-            let force = self.divided(node, &minus(&b[node], ax));
-            for i in 0..B {
-                for w in 0..WIDTH {
-                    after[i][w] = x[node][i][w] + kept * d[node][i][w] + second * force[i][w];
-                }
-            }
-        });
-        after
+        self.a.apply(x, |node, ax| {
+            let (force, d) = (self.divided(node, &minus(&b[node], ax)), step(node));
+            let moved = |i: usize, w: usize| x[node][i][w] + kept * d[i][w] + second * force[i][w];
+            std::array::from_fn(|i| std::array::from_fn(|w| moved(i, w)))
+        })
     }
 
     /// Factors of the Chebyshev iteration on the part of the spectrum that is damped.
@@ -150,9 +146,7 @@ impl<const B: usize> Smoother<B> {
 
     /// b - A x.
     pub(super) fn residual(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
-        let mut residual = vec![[[0.0; WIDTH]; B]; b.len()];
-        self.a.apply(x, &mut residual, |node, r, ax| *r = minus(&b[node], ax));
-        residual
+        self.a.apply(x, |node, ax| minus(&b[node], ax))
     }
 }
 
