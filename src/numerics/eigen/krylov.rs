@@ -4,8 +4,9 @@ use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
 use crate::numerics::linalg::{Solve, Tall, combine, gram, subtract_combination, uniform};
-use faer::prelude::IntoConst;
-use faer::{Mat, MatRef};
+use faer::prelude::{IntoConst, ReborrowMut};
+use faer::{ColMut, ColRef, Mat, MatRef};
+use rayon::prelude::*;
 
 /// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not
 /// see: the rest is rounding of the product.
@@ -226,11 +227,10 @@ impl<'a> Krylov<'a> {
         let basis = self.v.as_ref();
         let mut h = Mat::zeros(self.size(), width);
         let mut b = Mat::<f64>::identity(width, width);
-        let mut mw = Mat::zeros(0, 0);
+        counters.mass_columns += w.ncols() as u64;
+        let mut mw = pencil.apply_mass(w.as_ref());
         for from in [reach, 0] {
             let basis = basis.subcols(from, self.size() - from);
-            counters.mass_columns += 2 * w.ncols() as u64;
-            mw = pencil.apply_mass(w.as_ref());
             let norms: Vec<f64> = (0..w.ncols()).map(|j| dot(&w, &mw, j, j).max(0.0).sqrt()).collect();
             let rigid = gram(self.problem.rigid, mw.as_ref());
             let part = gram(basis, mw.as_ref());
@@ -238,12 +238,15 @@ impl<'a> Krylov<'a> {
             subtract_combination(w.as_mut(), basis, part.as_ref());
             let mut h = h.as_mut().subrows_mut(from, self.size() - from);
             h += combine(part.as_ref(), b.as_ref());
+            counters.mass_columns += w.ncols() as u64;
             mw = pencil.apply_mass(w.as_ref());
-            let unseen = |w: faer::ColRef<'_, f64>| {
-                let rows = w.iter().zip(&self.mass_diagonal);
-                UNSEEN * rows.map(|(w, m)| w * w * m).sum::<f64>()
-            };
-            b = combine(gram_schmidt(&mut w, &mut mw, &norms, &unseen).as_ref(), b.as_ref());
+            let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
+            let t = gram_schmidt(&mut w, &mut mw, &norms, &unseen);
+            if loses_digits(&t) {
+                counters.mass_columns += w.ncols() as u64;
+                mw = pencil.apply_mass(w.as_ref());
+            }
+            b = combine(t.as_ref(), b.as_ref());
         }
         let room = self.room();
         if w.ncols() > room {
@@ -253,6 +256,46 @@ impl<'a> Krylov<'a> {
         }
         Block { w, mw, h, b }
     }
+}
+
+/// Whether Gram-Schmidt with these coefficients has left less than a tenth of a column: the products with M that
+/// went along have then lost a digit.
+fn loses_digits(t: &Mat<f64>) -> bool {
+    (0..t.ncols()).any(|j| {
+        let before = t.col(j).norm_l2();
+        let left = (0..t.nrows()).rev().map(|i| t[(i, j)].abs()).find(|entry| *entry > 0.0);
+        left.is_some_and(|left| left < 0.1 * before)
+    })
+}
+
+/// Rows that a task works on: a fixed partition, so that the bits do not depend on the number of threads.
+const ROWS: usize = 4096;
+
+/// w' diag(m) w.
+fn weighted_square(w: ColRef<'_, f64>, m: &[f64]) -> f64 {
+    let w = w.try_as_col_major().expect("blocks are column-major").as_slice();
+    let part = |(w, m): (&[f64], &[f64])| w.iter().zip(m).map(|(w, m)| w * w * m).sum::<f64>();
+    let parts: Vec<f64> = w.par_chunks(ROWS).zip(m.par_chunks(ROWS)).map(part).collect();
+    parts.iter().sum()
+}
+
+/// Puts column `from`, divided by `size`, in the place of column `to`, which does not come after it.
+fn divide_column(block: &mut Mat<f64>, from: usize, to: usize, size: f64) {
+    let (mut before, mut rest) = block.as_mut().split_at_col_mut(from);
+    let column = |column| slice_of(column).par_chunks_mut(ROWS);
+    let source = rest.rb_mut().col_mut(0);
+    if to == from {
+        column(source).for_each(|x| x.iter_mut().for_each(|x| *x /= size));
+    } else {
+        let target = before.rb_mut().col_mut(to);
+        column(target).zip(column(source)).for_each(|(to, from)| {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from / size);
+        });
+    }
+}
+
+fn slice_of(column: ColMut<'_, f64>) -> &mut [f64] {
+    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
 }
 
 /// w_i' (M w)_j.
@@ -267,7 +310,7 @@ fn gram_schmidt(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,
     norms: &[f64],
-    unseen: &dyn Fn(faer::ColRef<'_, f64>) -> f64,
+    unseen: &dyn Fn(ColRef<'_, f64>) -> f64,
 ) -> Mat<f64> {
     let width = w.ncols();
     let mut t = Mat::zeros(width, width);
@@ -294,8 +337,7 @@ fn gram_schmidt(
         }
         t[(kept, j)] = norm;
         for block in [&mut *w, &mut *mw] {
-            let column: Vec<f64> = block.col(j).iter().map(|x| x / norm).collect();
-            block.col_mut(kept).iter_mut().zip(column).for_each(|(to, from)| *to = from);
+            divide_column(block, j, kept, norm);
         }
         kept += 1;
     }

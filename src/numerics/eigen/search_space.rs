@@ -14,9 +14,10 @@ pub(super) struct SearchSpace<'a> {
     problem: &'a EigenProblem<'a>,
     /// M times the rigid modes.
     m_rigid: Mat<f64>,
-    /// The basis and K times it.
+    /// The basis, and K and M times it.
     x: Tall,
     kx: Tall,
+    mx: Tall,
     /// Vectors that there is room for.
     capacity: usize,
     /// X'M X and X'K X.
@@ -26,9 +27,8 @@ pub(super) struct SearchSpace<'a> {
     pub lambda: Vec<f64>,
     /// Coefficients of the Ritz vectors, which are M-orthonormal.
     ritz: Mat<f64>,
-    /// Vectors in work, and M times them: kept, since memory that is taken anew is cleared first.
+    /// M times vectors in work: kept, since memory that is taken anew is cleared first.
     work: Tall,
-    m_work: Tall,
 }
 
 impl<'a> SearchSpace<'a> {
@@ -45,13 +45,13 @@ impl<'a> SearchSpace<'a> {
             m_rigid: problem.pencil.apply_mass(problem.rigid),
             x: Tall::with_room(n, room),
             kx: Tall::with_room(n, room),
+            mx: Tall::with_room(n, room),
             capacity: room,
             gm: Mat::zeros(0, 0),
             gk: Mat::zeros(0, 0),
             lambda: Vec::new(),
             ritz: Mat::zeros(0, 0),
             work: Tall::with_room(n, x.ncols()),
-            m_work: Tall::with_room(n, x.ncols()),
         };
         let mut first = Tall::copied(x.as_ref());
         drop(x);
@@ -75,35 +75,27 @@ impl<'a> SearchSpace<'a> {
         passes: usize,
         counters: &mut Counters,
     ) -> Result<(), EigenFailure> {
-        let Self { problem, m_rigid, x, kx, gm, gk, .. } = self;
+        let Self { problem, m_rigid, x, kx, mx, gm, gk, work, .. } = self;
         let (pencil, columns, used) = (&problem.pencil, d.ncols(), x.ncols());
-        counters.mass_columns += columns as u64;
         for _ in 0..passes {
             let along = gram(m_rigid.as_ref(), d.as_ref());
             subtract_combination(d.as_mut(), problem.rigid, along.as_ref());
-            if used == 0 {
-                continue;
+            if used > 0 {
+                let along = gram(mx.as_ref(), d.as_ref());
+                subtract_combination(d.as_mut(), x.as_ref(), along.as_ref());
             }
-            counters.mass_columns += columns as u64;
-            pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
-            let along = gram(x.as_ref(), self.m_work.first(columns));
-            subtract_combination(d.as_mut(), x.as_ref(), along.as_ref());
         }
-        pencil.mass_times(d.as_ref(), self.m_work.first_mut(columns));
-        let orthonormal = independent(&gram(d.as_ref(), self.m_work.first(columns)))?;
+        counters.mass_columns += columns as u64;
+        pencil.mass_times(d.as_ref(), work.first_mut(columns));
+        let orthonormal = independent(&gram(d.as_ref(), work.first(columns)))?;
         let added = used..used + orthonormal.ncols();
-        counters.mass_columns += added.len() as u64;
         counters.stiffness_columns += added.len() as u64;
-        x.add_zeros(added.len());
-        kx.add_zeros(added.len());
+        [&mut *x, &mut *kx, &mut *mx].into_iter().for_each(|block| block.add_zeros(added.len()));
         combine_into(x.columns_mut(added.clone()), d.as_ref(), orthonormal.as_ref());
-        pencil.mass_times(x.columns(added.clone()), self.m_work.first_mut(added.len()));
+        combine_into(mx.columns_mut(added.clone()), work.first(columns), orthonormal.as_ref());
         pencil.stiffness_times(x.columns(added.clone()), kx.columns_mut(added.clone()));
-        let bordered_by = |corner: &Mat<f64>, products: MatRef<'_, f64>| {
-            bordered(corner, &gram(x.first(used), products), &gram(x.columns(added.clone()), products))
-        };
-        *gm = bordered_by(gm, self.m_work.first(added.len()));
-        *gk = bordered_by(gk, kx.columns(added.clone()));
+        *gm = bordered(gm, &gram(x.as_ref(), mx.columns(added.clone())));
+        *gk = bordered(gk, &gram(x.as_ref(), kx.columns(added)));
         (self.lambda, self.ritz) = small_ritz(gm, gk)?;
         Ok(())
     }
@@ -112,7 +104,7 @@ impl<'a> SearchSpace<'a> {
     pub(super) fn contract(&mut self, kept: usize) {
         let kept = kept.min(self.lambda.len());
         let lowest = self.ritz.as_ref().subcols(0, kept);
-        for block in [&mut self.x, &mut self.kx] {
+        for block in [&mut self.x, &mut self.kx, &mut self.mx] {
             combine_in_place(block.as_mut(), lowest);
             block.truncate(kept);
         }
@@ -128,27 +120,24 @@ impl<'a> SearchSpace<'a> {
     }
 
     /// What some Ritz pairs leave unbalanced, K x - lambda M x, and its norm beside |K x| + |lambda M x|.
-    pub(super) fn unbalanced(&mut self, which: Range<usize>, counters: &mut Counters) -> (Tall, Vec<f64>) {
-        let Self { problem, x, kx, lambda, ritz, work, m_work, .. } = self;
+    pub(super) fn unbalanced(&mut self, which: Range<usize>) -> (Tall, Vec<f64>) {
+        let Self { problem, kx, mx, lambda, ritz, work, .. } = self;
         let (count, lambda) = (which.len(), &lambda[which.clone()]);
         let ritz = ritz.as_ref().subcols(which.start, count);
-        counters.mass_columns += count as u64;
-        combine_into(work.first_mut(count), x.as_ref(), ritz);
-        problem.pencil.mass_times(work.first(count), m_work.first_mut(count));
+        combine_into(work.first_mut(count), mx.as_ref(), ritz);
         let mut forces = Tall::zeros(problem.pencil.n(), count);
         combine_into(forces.as_mut(), kx.as_ref(), ritz);
-        let (_, residuals) = leave_unbalanced(&mut forces, m_work.first(count), lambda);
+        let (_, residuals) = leave_unbalanced(&mut forces, work.first(count), lambda);
         (forces, residuals)
     }
 }
 
-/// [A, B; B', C].
-fn bordered(a: &Mat<f64>, b: &Mat<f64>, c: &Mat<f64>) -> Mat<f64> {
+/// [A, B; B', C] for B above C: the last columns of the matrix.
+fn bordered(a: &Mat<f64>, last: &Mat<f64>) -> Mat<f64> {
     let m = a.ncols();
-    Mat::from_fn(m + c.ncols(), m + c.ncols(), |i, j| match (i < m, j < m) {
+    Mat::from_fn(last.nrows(), last.nrows(), |i, j| match (i < m, j < m) {
         (true, true) => a[(i, j)],
-        (true, false) => b[(i, j - m)],
-        (false, true) => b[(j, i - m)],
-        (false, false) => c[(i - m, j - m)],
+        (_, false) => last[(i, j - m)],
+        (false, true) => last[(j, i - m)],
     })
 }

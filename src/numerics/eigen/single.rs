@@ -170,7 +170,7 @@ impl<'a> Correction<'a> {
             self.floors = residuals(problem, &lambda[..looked], lowest.as_ref(), counters).1;
             self.size = size_along(problem, lambda[looked - 1], lowest.col(looked - 1));
         }
-        space.unbalanced(0..looked, counters)
+        space.unbalanced(0..looked)
     }
 
     /// Once the pairs are good enough to tell: where the gap above the wanted modes is too narrow for the
@@ -231,17 +231,15 @@ impl<'a> Correction<'a> {
         let Self { factor, space, base, width, .. } = self;
         let looked = forces.ncols();
         let filled = poor.len().next_multiple_of(*width) - poor.len();
-        let (after, _) = space.unbalanced(looked..space.lambda.len().min(looked + filled), counters);
-        let poor = poor.iter().map(|&j| forces.columns(j..j + 1));
-        let columns: Vec<_> = poor.chain(after.as_ref().col_iter().map(|column| column.as_mat())).collect();
+        let (after, _) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
+        let poor = poor.iter().map(|&j| forces.as_ref().col(j));
+        let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
         counters.solved_columns += columns.len() as u64;
-        let mut d = Tall::zeros(self.problem.pencil.n(), columns.len());
-        let pairs: Vec<_> = d.as_mut().col_iter_mut().zip(columns).collect();
-        pairs.into_par_iter().for_each(|(mut d, r)| {
-            // Unit size: residuals near rounding would leave the range of single precision.
-            let size = r.norm_max();
-            d.copy_from(r.col(0) * faer::Scale(if size > 0.0 { size.recip() } else { 0.0 }));
-        });
+        // Of unit size: residuals near rounding would leave the range of single precision.
+        let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };
+        let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
+        let mut d = Tall::with_room(self.problem.pencil.n(), columns.len());
+        columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
         factor.solve_in_place(d.as_mut());
         if d.ncols() > space.room() {
             space.contract(*base);

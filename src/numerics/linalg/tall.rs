@@ -3,7 +3,7 @@
 
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -48,6 +48,16 @@ impl Tall {
             let column = column.try_as_col_major().expect("blocks are column-major").as_slice();
             self.entries.par_extend(column.par_iter().copied().with_min_len(ROWS));
         }
+    }
+
+    /// Appends a multiple of a column, made by all threads.
+    ///
+    /// # Panics
+    /// When the row counts differ.
+    pub fn push_multiple(&mut self, scale: f64, x: ColRef<'_, f64>) {
+        assert_eq!(x.nrows(), self.rows, "rows of a column to append");
+        let column = x.try_as_col_major().expect("blocks are column-major").as_slice();
+        self.entries.par_extend(column.par_iter().with_min_len(ROWS).map(|x| scale * x));
     }
 
     /// Appends columns of zeros.
@@ -305,6 +315,8 @@ mod tests {
         grown.truncate(1);
         grown.add_zeros(1);
         assert_eq!((grown.ncols(), grown.first(1)), (2, given.first(1)));
+        grown.push_multiple(-0.5, given.as_ref().col(2));
+        assert_eq!(grown.as_ref().col(2), -0.5 * given.as_ref().col(2));
         assert!(grown.columns(1..2).col(0).iter().all(|x| *x == 0.0));
     }
 
