@@ -48,12 +48,11 @@ const MULTIGRID_MODES: usize = 100;
 /// Bytes of all levels, and of what they are made from: for each stored entry of K, and for each row.
 const LEVEL_BYTES: (u64, u64) = (12, 400);
 
-/// How many times more a factor has to take before modes of [`Accuracy::Standard`] are searched for without one:
-/// their residuals take half as many cycles again.
-const MULTIGRID_PROVED: f64 = 3.0;
-
 /// Entries in a row of K of linear hexahedra, nearly.
 const LINEAR_COUPLINGS: f64 = 64.0;
+
+/// How many times more cycles elements of the second order take.
+const MOST_CYCLES: f64 = 2.1;
 
 /// Whether the search is to go without a factor.
 fn suits_multigrid(
@@ -62,16 +61,13 @@ fn suits_multigrid(
     analysis: &Analysis,
     wanted: usize,
 ) -> bool {
-    let pays = settings.multigrid_pays
-        * match settings.accuracy {
-            Accuracy::Fast => 1.0,
-            Accuracy::Standard => MULTIGRID_PROVED,
-            Accuracy::Certified => return false,
-        };
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
-    // Elements of the second order couple more rows, and take as many more cycles.
+    // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows,
+    // which couple a quarter more, take twice the time of a factor.)
     let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_COUPLINGS)).max(1.0);
-    settings.factor == FactorChoice::Auto
+    let pays = settings.multigrid_pays * coupled * coupled.powi(2).min(MOST_CYCLES);
+    settings.accuracy != Accuracy::Certified
+        && settings.factor == FactorChoice::Auto
         && settings.method == Method::Auto
         && matches!(settings.wanted, Wanted::Lowest(_))
         // Cycles leave nothing to go on from before they are done.
@@ -79,7 +75,7 @@ fn suits_multigrid(
         && problem.resume.save.is_none()
         && can_have_levels(&problem.pencil, problem.rigid.ncols())
         && (1..=MULTIGRID_MODES).contains(&wanted)
-        && analysis.flops() > pays * coupled * entries
+        && analysis.flops() > pays * entries
 }
 
 /// Operations per second that estimates of time assume: what one processor does of the mixed work of a

@@ -66,9 +66,9 @@ pub struct EigenSettings {
     /// Multiplications and additions of a factorisation above which [`FactorChoice::Auto`] tries single
     /// precision for its speed.
     pub single_pays: f64,
-    /// Multiplications and additions of a factorisation, for each stored entry of K, above which modes of
-    /// [`Accuracy::Fast`] are searched for without a factor, where [`FactorChoice::Auto`] leaves that open;
-    /// modes of [`Accuracy::Standard`] above three times as many.
+    /// Multiplications and additions of a factorisation, for each stored entry of K, above which modes are
+    /// searched for without a factor, where [`FactorChoice::Auto`] leaves that open. Those of
+    /// [`Accuracy::Certified`] never are.
     pub multigrid_pays: f64,
     /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
     pub memory: Option<u64>,
@@ -92,9 +92,9 @@ impl Default for EigenSettings {
             factor: FactorChoice::Auto,
             // Below, the columns that its corrections solve cost what the factorisation saves.
             single_pays: 4e11,
-            // A compact solid of 80,000 rows. What is thin has less to factor, and more that no coarse level
-            // sees.
-            multigrid_pays: 2.5e4,
+            // Measured: a compact solid of 40,000 rows, a bar of 70,000. What is thin has less to factor, and
+            // more that no coarse level sees.
+            multigrid_pays: 1.2e4,
             memory: None,
             longest: None,
         }
