@@ -24,7 +24,7 @@ use crate::formats::flex_body_file;
 use crate::input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
-use crate::model::{CheckedModel, FeModel};
+use crate::model::{CheckedModel, FeModel, RawModel};
 use crate::motion::scene::Scene;
 use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
 use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
@@ -80,7 +80,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
         threads,
     };
     if !arguments.split {
-        let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
+        let done = job.convert(job.checked(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
         return Ok(done.outcome);
     }
@@ -135,6 +135,13 @@ struct Done {
 }
 
 impl Job<'_> {
+    /// The model, checked; with the order of elimination where its own modes are to be computed here.
+    fn checked(&self, raw: RawModel) -> Result<CheckedModel> {
+        let Self { arguments, .. } = self;
+        let searched = arguments.engine.engine == EngineName::BuiltIn && arguments.basis == BasisName::Free;
+        if searched { FeModel::from_raw_ordered(raw) } else { FeModel::from_raw(raw) }
+    }
+
     fn convert(
         &self,
         checked: CheckedModel,

@@ -6,9 +6,10 @@ use super::mass_structure::MassForm;
 use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
-use crate::numerics::linalg::{CscMatrix, Pencil, SymmetricMatrix, larger};
+use crate::numerics::linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};
 use faer::Mat;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the
 /// order of `nodes`, then what else [`rows`](FeModel::rows) says.
@@ -36,6 +37,7 @@ pub struct FeModel {
     /// Internal row of each matrix row; none when they are the same.
     row_to_internal: Option<Vec<u32>>,
     number: Option<BodyNumber>,
+    elimination: Option<Arc<Analysis>>,
 }
 
 impl FeModel {
@@ -68,6 +70,7 @@ impl FeModel {
             diagonal_mass,
             row_to_internal: body.row_to_internal,
             number,
+            elimination: None,
         }
     }
 
@@ -121,6 +124,7 @@ impl FeModel {
             commutes: true,
             mass_deviation: 0.0,
             diagonal_mass: true,
+            elimination: None,
             ..self.clone()
         }
     }
@@ -155,6 +159,16 @@ impl FeModel {
     /// of K.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
         &self.geometric_stiffness
+    }
+
+    /// Keeps the order of elimination of its pencil.
+    pub(super) fn set_elimination(&mut self, elimination: Option<Analysis>) {
+        self.elimination = elimination.map(Arc::new);
+    }
+
+    /// The order of elimination of [`pencil`](Self::pencil), where it was looked for during the checks.
+    pub fn elimination(&self) -> Option<&Arc<Analysis>> {
+        self.elimination.as_ref()
     }
 
     /// K and M.

@@ -75,6 +75,7 @@ fn with_modes(test: impl FnOnce(&EigenProblem<'_>, EigenSolution)) {
         rigid: rigid.as_ref(),
         first_estimate: ROOTS[0].powi(4) / 420.0,
         input_error: 0.5 * f64::EPSILON,
+        order: None,
         resume: Resume::default(),
     };
     let solution = solve(&problem, &settings(Accuracy::Standard), SILENT).expect("modes");

@@ -159,6 +159,7 @@ impl<'a> Parts<'a> {
             rigid: none.as_ref(),
             first_estimate,
             input_error: input_error(model),
+            order: None,
             resume: Resume::default(),
         };
         let in_model = |failure| failed(expanded(failure, &elimination));

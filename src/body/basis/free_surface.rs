@@ -77,6 +77,7 @@ pub fn free_surface_resumed(
         rigid: rigid.as_ref(),
         first_estimate,
         input_error: input_error(model),
+        order: model.elimination(),
         resume,
     };
     let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;

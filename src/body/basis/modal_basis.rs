@@ -94,7 +94,15 @@ pub(super) fn problem_of_span<'a>(
     resume: Resume<'a>,
 ) -> EigenProblem<'a> {
     let first_estimate = f64::INFINITY;
-    EigenProblem { pencil: model.pencil(), rigid, first_estimate, input_error: input_error(model), resume }
+    let order = model.elimination();
+    EigenProblem {
+        pencil: model.pencil(),
+        rigid,
+        first_estimate,
+        input_error: input_error(model),
+        order,
+        resume,
+    }
 }
 
 impl ModalBasis {

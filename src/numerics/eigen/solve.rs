@@ -21,6 +21,7 @@ use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 use faer::Mat;
+use std::sync::Arc;
 
 /// Models up to this size are solved densely: all modes take less than a second.
 const DENSE_ALWAYS: usize = 600;
@@ -99,9 +100,9 @@ fn analyse(
     problem: &EigenProblem<'_>,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<Analysis, EigenFailure> {
+) -> Result<Arc<Analysis>, EigenFailure> {
     watch(Event::Phase("ordering"));
-    let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
+    let analysis = problem.analysis().ok_or(EigenFailure::TooLarge)?;
     counters.factor_len = analysis.factor_len() as u64;
     counters.factor_flops = analysis.flops() as u64;
     if !is_positive_semidefinite(problem.pencil.mass(), &analysis) {

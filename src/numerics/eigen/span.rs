@@ -45,7 +45,7 @@ pub fn modes_of_span(
     let exact = modes.exact(settings.accuracy);
     let analysis = (exact > 0 && settings.accuracy != Accuracy::Fast).then(|| {
         watch(Event::Phase("completeness"));
-        Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)
+        problem.analysis().ok_or(EigenFailure::TooLarge)
     });
     let analysis = analysis.transpose()?;
     let completeness = match &analysis {
@@ -54,7 +54,7 @@ pub fn modes_of_span(
     };
     let mut bounds = None;
     if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
-        let analysis = certifiable(&modes, exact, &completeness, analysis.as_ref())
+        let analysis = certifiable(&modes, exact, &completeness, analysis.as_deref())
             .map_err(|why| EigenFailure::NotCertified { why })?;
         watch(Event::Phase("bounds"));
         // Refuses what does not fit the memory.

@@ -86,7 +86,7 @@ fn with_responses<T>(
     counters: &mut Counters,
     respond: impl FnOnce(&Responses<'_>, &mut Counters) -> Result<T, EigenFailure>,
 ) -> Result<T, EigenFailure> {
-    let analysis = Analysis::new(&problem.pencil).ok_or(EigenFailure::TooLarge)?;
+    let analysis = problem.analysis().ok_or(EigenFailure::TooLarge)?;
     let complement = Complement::of(&problem.pencil, &[problem.rigid, modes]);
     // Without known modes K itself is definite, and its factor the solution but for rounding.
     let tau = if complement.is_everything() { 0.0 } else { 0.5 * first };

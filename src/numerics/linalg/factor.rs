@@ -1,7 +1,7 @@
 //! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu,
 //! SIAM Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
 
-use super::assembly_tree::AssemblyTree;
+use super::assembly_tree::{AssemblyTree, Graph};
 use super::front::{self, Real, Trapezoid, extend_add};
 use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
@@ -11,6 +11,38 @@ use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 use std::convert::Infallible;
+
+/// Which rows of a pencil are coupled: all that an elimination is ordered by. It outlives the matrices, so that
+/// these can be looked at while the ordering library, which has one thread, is at work.
+pub struct CoupledRows {
+    graph: Graph,
+    /// Rows per vertex.
+    rows: usize,
+}
+
+impl CoupledRows {
+    /// Those of a pencil; `None` when they are too many for the ordering library.
+    pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
+        let (graph, rows) = smallest_graph(pencil)?;
+        Some(Self { graph, rows })
+    }
+
+    /// Those of K and M, node by node; `None` as above.
+    ///
+    /// # Panics
+    /// When the sizes disagree, or a node has not one, two or three rows.
+    pub fn of_nodes(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: usize) -> Option<Self> {
+        let graph = vertex_graph(&Pencil::new(stiffness, mass, 1), rows)?;
+        Some(Self { graph, rows })
+    }
+
+    /// Orders and analyses them; `None` when memory runs out.
+    pub fn analyse(self) -> Option<Analysis> {
+        let Self { mut graph, rows } = self;
+        let order = nested_dissection(&mut graph)?;
+        Some(Analysis::with_tree(AssemblyTree::new(&graph, &order, rows), rows))
+    }
+}
 
 /// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
 #[derive(Debug)]
@@ -26,9 +58,7 @@ pub struct Analysis {
 impl Analysis {
     /// Orders and analyses the pencil; `None` when memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        let (mut graph, rows) = smallest_graph(pencil)?;
-        let order = nested_dissection(&mut graph)?;
-        Some(Self::with_tree(AssemblyTree::new(&graph, &order, rows), rows))
+        CoupledRows::new(pencil)?.analyse()
     }
 
     fn with_tree(tree: AssemblyTree, block: usize) -> Self {
@@ -123,56 +153,100 @@ pub(super) struct Scaled<'a> {
 impl Scaled<'_> {
     /// Adds the columns of supernode `s` to its front.
     pub(super) fn assemble<T: Real>(&self, s: usize, front: &mut Trapezoid<T>) {
-        let (tree, block) = (&self.analysis.tree, self.analysis.block);
-        let columns = tree.columns(s);
-        let below = tree.rows(s);
-        // Row of the front of a vertex, if it is eliminated not before `column`.
-        let place = |vertex: usize, column: usize| {
-            let position = tree.position()[vertex] as usize;
-            if position < column {
-                None
-            } else if position < columns.end {
-                Some((position - columns.start) * block)
-            } else {
-                let at = below.binary_search(&(position as u32)).expect("the structure holds every entry");
-                Some((columns.len() + at) * block)
-            }
-        };
+        let columns = self.analysis.tree.columns(s);
         for column in columns.clone() {
-            let vertex = tree.order()[column] as usize;
-            for b in 0..block {
-                let (j, local) = (vertex * block + b, (column - columns.start) * block + b);
-                let (rows, values) = self.pencil.stiffness().row(j);
-                let mut last = (usize::MAX, None);
-                for (&i, &value) in rows.iter().zip(values) {
-                    let (other, component) = (i as usize / block, i as usize % block);
-                    if other != last.0 {
-                        last = (other, place(other, column));
-                    }
-                    if let Some(row) = last.1.map(|row| row + component)
-                        && row >= local
-                    {
-                        front.add(row, local, T::of(value * self.scale[i as usize] * self.scale[j]));
+            let mut places = Places { tree: &self.analysis.tree, s, column, known: Vec::new() };
+            let local = (column - columns.start) * self.analysis.block;
+            self.assemble_stiffness(local, &mut places, front);
+            self.assemble_mass(local, &mut places, front);
+        }
+    }
+
+    /// Adds the columns of K that a vertex has, the first of which is `local` in the front.
+    fn assemble_stiffness<T: Real>(&self, local: usize, places: &mut Places<'_>, front: &mut Trapezoid<T>) {
+        let block = self.analysis.block;
+        let vertex = places.vertex();
+        for b in 0..block {
+            let (j, local) = (vertex * block + b, local + b);
+            let (rows, values) = self.pencil.stiffness().row(j);
+            let mut at = 0;
+            for (&i, &value) in rows.iter().zip(values) {
+                let (other, component) = (i as usize / block, i as usize % block);
+                if let Some(row) = places.of(other, &mut at).map(|place| place * block + component)
+                    && row >= local
+                {
+                    front.add(row, local, T::of(value * self.scale[i as usize] * self.scale[j]));
+                }
+            }
+        }
+    }
+
+    /// Adds the same columns of -sigma M: of the rows of Ms that a vertex has, each is for as many rows of M.
+    fn assemble_mass<T: Real>(&self, local: usize, places: &mut Places<'_>, front: &mut Trapezoid<T>) {
+        let block = self.analysis.block;
+        let vertex = places.vertex();
+        let (copies, heavy) = (self.pencil.block(), block / self.pencil.block());
+        for own in 0..heavy {
+            let (others, masses) = self.pencil.mass().row(vertex * heavy + own);
+            let mut at = 0;
+            for (&other, &mass) in others.iter().zip(masses) {
+                let (other, part) = (other as usize / heavy, other as usize % heavy);
+                let Some(place) = places.of(other, &mut at) else { continue };
+                for copy in 0..copies {
+                    let (b, c) = (part * copies + copy, own * copies + copy);
+                    let (row, local) = (place * block + b, local + c);
+                    if row >= local {
+                        let scale = self.scale[other * block + b] * self.scale[vertex * block + c];
+                        front.add(row, local, T::of(-self.sigma * mass * scale));
                     }
                 }
             }
-            // Rows of Ms that a vertex has, each for as many rows of M.
-            let (copies, heavy) = (self.pencil.block(), block / self.pencil.block());
-            for own in 0..heavy {
-                let (others, masses) = self.pencil.mass().row(vertex * heavy + own);
-                for (&other, &mass) in others.iter().zip(masses) {
-                    let (other, part) = (other as usize / heavy, other as usize % heavy);
-                    let Some(first) = place(other, column) else { continue };
-                    for copy in 0..copies {
-                        let (b, c) = (part * copies + copy, own * copies + copy);
-                        let (row, local) = (first + b, (column - columns.start) * block + c);
-                        if row >= local {
-                            let scale = self.scale[other * block + b] * self.scale[vertex * block + c];
-                            front.add(row, local, T::of(-self.sigma * mass * scale));
-                        }
-                    }
-                }
-            }
+        }
+    }
+}
+
+/// Places of vertices in the front of a supernode, for the entries of one of its columns of vertices: looked up
+/// once for all rows of the vertex.
+struct Places<'a> {
+    tree: &'a AssemblyTree,
+    s: usize,
+    column: usize,
+    /// Vertices, ascending, and their places.
+    known: Vec<(usize, Option<usize>)>,
+}
+
+impl Places<'_> {
+    /// The vertex of the column.
+    fn vertex(&self) -> usize {
+        self.tree.order()[self.column] as usize
+    }
+
+    /// The place of a vertex that is eliminated not before the column. The vertices of a row come ascending: `at`
+    /// is where the last one stood, at first zero.
+    fn of(&mut self, vertex: usize, at: &mut usize) -> Option<usize> {
+        while self.known.get(*at).is_some_and(|known| known.0 < vertex) {
+            *at += 1;
+        }
+        if let Some(&(known, place)) = self.known.get(*at)
+            && known == vertex
+        {
+            return place;
+        }
+        let place = self.found(vertex);
+        self.known.insert(*at, (vertex, place));
+        place
+    }
+
+    fn found(&self, vertex: usize) -> Option<usize> {
+        let columns = self.tree.columns(self.s);
+        let position = self.tree.position()[vertex] as usize;
+        if position < self.column {
+            None
+        } else if position < columns.end {
+            Some(position - columns.start)
+        } else {
+            let below = self.tree.rows(self.s).binary_search(&(position as u32));
+            Some(columns.len() + below.expect("the structure holds every entry"))
         }
     }
 }
@@ -333,19 +407,21 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 
 /// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the
 /// diagonal has been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a
-/// matrix). Most are far from the border: where it succeeds in single precision with a diagonal that is
-/// 1e-3 less, that settles it in half the time. Uses the order of `analysis`.
+/// matrix). Most masses of displacements are far from the border: where it succeeds in single precision with a
+/// diagonal that is 1e-3 less, that settles it in half the time. Those of rotations are near it. Uses the order
+/// of `analysis`.
 pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
     let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows) else { return false };
     let analysis = Analysis::with_tree(AssemblyTree::new(&graph, order, rows), rows);
     drop(graph);
-    let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
-    if Cholesky::<f32>::new(&analysis, &Pencil::new(&lowered, &lowered, 1), 0.0).is_some() {
-        return true;
+    if rows == 1 {
+        let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
+        if Cholesky::<f32>::new(&analysis, &Pencil::new(&lowered, &lowered, 1), 0.0).is_some() {
+            return true;
+        }
     }
-    drop(lowered);
     let raised = mass.with_raised_diagonal(1.0 + 1e-9);
     Cholesky::<f64>::new(&analysis, &Pencil::new(&raised, &raised, 1), 0.0).is_some()
 }

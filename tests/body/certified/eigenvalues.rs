@@ -67,6 +67,7 @@ impl Body {
             rigid: rigid.as_ref(),
             first_estimate: form(&self.k, &ramp, &ramp) / form(&self.m, &ramp, &ramp),
             input_error: 0.0,
+            order: None,
             resume: Resume::default(),
         };
         solve(&problem, &EigenSettings { wanted, accuracy, method, ..EigenSettings::default() }, SILENT)

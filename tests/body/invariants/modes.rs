@@ -30,6 +30,7 @@ fn modes(model: &Model, positions: &[[f64; 3]], count: usize) -> Modes {
         rigid: rigid.as_ref(),
         first_estimate,
         input_error: 0.5e-13,
+        order: None,
         resume: Resume::default(),
     };
     let settings = EigenSettings { wanted: Wanted::Lowest(count), ..EigenSettings::default() };
