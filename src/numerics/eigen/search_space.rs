@@ -6,7 +6,7 @@ use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::refine::{independent, leave_unbalanced, small_ritz};
 use crate::numerics::linalg::{Tall, combine, combine_in_place, combine_into, gram, subtract_combination};
-use faer::{Mat, MatRef};
+use faer::Mat;
 use std::ops::Range;
 
 /// A basis M-orthogonal to the rigid modes, nearly M-orthonormal.

@@ -8,7 +8,7 @@ use super::failure::EigenFailure;
 use super::noise::rounding_residual;
 use super::problem::EigenProblem;
 use super::settings::Precision;
-use crate::numerics::linalg::{Analysis, Cholesky, Pencil, Solve, column_products};
+use crate::numerics::linalg::{Cholesky, Pencil, Solve, column_products};
 use faer::{Mat, MatRef};
 
 /// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of

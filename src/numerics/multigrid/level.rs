@@ -1,6 +1,6 @@
 //! A level: its smoother and the way to the next coarser one.
 
-use super::blocks::{BlockMatrix, Rows, WIDTH};
+use super::blocks::{BlockMatrix, Rows};
 use super::coarsening::{
     Block, Groups, Motions, SymmetricBlocks, diagonal, galerkin, inverse, narrow, stored, strong_couplings,
 };
