@@ -100,10 +100,9 @@ pub(super) fn finish(
     };
     let (elimination, checked) =
         rayon::join(|| coupled.and_then(CoupledRows::analyse), || check_body(body, number, found));
-    checked.map(|mut checked| {
-        checked.model.set_elimination(elimination);
-        checked
-    })
+    let mut checked = checked?;
+    checked.model.set_elimination(elimination);
+    Ok(checked)
 }
 
 /// Which rows the pencil of a body couples; `None` where they are too many to be ordered.
@@ -116,6 +115,7 @@ fn coupled_rows(body: &Assembled) -> Option<CoupledRows> {
     }
 }
 
+/// The checks alone.
 fn check_body(
     mut body: Assembled,
     number: Option<BodyNumber>,

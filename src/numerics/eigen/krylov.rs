@@ -3,10 +3,11 @@
 use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
-use crate::numerics::linalg::{Solve, Tall, combine, gram, subtract_combination, uniform};
+use crate::numerics::linalg::{
+    Solve, Tall, combine, divide, gram, subtract_combination, uniform, weighted_square,
+};
 use faer::prelude::{IntoConst, ReborrowMut};
-use faer::{ColMut, ColRef, Mat, MatRef};
-use rayon::prelude::*;
+use faer::{ColRef, Mat, MatRef};
 
 /// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not
 /// see: the rest is rounding of the product.
@@ -268,36 +269,6 @@ fn loses_digits(t: &Mat<f64>) -> bool {
     })
 }
 
-/// Rows that a task works on: a fixed partition, so that the bits do not depend on the number of threads.
-const ROWS: usize = 4096;
-
-/// w' diag(m) w.
-fn weighted_square(w: ColRef<'_, f64>, m: &[f64]) -> f64 {
-    let w = w.try_as_col_major().expect("blocks are column-major").as_slice();
-    let part = |(w, m): (&[f64], &[f64])| w.iter().zip(m).map(|(w, m)| w * w * m).sum::<f64>();
-    let parts: Vec<f64> = w.par_chunks(ROWS).zip(m.par_chunks(ROWS)).map(part).collect();
-    parts.iter().sum()
-}
-
-/// Puts column `from`, divided by `size`, in the place of column `to`, which does not come after it.
-fn divide_column(block: &mut Mat<f64>, from: usize, to: usize, size: f64) {
-    let (mut before, mut rest) = block.as_mut().split_at_col_mut(from);
-    let column = |column| slice_of(column).par_chunks_mut(ROWS);
-    let source = rest.rb_mut().col_mut(0);
-    if to == from {
-        column(source).for_each(|x| x.iter_mut().for_each(|x| *x /= size));
-    } else {
-        let target = before.rb_mut().col_mut(to);
-        column(target).zip(column(source)).for_each(|(to, from)| {
-            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from / size);
-        });
-    }
-}
-
-fn slice_of(column: ColMut<'_, f64>) -> &mut [f64] {
-    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
-}
-
 /// w_i' (M w)_j.
 fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
     gram(w.as_ref().subcols(i, 1), mw.as_ref().subcols(j, 1))[(0, 0)]
@@ -337,7 +308,11 @@ fn gram_schmidt(
         }
         t[(kept, j)] = norm;
         for block in [&mut *w, &mut *mw] {
-            divide_column(block, j, kept, norm);
+            if kept < j {
+                let (mut done, rest) = block.as_mut().split_at_col_mut(j);
+                done.rb_mut().col_mut(kept).copy_from(rest.col(0));
+            }
+            divide(block.col_mut(kept), norm);
         }
         kept += 1;
     }

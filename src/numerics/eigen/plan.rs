@@ -51,8 +51,9 @@ const LEVEL_BYTES: (u64, u64) = (12, 400);
 /// Entries in a row of K of linear hexahedra, nearly.
 const LINEAR_COUPLINGS: f64 = 64.0;
 
-/// How many times more cycles elements of the second order take.
-const MOST_CYCLES: f64 = 2.1;
+/// Most that the coupling of elements of the second order raises the threshold by, beside itself. Those of
+/// hexahedra have not been measured beyond it.
+const MOST_RAISED: f64 = 2.1;
 
 /// Whether the search is to go without a factor.
 fn suits_multigrid(
@@ -65,7 +66,7 @@ fn suits_multigrid(
     // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows,
     // which couple a quarter more, take twice the time of a factor.)
     let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_COUPLINGS)).max(1.0);
-    let pays = settings.multigrid_pays * coupled * coupled.powi(2).min(MOST_CYCLES);
+    let pays = settings.multigrid_pays * coupled * coupled.powi(2).min(MOST_RAISED);
     settings.accuracy != Accuracy::Certified
         && settings.factor == FactorChoice::Auto
         && settings.method == Method::Auto

@@ -41,7 +41,7 @@ const MAX_ROUNDS: usize = 60;
 const PATIENCE: usize = 6;
 
 /// Rounds of cycles after which each must have gained so much on average: with less, a factor takes less time than
-/// the rounds to come. (Solids gain 2 to 3; a cube whose Poisson's ratio is 0.4999 gains 1.3.)
+/// the rounds to come. (A bar of 100,000 rows gains 2.)
 const JUDGED_AFTER: usize = 5;
 const LEAST_GAIN: f64 = 1.5;
 

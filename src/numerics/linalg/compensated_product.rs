@@ -2,6 +2,7 @@
 
 use super::SymmetricMatrix;
 use super::compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
+use super::tall::contiguous;
 use faer::MatRef;
 use rayon::prelude::*;
 
@@ -83,7 +84,7 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
             let rows = chunk * ROWS..((chunk + 1) * ROWS).min(n);
             let column = |c: usize| {
                 let (mut hi, mut lo) = ([0.0; LANES], [0.0; LANES]);
-                let factors = a.col(c).try_as_col_major().expect("blocks are column-major").as_slice();
+                let factors = contiguous(a.col(c));
                 with_fma(
                     #[inline(always)]
                     || {

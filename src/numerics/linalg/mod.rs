@@ -47,7 +47,8 @@ pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use stored::Stored;
+pub(crate) use tall::contiguous_mut;
 pub use tall::{
-    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, gram,
-    side_by_side, subtract_columns, subtract_combination,
+    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, divide,
+    gram, side_by_side, subtract_columns, subtract_combination, weighted_square,
 };

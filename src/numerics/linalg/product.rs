@@ -5,8 +5,9 @@
 //! result row is one sum in storage order: the same bits at any thread count.
 
 use super::SymmetricMatrix;
+use super::tall::{contiguous, contiguous_mut};
 use faer::prelude::ReborrowMut;
-use faer::{ColRef, MatMut, MatRef};
+use faer::{MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -166,13 +167,8 @@ fn pass<const B: usize, const W: usize>(
     let rows = (0..a.n()).into_par_iter().with_min_len(ROWS);
     let packed: Vec<[[f64; W]; B]> =
         rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
-    let mut targets: Vec<_> = y
-        .col_iter_mut()
-        .map(|column| {
-            let column = column.try_as_col_major_mut().expect("blocks are column-major");
-            column.as_slice_mut().chunks_mut(ROWS * B)
-        })
-        .collect();
+    let mut targets: Vec<_> =
+        y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS * B)).collect();
     let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS))
         .map(|_| std::array::from_fn(|c| targets[c].next().expect("as many chunks as tasks")))
         .collect();
@@ -223,11 +219,6 @@ impl<F: Fn(f64) -> f64, const B: usize, const W: usize> WithSimd for RowProducts
             }
         }
     }
-}
-
-/// A column as a slice: every block in this crate is column-major.
-fn contiguous<'a>(column: ColRef<'a, f64>) -> &'a [f64] {
-    column.try_as_col_major().expect("blocks are column-major").as_slice()
 }
 
 #[cfg(test)]

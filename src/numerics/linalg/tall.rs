@@ -3,7 +3,7 @@
 
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
-use faer::{Accum, ColRef, Mat, MatMut, MatRef, Par};
+use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -44,10 +44,7 @@ impl Tall {
     /// When the row counts differ.
     pub fn push(&mut self, x: MatRef<'_, f64>) {
         assert_eq!(x.nrows(), self.rows, "rows of columns to append");
-        for column in x.col_iter() {
-            let column = column.try_as_col_major().expect("blocks are column-major").as_slice();
-            self.entries.par_extend(column.par_iter().copied().with_min_len(ROWS));
-        }
+        x.col_iter().for_each(|column| self.push_multiple(1.0, column));
     }
 
     /// Appends a multiple of a column, made by all threads.
@@ -56,8 +53,7 @@ impl Tall {
     /// When the row counts differ.
     pub fn push_multiple(&mut self, scale: f64, x: ColRef<'_, f64>) {
         assert_eq!(x.nrows(), self.rows, "rows of a column to append");
-        let column = x.try_as_col_major().expect("blocks are column-major").as_slice();
-        self.entries.par_extend(column.par_iter().with_min_len(ROWS).map(|x| scale * x));
+        self.entries.par_extend(contiguous(x).par_iter().with_min_len(ROWS).map(|x| scale * x));
     }
 
     /// Appends columns of zeros.
@@ -156,8 +152,7 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
     let squares = |k: usize| -> f64 {
         let (chunk, column) = (k % chunks, k / chunks);
         let part = a.col(column).subrows(chunk * ROWS, ROWS.min(a.nrows() - chunk * ROWS));
-        let part = part.try_as_col_major().expect("blocks are column-major").as_slice();
-        let (lanes, rest) = part.as_chunks::<8>();
+        let (lanes, rest) = contiguous(part).as_chunks::<8>();
         let mut sums = [0.0; 8];
         lanes.iter().for_each(|x| (0..8).for_each(|w| sums[w] += x[w] * x[w]));
         sums.iter().sum::<f64>() + rest.iter().map(|x| x * x).sum::<f64>()
@@ -168,6 +163,32 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
         if SQUARES.contains(&norm) { norm } else { a.col(j).norm_l2() }
     };
     (0..a.ncols()).map(norm).collect()
+}
+
+/// x' diag(w) x.
+///
+/// # Panics
+/// When the lengths differ.
+pub fn weighted_square(x: ColRef<'_, f64>, weights: &[f64]) -> f64 {
+    assert_eq!(x.nrows(), weights.len(), "one weight for each row");
+    let part = |(x, w): (&[f64], &[f64])| x.iter().zip(w).map(|(x, w)| x * x * w).sum::<f64>();
+    let parts: Vec<f64> = contiguous(x).par_chunks(ROWS).zip(weights.par_chunks(ROWS)).map(part).collect();
+    parts.iter().sum()
+}
+
+/// x /= size.
+pub fn divide(x: ColMut<'_, f64>, size: f64) {
+    contiguous_mut(x).par_chunks_mut(ROWS).for_each(|x| x.iter_mut().for_each(|x| *x /= size));
+}
+
+/// A column as a slice: every block in this crate is column-major.
+pub(crate) fn contiguous(column: ColRef<'_, f64>) -> &[f64] {
+    column.try_as_col_major().expect("blocks are column-major").as_slice()
+}
+
+/// The same, to be written.
+pub(crate) fn contiguous_mut(column: ColMut<'_, f64>) -> &mut [f64] {
+    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
 }
 
 /// Sum of equal-shaped matrices, pairwise: error grows with the logarithm of their number.

@@ -4,10 +4,10 @@ use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
 use super::level::{Coarse, Level};
 use crate::numerics::linalg::{
-    Pencil, Solve, combine, dense_cholesky, dense_inverse, gram, largest, solve_lower,
+    Pencil, Solve, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest, solve_lower,
 };
 use faer::prelude::ReborrowMut;
-use faer::{ColMut, Mat, MatMut, MatRef};
+use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -268,17 +268,12 @@ fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
 }
 
 fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {
-    let mut columns: Vec<&mut [f64]> = x.col_iter_mut().map(contiguous).collect();
+    let mut columns: Vec<&mut [f64]> = x.col_iter_mut().map(contiguous_mut).collect();
     columns.par_iter_mut().enumerate().for_each(|(w, column)| {
         for (own, rows) in column.chunks_exact_mut(B).zip(rows) {
             own.iter_mut().zip(rows).for_each(|(x, row)| *x = scale * f64::from(row[w]));
         }
     });
-}
-
-/// A column as a slice: blocks are column-major.
-fn contiguous(column: ColMut<'_, f64>) -> &mut [f64] {
-    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
 }
 
 #[cfg(test)]
