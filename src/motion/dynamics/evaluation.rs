@@ -3,6 +3,7 @@
 use super::EquationsOfMotion;
 use super::equations::{C1, LINEAR, PAIRS, W0, W1};
 use super::kernels::{WIDTH, add_scaled, dot};
+use crate::numerics::linalg::short_vectors;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use pulp::Arch;
 
@@ -65,7 +66,7 @@ impl<'a> Evaluation<'a> {
         let translation_products = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
         let mut evaluation = Self {
             equations,
-            arch: Arch::new(),
+            arch: short_vectors(),
             q: zeros(nf),
             qd: zeros(nf),
             velocity: Vector3::zeros(),

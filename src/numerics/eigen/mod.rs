@@ -5,6 +5,7 @@ mod bounds;
 mod canonical;
 mod complement;
 mod completeness;
+mod corrector;
 mod counters;
 mod dense;
 mod dynamic_response;

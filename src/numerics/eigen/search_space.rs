@@ -6,6 +6,7 @@ use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::refine::{independent, leave_unbalanced, small_ritz};
 use crate::numerics::linalg::{Tall, combine, combine_in_place, combine_into, gram, subtract_combination};
+use crate::numerics::multigrid::Near;
 use faer::Mat;
 use std::ops::Range;
 
@@ -112,6 +113,17 @@ impl<'a> SearchSpace<'a> {
         self.gm = Mat::identity(kept, kept);
         self.gk = Mat::from_fn(kept, kept, |i, j| if i == j { self.lambda[i] } else { 0.0 });
         self.ritz = Mat::identity(kept, kept);
+    }
+
+    /// The rigid modes and the basis, as far as that is one of Ritz vectors.
+    pub(super) fn near(&self) -> Near<'_> {
+        Near {
+            rigid: [self.problem.rigid, self.m_rigid.as_ref()],
+            modes: self.x.as_ref(),
+            k_modes: self.kx.as_ref(),
+            m_modes: self.mx.as_ref(),
+            eigenvalues: &self.lambda,
+        }
     }
 
     /// Some of the Ritz vectors (N x k).

@@ -9,6 +9,7 @@
 
 use super::canonical::cluster_end;
 use super::completeness::size_along;
+use super::corrector::{Corrector, Poor};
 use super::counters::Counters;
 use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
@@ -19,7 +20,7 @@ use super::resume::Snapshot;
 use super::search_space::SearchSpace;
 use super::start::fitting_start;
 use crate::base::progress::{Event, Watch};
-use crate::numerics::linalg::{Analysis, Cholesky, Solve, Tall, largest};
+use crate::numerics::linalg::{Analysis, Cholesky, Tall, largest};
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -40,10 +41,10 @@ const MAX_ROUNDS: usize = 60;
 /// Rounds in a row that gain less than a factor of two before it is given up.
 const PATIENCE: usize = 6;
 
-/// Rounds of cycles after which each must have gained so much on average: with less, a factor takes less time than
-/// the rounds to come. (A bar of 100,000 rows gains 2.)
-const JUDGED_AFTER: usize = 5;
-const LEAST_GAIN: f64 = 1.5;
+/// Rounds of cycles after which they must have gained so much: with less, a factor takes less time than the rounds
+/// to come. (Bars and cubes of 100,000 and 300,000 rows gain 25 to 10^5, with modes that come late.)
+const JUDGED_AFTER: usize = 4;
+const LEAST_GAIN: f64 = 7.0;
 
 /// The lowest modes, eigenvalues beyond them, and the shift; or the reason why single precision does not find
 /// them.
@@ -68,7 +69,8 @@ pub(super) fn search(
                 Search::Rough { vectors, wanted } => (vectors, wanted),
             },
         };
-        let corrected = Correction::begin(problem, factor, goal, vectors, (wanted, 1), watch, counters)?;
+        let corrected =
+            Correction::begin(problem, Corrector::Factor(factor), goal, vectors, wanted, watch, counters)?;
         corrected.run(counters).map(Attempt::Done)
     };
     let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
@@ -79,16 +81,12 @@ pub(super) fn search(
 /// cluster is seen.
 pub(super) struct Correction<'a> {
     problem: &'a EigenProblem<'a>,
-    factor: &'a dyn Solve,
+    corrector: Corrector<'a>,
     goal: &'a Goal,
     watch: Watch<'a>,
     space: SearchSpace<'a>,
-    /// The span keeps earlier corrections until it has twice this size: with them the last modes take half
-    /// the columns.
+    /// First size of the span.
     base: usize,
-    /// Columns that `factor` solves for in the time of one: the pairs above the wanted ones fill them up, and
-    /// the last ones converge sooner.
-    width: usize,
     /// Modes wanted, to the end of the cluster of the last one.
     wanted: usize,
     /// Those that keep the tolerance.
@@ -106,27 +104,28 @@ pub(super) struct Correction<'a> {
 }
 
 impl<'a> Correction<'a> {
-    /// The span of `x`, to be corrected by `factor`: anything that solves roughly.
+    /// The span of `x`, to be corrected.
     pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
-        factor: &'a dyn Solve,
+        corrector: Corrector<'a>,
         goal: &'a Goal,
         x: Mat<f64>,
-        (wanted, width): (usize, usize),
+        wanted: usize,
         watch: Watch<'a>,
         counters: &mut Counters,
     ) -> Result<Self, EigenFailure> {
-        // Twice the first size, and corrections.
-        let room = 3 * x.ncols() + width;
-        let space = SearchSpace::new(problem, x, room, counters)?;
+        let base = x.ncols();
+        let mut space = SearchSpace::new(problem, x, corrector.room(base), counters)?;
+        if corrector.contracts(base, base) {
+            space.contract(base);
+        }
         Ok(Self {
             problem,
-            factor,
+            corrector,
             goal,
             watch,
             base: space.lambda.len(),
             space,
-            width,
             wanted,
             converged: 0,
             floors: Vec::new(),
@@ -141,15 +140,15 @@ impl<'a> Correction<'a> {
     /// The modes, and the eigenvalue after them.
     pub(super) fn run(mut self, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
         for _ in 0..MAX_ROUNDS {
-            let (forces, excess) = self.excess(counters);
-            self.converged = excess[..self.wanted].iter().filter(|e| **e <= 1.0).count();
-            let poor: Vec<usize> =
-                (0..excess.len()).filter(|&i| excess[i].is_nan() || excess[i] > 1.0).collect();
-            (self.watch)(Event::Fraction(1.0 - poor.len() as f64 / excess.len() as f64));
+            let (forces, looked) = self.excess(counters);
+            let keeps = |pair: &Poor| pair.residual <= pair.allowed;
+            self.converged = looked[..self.wanted].iter().filter(|pair| keeps(pair)).count();
+            let poor: Vec<Poor> = looked.iter().copied().filter(|pair| !keeps(pair)).collect();
+            (self.watch)(Event::Fraction(1.0 - poor.len() as f64 / looked.len() as f64));
             if poor.is_empty() {
-                return self.hand_over(excess.len(), counters);
+                return self.hand_over(looked.len(), counters);
             }
-            if !self.gains(largest(excess)) {
+            if !self.gains(largest(looked.iter().map(|pair| pair.residual / pair.allowed))) {
                 break;
             }
             self.correct(&forces, &poor, counters)?;
@@ -157,16 +156,16 @@ impl<'a> Correction<'a> {
         Err(EigenFailure::NotConverged { converged: self.converged, wanted: self.wanted })
     }
 
-    /// What the pairs that are looked at leave unbalanced, and its size in units of what it may be.
-    fn excess(&mut self, counters: &mut Counters) -> (Tall, Vec<f64>) {
+    /// What the pairs that are looked at leave unbalanced, and its size beside what it may be.
+    fn excess(&mut self, counters: &mut Counters) -> (Tall, Vec<Poor>) {
         let (forces, relative) = self.look(counters);
         if self.seeks_gap(&relative) {
             return self.excess(counters);
         }
         let tolerance = self.goal.tolerance;
         let allowed = |j: usize| if j < self.wanted { tolerance.max(self.floors[j]) } else { BEYOND };
-        let excess = relative.iter().enumerate().map(|(j, relative)| relative / allowed(j)).collect();
-        (forces, excess)
+        let pair = |(pair, residual)| Poor { pair, residual, allowed: allowed(pair) };
+        (forces, relative.into_iter().enumerate().map(pair).collect())
     }
 
     /// What the wanted pairs and the one after them leave unbalanced, and its relative size.
@@ -206,11 +205,11 @@ impl<'a> Correction<'a> {
 
     /// Keeps the search, and hands its modes out.
     fn hand_over(self, looked: usize, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
-        let Self { problem, factor, space, wanted, .. } = self;
+        let Self { problem, corrector, space, wanted, .. } = self;
         let lambda = &space.lambda;
         let next = lambda[wanted..looked].to_vec();
         problem.resume.save(|| Snapshot {
-            shift: factor.shift(),
+            shift: corrector.shift(),
             eigenvalues: lambda.clone(),
             basis: space.vectors(0..lambda.len()),
             coupling: Mat::zeros(0, lambda.len()),
@@ -230,40 +229,35 @@ impl<'a> Correction<'a> {
         } else {
             self.since += 1;
         }
-        let enough = self.first / LEAST_GAIN.powi(JUDGED_AFTER as i32);
-        let is_slow = self.width > 1 && self.rounds == JUDGED_AFTER && worst > enough;
+        let enough = self.first / LEAST_GAIN;
+        let is_slow = self.corrector.width() > 1 && self.rounds == JUDGED_AFTER && worst > enough;
         self.rounds += 1;
         self.since <= PATIENCE && !is_slow && !worst.is_nan()
     }
 
-    /// Extends the space by corrections T r of the poor pairs, of those that are looked at, with their
-    /// residuals r, and of as many pairs after them as are solved for in the same time.
-    fn correct(
-        &mut self,
-        forces: &Tall,
-        poor: &[usize],
-        counters: &mut Counters,
-    ) -> Result<(), EigenFailure> {
-        let Self { factor, space, base, width, .. } = self;
+    /// Extends the space by corrections of the poor pairs, of those that are looked at, and of some pairs after
+    /// them.
+    fn correct(&mut self, forces: &Tall, poor: &[Poor], counters: &mut Counters) -> Result<(), EigenFailure> {
+        let Self { corrector, space, base, .. } = self;
         let looked = forces.ncols();
-        let filled = poor.len().next_multiple_of(*width) - poor.len();
-        let (after, _) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
-        let poor = poor.iter().map(|&j| forces.as_ref().col(j));
+        let filled = poor.len().next_multiple_of(corrector.width()) - poor.len();
+        let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
+        let later = relative.iter().zip(looked..);
+        let later = later.map(|(&residual, pair)| Poor { pair, residual, allowed: BEYOND });
+        let pairs: Vec<Poor> = poor.iter().copied().chain(later).collect();
+        let poor = poor.iter().map(|poor| forces.as_ref().col(poor.pair));
         let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
-        counters.solved_columns += columns.len() as u64;
         // Of unit size: residuals near rounding would leave the range of single precision.
         let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };
         let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
         let mut d = Tall::with_room(self.problem.pencil.n(), columns.len());
         columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
-        factor.solve_in_place(d.as_mut());
+        corrector.correct(space, &pairs, &mut d, counters);
         if d.ncols() > space.room() {
             space.contract(*base);
         }
-        // Twice costs as much as a cycle, and what is left along the space is accounted for.
-        let passes = if *width > 1 { 1 } else { 2 };
-        space.extend(&mut d, passes, counters)?;
-        if space.lambda.len() > 2 * *base {
+        space.extend(&mut d, corrector.passes(), counters)?;
+        if corrector.contracts(space.lambda.len(), *base) {
             space.contract(*base);
         }
         Ok(())

@@ -2,6 +2,7 @@
 //! until their true residuals keep the tolerance. For compact bodies, whose factor is what takes the time and
 //! the memory.
 
+use super::corrector::Corrector;
 use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::lanczos::Goal;
@@ -10,8 +11,7 @@ use super::refine::Refined;
 use super::single::Correction;
 use super::start::first_shift;
 use crate::base::progress::{Event, Watch};
-use crate::numerics::linalg::Solve;
-use crate::numerics::multigrid::{WIDTH, levels};
+use crate::numerics::multigrid::levels;
 
 /// Vectors beside the wanted modes. Hexahedral cubes of 100,000 and 300,000 rows take 285 solved columns for
 /// 20 modes with 8 of them, 258 with 16, 233 with 24, and the least time with 16.
@@ -37,9 +37,8 @@ pub(super) fn search(
     if rough.ncols() <= goal.wanted {
         return Err(unsuited());
     }
-    let solver: &dyn Solve = &*levels;
-    let sizes = (goal.wanted, WIDTH);
-    let correction = Correction::begin(problem, solver, goal, rough, sizes, watch, counters)?;
+    let corrector = Corrector::Levels(&*levels);
+    let correction = Correction::begin(problem, corrector, goal, rough, goal.wanted, watch, counters)?;
     let (modes, next) = correction.run(counters)?;
     Ok((modes, next, tau))
 }

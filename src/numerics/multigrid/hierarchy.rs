@@ -2,9 +2,12 @@
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
+use super::corrections::{Aim, Corrections, SmallPencil};
+use super::deflation::{Deflation, Near};
 use super::level::{Coarse, Level};
 use crate::numerics::linalg::{
-    Pencil, Solve, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest, solve_lower,
+    Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest,
+    solve_lower,
 };
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, MatRef};
@@ -32,11 +35,18 @@ const POLISHED: usize = 3;
 const NODES: usize = 1024;
 
 /// A hierarchy of levels, of nodes of any size.
-pub trait Levels: Solve {
+pub trait Levels {
+    /// The shift tau.
+    fn shift(&self) -> f64;
+
     /// The lowest modes of the coarsest level with the diagonal of M, improved on the levels up to the finest,
     /// as vectors of that (N x `count`, or as many columns as the coarsest level has rows): a start for a
     /// search. They are not orthonormal. `None` where they are linearly dependent.
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>>;
+
+    /// Replaces what approximate modes leave unbalanced, columns of about unit size, by corrections of the modes.
+    /// The columns of cycles that it took.
+    fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64;
 }
 
 /// Whether nodes with so many rows, and a body with so many rigid modes, can have levels.
@@ -64,6 +74,10 @@ struct Hierarchy<const B: usize, const C: usize> {
     inverse_of_bottom: Mat<f64>,
     /// Masses of its groups.
     masses: Vec<Block<C, C>>,
+    /// M / `heaviest` beside the blocks of the finest level.
+    mass: Vec<f32>,
+    /// Largest diagonal entry of M.
+    heaviest: f64,
     /// Largest diagonal entry of K: divided by it, numbers stay within single precision in any units.
     size: f64,
     tau: f64,
@@ -124,6 +138,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         };
         let masses = pencil.mass().diagonal().into_iter().map(scaled).collect();
         let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, STRONG)?;
+        let mass = masses_beside(fine.matrix(), pencil.mass(), 1.0 / heaviest);
         let mut coarser = Vec::new();
         while next.a.n_rows() * C > BOTTOM {
             if coarser.len() == MOST_LEVELS {
@@ -135,7 +150,8 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             next = after;
         }
         let inverse_of_bottom = dense_inverse(dense(&next.a))?;
-        Some(Self { fine, coarser, inverse_of_bottom, masses: next.masses, size, tau })
+        let masses = next.masses;
+        Some(Self { fine, coarser, inverse_of_bottom, masses, mass, heaviest, size, tau })
     }
 
     /// One cycle for (K + tau M) / size x = b.
@@ -171,22 +187,11 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
     }
 }
 
-impl<const B: usize, const C: usize> Solve for Hierarchy<B, C> {
+impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
     fn shift(&self) -> f64 {
         self.tau
     }
 
-    /// One cycle: roughly (K + tau M)^-1 X, for columns of about unit size.
-    fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
-        for columns in widths(x.ncols()) {
-            let mut part = x.rb_mut().subcols_mut(columns.start, columns.len());
-            let b = packed(part.as_ref());
-            unpack(&self.cycle(&b), part.rb_mut(), 1.0 / self.size);
-        }
-    }
-}
-
-impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>> {
         let mut x = self.bottom_modes(count)?;
         for (at, level) in self.coarser.iter().enumerate().rev() {
@@ -198,6 +203,27 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
         }
         Some(by_width(&x, self.fine.nodes(), |x| self.fine.prolonged(&x)))
     }
+
+    fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64 {
+        let ratio = self.heaviest / self.size;
+        let pencil = SmallPencil { a: self.fine.matrix(), mass: &self.mass, tau: self.tau, ratio };
+        let cycle = |b: &[Rows<B>]| self.cycle(b);
+        let deflation = Deflation::new(near);
+        Corrections { pencil, cycle, deflation, eigenvalues: near.eigenvalues }.solve(aims, forces)
+    }
+}
+
+/// Entries of M, scaled, beside the blocks of a matrix that has one wherever M has an entry.
+fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, scale: f64) -> Vec<f32> {
+    let row = |node: usize| {
+        let (others, values) = mass.row(node);
+        let mut entries = others.iter().zip(values).peekable();
+        a.row(node).map(move |(column, _)| {
+            let own = entries.next_if(|(other, _)| **other as usize == column);
+            own.map_or(0.0, |(_, value)| (scale * value) as f32)
+        })
+    };
+    (0..a.n_rows()).into_par_iter().with_min_len(NODES).flat_map_iter(row).collect()
 }
 
 /// Columns with a largest entry of one, which stays within single precision; columns of zeros stay so.
@@ -279,7 +305,7 @@ fn unpack<const B: usize>(rows: &[Rows<B>], x: MatMut<'_, f64>, scale: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::linalg::{CscMatrix, SymmetricMatrix, symmetric_eigen};
+    use crate::numerics::linalg::{CscMatrix, symmetric_eigen};
 
     /// Points of unit mass on a grid, with springs between neighbours, across the cells too: rigid motion
     /// costs nothing.
@@ -350,6 +376,11 @@ mod tests {
         }
     }
 
+    /// One cycle for (K + tau M) x = b.
+    fn solved(levels: &Hierarchy<3, 6>, b: &Mat<f64>) -> Mat<f64> {
+        by_width(b, levels.fine.nodes(), |b| levels.cycle(&b)) * faer::Scale(1.0 / levels.size)
+    }
+
     fn noise(n: usize, columns: usize) -> Mat<f64> {
         Mat::from_fn(n, columns, |i, j| ((i * 7919 + j * 104_729) % 1009) as f64 / 1009.0 - 0.5)
     }
@@ -366,13 +397,11 @@ mod tests {
             .chain([levels.inverse_of_bottom.nrows()])
             .collect();
         assert!(rows.len() == 3 && rows.is_sorted_by(|a, b| a > &(4 * b)), "{rows:?}");
-        // Eight columns and two that leave most of a width empty.
-        let mut x = noise(pencil.n(), 10);
-        let mut solved = x.clone();
-        levels.solve_in_place(solved.as_mut());
-        let products = gram(x.as_ref(), solved.as_ref());
+        // A width of columns and two that leave most of another empty.
+        let mut x = noise(pencil.n(), WIDTH + 2);
+        let products = gram(x.as_ref(), solved(&levels, &x).as_ref());
         let size = products.norm_max();
-        for i in 0..10 {
+        for i in 0..x.ncols() {
             for j in 0..i {
                 let off = (products[(i, j)] - products[(j, i)]).abs();
                 assert!(off < 1e-4 * size, "({i}, {j}): {off:e} of {size:e}");
@@ -388,9 +417,7 @@ mod tests {
             let energy = gram(x.as_ref(), force.as_ref())[(0, 0)].sqrt();
             assert!(energy < 0.5 * before, "{energy:e} after {before:e}");
             before = energy;
-            let mut moved = force;
-            levels.solve_in_place(moved.as_mut());
-            x -= moved;
+            x -= solved(&levels, &force);
         }
     }
 

@@ -55,6 +55,10 @@ impl<const B: usize, const C: usize> Level<B, C> {
         self.smoother.nodes()
     }
 
+    pub(super) fn matrix(&self) -> &BlockMatrix<B, B> {
+        self.smoother.matrix()
+    }
+
     /// One symmetric cycle for A x = b: smoothing, the coarser levels by `solve_coarse`, smoothing.
     pub(super) fn cycle(
         &self,

@@ -5,9 +5,12 @@
 mod aggregates;
 mod blocks;
 mod coarsening;
+mod corrections;
+mod deflation;
 mod hierarchy;
 mod level;
 mod smoother;
 
-pub use blocks::WIDTH;
+pub use corrections::Aim;
+pub use deflation::Near;
 pub use hierarchy::{Levels, can_have_levels, levels};

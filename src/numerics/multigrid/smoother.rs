@@ -37,6 +37,10 @@ impl<const B: usize> Smoother<B> {
         self.a.n_rows()
     }
 
+    pub(super) fn matrix(&self) -> &BlockMatrix<B, B> {
+        &self.a
+    }
+
     /// D^-1 x of a node.
     #[inline(always)]
     fn divided(&self, node: usize, x: &Rows<B>) -> Rows<B> {
@@ -163,7 +167,7 @@ fn minus<const B: usize>(b: &Rows<B>, ax: &Rows<B>) -> Rows<B> {
 }
 
 /// Products of the columns of two blocks: sums of fixed pieces, one after the other.
-fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WIDTH] {
+pub(super) fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WIDTH] {
     let piece = |(x, y): (&[Rows<B>], &[Rows<B>])| {
         let mut sums = [0.0; WIDTH];
         for (x, y) in x.iter().flatten().zip(y.iter().flatten()) {

@@ -1,0 +1,110 @@
+//! What makes corrections of approximate modes out of the forces that these leave unbalanced.
+
+use super::counters::Counters;
+use super::search_space::SearchSpace;
+use crate::numerics::linalg::{Solve, Tall};
+use crate::numerics::multigrid::{Aim, Levels};
+
+/// Part of the error of a correction that may be left, beside the residual of the pair: a correction is right to
+/// about the square of that, and the residual is mostly roughness that a step removes.
+const LEFT_OF_RESIDUAL: f64 = 0.1;
+
+/// The least part, since what the span lacks limits what a correction gains.
+const LEAST_LEFT: f64 = 0.01;
+
+/// Part of the residual that a last correction aims at.
+const BELOW_ALLOWED: f64 = 0.3;
+
+/// Pairs that cycles correct, filled up to a multiple: with those above the wanted ones the last of these converge
+/// sooner.
+const FILLED: usize = 8;
+
+#[derive(Clone, Copy)]
+pub(super) enum Corrector<'a> {
+    /// A factor of K + tau M that is not exact: T r.
+    Factor(&'a dyn Solve),
+    /// Cycles over levels, for the correction equation of each mode.
+    Levels(&'a dyn Levels),
+}
+
+/// A pair to correct.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Poor {
+    pub pair: usize,
+    /// Its relative residual, and what that may be.
+    pub residual: f64,
+    pub allowed: f64,
+}
+
+impl Corrector<'_> {
+    /// The shift tau.
+    pub(super) fn shift(self) -> f64 {
+        match self {
+            Self::Factor(factor) => factor.shift(),
+            Self::Levels(levels) => levels.shift(),
+        }
+    }
+
+    /// A multiple that the number of pairs is filled up to.
+    pub(super) fn width(self) -> usize {
+        match self {
+            Self::Factor(_) => 1,
+            Self::Levels(_) => FILLED,
+        }
+    }
+
+    /// Times that corrections are made orthogonal to the space: twice costs as much as a cycle, after which what is
+    /// left along the space is accounted for.
+    pub(super) fn passes(self) -> usize {
+        match self {
+            Self::Factor(_) => 2,
+            Self::Levels(_) => 1,
+        }
+    }
+
+    /// Whether a span of `base` vectors at first, and now so many, is to be contracted. With earlier corrections of a
+    /// factor the last modes take half the columns; corrections of levels have used up what these would tell, and
+    /// need a basis of Ritz vectors.
+    pub(super) fn contracts(self, vectors: usize, base: usize) -> bool {
+        match self {
+            Self::Factor(_) => vectors > 2 * base,
+            Self::Levels(_) => true,
+        }
+    }
+
+    /// Vectors that a span of `base` vectors at first has room for.
+    pub(super) fn room(self, base: usize) -> usize {
+        match self {
+            Self::Factor(_) => 3 * base + 1,
+            Self::Levels(_) => 2 * base + FILLED,
+        }
+    }
+
+    /// Replaces the forces, of about unit size, which the pairs of the space leave unbalanced. The space of levels is
+    /// one of Ritz vectors.
+    pub(super) fn correct(
+        self,
+        space: &SearchSpace<'_>,
+        poor: &[Poor],
+        forces: &mut Tall,
+        counters: &mut Counters,
+    ) {
+        counters.solved_columns += match self {
+            Self::Factor(factor) => {
+                factor.solve_in_place(forces.as_mut());
+                forces.ncols() as u64
+            }
+            Self::Levels(levels) => {
+                let aims: Vec<Aim> = poor.iter().map(Poor::aim).collect();
+                levels.correct(&space.near(), &aims, forces.as_mut())
+            }
+        };
+    }
+}
+
+impl Poor {
+    fn aim(&self) -> Aim {
+        let last = BELOW_ALLOWED * self.allowed / self.residual;
+        Aim { pair: self.pair, left: (LEFT_OF_RESIDUAL * self.residual).max(last).max(LEAST_LEFT) }
+    }
+}
