@@ -8,11 +8,11 @@
 //! group or the groups: rounding does not grow with the model.
 
 use super::{Groups, Invariants, PrimaryData};
-use crate::numerics::linalg::{SymmetricMatrix, short_vectors};
+use crate::numerics::linalg::SymmetricMatrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{Matrix3, Vector3};
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -295,7 +295,7 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
     });
     let x = x.get();
     let x_lanes = x.as_chunks::<LANE>().0;
-    let arch = short_vectors();
+    let arch = Arch::new();
     sum_of_groups(n, (before + width, width), |nodes| {
         let mut product = Aligned::zeros(CHUNK * width);
         let mut earlier = Aligned::zeros(CHUNK * before);

@@ -5,9 +5,10 @@ use super::condense::{
     Aligned, CHUNK, LANE, Lane, MassTimes, NodalMass, SolidColumns, rigid_part, sum_of_groups,
 };
 use super::{Groups, Invariants, LumpedMasses, PrimaryData, s_of_modal_mass};
-use crate::numerics::linalg::{SymmetricMatrix, gram, short_vectors};
+use crate::numerics::linalg::{SymmetricMatrix, gram};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// [`condense`](super::condense()) for modes that are mass-normalised, without W2 and W3: four columns are
@@ -79,7 +80,7 @@ fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) ->
     x.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
         columns.by_node(chunk * CHUNK, 0..4, LANE, rows.as_flattened_mut());
     });
-    let arch = short_vectors();
+    let arch = Arch::new();
     sum_of_groups(n, (count, LANE), |nodes| {
         let mut own = Aligned::zeros(CHUNK * count);
         let mut product = [[0.0; LANE]; CHUNK];

@@ -3,7 +3,6 @@
 use super::EquationsOfMotion;
 use super::equations::{C1, LINEAR, PAIRS, W0, W1};
 use super::kernels::{WIDTH, add_scaled, dot};
-use crate::numerics::linalg::short_vectors;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use pulp::Arch;
 
@@ -66,7 +65,7 @@ impl<'a> Evaluation<'a> {
         let translation_products = || zeros(equations.accelerated.as_ref().map_or(0, |k| k.padded_rows()));
         let mut evaluation = Self {
             equations,
-            arch: short_vectors(),
+            arch: Arch::new(),
             q: zeros(nf),
             qd: zeros(nf),
             velocity: Vector3::zeros(),

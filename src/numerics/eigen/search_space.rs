@@ -28,6 +28,8 @@ pub(super) struct SearchSpace<'a> {
     pub lambda: Vec<f64>,
     /// Coefficients of the Ritz vectors, which are M-orthonormal.
     ritz: Mat<f64>,
+    /// Whether the basis is one of Ritz vectors.
+    is_ritz: bool,
     /// M times vectors in work: kept, since memory that is taken anew is cleared first.
     work: Tall,
 }
@@ -52,6 +54,7 @@ impl<'a> SearchSpace<'a> {
             gk: Mat::zeros(0, 0),
             lambda: Vec::new(),
             ritz: Mat::zeros(0, 0),
+            is_ritz: false,
             work: Tall::with_room(n, x.ncols()),
         };
         let mut first = Tall::copied(x.as_ref());
@@ -98,6 +101,7 @@ impl<'a> SearchSpace<'a> {
         *gm = bordered(gm, &gram(x.as_ref(), mx.columns(added.clone())));
         *gk = bordered(gk, &gram(x.as_ref(), kx.columns(added)));
         (self.lambda, self.ritz) = small_ritz(gm, gk)?;
+        self.is_ritz = false;
         Ok(())
     }
 
@@ -113,6 +117,7 @@ impl<'a> SearchSpace<'a> {
         self.gm = Mat::identity(kept, kept);
         self.gk = Mat::from_fn(kept, kept, |i, j| if i == j { self.lambda[i] } else { 0.0 });
         self.ritz = Mat::identity(kept, kept);
+        self.is_ritz = true;
     }
 
     /// The rigid modes and the basis, as far as that is one of Ritz vectors.
@@ -135,6 +140,11 @@ impl<'a> SearchSpace<'a> {
     pub(super) fn unbalanced(&mut self, which: Range<usize>) -> (Tall, Vec<f64>) {
         let Self { problem, kx, mx, lambda, ritz, work, .. } = self;
         let (count, lambda) = (which.len(), &lambda[which.clone()]);
+        if self.is_ritz {
+            let mut forces = Tall::copied(kx.columns(which.clone()));
+            let (_, residuals) = leave_unbalanced(&mut forces, mx.columns(which), lambda);
+            return (forces, residuals);
+        }
         let ritz = ritz.as_ref().subcols(which.start, count);
         combine_into(work.first_mut(count), mx.as_ref(), ritz);
         let mut forces = Tall::zeros(problem.pencil.n(), count);

@@ -173,5 +173,5 @@ pub fn with_fma<R>(work: impl FnOnce() -> R) -> R {
             (self.0)()
         }
     }
-    super::instructions::short_vectors().dispatch(Work(work))
+    pulp::Arch::new().dispatch(Work(work))
 }

@@ -5,12 +5,11 @@ use super::Pencil;
 use super::factor::{Analysis, COLUMNS, substitute};
 use super::front::{PANEL, ROWS, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
-use super::instructions::short_vectors;
 use super::random::normal;
 use super::substitution::WORTH_TASKS;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut};
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -186,7 +185,7 @@ fn forward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
 ) {
-    let arch = short_vectors();
+    let arch = Arch::new();
     for (p, block) in blocks.iter().enumerate() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
@@ -213,7 +212,7 @@ fn backward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
 ) {
-    let arch = short_vectors();
+    let arch = Arch::new();
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);

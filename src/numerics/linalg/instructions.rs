@@ -1,7 +1,5 @@
 //! The vector instructions of this machine.
 
-use pulp::Arch;
-
 /// The widest vector instructions that the kernels find here. Sums keep their order whatever they are.
 pub fn instruction_set() -> &'static str {
     #[cfg(target_arch = "x86_64")]
@@ -15,14 +13,4 @@ pub fn instruction_set() -> &'static str {
         }
     }
     "of the build alone"
-}
-
-/// Vectors of 256 bits for kernels, where the machine has them. Most kernels do not gain by longer ones, and the
-/// substitutions lose a third.
-pub fn short_vectors() -> Arch {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(simd) = pulp::x86::V3::try_new() {
-        return Arch::V3(simd);
-    }
-    Arch::new()
 }

@@ -36,7 +36,7 @@ pub use factor::{Analysis, Cholesky, CoupledRows, Peaks, Solve, is_positive_semi
 pub use front::Real;
 pub use indefinite::Indefinite;
 pub use inertia::Inertia;
-pub use instructions::{instruction_set, short_vectors};
+pub use instructions::instruction_set;
 pub(crate) use largest::{larger, largest, largest_entry, not_negative};
 pub use ldl::SparseLdl;
 pub use matrix_sum::{MatrixSum, Scalar};

@@ -5,11 +5,10 @@
 //! result row is one sum in storage order: the same bits at any thread count.
 
 use super::SymmetricMatrix;
-use super::instructions::short_vectors;
 use super::tall::{contiguous, contiguous_mut};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows per parallel task.
@@ -40,7 +39,7 @@ pub fn multiply_vector(a: &SymmetricMatrix, block: usize, x: &[f64], y: &mut [f6
 }
 
 fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
-    short_vectors().dispatch(VectorProduct::<B> { a, x: x.as_chunks().0, y: y.as_chunks_mut().0 });
+    Arch::new().dispatch(VectorProduct::<B> { a, x: x.as_chunks().0, y: y.as_chunks_mut().0 });
 }
 
 // What is dispatched are structures: a closure may be compiled apart from the function that has the instruction
@@ -71,7 +70,7 @@ impl<const B: usize> WithSimd for VectorProduct<'_, B> {
 /// When `x` has not as many entries as A has rows.
 pub fn quadratic_form(a: &SymmetricMatrix, x: &[f64]) -> f64 {
     assert_eq!(x.len(), a.n(), "one entry for each row");
-    short_vectors().dispatch(QuadraticForm { a, x: x.as_chunks().0 })
+    Arch::new().dispatch(QuadraticForm { a, x: x.as_chunks().0 })
 }
 
 /// x'A x.
@@ -163,7 +162,7 @@ fn pass<const B: usize, const W: usize>(
     y: MatMut<'_, f64>,
     f: impl Fn(f64) -> f64 + Copy + Sync,
 ) {
-    let arch = short_vectors();
+    let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
     let rows = (0..a.n()).into_par_iter().with_min_len(ROWS);
     let packed: Vec<[[f64; W]; B]> =

@@ -3,11 +3,10 @@
 //! together, read once from end to end. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL, Real, Trapezoid};
-use super::instructions::short_vectors;
 use faer::traits::ComplexField;
 use faer::traits::math_utils::recip;
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
-use pulp::{Scalar, Simd, WithSimd};
+use pulp::{Arch, Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows of a piece of parallel work.
@@ -19,7 +18,7 @@ pub(super) const WORTH_TASKS: usize = 300_000;
 /// Forward substitution with the columns of a Cholesky factor: `front` holds a row of `K` right-hand sides
 /// for every row of the front; the leading rows become the solution, the others what is left for the parent.
 pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
-    let arch = short_vectors();
+    let arch = Arch::new();
     for (p, panel) in l.panels.iter().enumerate() {
         let width = l.panel_width(p);
         let (x, below) = front[p * PANEL..].split_at_mut(width);
@@ -37,7 +36,7 @@ pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T
 
 /// Back substitution with the transpose for the leading rows of `front`; the rows below hold their solution.
 pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
-    let arch = short_vectors();
+    let arch = Arch::new();
     for (p, panel) in l.panels.iter().enumerate().rev() {
         let width = l.panel_width(p);
         let (x, below) = front[p * PANEL..].split_at_mut(width);

@@ -135,7 +135,10 @@ where
     }
 }
 
-/// The product of a row. Short rows have three sums, which do not wait for each other.
+/// Vectors that sums may take, of the 16 of most machines.
+const REGISTERS: usize = 12;
+
+/// The product of a row. Short rows have several sums, which do not wait for each other.
 #[inline(always)]
 fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
     simd: S,
@@ -144,7 +147,7 @@ fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
     x: &[[Row<S, N>; C]],
 ) -> [Row<S, N>; R] {
     const SUMS: usize = 3;
-    let sums = if R * N > SUMS { 1 } else { SUMS };
+    let sums = (REGISTERS / (R * N)).clamp(1, SUMS);
     let range = matrix.pointers[row]..matrix.pointers[row + 1];
     let mut parts = [[[simd.splat_f32s(0.0); N]; R]; SUMS];
     for (&column, block) in matrix.columns[range.clone()].iter().zip(&matrix.blocks[range]) {

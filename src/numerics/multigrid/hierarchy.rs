@@ -9,7 +9,6 @@ use crate::numerics::linalg::{
     Pencil, SymmetricMatrix, combine, contiguous_mut, dense_cholesky, dense_inverse, gram, largest,
     solve_lower,
 };
-use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -4,6 +4,7 @@
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use crate::numerics::linalg::symmetric_eigen;
 use faer::Mat;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Nodes per parallel task.
@@ -104,8 +105,8 @@ impl<const B: usize> Smoother<B> {
 
     /// Two steps of the iteration for A x = b from x = 0.
     pub(super) fn smoothed_from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
-        let scale = self.steps().first;
-        let first = |(node, b)| self.divided(node, b).map(|row| row.map(|value| scale * value));
+        let (arch, scale) = (Arch::new(), self.steps().first);
+        let first = |(node, b)| arch.dispatch(FirstStep { smoother: self, scale, node, b });
         let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES).enumerate().map(first).collect();
         self.second_step(b, &x, |node| x[node])
     }
@@ -151,6 +152,25 @@ impl<const B: usize> Smoother<B> {
     /// b - A x.
     pub(super) fn residual(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
         self.a.apply(x, |node, ax| minus(&b[node], ax))
+    }
+}
+
+/// scale D^-1 b of a node.
+struct FirstStep<'a, const B: usize> {
+    smoother: &'a Smoother<B>,
+    scale: f32,
+    node: usize,
+    b: &'a Rows<B>,
+}
+
+impl<const B: usize> WithSimd for FirstStep<'_, B> {
+    type Output = Rows<B>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Rows<B> {
+        let mut x = self.smoother.divided(self.node, self.b);
+        x.iter_mut().flatten().for_each(|value| *value *= self.scale);
+        x
     }
 }
 
