@@ -27,10 +27,11 @@ pub(super) enum Corrector<'a> {
     Levels(&'a dyn Levels),
 }
 
-/// A pair to correct.
+/// A Ritz pair that is looked at.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Poor {
-    pub pair: usize,
+pub(super) struct Pair {
+    /// Its number, from the lowest.
+    pub number: usize,
     /// Its relative residual, and what that may be.
     pub residual: f64,
     pub allowed: f64,
@@ -53,8 +54,8 @@ impl Corrector<'_> {
         }
     }
 
-    /// Times that corrections are made orthogonal to the space: twice costs as much as a cycle, after which what is
-    /// left along the space is accounted for.
+    /// Times that corrections are made orthogonal to the space. Those of levels nearly are already, and Rayleigh-Ritz
+    /// accounts for what is left along it.
     pub(super) fn passes(self) -> usize {
         match self {
             Self::Factor(_) => 2,
@@ -85,7 +86,7 @@ impl Corrector<'_> {
     pub(super) fn correct(
         self,
         space: &SearchSpace<'_>,
-        poor: &[Poor],
+        pairs: &[Pair],
         forces: &mut Tall,
         counters: &mut Counters,
     ) {
@@ -95,16 +96,16 @@ impl Corrector<'_> {
                 forces.ncols() as u64
             }
             Self::Levels(levels) => {
-                let aims: Vec<Aim> = poor.iter().map(Poor::aim).collect();
+                let aims: Vec<Aim> = pairs.iter().map(Pair::aim).collect();
                 levels.correct(&space.near(), &aims, forces.as_mut())
             }
         };
     }
 }
 
-impl Poor {
+impl Pair {
     fn aim(&self) -> Aim {
         let last = BELOW_ALLOWED * self.allowed / self.residual;
-        Aim { pair: self.pair, left: (LEFT_OF_RESIDUAL * self.residual).max(last).max(LEAST_LEFT) }
+        Aim { pair: self.number, left: (LEFT_OF_RESIDUAL * self.residual).max(last).max(LEAST_LEFT) }
     }
 }

@@ -9,7 +9,7 @@
 
 use super::canonical::cluster_end;
 use super::completeness::size_along;
-use super::corrector::{Corrector, Poor};
+use super::corrector::{Corrector, Pair};
 use super::counters::Counters;
 use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
@@ -141,9 +141,9 @@ impl<'a> Correction<'a> {
     pub(super) fn run(mut self, counters: &mut Counters) -> Result<(Refined, Vec<f64>), EigenFailure> {
         for _ in 0..MAX_ROUNDS {
             let (forces, looked) = self.excess(counters);
-            let keeps = |pair: &Poor| pair.residual <= pair.allowed;
+            let keeps = |pair: &Pair| pair.residual <= pair.allowed;
             self.converged = looked[..self.wanted].iter().filter(|pair| keeps(pair)).count();
-            let poor: Vec<Poor> = looked.iter().copied().filter(|pair| !keeps(pair)).collect();
+            let poor: Vec<Pair> = looked.iter().copied().filter(|pair| !keeps(pair)).collect();
             (self.watch)(Event::Fraction(1.0 - poor.len() as f64 / looked.len() as f64));
             if poor.is_empty() {
                 return self.hand_over(looked.len(), counters);
@@ -157,14 +157,14 @@ impl<'a> Correction<'a> {
     }
 
     /// What the pairs that are looked at leave unbalanced, and its size beside what it may be.
-    fn excess(&mut self, counters: &mut Counters) -> (Tall, Vec<Poor>) {
+    fn excess(&mut self, counters: &mut Counters) -> (Tall, Vec<Pair>) {
         let (forces, relative) = self.look(counters);
         if self.seeks_gap(&relative) {
             return self.excess(counters);
         }
         let tolerance = self.goal.tolerance;
         let allowed = |j: usize| if j < self.wanted { tolerance.max(self.floors[j]) } else { BEYOND };
-        let pair = |(pair, residual)| Poor { pair, residual, allowed: allowed(pair) };
+        let pair = |(number, residual)| Pair { number, residual, allowed: allowed(number) };
         (forces, relative.into_iter().enumerate().map(pair).collect())
     }
 
@@ -230,22 +230,23 @@ impl<'a> Correction<'a> {
             self.since += 1;
         }
         let enough = self.first / LEAST_GAIN;
-        let is_slow = self.corrector.width() > 1 && self.rounds == JUDGED_AFTER && worst > enough;
+        let is_slow =
+            matches!(self.corrector, Corrector::Levels(_)) && self.rounds == JUDGED_AFTER && worst > enough;
         self.rounds += 1;
         self.since <= PATIENCE && !is_slow && !worst.is_nan()
     }
 
     /// Extends the space by corrections of the poor pairs, of those that are looked at, and of some pairs after
     /// them.
-    fn correct(&mut self, forces: &Tall, poor: &[Poor], counters: &mut Counters) -> Result<(), EigenFailure> {
+    fn correct(&mut self, forces: &Tall, poor: &[Pair], counters: &mut Counters) -> Result<(), EigenFailure> {
         let Self { corrector, space, base, .. } = self;
         let looked = forces.ncols();
         let filled = poor.len().next_multiple_of(corrector.width()) - poor.len();
         let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
         let later = relative.iter().zip(looked..);
-        let later = later.map(|(&residual, pair)| Poor { pair, residual, allowed: BEYOND });
-        let pairs: Vec<Poor> = poor.iter().copied().chain(later).collect();
-        let poor = poor.iter().map(|poor| forces.as_ref().col(poor.pair));
+        let later = later.map(|(&residual, number)| Pair { number, residual, allowed: BEYOND });
+        let pairs: Vec<Pair> = poor.iter().copied().chain(later).collect();
+        let poor = poor.iter().map(|pair| forces.as_ref().col(pair.number));
         let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
         // Of unit size: residuals near rounding would leave the range of single precision.
         let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };

@@ -5,8 +5,8 @@ use pulp::bytemuck::cast_slice;
 use pulp::{Arch, Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Columns that are worked on together: one or two vectors in single precision. Matrices are read once for all of
-/// them; with 8 or 32 columns each takes a third longer.
+/// Columns that are worked on together. Matrices are read once for all of them: with 8 columns each takes a third
+/// longer; 32 leave more of them empty than they gain.
 pub(super) const WIDTH: usize = 16;
 
 /// The rows of a node in [`WIDTH`] columns.
@@ -84,7 +84,16 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         make: impl Fn(usize, &Rows<R>) -> Rows<R> + Sync,
     ) -> Vec<Rows<R>> {
         let arch = Arch::new();
-        let made = |row: usize| arch.dispatch(RowProduct { matrix: self, row, x, make: &make });
+        let made = |row: usize| arch.dispatch(Dispatched(RowProduct { matrix: self, row, x, make: &make }));
+        (0..self.n_rows()).into_par_iter().with_min_len(NODES).map(made).collect()
+    }
+}
+
+impl<const B: usize> BlockMatrix<B, B> {
+    /// (A - theta M) x with a theta for each column; `mass` are the entries of M beside the blocks of A.
+    pub(super) fn apply_pencil(&self, mass: &[f32], theta: &[f32; WIDTH], x: &[Rows<B>]) -> Vec<Rows<B>> {
+        let arch = Arch::new();
+        let made = |row: usize| arch.dispatch(Dispatched(PencilProduct { a: self, mass, theta, row, x }));
         (0..self.n_rows()).into_par_iter().with_min_len(NODES).map(made).collect()
     }
 }
@@ -97,41 +106,61 @@ struct RowProduct<'a, F, const R: usize, const C: usize> {
     make: &'a F,
 }
 
+/// A row of [`WIDTH`] columns as `N` vectors.
+type Row<S, const N: usize> = [<S as Simd>::f32s; N];
+
+/// The rows of nodes as vectors.
+#[inline(always)]
+fn as_vectors<S: Simd, const N: usize, const C: usize>(x: &[Rows<C>]) -> &[[Row<S, N>; C]] {
+    let x = cast_slice::<f32, S::f32s>(x.as_flattened().as_flattened());
+    x.as_chunks::<N>().0.as_chunks::<C>().0
+}
+
+/// The vectors of a node as its rows.
+#[inline(always)]
+fn as_rows<S: Simd, const N: usize, const R: usize>(vectors: &[Row<S, N>; R]) -> Rows<R> {
+    let mut rows = [[0.0; WIDTH]; R];
+    rows.iter_mut().zip(vectors).for_each(|(to, from)| to.copy_from_slice(cast_slice(from)));
+    rows
+}
+
+/// What is made with `N` vectors for each row.
+trait ByVectors {
+    type Made;
+
+    fn make<S: Simd, const N: usize>(self, simd: S) -> Self::Made;
+}
+
+/// With the vectors of the machine.
+struct Dispatched<T>(T);
+
 // Neither a closure, which is compiled apart from the function that has the instruction set, nor loops over the
 // columns, which the compiler cuts into vectors of several lengths.
-impl<F, const R: usize, const C: usize> WithSimd for RowProduct<'_, F, R, C>
-where
-    F: Fn(usize, &Rows<R>) -> Rows<R>,
-{
-    type Output = Rows<R>;
+impl<T: ByVectors> WithSimd for Dispatched<T> {
+    type Output = T::Made;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Rows<R> {
+    fn with_simd<S: Simd>(self, simd: S) -> T::Made {
         match size_of::<[f32; WIDTH]>() / size_of::<S::f32s>() {
-            1 => self.run::<S, 1>(simd),
-            2 => self.run::<S, 2>(simd),
-            4 => self.run::<S, 4>(simd),
+            1 => self.0.make::<S, 1>(simd),
+            2 => self.0.make::<S, 2>(simd),
+            4 => self.0.make::<S, 4>(simd),
             // Machines without vectors, or with longer ones.
-            _ => self.run::<Scalar, WIDTH>(Scalar),
+            _ => self.0.make::<Scalar, WIDTH>(Scalar),
         }
     }
 }
 
-/// A row of [`WIDTH`] columns as `N` vectors.
-type Row<S, const N: usize> = [<S as Simd>::f32s; N];
-
-impl<F, const R: usize, const C: usize> RowProduct<'_, F, R, C>
+impl<F, const R: usize, const C: usize> ByVectors for RowProduct<'_, F, R, C>
 where
     F: Fn(usize, &Rows<R>) -> Rows<R>,
 {
+    type Made = Rows<R>;
+
     #[inline(always)]
-    fn run<S: Simd, const N: usize>(self, simd: S) -> Rows<R> {
-        let x = cast_slice::<f32, S::f32s>(self.x.as_flattened().as_flattened());
-        let x: &[[Row<S, N>; C]] = x.as_chunks::<N>().0.as_chunks::<C>().0;
-        let product = row_times::<S, N, R, C>(simd, self.matrix, self.row, x);
-        let mut rows = [[0.0; WIDTH]; R];
-        rows.iter_mut().zip(&product).for_each(|(to, from)| to.copy_from_slice(cast_slice(from)));
-        (self.make)(self.row, &rows)
+    fn make<S: Simd, const N: usize>(self, simd: S) -> Rows<R> {
+        let product = row_times::<S, N, R, C>(simd, self.matrix, self.row, as_vectors::<S, N, C>(self.x));
+        (self.make)(self.row, &as_rows::<S, N, R>(&product))
     }
 }
 
@@ -169,38 +198,23 @@ fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
     total
 }
 
-/// (A - theta M) x for one row, with a theta for each column.
-pub(super) struct PencilProduct<'a, const B: usize> {
-    pub a: &'a BlockMatrix<B, B>,
-    /// Entries of M beside those of A.
-    pub mass: &'a [f32],
-    pub theta: [f32; WIDTH],
-    pub row: usize,
-    pub x: &'a [Rows<B>],
+/// [`BlockMatrix::apply_pencil`] for one row.
+struct PencilProduct<'a, const B: usize> {
+    a: &'a BlockMatrix<B, B>,
+    mass: &'a [f32],
+    theta: &'a [f32; WIDTH],
+    row: usize,
+    x: &'a [Rows<B>],
 }
 
-impl<const B: usize> WithSimd for PencilProduct<'_, B> {
-    type Output = Rows<B>;
+impl<const B: usize> ByVectors for PencilProduct<'_, B> {
+    type Made = Rows<B>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Rows<B> {
-        match size_of::<[f32; WIDTH]>() / size_of::<S::f32s>() {
-            1 => self.run::<S, 1>(simd),
-            2 => self.run::<S, 2>(simd),
-            4 => self.run::<S, 4>(simd),
-            _ => self.run::<Scalar, WIDTH>(Scalar),
-        }
-    }
-}
-
-impl<const B: usize> PencilProduct<'_, B> {
-    #[inline(always)]
-    fn run<S: Simd, const N: usize>(self, simd: S) -> Rows<B> {
+    fn make<S: Simd, const N: usize>(self, simd: S) -> Rows<B> {
         let Self { a, mass, theta, row, x } = self;
-        let x = cast_slice::<f32, S::f32s>(x.as_flattened().as_flattened());
-        let x: &[[Row<S, N>; B]] = x.as_chunks::<N>().0.as_chunks::<B>().0;
-        let theta: &[Row<S, N>] = cast_slice::<f32, S::f32s>(&theta).as_chunks::<N>().0;
-        let theta = &theta[0];
+        let x = as_vectors::<S, N, B>(x);
+        let theta: Row<S, N> = std::array::from_fn(|n| cast_slice::<f32, S::f32s>(theta)[n]);
         let range = a.pointers[row]..a.pointers[row + 1];
         let zero = [[simd.splat_f32s(0.0); N]; B];
         let (mut stiff, mut heavy) = (zero, zero);
@@ -216,12 +230,9 @@ impl<const B: usize> PencilProduct<'_, B> {
                 (0..N).for_each(|n| heavy[c][n] = simd.mul_add_f32s(mass, x[c][n], heavy[c][n]));
             }
         }
-        let mut rows = [[0.0; WIDTH]; B];
-        for (b, row) in rows.iter_mut().enumerate() {
-            let product: Row<S, N> =
-                std::array::from_fn(|n| simd.sub_f32s(stiff[b][n], simd.mul_f32s(theta[n], heavy[b][n])));
-            row.copy_from_slice(cast_slice(&product));
-        }
-        rows
+        let product: [Row<S, N>; B] = std::array::from_fn(|b| {
+            std::array::from_fn(|n| simd.sub_f32s(stiff[b][n], simd.mul_f32s(theta[n], heavy[b][n])))
+        });
+        as_rows::<S, N, B>(&product)
     }
 }

@@ -3,12 +3,11 @@
 //! Matrix Anal. Appl. 17 (1996) 401). [`Deflation`] keeps off the modes below and treats those above, so that
 //! K - theta M is positive definite on what is left.
 
-use super::blocks::{BlockMatrix, PencilProduct, Rows, WIDTH};
+use super::blocks::{BlockMatrix, Rows, WIDTH};
 use super::deflation::Deflation;
 use super::smoother::products;
 use crate::numerics::linalg::contiguous_mut;
 use faer::MatMut;
-use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -120,9 +119,7 @@ where
         let SmallPencil { a, mass, tau, ratio } = self.pencil;
         let theta =
             pairs.map(|pair| pair.map_or(0.0, |pair| ((self.eigenvalues[pair] + tau) * ratio) as f32));
-        let arch = Arch::new();
-        let row = |row: usize| arch.dispatch(PencilProduct { a, mass, theta, row, x: p });
-        (0..p.len()).into_par_iter().with_min_len(NODES).map(row).collect()
+        a.apply_pencil(mass, &theta, p)
     }
 }
 
