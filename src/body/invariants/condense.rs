@@ -20,8 +20,10 @@ use std::ops::Range;
 pub(super) const CHUNK: usize = 128;
 /// Upper bound of the number of partial sums kept until they are added in order.
 pub(super) const MAX_GROUPS: usize = 64;
-/// Columns per pass over the mass matrix.
+/// Columns per pass over the mass matrix. A pass gathers the columns before its own once more, so that of many
+/// columns more are taken together.
 const PANEL: usize = 64;
+const WIDE_PANEL: usize = 192;
 /// Columns of a panel that are summed at a time, in registers.
 pub(super) const LANE: usize = 16;
 
@@ -236,9 +238,10 @@ impl Aligned {
 fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let n_columns = columns.count();
     let mut gram = Mat::<f64>::zeros(n_columns, n_columns);
-    for start in (0..n_columns).step_by(PANEL) {
+    let width = if n_columns > 2 * WIDE_PANEL { WIDE_PANEL } else { PANEL };
+    for start in (0..n_columns).step_by(width) {
         // Rows of X' beyond the panel are the transpose of a later panel.
-        let end = (start + PANEL).min(n_columns);
+        let end = (start + width).min(n_columns);
         let panel = gram_panel(mass, columns, start..end);
         fill_symmetric(&mut gram, start..end, |row, column| panel[(row, column - start)]);
     }

@@ -4,7 +4,8 @@ use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
 use crate::numerics::linalg::{
-    Solve, Tall, combine, divide, gram, subtract_combination, uniform, weighted_square,
+    Solve, Tall, combine, combine_in_place, dense_cholesky, divide, gram, solve_upper, subtract_combination,
+    uniform, weighted_square,
 };
 use faer::prelude::{IntoConst, ReborrowMut};
 use faer::{ColRef, Mat, MatRef};
@@ -16,6 +17,12 @@ const UNSEEN: f64 = 1e-13;
 /// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is
 /// rounding.
 const VANISHED: f64 = 1e-13;
+
+/// Multiple of these two below which a column is looked at by itself.
+const FAR_ABOVE: f64 = 1e4;
+
+/// Part of a column that projection off those before it may leave without a digit lost.
+const LEAST_KEPT: f64 = 0.1;
 
 /// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
 pub(super) struct Krylov<'a> {
@@ -232,7 +239,7 @@ impl<'a> Krylov<'a> {
         let mut mw = pencil.apply_mass(w.as_ref());
         for from in [reach, 0] {
             let basis = basis.subcols(from, self.size() - from);
-            let norms: Vec<f64> = (0..w.ncols()).map(|j| dot(&w, &mw, j, j).max(0.0).sqrt()).collect();
+            let norms = sizes(&gram(w.as_ref(), mw.as_ref()));
             let rigid = gram(self.problem.rigid, mw.as_ref());
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
@@ -242,7 +249,8 @@ impl<'a> Krylov<'a> {
             counters.mass_columns += w.ncols() as u64;
             mw = pencil.apply_mass(w.as_ref());
             let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
-            let t = gram_schmidt(&mut w, &mut mw, &norms, &unseen);
+            let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &unseen)
+                .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
             if loses_digits(&t) {
                 counters.mass_columns += w.ncols() as u64;
                 mw = pencil.apply_mass(w.as_ref());
@@ -265,7 +273,38 @@ fn loses_digits(t: &Mat<f64>) -> bool {
     (0..t.ncols()).any(|j| {
         let before = t.col(j).norm_l2();
         let left = (0..t.nrows()).rev().map(|i| t[(i, j)].abs()).find(|entry| *entry > 0.0);
-        left.is_some_and(|left| left < 0.1 * before)
+        left.is_some_and(|left| left < LEAST_KEPT * before)
+    })
+}
+
+/// The square roots of a diagonal, of zero where it is negative.
+fn sizes(gram: &Mat<f64>) -> Vec<f64> {
+    (0..gram.ncols()).map(|j| gram[(j, j)].max(0.0).sqrt()).collect()
+}
+
+/// M-orthonormalises the columns of W in place by the Cholesky factor of their Gram matrix, M W along with them:
+/// a few passes over the block, where Gram-Schmidt takes a few for each column. Returns T with W_old = W_new T;
+/// `None`, and nothing changed, unless every column is far from what Gram-Schmidt drops and keeps a tenth of its
+/// norm beside those before it: the columns are then orthonormal to a few digits less than all.
+fn orthonormalise_at_once(
+    w: &mut Mat<f64>,
+    mw: &mut Mat<f64>,
+    norms: &[f64],
+    unseen: &dyn Fn(ColRef<'_, f64>) -> f64,
+) -> Option<Mat<f64>> {
+    let width = w.ncols();
+    let g = gram(w.as_ref(), mw.as_ref());
+    let sizes = sizes(&g);
+    let is_clear =
+        |j: usize| sizes[j] > FAR_ABOVE * VANISHED * norms[j] && g[(j, j)] > FAR_ABOVE * unseen(w.col(j));
+    let cosine = |i: usize, j: usize| 0.5 * (g[(i, j)] + g[(j, i)]) / (sizes[i] * sizes[j]);
+    let l = (0..width).all(is_clear).then(|| dense_cholesky(Mat::from_fn(width, width, cosine)))??;
+    let keeps = |j: usize| l[(j, j)] >= LEAST_KEPT;
+    (0..width).all(keeps).then(|| {
+        let inverse = solve_upper(&l, &Mat::identity(width, width));
+        let inverse = Mat::from_fn(width, width, |i, j| inverse[(i, j)] / sizes[i]);
+        [&mut *w, &mut *mw].into_iter().for_each(|block| combine_in_place(block.as_mut(), inverse.as_ref()));
+        Mat::from_fn(width, width, |i, j| l[(j, i)] * sizes[j])
     })
 }
 

@@ -22,7 +22,17 @@ use std::ops::RangeInclusive;
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138
 /// with 6, 88 to 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8.
 /// 4 is also one more than the copies of an eigenvalue that an isotropic cube has.
-pub(super) const BLOCK: usize = 4;
+const BLOCK: usize = 4;
+
+/// Modes from which on twice as many columns per step take less time: most steps then meet a large basis, which
+/// each of them reads from memory, as it does the factor.
+const MANY: usize = 60;
+
+/// Columns per step for so many modes.
+pub(super) fn columns_per_step(wanted: usize) -> usize {
+    let many = std::env::var("MANY").ok().and_then(|v| v.parse().ok()).unwrap_or(MANY);
+    if wanted < many { BLOCK } else { 2 * BLOCK }
+}
 
 /// Restarts without which every model met so far converged, times ten.
 const MAX_RESTARTS: u64 = 100;
@@ -174,6 +184,7 @@ pub(super) fn lowest_modes(
             continue;
         }
         let ritz = iteration.test()?;
+        iteration.missing = ritz.last - ritz.converged;
         iteration.save(&ritz);
         if let Some(found) = iteration.hand_over(&ritz, counters)? {
             return Ok(found);
@@ -201,6 +212,8 @@ struct Iteration<'a> {
     complete: bool,
     /// Size of the projected eigenproblem that was tested last.
     tested: usize,
+    /// Modes that had not converged then.
+    missing: usize,
     /// Modes that had converged when the search was saved last.
     saved: usize,
     /// K-residual that an estimate has to keep before the true residuals are looked at.
@@ -300,6 +313,7 @@ impl<'a> Iteration<'a> {
             at_start,
             complete: false,
             tested: 0,
+            missing: 0,
             saved: 0,
             asked: goal.tolerance,
             least_excess: f64::INFINITY,
@@ -334,10 +348,11 @@ impl<'a> Iteration<'a> {
     }
 
     /// Whether the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100
-    /// vectors or so not after every step.
+    /// vectors or so not after every step, and not while many modes are missing, of which a step finds a few.
     fn is_test_due(&mut self) -> bool {
         let size = self.krylov.projected();
-        let small = size < self.goal.wanted + 1 || size < self.tested + self.tested / 25;
+        let soon = self.tested + (self.tested / 25).max(self.missing / 4);
+        let small = size < self.goal.wanted + 1 || size < soon;
         // What was taken up is a start no more, tested or not.
         if !(self.complete || self.is_full()) && small {
             self.at_start = false;
@@ -446,7 +461,7 @@ impl<'a> Iteration<'a> {
         counters.restarts += 1;
         let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.goal.block));
         self.krylov.restart(ritz.s.as_ref().subcols(0, keep), &ritz.theta[..keep]);
-        self.tested = 0;
+        (self.tested, self.missing) = (0, 0);
         Ok(None)
     }
 }

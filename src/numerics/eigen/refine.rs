@@ -6,10 +6,11 @@ use super::failure::EigenFailure;
 use super::noise::{is_noisy, rounding_residual};
 use super::problem::EigenProblem;
 use crate::numerics::linalg::{
-    DoubleDouble, Solve, Tall, column_norms, combine, combine_into, gram, largest, projection_compensated,
-    small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
+    DoubleDouble, Solve, Tall, column_norms, combine, combine_in_place, combine_into, gram, largest,
+    projection_compensated, small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
 };
 use faer::{ColRef, Mat, MatRef};
+use std::ops::Range;
 
 /// Refined modes with their products.
 pub(super) struct Refined {
@@ -56,6 +57,15 @@ const DEPENDENT: f64 = 1e-8;
 /// grows with the third power, and is a second with 200.
 const SHARPENED_AT_MOST: usize = 200;
 
+/// Columns whose products with K and M are held at a time: those of 200 modes would take twice the memory of
+/// the modes, and memory that is taken anew is cleared first, which takes longer than the products.
+const TOGETHER: usize = 32;
+
+/// `count` columns, [`TOGETHER`] at a time.
+fn columns_together(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
+}
+
 /// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz
 /// vectors in ascending order of lambda. Directions in which X is dependent are left out.
 pub(super) fn rayleigh_ritz(
@@ -63,22 +73,38 @@ pub(super) fn rayleigh_ritz(
     mut x: Mat<f64>,
     counters: &mut Counters,
 ) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
-    let pencil = &problem.pencil;
-    let k = x.ncols() as u64;
-    counters.mass_columns += k;
-    let [mut mx, mut kx] = [(); 2].map(|()| Tall::zeros(x.nrows(), x.ncols()));
-    pencil.mass_times(x.as_ref(), mx.as_mut());
-    let along = gram(problem.rigid, mx.as_ref());
+    let (pencil, n, k) = (&problem.pencil, x.nrows(), x.ncols());
+    counters.mass_columns += (problem.rigid.ncols() + k) as u64;
+    counters.stiffness_columns += k as u64;
+    let along = gram(pencil.apply_mass(problem.rigid).as_ref(), x.as_ref());
     subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
-    // Unit M-norms first: inverse iteration scales the columns by theta.
-    counters.mass_columns += k;
-    counters.stiffness_columns += k;
-    pencil.mass_times(x.as_ref(), mx.as_mut());
-    pencil.stiffness_times(x.as_ref(), kx.as_mut());
-    let gm = gram(x.as_ref(), mx.as_ref());
-    let gk = gram(x.as_ref(), kx.as_ref());
+    let [mut gm, mut gk] = [(); 2].map(|()| Mat::zeros(k, k));
+    for columns in columns_together(k) {
+        let own = x.as_ref().subcols(columns.start, columns.len());
+        let above = x.as_ref().subcols(0, columns.end);
+        let mut product = Tall::zeros(n, columns.len());
+        pencil.mass_times(own, product.as_mut());
+        mirror(&mut gm, columns.start, &gram(above, product.as_ref()));
+        pencil.stiffness_times(own, product.as_mut());
+        mirror(&mut gk, columns.start, &gram(above, product.as_ref()));
+    }
     let (values, coefficients) = small_ritz(&gm, &gk)?;
-    Ok((values, combine(x.as_ref(), coefficients.as_ref())))
+    combine_in_place(x.as_mut(), coefficients.as_ref());
+    x.truncate(n, values.len());
+    Ok((values, x))
+}
+
+/// Columns of a symmetric matrix from number `first` on, down to the square on its diagonal, and their mirror
+/// image.
+fn mirror(matrix: &mut Mat<f64>, first: usize, columns: &Mat<f64>) {
+    for j in 0..columns.ncols() {
+        for i in 0..columns.nrows() {
+            matrix[(i, first + j)] = columns[(i, j)];
+            if i < first {
+                matrix[(first + j, i)] = columns[(i, j)];
+            }
+        }
+    }
 }
 
 /// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
@@ -135,18 +161,33 @@ pub(super) fn residuals(
     x: MatRef<'_, f64>,
     counters: &mut Counters,
 ) -> (Vec<f64>, Vec<f64>) {
-    let pencil = &problem.pencil;
     counters.mass_columns += x.ncols() as u64;
     counters.stiffness_columns += x.ncols() as u64;
+    let m_rigid = problem.pencil.apply_mass(problem.rigid);
+    columns_together(x.ncols())
+        .flat_map(|columns| {
+            let own = x.subcols(columns.start, columns.len());
+            residuals_together(problem, m_rigid.as_ref(), &eigenvalues[columns], own)
+        })
+        .unzip()
+}
+
+/// Residual and floor of each of a few pairs.
+fn residuals_together(
+    problem: &EigenProblem<'_>,
+    m_rigid: MatRef<'_, f64>,
+    eigenvalues: &[f64],
+    x: MatRef<'_, f64>,
+) -> Vec<(f64, f64)> {
+    let pencil = &problem.pencil;
     let [mut kx, mut mx, mut rigid] = [(); 3].map(|()| Tall::zeros(x.nrows(), x.ncols()));
     pencil.stiffness_times(x, kx.as_mut());
     pencil.mass_times(x, mx.as_mut());
-    let m_rigid = pencil.apply_mass(problem.rigid);
-    combine_into(rigid.as_mut(), m_rigid.as_ref(), gram(problem.rigid, kx.as_ref()).as_ref());
+    combine_into(rigid.as_mut(), m_rigid, gram(problem.rigid, kx.as_ref()).as_ref());
     let (sizes, residuals) = leave_unbalanced(&mut kx, mx.as_ref(), eigenvalues);
     let rounding = rounding_residual(pencil.stiffness(), x).into_iter().zip(column_norms(rigid.as_ref()));
     let floors = rounding.zip(sizes).map(|((rounding, rigid), size)| beside(rounding + rigid, size));
-    (residuals, floors.collect())
+    residuals.into_iter().zip(floors).collect()
 }
 
 /// Turns K X into what the pairs leave unbalanced, K x - lambda M x. The sizes |K x| + |lambda M x|, and the

@@ -7,7 +7,7 @@ use super::counters::Counters;
 use super::dense;
 use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
-use super::lanczos::{self, BLOCK, Goal};
+use super::lanczos::{self, Goal, columns_per_step};
 use super::plan::{CountPlan, Multigrid, Plan, gigabytes};
 use super::problem::EigenProblem;
 use super::refine::{Refined, refine, residuals as residuals_of};
@@ -21,6 +21,7 @@ use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 use faer::Mat;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Models up to this size are solved densely: all modes take less than a second.
@@ -270,7 +271,7 @@ impl Sparse<'_> {
             tolerance,
             cluster_gap: CLUSTER_GAP,
             separation,
-            block: BLOCK,
+            block: columns_per_step(wanted),
             rough: false,
             attempt,
         };
@@ -426,8 +427,15 @@ fn finish(
     if let Some(bounds) = &bounds {
         bounds.clamp(&mut eigenvalues);
     }
-    if bounds.is_some() || groups.iter().any(|g| g.len() > 1) {
-        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), &mut counters);
+    let is_changed = |group: &Range<usize>| bounds.is_some() || group.len() > 1;
+    let changed: Vec<usize> = groups.into_iter().filter(is_changed).flatten().collect();
+    if !changed.is_empty() {
+        let shapes = Mat::from_fn(vectors.nrows(), changed.len(), |i, j| vectors[(i, changed[j])]);
+        let lambda: Vec<f64> = changed.iter().map(|&i| eigenvalues[i]).collect();
+        let renewed = residuals_of(problem, &lambda, shapes.as_ref(), &mut counters);
+        for ((&i, residual), floor) in changed.iter().zip(renewed.0).zip(renewed.1) {
+            (residuals[i], floors[i]) = (residual, floor);
+        }
     }
     let kept = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
     let converged = (0..eigenvalues.len()).filter(kept).count();
