@@ -5,6 +5,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Error;
 use crate::model::{FeModel, rigid_count};
 use crate::numerics::eigen::{EigenFailure, Unresisted, unresisted_motions};
+use crate::numerics::linalg::largest;
 use faer::Mat;
 
 /// A failure that a single-precision factor may have caused by itself: nothing is known about the model then.
@@ -98,7 +99,11 @@ fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
             .map(|(row, j)| vectors[(row, j)].powi(2))
             .sum::<f64>()
     };
-    let mut moved: Vec<(usize, f64)> = (0..model.nodes().len()).map(|i| (i, square(i))).collect();
+    let squares: Vec<f64> = (0..model.nodes().len()).map(square).collect();
+    // Nodes that move alike but for rounding are named in their order.
+    let digits = 1e6 / largest(squares.iter().copied());
+    let mut moved: Vec<(usize, f64)> =
+        squares.iter().map(|square| (square * digits).round()).enumerate().collect();
     moved.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let named: Vec<String> = moved.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
     named.join(", ")
