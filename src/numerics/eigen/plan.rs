@@ -3,6 +3,7 @@
 use super::completeness::Counting;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
+use super::refine::TOGETHER;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
 use crate::numerics::linalg::{Analysis, Peaks};
 use crate::numerics::multigrid::can_have_levels;
@@ -94,19 +95,20 @@ fn basis_columns(wanted: usize) -> usize {
     (5 * wanted + 16).min(2 * wanted + 128)
 }
 
-/// What the search needs beside the factor: Krylov basis, blocks in work, modes with their products,
+/// What the search needs beside the factor: Krylov basis, blocks in work, modes and products of some of them,
 /// corrections, and the copy of the basis that a checkpoint is written from.
 fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
     let basis = basis_columns(wanted);
-    let searched = basis + 4 * wanted + 24;
+    let saved = if problem.resume.save.is_some() { basis } else { 0 };
+    let found = wanted + 3 * wanted.min(TOGETHER) + 24;
     let columns = match precision {
-        Precision::Double => searched,
+        // A search is saved before its modes are made.
+        Precision::Double => basis + found.max(saved),
         // A span of twice its first size, 1.5 for each wanted mode, and the corrections, all with both
         // products; one more while they are combined.
-        Precision::Single => (searched + 2 * wanted).max(15 * wanted + 128),
+        Precision::Single => (basis + found + 2 * wanted).max(15 * wanted + 128) + saved,
     };
-    let saved = if problem.resume.save.is_some() { basis } else { 0 };
-    8 * (problem.pencil.n() * (columns + saved)) as u64
+    8 * (problem.pencil.n() * columns) as u64
 }
 
 /// What the dense path holds: both matrices, their transformed product, its eigenvectors and copies in work.

@@ -59,7 +59,7 @@ const SHARPENED_AT_MOST: usize = 200;
 
 /// Columns whose products with K and M are held at a time: those of 200 modes would take twice the memory of
 /// the modes, and memory that is taken anew is cleared first, which takes longer than the products.
-const TOGETHER: usize = 32;
+pub(super) const TOGETHER: usize = 32;
 
 /// `count` columns, [`TOGETHER`] at a time.
 fn columns_together(count: usize) -> impl Iterator<Item = Range<usize>> {
