@@ -359,3 +359,57 @@ fn gram_schmidt(
     *mw = mw.as_ref().subcols(0, kept).to_owned();
     t.as_ref().subrows(0, kept).to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of which the last is nearly the sum of the others, up to `apart`.
+    fn block(apart: f64) -> Mat<f64> {
+        let wave = |i: usize, j: usize| ((i * (2 * j + 3)) as f64).sin();
+        Mat::from_fn(90, 4, |i, j| match j {
+            3 => (0..3).map(|k| wave(i, k)).sum::<f64>() + apart * wave(i, 3),
+            _ => 3f64.powi(j as i32) * wave(i, j),
+        })
+    }
+
+    /// M times a block, for masses from one to two.
+    fn weighted(x: &Mat<f64>) -> Mat<f64> {
+        Mat::from_fn(x.nrows(), x.ncols(), |i, j| (1.0 + (i % 5) as f64 / 5.0) * x[(i, j)])
+    }
+
+    fn all_seen(_: ColRef<'_, f64>) -> f64 {
+        0.0
+    }
+
+    #[test]
+    fn a_block_is_orthonormalised_alike_at_once_and_column_by_column() {
+        let given = block(1.0);
+        let norms = sizes(&gram(given.as_ref(), weighted(&given).as_ref()));
+        let (mut w, mut mw) = (given.clone(), weighted(&given));
+        let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &all_seen).expect("far from dependent");
+        assert!((gram(w.as_ref(), weighted(&w).as_ref()) - Mat::<f64>::identity(4, 4)).norm_max() < 1e-14);
+        assert!((weighted(&w) - &mw).norm_max() < 1e-14);
+        assert!((combine(w.as_ref(), t.as_ref()) - &given).norm_max() < 1e-13);
+        let (mut slow, mut m_slow) = (given.clone(), weighted(&given));
+        let t_slow = gram_schmidt(&mut slow, &mut m_slow, &norms, &all_seen);
+        assert!((&slow - &w).norm_max() < 1e-13 && (&t_slow - &t).norm_max() < 1e-13);
+    }
+
+    #[test]
+    fn what_may_be_dependent_is_left_to_gram_schmidt() {
+        for apart in [0.0, 1e-9, 1e-3] {
+            let given = block(apart);
+            let norms = sizes(&gram(given.as_ref(), weighted(&given).as_ref()));
+            let (mut w, mut mw) = (given.clone(), weighted(&given));
+            assert!(orthonormalise_at_once(&mut w, &mut mw, &norms, &all_seen).is_none(), "{apart:e}");
+            assert_eq!(w, given, "{apart:e}: changed");
+        }
+        // What has vanished beside what it was, and what M does not see.
+        let given = block(1.0);
+        let (mut w, mut mw) = (given.clone(), weighted(&given));
+        assert!(orthonormalise_at_once(&mut w, &mut mw, &[1e12; 4], &all_seen).is_none());
+        let norms = sizes(&gram(given.as_ref(), mw.as_ref()));
+        assert!(orthonormalise_at_once(&mut w, &mut mw, &norms, &|_| 1.0).is_none());
+    }
+}
