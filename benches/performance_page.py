@@ -268,7 +268,7 @@ def reader_lines(found):
     rows = [(row["form"], number(row["dofs"]), number(row["files_mb"]), number(row["wall_s"]), number(row["cpu_s"]), number(row["files_mb"] / row["wall_s"]),
              number(row["memory_mb"]), number(row["memory_mb"] / row["kept_mb"])) for row in found["rows"]]
     said = (f"Files of FE programs for a cube, on two threads (`python3 benches/readers.py`; {found['machine']['processor']}, commit {found['commit']}, medians of {found['runs']}): "
-            "the whole process until its check of rigid motion, which one misplaced node fails. Memory is also given over that of K and M in compressed columns.")
+            "the whole process of `prepare` until its check of rigid motion, which one misplaced node fails. Memory is also given over that of K and M in compressed columns.")
     head = ("form", "rows", "files, MB", "wall, s", "CPU, s", "MB/s", "memory, MB", "over K and M")
     return ["## Readers", "", said, "", *table(head, rows), ""]
 

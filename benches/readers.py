@@ -5,8 +5,8 @@
     cargo build --release --locked
     python3 benches/readers.py                     needs a quiet machine, and 2 GB of disk
 
-Each model has one node in the wrong place (benches/make_job.py --misplaced): the program reads all files and ends at its check of rigid motion, with exit code 2. What is
-measured is that whole process on two threads, fingerprints of the files and the check included. Memory is beside that of K and M in compressed columns.
+Each model has one node in the wrong place (benches/make_job.py --misplaced): `prepare` reads all files and ends at its check of rigid motion, with exit code 2 (`convert`
+looks for the order of elimination beside its checks, which is no reading). What is measured is that whole process on two threads, fingerprints of the files and the check included. Memory is beside that of K and M in compressed columns.
 """
 
 import argparse
@@ -29,7 +29,7 @@ def measure(args, form, dofs):
     maker = [args.python, performance.BENCHES / "make_job.py", folder, "--form", form, "--dofs", dofs, "--misplaced"]
     subprocess.run(list(map(str, maker)), check=True)
     units = [] if form == "mtx" else ["--units", "m,kg,s"]
-    words = [args.program, "convert", folder / MAIN_FILES.get(form, "job.inp"), *units, "--threads", 2, "--quiet", "--json", "-o", folder / "body.h5"]
+    words = [args.program, "prepare", folder / MAIN_FILES.get(form, "job.inp"), *units, "--threads", 2, "--quiet", "--json", "-o", folder / "prepared"]
     try:
         size = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
         runs = []
