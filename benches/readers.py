@@ -11,6 +11,7 @@ looks for the order of elimination beside its checks, which is no reading). What
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -29,7 +30,7 @@ def measure(args, form, dofs):
     maker = [args.python, performance.BENCHES / "make_job.py", folder, "--form", form, "--dofs", dofs, "--misplaced"]
     subprocess.run(list(map(str, maker)), check=True)
     units = [] if form == "mtx" else ["--units", "m,kg,s"]
-    words = [args.program, "prepare", folder / MAIN_FILES.get(form, "job.inp"), *units, "--threads", 2, "--quiet", "--json", "-o", folder / "prepared"]
+    words = [args.program, "prepare", folder / MAIN_FILES.get(form, "job.inp"), *units, "--quiet", "--json", "-o", folder / "prepared"]
     try:
         size = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
         runs = []
@@ -50,6 +51,7 @@ def measure(args, form, dofs):
 
 
 def main():
+    os.environ["RAYON_NUM_THREADS"] = "2"  # `prepare` takes what there is
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     target = performance.ROOT / "target"
     parser.add_argument("--runs", type=int, default=3, help="runs of each form (default: 3)")
