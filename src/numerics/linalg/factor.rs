@@ -277,12 +277,7 @@ impl<'a, T: Real> Cholesky<'a, T> {
         let matrix = analysis.scaled(pencil, -tau);
         let mut fronts: Vec<Trapezoid<T>> = (0..tree.len()).map(|_| Trapezoid::default()).collect();
         let visit = |s: usize, slot: &mut Trapezoid<T>, children: Vec<Trapezoid<T>>| {
-            let (mut pivots, mut rest) = analysis.new_front::<T>(s);
-            matrix.assemble(s, &mut pivots);
-            for (&c, child) in tree.children(s).iter().zip(children) {
-                extend_add(&mut pivots, &mut rest, &child, &analysis.places(c as usize));
-            }
-            front::cholesky(&mut pivots, &mut rest).ok_or(())?;
+            let (pivots, rest) = eliminate_front(analysis, &matrix, s, children).ok_or(())?;
             *slot = pivots;
             Ok::<_, ()>(rest)
         };
@@ -296,6 +291,34 @@ impl<'a, T: Real> Cholesky<'a, T> {
         let backward = |s: usize, front: &mut [[T; K]]| substitution::backward(&self.fronts[s], front);
         substitute(self.analysis, &self.scale, x, forward, backward);
     }
+}
+
+/// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and
+/// eliminates its columns. The columns of the factor, and what is handed on to the parent; `None` when a pivot is
+/// not positive.
+fn eliminate_front<T: Real>(
+    analysis: &Analysis,
+    matrix: &Scaled<'_>,
+    s: usize,
+    children: Vec<Trapezoid<T>>,
+) -> Option<(Trapezoid<T>, Trapezoid<T>)> {
+    let (mut pivots, mut rest) = analysis.new_front::<T>(s);
+    matrix.assemble(s, &mut pivots);
+    for (&c, child) in analysis.tree.children(s).iter().zip(children) {
+        extend_add(&mut pivots, &mut rest, &child, &analysis.places(c as usize));
+    }
+    front::cholesky(&mut pivots, &mut rest)?;
+    Some((pivots, rest))
+}
+
+/// Whether a matrix has a Cholesky factor with numbers of type `T`, which is forgotten front by front.
+fn is_positive_definite<T: Real>(analysis: &Analysis, matrix: &SymmetricMatrix) -> bool {
+    let pencil = Pencil::new(matrix, matrix, 1);
+    let matrix = analysis.scaled(&pencil, 0.0);
+    let visit = |s: usize, (): &mut (), children: Vec<Trapezoid<T>>| {
+        eliminate_front(analysis, &matrix, s, children).map(|(_, rest)| rest).ok_or(())
+    };
+    analysis.walk.up(&analysis.tree, &mut vec![(); analysis.tree.len()], &visit).is_ok()
 }
 
 /// Rows that a task reorders: that takes far longer than to start it.
@@ -418,10 +441,10 @@ pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> 
     drop(graph);
     if rows == 1 {
         let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
-        if Cholesky::<f32>::new(&analysis, &Pencil::new(&lowered, &lowered, 1), 0.0).is_some() {
+        if is_positive_definite::<f32>(&analysis, &lowered) {
             return true;
         }
     }
     let raised = mass.with_raised_diagonal(1.0 + 1e-9);
-    Cholesky::<f64>::new(&analysis, &Pencil::new(&raised, &raised, 1), 0.0).is_some()
+    is_positive_definite::<f64>(&analysis, &raised)
 }
