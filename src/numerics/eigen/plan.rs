@@ -104,9 +104,9 @@ fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u
     let columns = match precision {
         // A search is saved before its modes are made.
         Precision::Double => basis + found.max(saved),
-        // A span of twice its first size, 1.5 for each wanted mode, and the corrections, all with both
-        // products; one more while they are combined.
-        Precision::Single => (basis + found + 2 * wanted).max(15 * wanted + 128) + saved,
+        // A span of three times its first size, 1.5 for each wanted mode and 16, with both products; forces and
+        // vectors in work beside it.
+        Precision::Single => (basis + found + 2 * wanted).max(17 * wanted + 180) + saved,
     };
     8 * (problem.pencil.n() * columns) as u64
 }
