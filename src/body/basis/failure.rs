@@ -101,9 +101,9 @@ fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
     };
     let squares: Vec<f64> = (0..model.nodes().len()).map(square).collect();
     // Nodes that move alike but for rounding are named in their order.
-    let digits = 1e6 / largest(squares.iter().copied());
+    let millionth = 1e-6 * largest(squares.iter().copied());
     let mut moved: Vec<(usize, f64)> =
-        squares.iter().map(|square| (square * digits).round()).enumerate().collect();
+        squares.iter().map(|square| (square / millionth).round()).enumerate().collect();
     moved.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let named: Vec<String> = moved.iter().take(5).map(|(i, _)| model.nodes().ids[*i].to_string()).collect();
     named.join(", ")

@@ -20,9 +20,9 @@ use std::ops::Range;
 pub(super) const CHUNK: usize = 128;
 /// Upper bound of the number of partial sums kept until they are added in order.
 pub(super) const MAX_GROUPS: usize = 64;
-/// Columns per pass over the mass matrix. A pass gathers the columns before its own once more, so that of many
-/// columns more are taken together.
+/// Columns per pass over the mass matrix.
 const PANEL: usize = 64;
+/// The same of more than twice as many: a pass gathers the columns before its own once more.
 const WIDE_PANEL: usize = 192;
 /// Columns of a panel that are summed at a time, in registers.
 pub(super) const LANE: usize = 16;

@@ -184,7 +184,6 @@ pub(super) fn lowest_modes(
             continue;
         }
         let ritz = iteration.test()?;
-        iteration.missing = ritz.last - ritz.converged;
         iteration.save(&ritz);
         if let Some(found) = iteration.hand_over(&ritz, counters)? {
             return Ok(found);
@@ -210,10 +209,8 @@ struct Iteration<'a> {
     at_start: bool,
     /// Whether the basis spans all there is.
     complete: bool,
-    /// Size of the projected eigenproblem that was tested last.
-    tested: usize,
-    /// Modes that had not converged then.
-    missing: usize,
+    /// Size of the projected eigenproblem from which on it is worth being tested again.
+    next_test: usize,
     /// Modes that had converged when the search was saved last.
     saved: usize,
     /// K-residual that an estimate has to keep before the true residuals are looked at.
@@ -312,8 +309,7 @@ impl<'a> Iteration<'a> {
             steps: 0,
             at_start,
             complete: false,
-            tested: 0,
-            missing: 0,
+            next_test: 0,
             saved: 0,
             asked: goal.tolerance,
             least_excess: f64::INFINITY,
@@ -351,19 +347,17 @@ impl<'a> Iteration<'a> {
     /// vectors or so not after every step, and not while many modes are missing, of which a step finds a few.
     fn is_test_due(&mut self) -> bool {
         let size = self.krylov.projected();
-        let soon = self.tested + (self.tested / 25).max(self.missing / 4);
-        let small = size < self.goal.wanted + 1 || size < soon;
+        let small = size < self.goal.wanted + 1 || size < self.next_test;
         // What was taken up is a start no more, tested or not.
         if !(self.complete || self.is_full()) && small {
             self.at_start = false;
             return false;
         }
-        self.tested = size;
         true
     }
 
     /// Solves the projected eigenproblem, and sees which Ritz pairs are modes.
-    fn test(&self) -> Result<Ritz, EigenFailure> {
+    fn test(&mut self) -> Result<Ritz, EigenFailure> {
         let (krylov, wanted, tau) = (&self.krylov, self.goal.wanted, self.factor.shift());
         let size = krylov.projected();
         let found = descending(krylov)?;
@@ -379,6 +373,7 @@ impl<'a> Iteration<'a> {
         let converged = (0..last).take_while(is_mode).count();
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
+        self.next_test = size + (size / 25).max((last - converged) / 4);
         (self.watch)(Event::Fraction(converged as f64 / wanted.max(1) as f64));
         Ok(ritz)
     }
@@ -461,7 +456,7 @@ impl<'a> Iteration<'a> {
         counters.restarts += 1;
         let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.goal.block));
         self.krylov.restart(ritz.s.as_ref().subcols(0, keep), &ritz.theta[..keep]);
-        (self.tested, self.missing) = (0, 0);
+        self.next_test = 0;
         Ok(None)
     }
 }

@@ -265,6 +265,19 @@ impl Refined {
         Self { eigenvalues, vectors, residuals, floors }
     }
 
+    /// Residuals and floors anew of some modes, whose vectors or eigenvalues have changed.
+    pub(super) fn renew(&mut self, problem: &EigenProblem<'_>, changed: &[usize], counters: &mut Counters) {
+        if changed.is_empty() {
+            return;
+        }
+        let x = Mat::from_fn(self.vectors.nrows(), changed.len(), |i, j| self.vectors[(i, changed[j])]);
+        let lambda: Vec<f64> = changed.iter().map(|&i| self.eigenvalues[i]).collect();
+        let (found, rounding) = residuals(problem, &lambda, x.as_ref(), counters);
+        for ((&i, residual), floor) in changed.iter().zip(found).zip(rounding) {
+            (self.residuals[i], self.floors[i]) = (residual, floor);
+        }
+    }
+
     /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is
     /// higher.
     fn excess_of(&self, i: usize, tolerance: f64) -> f64 {

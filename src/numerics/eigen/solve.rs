@@ -10,7 +10,7 @@ use super::failure::EigenFailure;
 use super::lanczos::{self, Goal, columns_per_step};
 use super::plan::{CountPlan, Multigrid, Plan, gigabytes};
 use super::problem::EigenProblem;
-use super::refine::{Refined, refine, residuals as residuals_of};
+use super::refine::{Refined, refine};
 use super::resume::Snapshot;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted, keeps};
 use super::single;
@@ -421,22 +421,16 @@ fn finish(
     (plan, finite_modes): (Option<Plan>, Option<usize>),
     mut counters: Counters,
 ) -> Result<EigenSolution, EigenFailure> {
-    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = search.refined;
-    let groups = clusters(&eigenvalues, CLUSTER_GAP);
-    canonical_basis(vectors.as_mut(), &groups);
+    let mut modes = search.refined;
+    let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
+    canonical_basis(modes.vectors.as_mut(), &groups);
     if let Some(bounds) = &bounds {
-        bounds.clamp(&mut eigenvalues);
+        bounds.clamp(&mut modes.eigenvalues);
     }
     let is_changed = |group: &Range<usize>| bounds.is_some() || group.len() > 1;
     let changed: Vec<usize> = groups.into_iter().filter(is_changed).flatten().collect();
-    if !changed.is_empty() {
-        let shapes = Mat::from_fn(vectors.nrows(), changed.len(), |i, j| vectors[(i, changed[j])]);
-        let lambda: Vec<f64> = changed.iter().map(|&i| eigenvalues[i]).collect();
-        let renewed = residuals_of(problem, &lambda, shapes.as_ref(), &mut counters);
-        for ((&i, residual), floor) in changed.iter().zip(renewed.0).zip(renewed.1) {
-            (residuals[i], floors[i]) = (residual, floor);
-        }
-    }
+    modes.renew(problem, &changed, &mut counters);
+    let Refined { eigenvalues, mut vectors, residuals, floors } = modes;
     let kept = |i: &usize| keeps(residuals[*i], floors[*i], tolerance);
     let converged = (0..eigenvalues.len()).filter(kept).count();
     if converged < eigenvalues.len() {

@@ -8,7 +8,7 @@ use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::plan::{Plan, gigabytes};
 use super::problem::EigenProblem;
-use super::refine::{Refined, residuals as residuals_of};
+use super::refine::Refined;
 use super::settings::{Accuracy, EigenSettings, Wanted, keeps};
 use super::solution::EigenSolution;
 use super::zero_energy::check_zero_energy;
@@ -87,22 +87,22 @@ fn canonical_modes(
     settings: &EigenSettings,
     counters: &mut Counters,
 ) -> (Refined, Option<f64>) {
-    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = refined;
+    let Refined { mut eigenvalues, vectors, mut residuals, mut floors } = refined;
     let given = match settings.wanted {
         Wanted::Lowest(count) => count.min(eigenvalues.len()),
         Wanted::Below(lambda) => eigenvalues.partition_point(|&l| l < lambda),
     };
     let next_eigenvalue = eigenvalues.get(given).copied();
     eigenvalues.truncate(given);
-    vectors = vectors.as_ref().subcols(0, given).to_owned();
-    let groups = clusters(&eigenvalues, CLUSTER_GAP);
-    canonical_basis(vectors.as_mut(), &groups);
-    if groups.iter().any(|group| group.len() > 1) {
-        (residuals, floors) = residuals_of(problem, &eigenvalues, vectors.as_ref(), counters);
-    }
     residuals.truncate(given);
     floors.truncate(given);
-    (Refined { eigenvalues, vectors, residuals, floors }, next_eigenvalue)
+    let vectors = vectors.as_ref().subcols(0, given).to_owned();
+    let mut modes = Refined { eigenvalues, vectors, residuals, floors };
+    let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
+    canonical_basis(modes.vectors.as_mut(), &groups);
+    let mixed: Vec<usize> = groups.into_iter().filter(|group| group.len() > 1).flatten().collect();
+    modes.renew(problem, &mixed, counters);
+    (modes, next_eigenvalue)
 }
 
 impl Refined {
