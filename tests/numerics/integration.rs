@@ -183,6 +183,43 @@ fn no_step_passes_over_a_jump() {
     assert!(run(explicit(), &[jump]) < 1e-14);
 }
 
+/// A table and the run that it belongs to may end at times that differ by rounding.
+#[test]
+fn breaks_a_few_roundings_apart_stop_nothing() {
+    for apart in [1, 2, 3, 5, 10, 20, 40, 100] {
+        for ends_there in [false, true] {
+            let jump: f64 = 0.7;
+            let next = (0..apart).fold(jump, |time, _| time.next_up());
+            let last = if ends_there { next } else { 1.0 };
+            let run = |mut method: Method| {
+                let mut system = Equation::new(4, |time, _: &[f64], rates: &mut [f64]| {
+                    rates.fill(if time < jump { 1.0 } else { -2.0 });
+                });
+                let mut state = [0.0; 4];
+                let mut seen = Vec::new();
+                let observe = |time: f64, _: &[f64]| {
+                    seen.push(time);
+                    Ok::<(), Failure>(())
+                };
+                integrate(&mut method, &mut system, &mut state, &[0.0, jump, last], &[jump, next], observe)
+                    .expect("polynomials");
+                assert_eq!(seen, [0.0, jump, last]);
+                (state[0] - (jump - 2.0 * (last - jump))).abs()
+            };
+            let found = [run(gauss(4, 0.4)), run(Method::Explicit(Explicit::new(4, 1e-10, 1.0)))];
+            assert!(found.iter().all(|error| *error < 1e-14), "{apart} roundings: {found:?}");
+        }
+    }
+    // Where only the run ends there, as when a table's last time was computed another way.
+    let mut state = [0.0; 4];
+    let mut system = Equation::new(4, |_, _: &[f64], rates: &mut [f64]| rates.fill(1.0));
+    let instants = [0.0, 0.7_f64.next_up()];
+    let mut method = Method::Explicit(Explicit::new(4, 1e-10, 1.0));
+    integrate(&mut method, &mut system, &mut state, &instants, &[0.7], |_, _| Ok::<(), Failure>(()))
+        .expect("a straight line");
+    assert!((state[0] - 0.7).abs() < 1e-15);
+}
+
 #[test]
 fn what_cannot_go_on_is_said() {
     let mut never = Equation::new(4, |_, y: &[f64], rates: &mut [f64]| {
