@@ -6,10 +6,11 @@ use crate::body::invariants::{
     symmetric_part,
 };
 use crate::model::{FeModel, rigid_count};
-use crate::numerics::eigen::canonical_basis;
-use crate::numerics::linalg::{SymmetricMatrix, gram, multiply, projection_compensated};
+use crate::numerics::eigen::canonical_sign;
+use crate::numerics::linalg::{SymmetricMatrix, contiguous_mut, gram, multiply, projection_compensated};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// The body frame and the node positions in it.
 pub(crate) struct NodesInFrame {
@@ -67,7 +68,7 @@ pub(crate) struct BodyModes {
 impl BodyModes {
     /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest
     /// magnitude is positive, rotations of nodes times the size of the body.
-    pub fn new(model: &FeModel, place: &NodesInFrame, vectors: &Mat<f64>) -> Self {
+    pub fn new(model: &FeModel, place: &NodesInFrame, mut vectors: Mat<f64>) -> Self {
         let rows = model.rows();
         let (nodes, nf) = (model.nodes().len(), vectors.ncols());
         let mut displacements =
@@ -84,24 +85,19 @@ impl BodyModes {
             rotations
         });
         let size = place.positions.iter().map(|x| Vector3::from(*x).norm()).fold(0.0, f64::max);
-        let moved = 3 * nodes;
-        let turned = rotations.as_ref().map_or(0, Mat::nrows);
-        let mut signed =
-            Mat::from_fn(moved + turned, nf, |row, j| match (row.checked_sub(moved), &rotations) {
-                (Some(row), Some(rotations)) => size * rotations[(row, j)],
-                _ => displacements[(row, j)],
-            });
-        let unsigned = signed.clone();
-        canonical_basis(signed.as_mut(), &[]);
-        let kept = |j: usize| (0..signed.nrows()).all(|i| signed[(i, j)] == unsigned[(i, j)]);
-        let signs: Vec<f64> = (0..nf).map(|j| if kept(j) { 1.0 } else { -1.0 }).collect();
-        let flip = |shapes: &mut Mat<f64>| {
-            (0..nf).for_each(|j| shapes.col_as_slice_mut(j).iter_mut().for_each(|v| *v *= signs[j]));
+        let sign = |j: usize| {
+            let moved = displacements.col_as_slice(j)[..3 * nodes].iter().copied();
+            let turned = rotations.iter().flat_map(|turned| turned.col_as_slice(j)).map(|angle| size * angle);
+            canonical_sign(moved.chain(turned))
         };
-        let mut vectors = vectors.clone();
-        flip(&mut vectors);
-        flip(&mut displacements);
-        rotations.iter_mut().for_each(flip);
+        let signs: Vec<f64> = (0..nf).into_par_iter().map(sign).collect();
+        for shapes in [&mut vectors, &mut displacements].into_iter().chain(&mut rotations) {
+            let columns: Vec<_> =
+                shapes.col_iter_mut().zip(&signs).filter(|(_, sign)| **sign < 0.0).collect();
+            columns
+                .into_par_iter()
+                .for_each(|(shape, _)| contiguous_mut(shape).iter_mut().for_each(|x| *x = -*x));
+        }
         let internal = internal(model, &vectors, &displacements);
         Self { vectors, displacements, rotations, internal, signs, nodes }
     }

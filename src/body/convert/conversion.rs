@@ -1,7 +1,6 @@
 //! The last stage of a conversion: the body, what lumped masses would have given, and what the user should
 //! know.
 
-use super::certificate::certificate;
 use super::geometric_stiffness::softening_warning;
 use super::remarks::{free_frequencies, poor_fit};
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
@@ -117,7 +116,7 @@ impl ModalModel<'_> {
             invariants: condensed.invariants.clone(),
             geometric_stiffness: self.geometric_stiffness.clone(),
             lumped,
-            certificate: certificate(self.model, &self.found, condensed.guarantee.clone()),
+            certificate: self.certificate(condensed.guarantee.clone()),
             terms: condensed.terms.clone(),
             storage: Storage::default(),
         };

@@ -97,11 +97,11 @@ pub(super) fn pipeline(
     watch: Watch<'_>,
 ) -> Result<LumpedPipeline> {
     let scheme = masses.scheme().name().to_owned();
-    let eigenvectors = match own_modes(modal, masses, watch) {
+    let EigenSolution { eigenvalues, vectors, .. } = match own_modes(modal, masses, watch) {
         Ok(found) => found,
         Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
     };
-    let modes = BodyModes::new(modal.model, &modal.place, &eigenvectors.vectors);
+    let modes = BodyModes::new(modal.model, &modal.place, vectors);
     let mass_times_modes = modal.model.pencil().apply_mass(modes.vectors.as_ref());
     let cross = gram(modal.modes.vectors.as_ref(), mass_times_modes.as_ref());
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..modal.n_modes())));
@@ -109,7 +109,7 @@ pub(super) fn pipeline(
     let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
     Ok(LumpedPipeline {
         scheme,
-        eigenvalues: eigenvectors.eigenvalues,
+        eigenvalues,
         subspace_cosine: alignment.agreement,
         comparison: error_norms(exact, &own.with_basis(alignment.basis.as_ref())),
         remark: String::new(),

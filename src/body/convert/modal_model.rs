@@ -21,7 +21,7 @@ pub struct ModalModel<'m> {
     pub(super) settings: &'m ConvertSettings,
     /// The comparators that are wanted.
     pub(super) schemes: Vec<LumpedMasses>,
-    /// The modes in model axes, with what is known of each.
+    /// What is known of the modes; their vectors are those of `modes`.
     pub(super) found: ModalBasis,
     pub(super) mass_properties: MassProperties,
     pub(super) place: NodesInFrame,
@@ -53,11 +53,11 @@ impl<'m> ModalModel<'m> {
         let schemes =
             settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
         let task = Task { model, settings: &settings.modes, resume, watch };
-        let found = settings.basis.basis().modes(&task)?;
+        let mut found = settings.basis.basis().modes(&task)?;
         watch(Event::Phase("invariants"));
         let (frame, mass_properties) = body_frame(model, settings.frame)?;
         let place = NodesInFrame::new(model, frame);
-        let modes = BodyModes::new(model, &place, &found.solution.vectors);
+        let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
         // `certified` makes its own.
         let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };

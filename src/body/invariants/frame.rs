@@ -7,9 +7,10 @@ use super::general::rigid_inertia;
 use super::principal_axes::principal_axes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::numerics::linalg::SymmetricMatrix;
+use crate::numerics::linalg::{SymmetricMatrix, contiguous_mut};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// The body frame in model coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,11 +45,12 @@ impl Frame {
     pub fn rotate_shapes(&self, shapes: &mut Mat<f64>) {
         assert_eq!(shapes.nrows() % 3, 0, "three rows per node");
         let to_body = self.axes.transpose();
-        for p in 0..shapes.ncols() {
-            for node in shapes.col_as_slice_mut(p).as_chunks_mut::<3>().0 {
+        let shapes: Vec<&mut [f64]> = shapes.col_iter_mut().map(contiguous_mut).collect();
+        shapes.into_par_iter().for_each(|shape| {
+            for node in shape.as_chunks_mut::<3>().0 {
                 *node = (to_body * Vector3::from(*node)).into();
             }
-        }
+        });
     }
 
     /// Turns rigid fields (six columns: unit translations along the model axes, unit rotations about them; in

@@ -24,7 +24,7 @@ pub(super) type Digests = BTreeMap<String, String>;
 pub(super) type Numbers = HashMap<String, Fingerprint>;
 
 /// Numbers that a dataset holds.
-pub(super) trait Number: Copy {
+pub(super) trait Number: Copy + Sync {
     /// Name of the type in a digest.
     const KIND: &'static str;
     /// Appends its bytes, little-endian.

@@ -1,9 +1,10 @@
 //! A canonical basis inside repeated eigenvalues and canonical signs, so that the same body gives the same
 //! modes whatever path computed them.
 
-use crate::numerics::linalg::combine;
+use crate::numerics::linalg::{combine, contiguous_mut};
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form
@@ -54,15 +55,19 @@ pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
             reflect_onto_first(rest.rb_mut(), row);
         }
     }
-    for j in 0..shapes.ncols() {
-        let mut column = shapes.rb_mut().subcols_mut(j, 1);
-        let row = dominant_row(column.rb());
-        if column.nrows() > 0 && column[(row, 0)] < 0.0 {
-            for i in 0..column.nrows() {
-                column[(i, 0)] = -column[(i, 0)];
-            }
+    let columns: Vec<&mut [f64]> = shapes.col_iter_mut().map(contiguous_mut).collect();
+    columns.into_par_iter().for_each(|column| {
+        if canonical_sign(column.iter().copied()) < 0.0 {
+            column.iter_mut().for_each(|x| *x = -*x);
         }
-    }
+    });
+}
+
+/// The sign that makes the component of largest magnitude positive, 1 or -1.
+pub fn canonical_sign(shape: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = shape.clone().fold(0.0f64, |largest, x| largest.max(x * x));
+    let dominant = { shape }.find(|x| x * x >= largest * (1.0 - EQUAL));
+    if dominant.is_some_and(|x| x < 0.0) { -1.0 } else { 1.0 }
 }
 
 /// First row whose norm is the largest, up to [`EQUAL`].

@@ -179,10 +179,10 @@ impl<'a> Krylov<'a> {
 
     /// Thick restart: keeps the Ritz vectors V S (S: projected x k) with values theta, and the newest block.
     pub(super) fn restart(&mut self, s: MatRef<'_, f64>, theta: &[f64]) {
-        let kept = self.combination(s);
-        let fresh = self.v.columns(self.projected()..self.size()).to_owned();
-        self.v.truncate(0);
-        self.v.push(kept.as_ref());
+        let projected = self.projected();
+        let fresh = self.v.columns(projected..self.size()).to_owned();
+        combine_in_place(self.v.columns_mut(0..projected), s);
+        self.v.truncate(s.ncols());
         self.v.push(fresh.as_ref());
         self.t.fill(0.0);
         for (i, &value) in theta.iter().enumerate() {

@@ -30,7 +30,7 @@ mod unresisted;
 mod without_factor;
 mod zero_energy;
 
-pub use canonical::{CLUSTER_GAP, canonical_basis, clusters};
+pub use canonical::{CLUSTER_GAP, canonical_basis, canonical_sign, clusters};
 pub use completeness::{Completeness, Proof};
 pub use counters::Counters;
 pub use dynamic_response::dynamic_responses;
