@@ -6,10 +6,11 @@ use super::factor::{Analysis, COLUMNS, substitute};
 use super::front::{PANEL, ROWS, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
 use super::random::normal;
-use super::substitution::WORTH_TASKS;
+use super::substitution::{
+    WORTH_TASKS, solve_lower, solve_transposed, subtract_product, subtract_transposed,
+};
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut};
-use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -110,73 +111,34 @@ const MARGIN: f64 = 100.0;
 const POWERS: usize = 12;
 const FALLING: f64 = 0.5;
 
-/// to -= factor from.
-#[inline(always)]
-fn subtract<const K: usize>(to: &mut [f64; K], factor: f64, from: &[f64; K]) {
-    to.iter_mut().zip(from).for_each(|(to, from)| *to -= factor * from);
-}
+/// Rows of L that are brought to double precision together: they stay in the nearest cache.
+const TOGETHER: usize = 32;
 
-/// Rows of L that are taken together: what is read for them is read once.
-const TOGETHER: usize = 4;
-
-/// One pass over rows of L, which are those of `below`; its columns are those of y.
-enum Pass<'a, T, const K: usize> {
-    /// below -= L y.
-    Product(&'a [T], &'a [[f64; K]], &'a mut [[f64; K]]),
-    /// y -= L' below.
-    Transposed(&'a [T], &'a [[f64; K]], &'a mut [[f64; K]]),
-}
-
-impl<T: Real, const K: usize> WithSimd for Pass<'_, T, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        match self {
-            Self::Product(l, y, below) => subtract_product(l, y, below),
-            Self::Transposed(l, below, y) => subtract_transposed(l, below, y),
-        }
+/// Calls `work` with a few rows of L in double precision, as many rows of `below` each time.
+fn for_rows<T: Real, B>(
+    l: &[T],
+    width: usize,
+    below: impl Iterator<Item = B>,
+    mut work: impl FnMut(&[f64], B),
+) {
+    let mut wide = vec![0.0; TOGETHER * width];
+    for (l, below) in l.chunks(TOGETHER * width).zip(below) {
+        let wide = &mut wide[..l.len()];
+        wide.iter_mut().zip(l).for_each(|(to, from)| *to = from.wide());
+        work(wide, below);
     }
 }
 
-#[inline(always)] // compiled once per instruction set
-fn subtract_product<T: Real, const K: usize>(l: &[T], y: &[[f64; K]], below: &mut [[f64; K]]) {
-    let width = y.len();
-    let (groups, rest) = below.as_chunks_mut::<TOGETHER>();
-    let (l, l_rest) = l.split_at(groups.len() * TOGETHER * width);
-    for (l, group) in l.chunks_exact(TOGETHER * width).zip(groups) {
-        let mut values = *group;
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| &l[i * width..(i + 1) * width]);
-        for ((((y, a), b), c), d) in y.iter().zip(a).zip(b).zip(c).zip(d) {
-            subtract(&mut values[0], a.wide(), y);
-            subtract(&mut values[1], b.wide(), y);
-            subtract(&mut values[2], c.wide(), y);
-            subtract(&mut values[3], d.wide(), y);
-        }
-        *group = values;
+/// The unit lower triangle of the leading square of a panel, row by row.
+fn unit_triangle<T: Real>(block: &Blocks<T>) -> Vec<f64> {
+    let width = block.order.len();
+    let mut rows = vec![0.0; width * width];
+    for j in 0..width {
+        rows[j * width + j] = 1.0;
+        let column = &block.l.col_as_slice(j)[j + 1..];
+        column.iter().enumerate().for_each(|(i, l)| rows[(j + 1 + i) * width + j] = l.wide());
     }
-    for (row, value) in l_rest.chunks_exact(width).zip(rest) {
-        row.iter().zip(y).for_each(|(l, y)| subtract(value, l.wide(), y));
-    }
-}
-
-#[inline(always)] // compiled once per instruction set
-fn subtract_transposed<T: Real, const K: usize>(l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]) {
-    let width = y.len();
-    let (groups, rest) = below.as_chunks::<TOGETHER>();
-    let (l, l_rest) = l.split_at(groups.len() * TOGETHER * width);
-    for (l, values) in l.chunks_exact(TOGETHER * width).zip(groups) {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| &l[i * width..(i + 1) * width]);
-        for ((((y, a), b), c), d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-            subtract(y, a.wide(), &values[0]);
-            subtract(y, b.wide(), &values[1]);
-            subtract(y, c.wide(), &values[2]);
-            subtract(y, d.wide(), &values[3]);
-        }
-    }
-    for (row, value) in l_rest.chunks_exact(width).zip(rest) {
-        row.iter().zip(&mut *y).for_each(|(l, y)| subtract(y, l.wide(), value));
-    }
+    rows
 }
 
 /// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows
@@ -185,24 +147,21 @@ fn forward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
 ) {
-    let arch = Arch::new();
     for (p, block) in blocks.iter().enumerate() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
         let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| own[row]).collect();
-        for j in 0..width {
-            let (done, rest) = y.split_at_mut(j + 1);
-            for (i, y) in rest.iter_mut().enumerate() {
-                subtract(y, block.l[(j + 1 + i, j)].wide(), &done[j]);
-            }
-        }
+        solve_lower(&unit_triangle(block), &mut y);
         own.copy_from_slice(&y);
+        let piece = |l: &[T], below: &mut [[f64; K]]| {
+            for_rows(l, width, below.chunks_mut(TOGETHER), |l, below| subtract_product(l, &y, below));
+        };
         let l = &columns.panels[p][width * width..];
         if l.len() < WORTH_TASKS {
-            arch.dispatch(Pass::Product(l, &y, below));
+            piece(l, below);
         } else {
             let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
-            pieces.for_each(|(l, below)| arch.dispatch(Pass::Product(l, &y, below)));
+            pieces.for_each(|(l, below)| piece(l, below));
         }
     }
 }
@@ -212,7 +171,6 @@ fn backward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
 ) {
-    let arch = Arch::new();
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
@@ -223,26 +181,26 @@ fn backward<T: Real, const K: usize>(
             block.divide(&mut column);
             y.iter_mut().zip(&column).for_each(|(to, from)| to[k] = *from);
         }
+        let piece = |l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]| {
+            for_rows(l, width, below.chunks(TOGETHER), |l, below| subtract_transposed(l, below, y));
+        };
         let l = &columns.panels[p][width * width..];
         if l.len() < WORTH_TASKS {
-            arch.dispatch(Pass::Transposed(l, below, &mut y));
+            piece(l, below, &mut y);
         } else {
             let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
             let parts = pieces.map(|(l, below)| {
                 let mut part = vec![[0.0; K]; width];
-                arch.dispatch(Pass::Transposed(l, below, &mut part));
+                piece(l, below, &mut part);
                 part
             });
             for part in parts.collect::<Vec<_>>() {
-                y.iter_mut().zip(&part).for_each(|(y, part)| subtract(y, -1.0, part));
+                for (y, part) in y.iter_mut().zip(&part) {
+                    y.iter_mut().zip(part).for_each(|(y, part)| *y += part);
+                }
             }
         }
-        for j in (0..width).rev() {
-            let (rest, found) = y.split_at_mut(j + 1);
-            for (i, x) in found.iter().enumerate() {
-                subtract(&mut rest[j], block.l[(j + 1 + i, j)].wide(), x);
-            }
-        }
+        solve_transposed(&unit_triangle(block), &mut y);
         for (&row, x) in block.order.iter().zip(&y) {
             own[row] = *x;
         }

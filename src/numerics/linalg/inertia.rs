@@ -138,6 +138,9 @@ fn eliminate<T: Real>(
     squares
 }
 
+/// Sums that are taken side by side.
+const LANES: usize = 8;
+
 /// P A P' = L B L' of the leading square of a panel.
 pub(super) struct Blocks<T> {
     /// Unit lower triangle below the diagonal.
@@ -145,6 +148,10 @@ pub(super) struct Blocks<T> {
     /// Row of A at each place.
     pub order: Vec<usize>,
     diagonal: Vec<f64>,
+    /// |d| of the diagonal.
+    sizes: Vec<f64>,
+    /// Whether there are 2x2 blocks.
+    has_pairs: bool,
     /// Nonzero where a 2x2 block of B starts.
     coupling: Vec<f64>,
     negative: usize,
@@ -172,7 +179,9 @@ impl<T: Real> Blocks<T> {
         let coupling: Vec<f64> =
             (0..n).map(|j| if j + 1 < n { subdiagonal[(j, 0)].wide() } else { 0.0 }).collect();
         let (negative, zero) = count(&diagonal, &coupling);
-        Self { l, order, diagonal, coupling, negative, zero }
+        let sizes = diagonal.iter().map(|d| d.abs()).collect();
+        let has_pairs = coupling.iter().any(|off| *off != 0.0);
+        Self { l, order, diagonal, sizes, has_pairs, coupling, negative, zero }
     }
 
     /// Rows of L from the rows `below` the square, whose L B is left in `scaled`; adds what they contribute
@@ -215,6 +224,10 @@ impl<T: Real> Blocks<T> {
 
     /// Row of L from a row of L B: the row times B^-1.
     pub fn divide(&self, row: &mut [f64]) {
+        if !self.has_pairs {
+            row.iter_mut().zip(&self.diagonal).for_each(|(x, d)| *x /= d);
+            return;
+        }
         let mut j = 0;
         while j < row.len() {
             let off = self.coupling[j];
@@ -235,10 +248,19 @@ impl<T: Real> Blocks<T> {
 
     /// |l|' |B| |l| of a row of L.
     fn growth(&self, row: &[T]) -> f64 {
+        let (lanes, rest) = row.as_chunks::<LANES>();
+        let (sizes, last) = self.sizes.as_chunks::<LANES>();
+        let mut sums = [0.0; LANES];
+        for (l, d) in lanes.iter().zip(sizes) {
+            (0..LANES).for_each(|w| sums[w] += l[w].wide() * l[w].wide() * d[w]);
+        }
+        let rest = rest.iter().zip(last).map(|(l, d)| l.wide() * l.wide() * d);
+        let squares = sums.iter().sum::<f64>() + rest.sum::<f64>();
+        if !self.has_pairs {
+            return squares;
+        }
         let pairs = row.windows(2).zip(&self.coupling);
-        let pairs = pairs.map(|(l, off)| 2.0 * (l[0].wide() * l[1].wide() * off).abs());
-        let squares = row.iter().zip(&self.diagonal).map(|(l, d)| l.wide() * l.wide() * d.abs());
-        pairs.sum::<f64>() + squares.sum::<f64>()
+        squares + pairs.map(|(l, off)| 2.0 * (l[0].wide() * l[1].wide() * off).abs()).sum::<f64>()
     }
 }
 

@@ -62,6 +62,26 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
     }
 }
 
+/// y -= L x, L row by row.
+pub(super) fn subtract_product<const K: usize>(l: &[f64], x: &[[f64; K]], y: &mut [[f64; K]]) {
+    Arch::new().dispatch(Step::SubtractProduct(l, x, y));
+}
+
+/// x -= L' y, L row by row.
+pub(super) fn subtract_transposed<const K: usize>(l: &[f64], y: &[[f64; K]], x: &mut [[f64; K]]) {
+    Arch::new().dispatch(Step::SubtractTransposed(l, y, x));
+}
+
+/// x <- L^-1 x for a square of the rows of a lower triangle.
+pub(super) fn solve_lower<const K: usize>(l: &[f64], x: &mut [[f64; K]]) {
+    Arch::new().dispatch(Step::SolveLower(l, x));
+}
+
+/// x <- L^-T x for the same.
+pub(super) fn solve_transposed<const K: usize>(l: &[f64], x: &mut [[f64; K]]) {
+    Arch::new().dispatch(Step::SolveTransposed(l, x));
+}
+
 /// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its
 /// columns to the other (x).
 enum Step<'a, T, const K: usize> {
