@@ -9,7 +9,7 @@
 
 use super::failure::explain;
 use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
-use super::free_surface::{quadratic_estimate, single_precision_note};
+use super::free_surface::{polynomial_estimate, single_precision_note};
 use super::interface_coordinates::InterfaceCoordinates;
 use super::interface_rows::{CoupledInterface, check_prescribable, coupled_interfaces, hold};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
@@ -152,7 +152,7 @@ impl<'a> Parts<'a> {
         // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of
         // the free body will do.
         let rigid = rigid_modes(model, &pencil)?;
-        let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
+        let first_estimate = polynomial_estimate(model, &pencil, rigid.as_ref());
         let none = Mat::zeros(held.n(), 0);
         let problem = EigenProblem {
             pencil: held,

@@ -11,7 +11,7 @@ use crate::base::progress::Watch;
 use crate::model::{FeModel, centre_and_length};
 use crate::numerics::eigen::{
     Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted,
-    planned_bytes, solve,
+    energy_noise, planned_bytes, solve,
 };
 use crate::numerics::linalg::{Pencil, combine, gram, subtract_combination, symmetric_eigen};
 use faer::{Mat, MatRef};
@@ -71,7 +71,7 @@ pub fn free_surface_resumed(
 ) -> Result<ModalBasis> {
     let pencil = model.pencil();
     let rigid = rigid_modes(model, &pencil)?;
-    let first_estimate = quadratic_estimate(model, &pencil, rigid.as_ref());
+    let first_estimate = polynomial_estimate(model, &pencil, rigid.as_ref());
     let problem = EigenProblem {
         pencil,
         rigid: rigid.as_ref(),
@@ -170,7 +170,7 @@ fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Opti
 /// An upper bound of the first flexible eigenvalue of a model with these rigid modes, near it for a uniform
 /// body: the scale of a shift.
 pub fn first_eigenvalue_estimate(model: &FeModel, rigid: MatRef<'_, f64>) -> f64 {
-    quadratic_estimate(model, &model.pencil(), rigid)
+    polynomial_estimate(model, &model.pencil(), rigid)
 }
 
 /// Bytes that the search for the free modes of a model holds at the most.
@@ -183,46 +183,19 @@ pub fn memory_estimate(model: &FeModel, settings: &ModeSettings, watch: Watch<'_
     planned_bytes(&problem, settings, watch).map_err(|failure| explain(model, failure))
 }
 
-/// The smallest Rayleigh quotient of fields quadratic in the coordinates, M-orthogonal to the rigid modes: an
-/// upper bound of the first flexible eigenvalue, within a factor of two for a uniform body. Nodal rotations
-/// are half the curl of the field, rows without a place stay zero.
-pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
-    let positions = &model.nodes().positions;
-    let (centre, length) = centre_and_length(positions);
-    let exponents = [(0, 9), (1, 9), (2, 9), (0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
-    let d = model.dimension();
-    let mut fields = Mat::zeros(pencil.n(), exponents.len() * d);
-    let local = |i: usize| [0, 1, 2].map(|k| (positions[i][k] - centre[k]) / length);
-    let factor = |r: &[f64; 3], b: usize| r.get(b).copied().unwrap_or(1.0);
-    for i in 0..positions.len() {
-        let r = local(i);
-        for (e, &(a, b)) in exponents.iter().enumerate() {
-            for k in 0..d {
-                fields[(d * i + k, d * e + k)] = r[a] * factor(&r, b);
-            }
-        }
-    }
-    let rows = model.rows();
-    for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
-        let r = local(node as usize);
-        let (l, m) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
-        for (e, &(a, b)) in exponents.iter().enumerate() {
-            let slope = |p: usize| {
-                let first = if a == p { factor(&r, b) } else { 0.0 };
-                (first + if b == p { r[a] } else { 0.0 }) / length
-            };
-            // (curl v e_k) along (k, l, m) cyclic: dv/dl along m for k = m, -dv/dm for k = l.
-            for (k, curl) in [(m, slope(l)), (l, -slope(m))] {
-                if k < d {
-                    fields[(row, d * e + k)] = 0.5 * curl;
-                }
-            }
-        }
-    }
+/// The smallest Rayleigh quotient of polynomial fields, M-orthogonal to the rigid modes: an upper bound of the first
+/// flexible eigenvalue. Fields of the second degree come within a factor of two for a uniform solid; those of the
+/// third degree bend a curved shell nearly without stretching it (a cylinder with u_x = x^3, u_y = -y^3 exactly), and
+/// are taken where nodes have rotations. Rows without a place stay zero.
+pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
+    let has_rotations = !model.rows().rotations().is_empty();
+    let monomials = if has_rotations { [QUADRATIC, CUBIC].concat() } else { QUADRATIC.to_vec() };
+    let mut fields = polynomial_fields(model, pencil.n(), &monomials);
     let mass = |x: MatRef<'_, f64>| pencil.apply_mass(x);
     let before = gram_in_panels(fields.as_ref(), fields.as_ref(), mass);
+    let m_rigid = pencil.apply_mass(rigid);
     for _ in 0..2 {
-        let along = gram_in_panels(rigid, fields.as_ref(), mass);
+        let along = gram(m_rigid.as_ref(), fields.as_ref());
         subtract_combination(fields.as_mut(), rigid, along.as_ref());
     }
     let mut m = gram_in_panels(fields.as_ref(), fields.as_ref(), mass);
@@ -233,8 +206,77 @@ pub(super) fn quadratic_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: Ma
         }
     }
     let k = gram_in_panels(fields.as_ref(), fields.as_ref(), |x| pencil.apply_stiffness(x));
-    smallest_ratio(&k, &m).unwrap_or_else(|| trace_ratio(pencil))
+    // Bending is a small difference of the fields of a shell.
+    let bending = has_rotations.then(|| smallest_ratio(&k, &m, 1e-8)).flatten();
+    bending
+        .and_then(|(_, field)| resolved_ratio(pencil, combine(fields.as_ref(), field.as_ref()).as_ref()))
+        .or_else(|| smallest_ratio(&k, &m, 1e-6).map(|(ratio, _)| ratio))
+        .filter(|ratio| *ratio > 0.0 && ratio.is_finite())
+        .unwrap_or_else(|| trace_ratio(pencil))
 }
+
+/// Monomials of the coordinates by their factors: of the first and second degree, and of the third.
+const QUADRATIC: &[&[usize]] = &[&[0], &[1], &[2], &[0, 0], &[1, 1], &[2, 2], &[0, 1], &[1, 2], &[0, 2]];
+const CUBIC: &[&[usize]] = &[
+    &[0, 0, 0],
+    &[1, 1, 1],
+    &[2, 2, 2],
+    &[0, 0, 1],
+    &[0, 0, 2],
+    &[0, 1, 1],
+    &[1, 1, 2],
+    &[0, 2, 2],
+    &[1, 2, 2],
+    &[0, 1, 2],
+];
+
+/// Fields with a monomial as their component along each axis; nodal rotations are half the curl of the field.
+fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Mat<f64> {
+    let positions = &model.nodes().positions;
+    let (centre, length) = centre_and_length(positions);
+    let d = model.dimension();
+    let mut fields = Mat::zeros(n, monomials.len() * d);
+    let local = |i: usize| [0, 1, 2].map(|k| (positions[i][k] - centre[k]) / length);
+    for i in 0..positions.len() {
+        let r = local(i);
+        for (e, monomial) in monomials.iter().enumerate() {
+            let value = monomial.iter().map(|&k| r[k]).product();
+            (0..d).for_each(|k| fields[(d * i + k, d * e + k)] = value);
+        }
+    }
+    let rows = model.rows();
+    for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
+        let r = local(node as usize);
+        let (l, m) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
+        for (e, monomial) in monomials.iter().enumerate() {
+            let slope = |p: usize| {
+                let without = |at: usize| -> f64 {
+                    let others = monomial.iter().enumerate().filter(|(other, _)| *other != at);
+                    others.map(|(_, &k)| r[k]).product()
+                };
+                let factors = (0..monomial.len()).filter(|&at| monomial[at] == p);
+                factors.map(without).sum::<f64>() / length
+            };
+            // (curl v e_k) along (k, l, m) cyclic: dv/dl along m for k = m, -dv/dm for k = l.
+            for (k, curl) in [(m, slope(l)), (l, -slope(m))] {
+                if k < d {
+                    fields[(row, d * e + k)] = 0.5 * curl;
+                }
+            }
+        }
+    }
+    fields
+}
+
+/// The Rayleigh quotient of a field, where that is more than rounding of the stiffness makes of it.
+fn resolved_ratio(pencil: &Pencil<'_>, x: MatRef<'_, f64>) -> Option<f64> {
+    let energy = gram(x, pencil.apply_stiffness(x).as_ref())[(0, 0)];
+    let noise = energy_noise(pencil.stiffness(), x, f64::EPSILON)[0];
+    (energy > RESOLVED * noise).then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
+}
+
+/// Energy beside its rounding from which on a field tells of the first eigenvalue.
+const RESOLVED: f64 = 1e3;
 
 /// A' f(B), where f takes a few columns at a time: the products of all need no room at once.
 fn gram_in_panels(
@@ -251,8 +293,9 @@ fn gram_in_panels(
     whole
 }
 
-/// Smallest eigenvalue of the small pencil (K, M) on the well-conditioned part of M.
-fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>) -> Option<f64> {
+/// The smallest eigenvalue of the small pencil (K, M) on the part of M above so much of its largest eigenvalue, and its
+/// eigenvector (one column).
+fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, Mat<f64>)> {
     let scale: Vec<f64> =
         (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
     let scaled = |a: &Mat<f64>| {
@@ -260,13 +303,16 @@ fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>) -> Option<f64> {
     };
     let eigen = symmetric_eigen(scaled(m).as_ref())?;
     let largest = *eigen.values.last()?;
-    let kept: Vec<usize> = (0..eigen.values.len()).filter(|&i| eigen.values[i] > 1e-6 * largest).collect();
+    let kept: Vec<usize> =
+        (0..eigen.values.len()).filter(|&i| eigen.values[i] > kept_above * largest).collect();
     let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
         eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
     });
     let projected = gram(root.as_ref(), combine(scaled(k).as_ref(), root.as_ref()).as_ref());
     let ratios = symmetric_eigen(projected.as_ref())?;
-    ratios.values.first().copied().filter(|v| *v > 0.0 && v.is_finite())
+    let ratio = *ratios.values.first()?;
+    let field = combine(root.as_ref(), ratios.vectors.as_ref().subcols(0, 1));
+    Some((ratio, Mat::from_fn(m.nrows(), 1, |i, _| scale[i] * field[(i, 0)])))
 }
 
 /// Mean stiffness over mean mass: a scale when nothing better is known.

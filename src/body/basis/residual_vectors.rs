@@ -393,6 +393,8 @@ impl<'a> Responses<'a> {
     /// What the modes lack, M-orthonormalised against them; `None` when M is indefinite.
     fn added(&self, problem: &EigenProblem<'_>, modes: MatRef<'_, f64>) -> Option<Added> {
         let names = &self.loads.names;
+        let part =
+            |left: f64| if left < f64::EPSILON { "rounding".to_owned() } else { format!("{left:.0e}") };
         let mut dropped: Vec<String> = Vec::new();
         let mut used = Vec::new();
         for (j, name) in names.iter().enumerate() {
@@ -400,7 +402,7 @@ impl<'a> Responses<'a> {
             if !self.deforms[j] {
                 dropped.push(format!("{name} (deforms nothing)"));
             } else if left.sqrt() < LEFT * self.mass[j].sqrt() {
-                dropped.push(format!("{name} ({:.0e})", (left / self.mass[j]).sqrt()));
+                dropped.push(format!("{name} ({})", part((left / self.mass[j]).sqrt())));
             } else {
                 used.push(j);
             }
@@ -409,7 +411,7 @@ impl<'a> Responses<'a> {
         let known = side_by_side(&[problem.rigid, modes]);
         let found = independent(&problem.pencil, known.as_ref(), candidates, LEFT)?;
         let name = |j: usize| &names[used[j]];
-        dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({left:.0e})", name(j))));
+        dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), part(left))));
         dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", name(j))));
         dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
         let kept = found.kept.iter().map(|&j| used[j]).collect();
