@@ -9,6 +9,7 @@ mod certified;
 mod craig_bampton;
 mod craig_bampton_rotations;
 mod damping;
+mod first_shift;
 mod geometric_stiffness;
 mod imported_shapes;
 mod invariants;

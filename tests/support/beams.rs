@@ -35,9 +35,34 @@ pub fn star(mass: BeamMass) -> RawModel {
     ];
     let beams = [(0, 3), (1, 3), (2, 3), (3, 4), (3, 5), (3, 6)];
     let section = Section { width: 0.2, youngs: 4.0, shear: 1.5, density: 1.0 };
+    frame("star of beams", &positions, &beams, &section, mass)
+}
+
+/// A closed ring of `n` beams of unit radius around z, of consistent mass, and the first flexible eigenvalue of a
+/// thin ring: two waves around, out of its plane (Blevins, Formulas for Natural Frequency and Mode Shape, table 9-2).
+pub fn ring(n: usize, width: f64) -> (RawModel, f64) {
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+    let positions: Vec<[f64; 3]> = (0..n).map(|i| [angle(i).cos(), angle(i).sin(), 0.0]).collect();
+    let beams: Vec<(usize, usize)> = (0..n).map(|i| (i, (i + 1) % n)).collect();
+    let section = Section { width, youngs: 4.0, shear: 1.5, density: 1.0 };
+    let bending = section.youngs * width * width / 12.0;
+    let twist = section.youngs / (2.0 * section.shear);
+    (
+        frame("ring of beams", &positions, &beams, &section, BeamMass::Consistent),
+        bending * 36.0 / (5.0 + twist),
+    )
+}
+
+fn frame(
+    name: &str,
+    positions: &[[f64; 3]],
+    beams: &[(usize, usize)],
+    section: &Section,
+    mass: BeamMass,
+) -> RawModel {
     let n = 6 * positions.len();
     let (mut k, mut m) = (Mat::<f64>::zeros(n, n), Mat::<f64>::zeros(n, n));
-    for (a, b) in beams {
+    for &(a, b) in beams {
         let ends = [a, b].map(|node| Vector3::from(positions[node]));
         let rows = |r: usize| if r < 6 { 6 * a + r } else { 6 * b + r - 6 };
         let (ke, me) = section.beam(ends, mass);
@@ -52,7 +77,7 @@ pub fn star(mass: BeamMass) -> RawModel {
     let labels = ids.iter().flat_map(|&node| (1..=6).map(move |direction| DofLabel { node, direction }));
     let dofs = Some(labels.collect());
     let nodes = Nodes { ids, positions: positions.to_vec() };
-    RawModel { dofs, ..RawModel::in_memory("star of beams", sparse(&k), sparse(&m), nodes) }
+    RawModel { dofs, ..RawModel::in_memory(name, sparse(&k), sparse(&m), nodes) }
 }
 
 impl Section {
