@@ -38,19 +38,24 @@ pub fn star(mass: BeamMass) -> RawModel {
     frame("star of beams", &positions, &beams, &section, mass)
 }
 
-/// A closed ring of `n` beams of unit radius around z, of consistent mass, and the first flexible eigenvalue of a
-/// thin ring: two waves around, out of its plane (Blevins, Formulas for Natural Frequency and Mode Shape, table 9-2).
-pub fn ring(n: usize, width: f64) -> (RawModel, f64) {
-    let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
-    let positions: Vec<[f64; 3]> = (0..n).map(|i| [angle(i).cos(), angle(i).sin(), 0.0]).collect();
-    let beams: Vec<(usize, usize)> = (0..n).map(|i| (i, (i + 1) % n)).collect();
+/// A tube of unit radius around z: rings of `around` beams at a distance of a half, and beams along between them, of
+/// consistent mass. Beside it the eigenvalue of its rings in their planes with two waves around, where the beams along
+/// are moved without being deformed (Blevins, Formulas for Natural Frequency and Mode Shape, table 9-2).
+pub fn tube(around: usize, rings: usize, width: f64) -> (RawModel, f64) {
+    const APART: f64 = 0.5;
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / around as f64;
+    let node = |ring: usize, i: usize| ring * around + i % around;
+    let places =
+        |ring: usize| (0..around).map(move |i| [angle(i).cos(), angle(i).sin(), APART * ring as f64]);
+    let positions: Vec<[f64; 3]> = (0..rings).flat_map(places).collect();
+    let closed = |ring: usize| (0..around).map(move |i| (node(ring, i), node(ring, i + 1)));
+    let along = |ring: usize| (0..around).map(move |i| (node(ring, i), node(ring + 1, i)));
+    let beams: Vec<_> = (0..rings).flat_map(closed).chain((0..rings - 1).flat_map(along)).collect();
     let section = Section { width, youngs: 4.0, shear: 1.5, density: 1.0 };
-    let bending = section.youngs * width * width / 12.0;
-    let twist = section.youngs / (2.0 * section.shear);
-    (
-        frame("ring of beams", &positions, &beams, &section, BeamMass::Consistent),
-        bending * 36.0 / (5.0 + twist),
-    )
+    let of_rings = std::f64::consts::TAU * rings as f64;
+    let part = of_rings / (of_rings + APART * (around * (rings - 1)) as f64);
+    let first = part * 36.0 / 5.0 * section.youngs * width * width / 12.0;
+    (frame("tube of beams", &positions, &beams, &section, BeamMass::Consistent), first)
 }
 
 fn frame(
