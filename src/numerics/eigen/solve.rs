@@ -438,9 +438,7 @@ fn finish(
     }
     let given = wanted.min(eigenvalues.len());
     let next_eigenvalue = eigenvalues.get(given).copied().or(search.next.first().copied());
-    if given < eigenvalues.len() {
-        vectors = vectors.as_ref().subcols(0, given).to_owned();
-    }
+    vectors.truncate(vectors.nrows(), given);
     if let Some(bounds) = &mut bounds {
         for column in [&mut bounds.lower, &mut bounds.upper, &mut bounds.shape_error] {
             column.truncate(given);

@@ -87,7 +87,7 @@ fn canonical_modes(
     settings: &EigenSettings,
     counters: &mut Counters,
 ) -> (Refined, Option<f64>) {
-    let Refined { mut eigenvalues, vectors, mut residuals, mut floors } = refined;
+    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = refined;
     let given = match settings.wanted {
         Wanted::Lowest(count) => count.min(eigenvalues.len()),
         Wanted::Below(lambda) => eigenvalues.partition_point(|&l| l < lambda),
@@ -96,7 +96,7 @@ fn canonical_modes(
     eigenvalues.truncate(given);
     residuals.truncate(given);
     floors.truncate(given);
-    let vectors = vectors.as_ref().subcols(0, given).to_owned();
+    vectors.truncate(vectors.nrows(), given);
     let mut modes = Refined { eigenvalues, vectors, residuals, floors };
     let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
     canonical_basis(modes.vectors.as_mut(), &groups);
