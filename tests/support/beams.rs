@@ -58,6 +58,7 @@ pub fn tube(around: usize, rings: usize, width: f64) -> (RawModel, f64) {
     (frame("tube of beams", &positions, &beams, &section, BeamMass::Consistent), first)
 }
 
+/// Beams of one section between nodes.
 fn frame(
     name: &str,
     positions: &[[f64; 3]],

@@ -192,20 +192,20 @@ pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: M
     let monomials = if has_rotations { [QUADRATIC, CUBIC].concat() } else { QUADRATIC.to_vec() };
     let mut fields = polynomial_fields(model, pencil.n(), &monomials);
     let mass = |x: MatRef<'_, f64>| pencil.apply_mass(x);
-    let before = gram_in_panels(fields.as_ref(), fields.as_ref(), mass);
+    let before = gram_in_panels(fields.as_ref(), mass);
     let m_rigid = pencil.apply_mass(rigid);
     for _ in 0..2 {
         let along = gram(m_rigid.as_ref(), fields.as_ref());
         subtract_combination(fields.as_mut(), rigid, along.as_ref());
     }
-    let mut m = gram_in_panels(fields.as_ref(), fields.as_ref(), mass);
+    let mut m = gram_in_panels(fields.as_ref(), mass);
     for i in 0..m.nrows() {
         // A rigid field, or one that a singular mass matrix does not see: rounding only.
         if m[(i, i)] < 1e-10 * before[(i, i)] {
             m[(i, i)] = 0.0;
         }
     }
-    let k = gram_in_panels(fields.as_ref(), fields.as_ref(), |x| pencil.apply_stiffness(x));
+    let k = gram_in_panels(fields.as_ref(), |x| pencil.apply_stiffness(x));
     // Bending is a small difference of the fields of a shell.
     let bending = has_rotations.then(|| smallest_ratio(&k, &m, 1e-8)).flatten();
     bending
@@ -278,16 +278,12 @@ fn resolved_ratio(pencil: &Pencil<'_>, x: MatRef<'_, f64>) -> Option<f64> {
 /// Energy beside its rounding from which on a field tells of the first eigenvalue.
 const RESOLVED: f64 = 1e3;
 
-/// A' f(B), where f takes a few columns at a time: the products of all need no room at once.
-fn gram_in_panels(
-    a: MatRef<'_, f64>,
-    b: MatRef<'_, f64>,
-    product: impl Fn(MatRef<'_, f64>) -> Mat<f64>,
-) -> Mat<f64> {
-    let mut whole = Mat::zeros(a.ncols(), b.ncols());
-    for start in (0..b.ncols()).step_by(PANEL) {
-        let width = PANEL.min(b.ncols() - start);
-        let panel = gram(a, product(b.subcols(start, width)).as_ref());
+/// X' f(X), where f takes a few columns at a time: the products of all need no room at once.
+fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> Mat<f64> {
+    let mut whole = Mat::zeros(x.ncols(), x.ncols());
+    for start in (0..x.ncols()).step_by(PANEL) {
+        let width = PANEL.min(x.ncols() - start);
+        let panel = gram(x, product(x.subcols(start, width)).as_ref());
         whole.as_mut().subcols_mut(start, width).copy_from(&panel);
     }
     whole

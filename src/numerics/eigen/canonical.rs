@@ -64,10 +64,9 @@ pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
 }
 
 /// The sign that makes the component of largest magnitude positive, 1 or -1.
-pub fn canonical_sign(shape: impl Iterator<Item = f64> + Clone) -> f64 {
-    let largest = shape.clone().fold(0.0f64, |largest, x| largest.max(x * x));
-    let dominant = { shape }.find(|x| x * x >= largest * (1.0 - EQUAL));
-    if dominant.is_some_and(|x| x < 0.0) { -1.0 } else { 1.0 }
+pub fn canonical_sign(mut shape: impl Iterator<Item = f64> + Clone) -> f64 {
+    let dominant = first_largest(shape.clone().map(|x| x * x));
+    if shape.nth(dominant).is_some_and(|x| x < 0.0) { -1.0 } else { 1.0 }
 }
 
 /// First row whose norm is the largest, up to [`EQUAL`].
@@ -78,8 +77,13 @@ fn dominant_row(block: MatRef<'_, f64>) -> usize {
             *square += value * value;
         }
     }
-    let largest = squares.iter().fold(0.0f64, |m, &s| m.max(s));
-    squares.iter().position(|&s| s >= largest * (1.0 - EQUAL)).unwrap_or(0)
+    first_largest(squares.iter().copied())
+}
+
+/// Place of the first square that is the largest, up to [`EQUAL`].
+fn first_largest(mut squares: impl Iterator<Item = f64> + Clone) -> usize {
+    let largest = squares.clone().fold(0.0, f64::max);
+    squares.position(|square| square >= largest * (1.0 - EQUAL)).unwrap_or(0)
 }
 
 /// Applies the Householder reflection of the columns that leaves only the first one with a component in

@@ -148,8 +148,6 @@ pub(super) struct Blocks<T> {
     /// Row of A at each place.
     pub order: Vec<usize>,
     diagonal: Vec<f64>,
-    /// |d| of the diagonal.
-    sizes: Vec<f64>,
     /// Whether there are 2x2 blocks.
     has_pairs: bool,
     /// Nonzero where a 2x2 block of B starts.
@@ -179,9 +177,8 @@ impl<T: Real> Blocks<T> {
         let coupling: Vec<f64> =
             (0..n).map(|j| if j + 1 < n { subdiagonal[(j, 0)].wide() } else { 0.0 }).collect();
         let (negative, zero) = count(&diagonal, &coupling);
-        let sizes = diagonal.iter().map(|d| d.abs()).collect();
         let has_pairs = coupling.iter().any(|off| *off != 0.0);
-        Self { l, order, diagonal, sizes, has_pairs, coupling, negative, zero }
+        Self { l, order, diagonal, has_pairs, coupling, negative, zero }
     }
 
     /// Rows of L from the rows `below` the square, whose L B is left in `scaled`; adds what they contribute
@@ -249,12 +246,12 @@ impl<T: Real> Blocks<T> {
     /// |l|' |B| |l| of a row of L.
     fn growth(&self, row: &[T]) -> f64 {
         let (lanes, rest) = row.as_chunks::<LANES>();
-        let (sizes, last) = self.sizes.as_chunks::<LANES>();
+        let (diagonal, last) = self.diagonal.as_chunks::<LANES>();
         let mut sums = [0.0; LANES];
-        for (l, d) in lanes.iter().zip(sizes) {
-            (0..LANES).for_each(|w| sums[w] += l[w].wide() * l[w].wide() * d[w]);
+        for (l, d) in lanes.iter().zip(diagonal) {
+            (0..LANES).for_each(|w| sums[w] += l[w].wide() * l[w].wide() * d[w].abs());
         }
-        let rest = rest.iter().zip(last).map(|(l, d)| l.wide() * l.wide() * d);
+        let rest = rest.iter().zip(last).map(|(l, d)| l.wide() * l.wide() * d.abs());
         let squares = sums.iter().sum::<f64>() + rest.sum::<f64>();
         if !self.has_pairs {
             return squares;
