@@ -1,5 +1,7 @@
 //! The vector instructions of this machine.
 
+use pulp::Arch;
+
 /// The widest vector instructions that the kernels find here. Sums keep their order whatever they are.
 pub fn instruction_set() -> &'static str {
     #[cfg(target_arch = "x86_64")]
@@ -13,4 +15,14 @@ pub fn instruction_set() -> &'static str {
         }
     }
     "of the build alone"
+}
+
+/// The widest vector instructions whose vectors are not longer than rows of so many bytes, which the kernels then
+/// hold in whole vectors.
+pub(super) fn instructions_for_rows(bytes: usize) -> Arch {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(longer) if bytes < 64 => Arch::V3(*longer),
+        arch => arch,
+    }
 }

@@ -3,10 +3,11 @@
 //! together, read once from end to end. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL, Real, Trapezoid};
+use super::instructions::instructions_for_rows;
 use faer::traits::ComplexField;
 use faer::traits::math_utils::recip;
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
-use pulp::{Arch, Scalar, Simd, WithSimd};
+use pulp::{Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows of a piece of parallel work.
@@ -18,7 +19,7 @@ pub(super) const WORTH_TASKS: usize = 300_000;
 /// Forward substitution with the columns of a Cholesky factor: `front` holds a row of `K` right-hand sides
 /// for every row of the front; the leading rows become the solution, the others what is left for the parent.
 pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
-    let arch = Arch::new();
+    let arch = instructions_for_rows(size_of::<[T; K]>());
     for (p, panel) in l.panels.iter().enumerate() {
         let width = l.panel_width(p);
         let (x, below) = front[p * PANEL..].split_at_mut(width);
@@ -36,7 +37,7 @@ pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T
 
 /// Back substitution with the transpose for the leading rows of `front`; the rows below hold their solution.
 pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
-    let arch = Arch::new();
+    let arch = instructions_for_rows(size_of::<[T; K]>());
     for (p, panel) in l.panels.iter().enumerate().rev() {
         let width = l.panel_width(p);
         let (x, below) = front[p * PANEL..].split_at_mut(width);
@@ -64,22 +65,22 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
 
 /// y -= L x, L row by row.
 pub(super) fn subtract_product<const K: usize>(l: &[f64], x: &[[f64; K]], y: &mut [[f64; K]]) {
-    Arch::new().dispatch(Step::SubtractProduct(l, x, y));
+    instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SubtractProduct(l, x, y));
 }
 
 /// x -= L' y, L row by row.
 pub(super) fn subtract_transposed<const K: usize>(l: &[f64], y: &[[f64; K]], x: &mut [[f64; K]]) {
-    Arch::new().dispatch(Step::SubtractTransposed(l, y, x));
+    instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SubtractTransposed(l, y, x));
 }
 
 /// x <- L^-1 x for a square of the rows of a lower triangle.
 pub(super) fn solve_lower<const K: usize>(l: &[f64], x: &mut [[f64; K]]) {
-    Arch::new().dispatch(Step::SolveLower(l, x));
+    instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SolveLower(l, x));
 }
 
 /// x <- L^-T x for the same.
 pub(super) fn solve_transposed<const K: usize>(l: &[f64], x: &mut [[f64; K]]) {
-    Arch::new().dispatch(Step::SolveTransposed(l, x));
+    instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SolveTransposed(l, x));
 }
 
 /// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its
