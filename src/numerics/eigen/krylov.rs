@@ -237,9 +237,9 @@ impl<'a> Krylov<'a> {
         let mut b = Mat::<f64>::identity(width, width);
         counters.mass_columns += w.ncols() as u64;
         let mut mw = pencil.apply_mass(w.as_ref());
+        let mut norms = sizes(&gram(w.as_ref(), mw.as_ref()));
         for from in [reach, 0] {
             let basis = basis.subcols(from, self.size() - from);
-            let norms = sizes(&gram(w.as_ref(), mw.as_ref()));
             let rigid = gram(self.problem.rigid, mw.as_ref());
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
@@ -247,14 +247,15 @@ impl<'a> Krylov<'a> {
             let mut h = h.as_mut().subrows_mut(from, self.size() - from);
             h += combine(part.as_ref(), b.as_ref());
             counters.mass_columns += w.ncols() as u64;
-            mw = pencil.apply_mass(w.as_ref());
+            pencil.mass_times(w.as_ref(), mw.as_mut());
             let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
             let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &unseen)
                 .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
             if loses_digits(&t) {
                 counters.mass_columns += w.ncols() as u64;
-                mw = pencil.apply_mass(w.as_ref());
+                pencil.mass_times(w.as_ref(), mw.as_mut());
             }
+            norms = vec![1.0; w.ncols()];
             b = combine(t.as_ref(), b.as_ref());
         }
         let room = self.room();

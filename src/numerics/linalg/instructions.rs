@@ -26,3 +26,19 @@ pub(super) fn instructions_for_rows(bytes: usize) -> Arch {
         arch => arch,
     }
 }
+
+/// Asks the processor to bring the line at `address` into its cache; any address will do. (Reading ahead
+/// instead, in safe code, leaves solves with 4 columns at 0.63 of the speed.)
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(super) fn prefetch<T>(address: *const T) {
+    // SAFETY: a hint, of the instructions that every x86-64 has: nothing is read, and an address that nothing
+    // may be read from is ignored.
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(address.cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = address;
+}

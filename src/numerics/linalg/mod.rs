@@ -8,6 +8,7 @@ mod compensated_product;
 mod dense;
 mod elimination;
 mod factor;
+mod few_columns;
 mod front;
 mod indefinite;
 mod inertia;

@@ -3,7 +3,7 @@
 //! together, read once from end to end. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL, Real, Trapezoid};
-use super::instructions::instructions_for_rows;
+use super::instructions::{instructions_for_rows, prefetch};
 use faer::traits::ComplexField;
 use faer::traits::math_utils::recip;
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
@@ -127,22 +127,6 @@ fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
     for at in (from..from + R * STEP).step_by(64 / size_of::<T>()) {
         prefetch(l.as_ptr().wrapping_add(at));
     }
-}
-
-/// Asks the processor to bring the line at `address` into its cache; any address will do. (Reading ahead
-/// instead, in safe code, leaves solves with 4 columns at 0.63 of the speed.)
-#[inline(always)]
-#[allow(unsafe_code)]
-fn prefetch<T>(address: *const T) {
-    // SAFETY: a hint, of the instructions that every x86-64 has: nothing is read, and an address that nothing
-    // may be read from is ignored.
-    #[cfg(target_arch = "x86_64")]
-    unsafe {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_T0>(address.cast());
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = address;
 }
 
 /// The right-hand sides of a row.

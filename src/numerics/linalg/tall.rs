@@ -1,6 +1,7 @@
 //! Products of tall, skinny blocks (n x m, n large) with fixed partitions: partial results of fixed row
 //! chunks are added in a fixed order, so that the bits do not depend on the number of threads.
 
+use super::few_columns::{FEW, add_few_combinations, gram_of_few};
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
 use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
@@ -119,15 +120,12 @@ pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
         .map(|chunk| {
             let start = chunk * ROWS;
             let rows = ROWS.min(n - start);
+            let (a, b) = (a.subrows(start, rows), b.subrows(start, rows));
+            if b.ncols() <= FEW {
+                return gram_of_few(a, b);
+            }
             let mut part = Mat::zeros(a.ncols(), b.ncols());
-            matmul(
-                part.as_mut(),
-                Accum::Replace,
-                a.subrows(start, rows).transpose(),
-                b.subrows(start, rows),
-                1.0,
-                Par::Seq,
-            );
+            matmul(part.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
             part
         })
         .collect();
@@ -246,7 +244,7 @@ pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
     let chunks = v.nrows().div_ceil(ROWS);
     split_rows(v, chunks).into_par_iter().for_each(|mut part| {
         let mut combined = Mat::zeros(part.nrows(), h.ncols());
-        matmul(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0, Par::Seq);
+        add_product_of_rows(combined.as_mut(), Accum::Replace, part.as_ref(), h, 1.0);
         part.rb_mut().subcols_mut(0, h.ncols()).copy_from(combined);
     });
 }
@@ -281,9 +279,26 @@ fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'
     assert!(w.nrows() == v.nrows() && v.ncols() == h.nrows() && w.ncols() == h.ncols(), "tall product");
     let chunks = w.nrows().div_ceil(ROWS);
     split_rows(w, chunks).into_par_iter().enumerate().for_each(|(chunk, part)| {
-        let rows = part.nrows();
-        matmul(part, accum, v.subrows(chunk * ROWS, rows), h, alpha, Par::Seq);
+        let v = v.subrows(chunk * ROWS, part.nrows());
+        add_product_of_rows(part, accum, v, h, alpha);
     });
+}
+
+/// The same by one thread.
+fn add_product_of_rows(
+    mut w: MatMut<'_, f64>,
+    accum: Accum,
+    v: MatRef<'_, f64>,
+    h: MatRef<'_, f64>,
+    alpha: f64,
+) {
+    if w.ncols() > FEW {
+        return matmul(w, accum, v, h, alpha, Par::Seq);
+    }
+    if accum == Accum::Replace {
+        w.fill(0.0);
+    }
+    add_few_combinations(w, v, h, alpha);
 }
 
 /// Cuts a block into `chunks` pieces of [`ROWS`] rows (the last one shorter).

@@ -1,0 +1,348 @@
+//! Products of a tall block with a few columns, as orthogonalisation takes them. Nothing is packed first, as general
+//! matrix products do, which then take longer over that than over the products. Sums run over blocks of rows, and in
+//! these over lanes, in a fixed order.
+
+use super::instructions::prefetch;
+use super::tall::{contiguous, contiguous_mut};
+use faer::prelude::ReborrowMut;
+use faer::{Mat, MatMut, MatRef};
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::Range;
+
+/// Columns up to which these products are faster than general ones.
+pub(super) const FEW: usize = 8;
+
+/// Rows that are taken together: those of the few columns and of some of the others stay in the nearest cache.
+const ROWS: usize = 256;
+
+/// Columns of the tall block that are taken together: of a product, and of a combination.
+const TOGETHER: usize = 3;
+const COMBINED: usize = 4;
+
+/// A' B (m x k) for A (n x m) and a few columns B (n x k).
+pub(super) fn gram_of_few(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut sums = Mat::zeros(a.ncols(), b.ncols());
+    Arch::new().dispatch(Gram { a, b, sums: sums.as_mut() });
+    sums
+}
+
+/// W += alpha V H for V (n x m), a few columns W (n x k) and small H (m x k).
+pub(super) fn add_few_combinations(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
+    Arch::new().dispatch(Combination { w, v, h, alpha });
+}
+
+/// Blocks of rows.
+fn blocks(rows: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..rows).step_by(ROWS).map(move |first| first..rows.min(first + ROWS))
+}
+
+/// Numbers from the rows that are worked on, of some columns from `first` on, to those that come next: the same
+/// rows of the next columns, or the next rows of the first ones.
+fn ahead(a: MatRef<'_, f64>, first: usize, columns: usize) -> isize {
+    let next = if first + columns < a.ncols() { 0 } else { ROWS as isize };
+    let moved = if next == 0 { columns as isize } else { -(first as isize) };
+    moved * a.col_stride() + next
+}
+
+/// Some rows of the columns from `first` on.
+#[inline(always)]
+fn columns_of<'a, const N: usize>(a: MatRef<'a, f64>, first: usize, rows: &Range<usize>) -> [&'a [f64]; N] {
+    std::array::from_fn(|k| &contiguous(a.col(first + k))[rows.clone()])
+}
+
+/// Columns of equal length as vectors, and what is left of them.
+#[inline(always)]
+fn vectors<S: Simd, const N: usize>(columns: [&[f64]; N]) -> ([&[S::f64s]; N], [&[f64]; N]) {
+    let split = columns.map(S::as_simd_f64s);
+    let count = split[0].0.len();
+    (split.map(|(vectors, _)| &vectors[..count]), split.map(|(_, rest)| rest))
+}
+
+/// Whether the machine has registers for the sums of twice as many columns.
+fn has_long_vectors<S: Simd>() -> bool {
+    size_of::<S::f64s>() == 64
+}
+
+// What is dispatched are structures with loops, not closures, which may be compiled apart from the function that has
+// the instruction set.
+
+/// Adds A' B to the sums.
+struct Gram<'a> {
+    a: MatRef<'a, f64>,
+    b: MatRef<'a, f64>,
+    sums: MatMut<'a, f64>,
+}
+
+impl WithSimd for Gram<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let m = self.a.ncols();
+        for rows in blocks(self.a.nrows()) {
+            let mut first = 0;
+            while first < m {
+                if m - first >= TOGETHER {
+                    self.add_products::<S, TOGETHER>(simd, first, &rows);
+                    first += TOGETHER;
+                } else {
+                    self.add_products::<S, 1>(simd, first, &rows);
+                    first += 1;
+                }
+            }
+        }
+    }
+}
+
+impl Gram<'_> {
+    /// Adds the products of `A` columns, from the `first` on, with all of B.
+    #[inline(always)]
+    fn add_products<S: Simd, const A: usize>(&mut self, simd: S, first: usize, rows: &Range<usize>) {
+        let k = self.b.ncols();
+        let mut column = 0;
+        while column < k {
+            match k - column {
+                8.. if has_long_vectors::<S>() => {
+                    self.add_tile::<S, A, 8>(simd, first, column, rows);
+                    column += 8;
+                }
+                4.. => {
+                    self.add_tile::<S, A, 4>(simd, first, column, rows);
+                    column += 4;
+                }
+                _ => {
+                    self.add_tile::<S, A, 1>(simd, first, column, rows);
+                    column += 1;
+                }
+            }
+        }
+    }
+
+    /// The same with `B` columns.
+    #[inline(always)]
+    fn add_tile<S: Simd, const A: usize, const B: usize>(
+        &mut self,
+        simd: S,
+        first: usize,
+        column: usize,
+        rows: &Range<usize>,
+    ) {
+        let ahead = ahead(self.a, first, A);
+        let sums = products::<S, A, B>(
+            simd,
+            columns_of(self.a, first, rows),
+            columns_of(self.b, column, rows),
+            ahead,
+        );
+        for (q, sums) in sums.iter().enumerate() {
+            for (c, sum) in sums.iter().enumerate() {
+                self.sums[(first + q, column + c)] += sum;
+            }
+        }
+    }
+}
+
+/// Products of all pairs of columns of equal length. Asks for the numbers that are `ahead` of those of A.
+#[inline(always)]
+fn products<S: Simd, const A: usize, const B: usize>(
+    simd: S,
+    a: [&[f64]; A],
+    b: [&[f64]; B],
+    ahead: isize,
+) -> [[f64; B]; A] {
+    let (a_vectors, a_rest) = vectors::<S, A>(a);
+    let (b_vectors, b_rest) = vectors::<S, B>(b);
+    let mut sums = [[simd.splat_f64s(0.0); B]; A];
+    for i in 0..a_vectors[0].len() {
+        for a in &a_vectors {
+            prefetch_vectors(&a[i..=i], ahead);
+        }
+        for c in 0..B {
+            let b = b_vectors[c][i];
+            for q in 0..A {
+                sums[q][c] = simd.mul_add_f64s(a_vectors[q][i], b, sums[q][c]);
+            }
+        }
+    }
+    let mut totals = [[0.0; B]; A];
+    for q in 0..A {
+        for c in 0..B {
+            totals[q][c] = simd.reduce_sum_f64s(sums[q][c]);
+            for (a, b) in a_rest[q].iter().zip(b_rest[c]) {
+                totals[q][c] += a * b;
+            }
+        }
+    }
+    totals
+}
+
+/// W += alpha V H.
+struct Combination<'a> {
+    w: MatMut<'a, f64>,
+    v: MatRef<'a, f64>,
+    h: MatRef<'a, f64>,
+    alpha: f64,
+}
+
+impl WithSimd for Combination<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let m = self.v.ncols();
+        for rows in blocks(self.v.nrows()) {
+            let mut first = 0;
+            while first < m {
+                if m - first >= COMBINED {
+                    self.add_multiples::<S, COMBINED>(simd, first, &rows);
+                    first += COMBINED;
+                } else {
+                    self.add_multiples::<S, 1>(simd, first, &rows);
+                    first += 1;
+                }
+            }
+        }
+    }
+}
+
+impl Combination<'_> {
+    /// Adds what `V` columns, from the `first` on, contribute to all of W.
+    #[inline(always)]
+    fn add_multiples<S: Simd, const V: usize>(&mut self, simd: S, first: usize, rows: &Range<usize>) {
+        let k = self.w.ncols();
+        let mut column = 0;
+        while column < k {
+            match k - column {
+                8.. if has_long_vectors::<S>() => {
+                    self.add_tile::<S, V, 8>(simd, first, column, rows);
+                    column += 8;
+                }
+                4.. => {
+                    self.add_tile::<S, V, 4>(simd, first, column, rows);
+                    column += 4;
+                }
+                _ => {
+                    self.add_tile::<S, V, 1>(simd, first, column, rows);
+                    column += 1;
+                }
+            }
+        }
+    }
+
+    /// The same to `W` columns.
+    #[inline(always)]
+    fn add_tile<S: Simd, const V: usize, const W: usize>(
+        &mut self,
+        simd: S,
+        first: usize,
+        column: usize,
+        rows: &Range<usize>,
+    ) {
+        let factors: [[f64; W]; V] =
+            std::array::from_fn(|q| std::array::from_fn(|c| self.alpha * self.h[(first + q, column + c)]));
+        let ahead = ahead(self.v, first, V);
+        let v = columns_of::<V>(self.v, first, rows);
+        let mut own = self.w.rb_mut().subcols_mut(column, W).col_iter_mut();
+        let w = [(); W].map(|()| &mut contiguous_mut(own.next().expect("so many columns"))[rows.clone()]);
+        add_multiples::<S, V, W>(simd, w, v, &factors, ahead);
+    }
+}
+
+/// W += V factors for columns of equal length. Asks for the numbers that are `ahead` of those of V.
+#[inline(always)]
+fn add_multiples<S: Simd, const V: usize, const W: usize>(
+    simd: S,
+    w: [&mut [f64]; W],
+    v: [&[f64]; V],
+    factors: &[[f64; W]; V],
+    ahead: isize,
+) {
+    let (v_vectors, v_rest) = vectors::<S, V>(v);
+    let (v_pairs, v_odd) = chunks(v_vectors);
+    let (mut w_pairs, mut w_odd) = ([(); W].map(|()| &mut [][..]), [(); W].map(|()| &mut [][..]));
+    let mut w_rest = [(); W].map(|()| &mut [][..]);
+    for (c, w) in w.into_iter().enumerate() {
+        let (vectors, rest) = S::as_mut_simd_f64s(w);
+        let (pairs, odd) = vectors.as_chunks_mut::<2>();
+        (w_pairs[c], w_odd[c], w_rest[c]) = (pairs, odd.as_chunks_mut::<1>().0, rest);
+    }
+    add_to_vectors::<S, 2, V, W>(simd, w_pairs, v_pairs, factors, ahead);
+    add_to_vectors::<S, 1, V, W>(simd, w_odd, v_odd.map(|odd| odd.as_chunks().0), factors, ahead);
+    for (c, w) in w_rest.iter_mut().enumerate() {
+        for (i, w) in w.iter_mut().enumerate() {
+            for q in 0..V {
+                *w += factors[q][c] * v_rest[q][i];
+            }
+        }
+    }
+}
+
+/// Columns of vectors as pairs, and what is left of them.
+#[inline(always)]
+fn chunks<V, const N: usize>(columns: [&[V]; N]) -> ([&[[V; 2]]; N], [&[V]; N]) {
+    let split = columns.map(<[V]>::as_chunks);
+    (split.map(|(pairs, _)| pairs), split.map(|(_, odd)| odd))
+}
+
+/// The same for groups of `R` vectors, whose sums are in work together.
+#[inline(always)]
+fn add_to_vectors<S: Simd, const R: usize, const V: usize, const W: usize>(
+    simd: S,
+    w: [&mut [[S::f64s; R]]; W],
+    v: [&[[S::f64s; R]]; V],
+    factors: &[[f64; W]; V],
+    ahead: isize,
+) {
+    let count = v[0].len();
+    let v = v.map(|v| &v[..count]);
+    for i in 0..count {
+        v.iter().for_each(|v| prefetch_vectors(&v[i], ahead));
+        let mut sums: [[S::f64s; R]; W] = std::array::from_fn(|c| w[c][i]);
+        for q in 0..V {
+            for c in 0..W {
+                let factor = simd.splat_f64s(factors[q][c]);
+                for r in 0..R {
+                    sums[c][r] = simd.mul_add_f64s(factor, v[q][i][r], sums[c][r]);
+                }
+            }
+        }
+        for c in 0..W {
+            w[c][i] = sums[c];
+        }
+    }
+}
+
+/// Asks for the numbers that are `ahead` of some vectors.
+#[inline(always)]
+fn prefetch_vectors<V>(vectors: &[V], ahead: isize) {
+    for vector in vectors {
+        prefetch((&raw const *vector).cast::<f64>().wrapping_offset(ahead));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(rows: usize, columns: usize, seed: f64) -> Mat<f64> {
+        Mat::from_fn(rows, columns, |i, j| (seed + (i * 7 + j * 13) as f64).sin())
+    }
+
+    /// Both products against their definition, with whole and begun vectors, tiles and blocks of rows.
+    #[test]
+    fn products_with_a_few_columns_match_their_definition() {
+        for rows in [0, 1, 7, 8, 29, ROWS, ROWS + 21] {
+            for (m, k) in [(0, 2), (1, 1), (2, 3), (3, 4), (7, 5), (8, 8), (13, 8)] {
+                let (a, b) = (block(rows, m, 0.3), block(rows, k, 1.7));
+                let gram = gram_of_few(a.as_ref(), b.as_ref());
+                let off = (&gram - a.transpose() * &b).norm_max();
+                assert!(off <= 1e-12, "{rows} rows, {m} and {k} columns: {off:e}");
+                let h = block(m, k, 2.9);
+                let mut w = b.clone();
+                add_few_combinations(w.as_mut(), a.as_ref(), h.as_ref(), -0.5);
+                let off = (&w - (&b - faer::Scale(0.5) * (&a * &h))).norm_max();
+                assert!(off <= 1e-13, "{rows} rows, {m} and {k} columns: {off:e}");
+            }
+        }
+    }
+}
