@@ -13,8 +13,11 @@ use crate::numerics::eigen::{
     Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted,
     energy_noise, planned_bytes, solve,
 };
-use crate::numerics::linalg::{Pencil, combine, gram, subtract_combination, symmetric_eigen};
+use crate::numerics::linalg::{
+    Pencil, Tall, combine, contiguous_mut, gram, subtract_combination, symmetric_eigen,
+};
 use faer::{Mat, MatRef};
+use rayon::prelude::*;
 
 /// Columns that are multiplied by K or M at a time where only products with others are wanted: as many as the
 /// product itself takes.
@@ -230,42 +233,43 @@ const CUBIC: &[&[usize]] = &[
     &[0, 1, 2],
 ];
 
-/// Fields with a monomial as their component along each axis; nodal rotations are half the curl of the field.
-fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Mat<f64> {
+/// Fields with a monomial as their component along each axis; nodal rotations are half the curl of the field. Made
+/// side by side.
+fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Tall {
     let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
     let d = model.dimension();
-    let mut fields = Mat::zeros(n, monomials.len() * d);
-    let local = |i: usize| [0, 1, 2].map(|k| (positions[i][k] - centre[k]) / length);
-    for i in 0..positions.len() {
-        let r = local(i);
-        for (e, monomial) in monomials.iter().enumerate() {
-            let value = monomial.iter().map(|&k| r[k]).product();
-            (0..d).for_each(|k| fields[(d * i + k, d * e + k)] = value);
-        }
-    }
+    let local: Vec<[f64; 3]> =
+        positions.iter().map(|r| [0, 1, 2].map(|k| (r[k] - centre[k]) / length)).collect();
     let rows = model.rows();
-    for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
-        let r = local(node as usize);
-        let (l, m) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
-        for (e, monomial) in monomials.iter().enumerate() {
-            let slope = |p: usize| {
-                let without = |at: usize| -> f64 {
-                    let others = monomial.iter().enumerate().filter(|(other, _)| *other != at);
-                    others.map(|(_, &k)| r[k]).product()
-                };
-                let factors = (0..monomial.len()).filter(|&at| monomial[at] == p);
-                factors.map(without).sum::<f64>() / length
-            };
-            // (curl v e_k) along (k, l, m) cyclic: dv/dl along m for k = m, -dv/dm for k = l.
-            for (k, curl) in [(m, slope(l)), (l, -slope(m))] {
-                if k < d {
-                    fields[(row, d * e + k)] = 0.5 * curl;
-                }
+    let rotations = rows.displacements()..;
+    let mut fields = Tall::zeros(n, monomials.len() * d);
+    let columns: Vec<&mut [f64]> = fields.as_mut().col_iter_mut().map(contiguous_mut).collect();
+    columns.into_par_iter().enumerate().for_each(|(column, field)| {
+        let (monomial, component) = (monomials[column / d], column % d);
+        for (r, at) in local.iter().zip((component..).step_by(d)) {
+            field[at] = monomial.iter().map(|&k| r[k]).product();
+        }
+        for (row, &(node, axis)) in rotations.clone().zip(rows.rotations()) {
+            let slope = |along: usize| slope(monomial, &local[node as usize], along) / length;
+            let (next, after) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
+            // (curl u) along an axis = d u_after / d next - d u_next / d after.
+            if component == after {
+                field[row] = 0.5 * slope(next);
+            } else if component == next {
+                field[row] = -0.5 * slope(after);
             }
         }
-    }
+    });
     fields
+}
+
+/// The derivative of a monomial along an axis.
+fn slope(monomial: &[usize], r: &[f64; 3], along: usize) -> f64 {
+    let without = |at: usize| -> f64 {
+        monomial.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, &k)| r[k]).product()
+    };
+    (0..monomial.len()).filter(|&at| monomial[at] == along).map(without).sum()
 }
 
 /// The Rayleigh quotient of a field, where that is more than rounding of the stiffness makes of it.

@@ -16,7 +16,7 @@ const LEAST_LEFT: f64 = 0.01;
 const BELOW_ALLOWED: f64 = 0.3;
 
 /// Pairs that cycles correct, filled up to a multiple: with those above the wanted ones the last of these converge
-/// sooner.
+/// sooner. The few that are poor at the end take fewer steps than those that would fill them up.
 const FILLED: usize = 8;
 
 #[derive(Clone, Copy)]
@@ -46,11 +46,11 @@ impl Corrector<'_> {
         }
     }
 
-    /// A multiple that the number of pairs is filled up to.
-    pub(super) fn width(self) -> usize {
+    /// The number of pairs that is corrected where so many are poor.
+    pub(super) fn filled(self, poor: usize) -> usize {
         match self {
-            Self::Factor(_) => 1,
-            Self::Levels(_) => FILLED,
+            Self::Levels(_) if poor >= FILLED => poor.next_multiple_of(FILLED),
+            _ => poor,
         }
     }
 

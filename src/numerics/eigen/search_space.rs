@@ -136,6 +136,13 @@ impl<'a> SearchSpace<'a> {
         combine(self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()))
     }
 
+    /// The same, made by all threads.
+    pub(super) fn some_vectors(&self, which: Range<usize>) -> Tall {
+        let mut own = Tall::zeros(self.problem.pencil.n(), which.len());
+        combine_into(own.as_mut(), self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()));
+        own
+    }
+
     /// What some Ritz pairs leave unbalanced, K x - lambda M x, and its norm beside |K x| + |lambda M x|.
     pub(super) fn unbalanced(&mut self, which: Range<usize>) -> (Tall, Vec<f64>) {
         let Self { problem, kx, mx, lambda, ritz, work, .. } = self;

@@ -175,9 +175,9 @@ impl<'a> Correction<'a> {
         self.wanted = cluster_end(self.wanted, lambda.len(), goal.cluster_gap, |i| lambda[i]);
         let looked = (self.wanted + 1).min(lambda.len());
         if self.floors.len() < looked {
-            let lowest = space.vectors(0..looked);
+            let lowest = space.some_vectors(0..looked);
             self.floors = residuals(problem, &lambda[..looked], lowest.as_ref(), counters).1;
-            self.size = size_along(problem, lambda[looked - 1], lowest.col(looked - 1));
+            self.size = size_along(problem, lambda[looked - 1], lowest.as_ref().col(looked - 1));
         }
         space.unbalanced(0..looked)
     }
@@ -241,7 +241,7 @@ impl<'a> Correction<'a> {
     fn correct(&mut self, forces: &Tall, poor: &[Pair], counters: &mut Counters) -> Result<(), EigenFailure> {
         let Self { corrector, space, base, .. } = self;
         let looked = forces.ncols();
-        let filled = poor.len().next_multiple_of(corrector.width()) - poor.len();
+        let filled = corrector.filled(poor.len()) - poor.len();
         let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
         let later = relative.iter().zip(looked..);
         let later = later.map(|(&residual, number)| Pair { number, residual, allowed: BEYOND });

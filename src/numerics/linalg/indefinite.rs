@@ -9,8 +9,9 @@ use super::random::normal;
 use super::substitution::{
     WORTH_TASKS, solve_lower, solve_transposed, subtract_product, subtract_transposed,
 };
+use super::tall::{Tall, column_norms, contiguous_mut, subtract_columns};
+use faer::MatMut;
 use faer::prelude::ReborrowMut;
-use faer::{Mat, MatMut};
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -79,16 +80,20 @@ impl<'a, T: Real> Indefinite<'a, T> {
     /// The norm that was measured, times [`MARGIN`]; `None` where none of the powers is small enough.
     pub fn perturbation(&self, pencil: &Pencil<'_>) -> Option<f64> {
         let n = pencil.n();
-        let scale = |i: usize| self.scale[i];
-        let mut z = Mat::from_fn(n, COLUMNS, |i, j| normal(i as u64, j as u64));
+        let [mut z, mut x, mut product, mut heavy] = [(); 4].map(|()| Tall::zeros(n, COLUMNS));
+        for_columns(&mut z, |i, j, z| *z = normal(i as u64, j as u64));
         let mut before = f64::INFINITY;
         for _ in 0..POWERS {
-            let x = Mat::from_fn(n, COLUMNS, |i, j| scale(i) * z[(i, j)]);
-            let mut product = pencil.apply_stiffness(x.as_ref());
-            product -= pencil.apply_mass(x.as_ref()) * faer::Scale(self.sigma);
+            let (given, scale) = (z.as_ref(), &self.scale);
+            for_columns(&mut x, |i, j, x| *x = scale[i] * given[(i, j)]);
+            pencil.stiffness_times(x.as_ref(), product.as_mut());
+            pencil.mass_times(x.as_ref(), heavy.as_mut());
+            subtract_columns(product.as_mut(), &[self.sigma; COLUMNS], heavy.as_ref());
             self.solve_in_place(product.as_mut());
-            z = Mat::from_fn(n, COLUMNS, |i, j| z[(i, j)] - product[(i, j)] / scale(i));
-            let bound = MARGIN * z.squared_norm_l2().sqrt() / (COLUMNS as f64).sqrt();
+            let solved = product.as_ref();
+            for_columns(&mut z, |i, j, z| *z -= solved[(i, j)] / scale[i]);
+            let squares = column_norms(z.as_ref()).into_iter().map(|norm| norm * norm);
+            let bound = MARGIN * (squares.sum::<f64>() / COLUMNS as f64).sqrt();
             if bound < 1.0 {
                 return Some(bound);
             }
@@ -101,6 +106,14 @@ impl<'a, T: Real> Indefinite<'a, T> {
         }
         None
     }
+}
+
+/// Calls `change` with row, column and entry of a block, its columns side by side.
+fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync) {
+    let columns: Vec<_> = block.as_mut().col_iter_mut().map(contiguous_mut).collect();
+    columns.into_par_iter().enumerate().for_each(|(j, column)| {
+        column.iter_mut().enumerate().for_each(|(i, entry)| change(i, j, entry));
+    });
 }
 
 /// See [`Indefinite::perturbation`]: the probability that the mean square of eight normal numbers is less

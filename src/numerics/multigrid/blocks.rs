@@ -32,17 +32,28 @@ pub(super) struct BlockMatrix<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> BlockMatrix<R, C> {
+    /// The rows one after the other, copied by all threads.
     pub(super) fn from_rows(rows: Vec<Entries<R, C>>) -> Self {
+        let mut pointers = vec![0];
+        pointers.extend(rows.iter().scan(0, |end, row| {
+            *end += row.len();
+            Some(*end)
+        }));
         let entries = rows.iter().map(Vec::len).sum();
-        let (mut pointers, mut columns) = (vec![0], Vec::with_capacity(entries));
-        let mut blocks = Vec::with_capacity(entries);
-        for row in rows {
-            for (column, block) in row {
-                columns.push(column);
-                blocks.push(block);
-            }
-            pointers.push(columns.len());
+        let (mut columns, mut blocks) = (vec![0; entries], vec![[[0.0; C]; R]; entries]);
+        let (mut free_columns, mut free_blocks) = (&mut columns[..], &mut blocks[..]);
+        let mut places = Vec::with_capacity(rows.len());
+        for row in &rows {
+            let (own_columns, own_blocks);
+            (own_columns, free_columns) = free_columns.split_at_mut(row.len());
+            (own_blocks, free_blocks) = free_blocks.split_at_mut(row.len());
+            places.push((own_columns, own_blocks));
         }
+        rows.into_par_iter().zip(places).with_min_len(NODES).for_each(|(row, (columns, blocks))| {
+            for ((entry, column), block) in row.into_iter().zip(columns).zip(blocks) {
+                (*column, *block) = entry;
+            }
+        });
         Self { pointers, columns, blocks }
     }
 
