@@ -11,9 +11,10 @@ use std::ops::Range;
 /// together.
 pub const CLUSTER_GAP: f64 = 1e-9;
 
-/// Components within this part of the largest count as equally large; the first of them in row order is
-/// taken, so that rounding does not choose between symmetric nodes.
-const EQUAL: f64 = 1e-6;
+/// Components whose squares are within this part of the largest count as equally large; the first of them in row order
+/// is taken, so that neither rounding nor what [`Accuracy::Fast`](super::Accuracy::Fast) leaves chooses between
+/// symmetric nodes.
+const EQUAL: f64 = 1e-4;
 
 /// Index ranges of eigenvalues (ascending) whose neighbours differ by at most `gap` relative to their size.
 pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
