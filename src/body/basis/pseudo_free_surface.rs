@@ -196,7 +196,7 @@ impl Independent {
             notes.push(Diagnostic::new(Code::ShapesDependent, message));
         }
         if !self.dependent.is_empty() {
-            let left = |&(j, left): &(usize, f64)| format!("{} ({left:.0e})", name(j));
+            let left = |&(j, left): &(usize, f64)| format!("{} ({})", name(j), part_in_words(left));
             let which = named(self.dependent.iter().map(left).collect());
             let message = format!(
                 "{} of {all} {what} depend on those before them (less than {criterion:.0e} of the M-norm is left) and are left out: {which}",
@@ -206,6 +206,11 @@ impl Independent {
         }
         notes
     }
+}
+
+/// The part that is left of a norm, as messages name it: that below the rounding of one has no digits.
+pub(super) fn part_in_words(left: f64) -> String {
+    if left < f64::EPSILON { "rounding".to_owned() } else { format!("{left:.0e}") }
 }
 
 /// `a, b, c`, or `a, b, c, d, e and 7 more`.

@@ -5,7 +5,7 @@ use super::columns::columns;
 use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::modal_basis::{ModalBasis, problem_of_span};
-use super::pseudo_free_surface::independent;
+use super::pseudo_free_surface::{independent, part_in_words};
 use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -393,8 +393,6 @@ impl<'a> Responses<'a> {
     /// What the modes lack, M-orthonormalised against them; `None` when M is indefinite.
     fn added(&self, problem: &EigenProblem<'_>, modes: MatRef<'_, f64>) -> Option<Added> {
         let names = &self.loads.names;
-        let part =
-            |left: f64| if left < f64::EPSILON { "rounding".to_owned() } else { format!("{left:.0e}") };
         let mut dropped: Vec<String> = Vec::new();
         let mut used = Vec::new();
         for (j, name) in names.iter().enumerate() {
@@ -402,7 +400,7 @@ impl<'a> Responses<'a> {
             if !self.deforms[j] {
                 dropped.push(format!("{name} (deforms nothing)"));
             } else if left.sqrt() < LEFT * self.mass[j].sqrt() {
-                dropped.push(format!("{name} ({})", part((left / self.mass[j]).sqrt())));
+                dropped.push(format!("{name} ({})", part_in_words((left / self.mass[j]).sqrt())));
             } else {
                 used.push(j);
             }
@@ -411,7 +409,9 @@ impl<'a> Responses<'a> {
         let known = side_by_side(&[problem.rigid, modes]);
         let found = independent(&problem.pencil, known.as_ref(), candidates, LEFT)?;
         let name = |j: usize| &names[used[j]];
-        dropped.extend(found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), part(left))));
+        dropped.extend(
+            found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), part_in_words(left))),
+        );
         dropped.extend(found.massless.iter().map(|&j| format!("{} (moves no mass)", name(j))));
         dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
         let kept = found.kept.iter().map(|&j| used[j]).collect();

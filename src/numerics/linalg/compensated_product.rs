@@ -2,7 +2,7 @@
 
 use super::SymmetricMatrix;
 use super::compensated::{DoubleDouble, accumulate, accumulate_pair, with_fma};
-use super::tall::contiguous;
+use super::contiguous::contiguous;
 use faer::MatRef;
 use rayon::prelude::*;
 

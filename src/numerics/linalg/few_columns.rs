@@ -2,8 +2,8 @@
 //! matrix products do, which then take longer over that than over the products. Sums run over blocks of rows, and in
 //! these over lanes, in a fixed order.
 
+use super::contiguous::{contiguous, contiguous_mut};
 use super::instructions::prefetch;
-use super::tall::{contiguous, contiguous_mut};
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};

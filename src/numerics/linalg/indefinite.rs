@@ -2,6 +2,7 @@
 //! stiffness at a frequency; and in single precision, to count with.
 
 use super::Pencil;
+use super::contiguous::contiguous_mut;
 use super::factor::{Analysis, COLUMNS, substitute};
 use super::front::{PANEL, ROWS, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
@@ -9,7 +10,7 @@ use super::random::normal;
 use super::substitution::{
     WORTH_TASKS, solve_lower, solve_transposed, subtract_product, subtract_transposed,
 };
-use super::tall::{Tall, column_norms, contiguous_mut, subtract_columns};
+use super::tall::{Tall, column_norms, subtract_columns};
 use faer::MatMut;
 use faer::prelude::ReborrowMut;
 use rayon::prelude::*;

@@ -5,6 +5,7 @@ mod assembly_tree;
 mod compensated;
 mod compensated_pencil;
 mod compensated_product;
+mod contiguous;
 mod dense;
 mod elimination;
 mod factor;
@@ -31,6 +32,7 @@ pub use compensated_pencil::{SmallEigen, small_pencil};
 pub use compensated_product::{
     CompensatedBlock, LANES, gram_compensated, multiply_compensated, projection_compensated, sum_length,
 };
+pub(crate) use contiguous::contiguous_mut;
 pub use dense::{SymmetricEigen, dense_cholesky, dense_inverse, solve_lower, solve_upper, symmetric_eigen};
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, CoupledRows, Peaks, Solve, is_positive_semidefinite};
@@ -48,7 +50,6 @@ pub use random::uniform;
 pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use stored::Stored;
-pub(crate) use tall::contiguous_mut;
 pub use tall::{
     Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, divide,
     gram, side_by_side, subtract_columns, subtract_combination, weighted_square,

@@ -5,7 +5,7 @@
 //! result row is one sum in storage order: the same bits at any thread count.
 
 use super::SymmetricMatrix;
-use super::tall::{contiguous, contiguous_mut};
+use super::contiguous::{contiguous, contiguous_mut};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};

@@ -1,6 +1,7 @@
 //! Products of tall, skinny blocks (n x m, n large) with fixed partitions: partial results of fixed row
 //! chunks are added in a fixed order, so that the bits do not depend on the number of threads.
 
+use super::contiguous::{contiguous, contiguous_mut};
 use super::few_columns::{FEW, add_few_combinations, gram_of_few};
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
@@ -177,16 +178,6 @@ pub fn weighted_square(x: ColRef<'_, f64>, weights: &[f64]) -> f64 {
 /// x /= size.
 pub fn divide(x: ColMut<'_, f64>, size: f64) {
     contiguous_mut(x).par_chunks_mut(ROWS).for_each(|x| x.iter_mut().for_each(|x| *x /= size));
-}
-
-/// A column as a slice: every block in this crate is column-major.
-pub(crate) fn contiguous(column: ColRef<'_, f64>) -> &[f64] {
-    column.try_as_col_major().expect("blocks are column-major").as_slice()
-}
-
-/// The same, to be written.
-pub(crate) fn contiguous_mut(column: ColMut<'_, f64>) -> &mut [f64] {
-    column.try_as_col_major_mut().expect("blocks are column-major").as_slice_mut()
 }
 
 /// Sum of equal-shaped matrices, pairwise: error grows with the logarithm of their number.
