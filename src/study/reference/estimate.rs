@@ -52,7 +52,7 @@ impl ReferenceError {
             return None;
         }
         let message = format!(
-            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.3e}",
+            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.2e}",
             self.modes,
             100.0 * self.worst,
             self.time
