@@ -22,13 +22,13 @@ const COMBINED: usize = 4;
 /// A' B (m x k) for A (n x m) and a few columns B (n x k).
 pub(super) fn gram_of_few(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut sums = Mat::zeros(a.ncols(), b.ncols());
-    Arch::new().dispatch(Gram { a, b, sums: sums.as_mut() });
+    Arch::new().dispatch(Tiles::<_, TOGETHER>(Gram { a, b, sums: sums.as_mut() }));
     sums
 }
 
 /// W += alpha V H for V (n x m), a few columns W (n x k) and small H (m x k).
 pub(super) fn add_few_combinations(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
-    Arch::new().dispatch(Combination { w, v, h, alpha });
+    Arch::new().dispatch(Tiles::<_, COMBINED>(Combination { w, v, h, alpha }));
 }
 
 /// Blocks of rows.
@@ -63,8 +63,76 @@ fn has_long_vectors<S: Simd>() -> bool {
     size_of::<S::f64s>() == 64
 }
 
+/// A product of a tall block with a few columns, made tile by tile.
+trait Tiled {
+    /// The tall block.
+    fn tall(&self) -> MatRef<'_, f64>;
+
+    /// How many the few columns are.
+    fn few(&self) -> usize;
+
+    /// Adds what `A` columns of the tall block, from the `first` on, and `B` of the few, from `column` on, contribute
+    /// over some rows.
+    fn add_tile<S: Simd, const A: usize, const B: usize>(
+        &mut self,
+        simd: S,
+        first: usize,
+        column: usize,
+        rows: &Range<usize>,
+    );
+}
+
+/// All tiles, with `G` columns of the tall block where there are so many left, and as many of the few as the sums have
+/// registers for.
+struct Tiles<T, const G: usize>(T);
+
 // What is dispatched are structures with loops, not closures, which may be compiled apart from the function that has
 // the instruction set.
+impl<T: Tiled, const G: usize> WithSimd for Tiles<T, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let (n, m) = self.0.tall().shape();
+        for rows in blocks(n) {
+            let mut first = 0;
+            while first < m {
+                if m - first >= G {
+                    self.add_columns::<S, G>(simd, first, &rows);
+                    first += G;
+                } else {
+                    self.add_columns::<S, 1>(simd, first, &rows);
+                    first += 1;
+                }
+            }
+        }
+    }
+}
+
+impl<T: Tiled, const G: usize> Tiles<T, G> {
+    /// The tiles of `A` columns of the tall block with all of the few.
+    #[inline(always)]
+    fn add_columns<S: Simd, const A: usize>(&mut self, simd: S, first: usize, rows: &Range<usize>) {
+        let k = self.0.few();
+        let mut column = 0;
+        while column < k {
+            match k - column {
+                8.. if has_long_vectors::<S>() => {
+                    self.0.add_tile::<S, A, 8>(simd, first, column, rows);
+                    column += 8;
+                }
+                4.. => {
+                    self.0.add_tile::<S, A, 4>(simd, first, column, rows);
+                    column += 4;
+                }
+                _ => {
+                    self.0.add_tile::<S, A, 1>(simd, first, column, rows);
+                    column += 1;
+                }
+            }
+        }
+    }
+}
 
 /// Adds A' B to the sums.
 struct Gram<'a> {
@@ -73,52 +141,15 @@ struct Gram<'a> {
     sums: MatMut<'a, f64>,
 }
 
-impl WithSimd for Gram<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        let m = self.a.ncols();
-        for rows in blocks(self.a.nrows()) {
-            let mut first = 0;
-            while first < m {
-                if m - first >= TOGETHER {
-                    self.add_products::<S, TOGETHER>(simd, first, &rows);
-                    first += TOGETHER;
-                } else {
-                    self.add_products::<S, 1>(simd, first, &rows);
-                    first += 1;
-                }
-            }
-        }
-    }
-}
-
-impl Gram<'_> {
-    /// Adds the products of `A` columns, from the `first` on, with all of B.
-    #[inline(always)]
-    fn add_products<S: Simd, const A: usize>(&mut self, simd: S, first: usize, rows: &Range<usize>) {
-        let k = self.b.ncols();
-        let mut column = 0;
-        while column < k {
-            match k - column {
-                8.. if has_long_vectors::<S>() => {
-                    self.add_tile::<S, A, 8>(simd, first, column, rows);
-                    column += 8;
-                }
-                4.. => {
-                    self.add_tile::<S, A, 4>(simd, first, column, rows);
-                    column += 4;
-                }
-                _ => {
-                    self.add_tile::<S, A, 1>(simd, first, column, rows);
-                    column += 1;
-                }
-            }
-        }
+impl Tiled for Gram<'_> {
+    fn tall(&self) -> MatRef<'_, f64> {
+        self.a
     }
 
-    /// The same with `B` columns.
+    fn few(&self) -> usize {
+        self.b.ncols()
+    }
+
     #[inline(always)]
     fn add_tile<S: Simd, const A: usize, const B: usize>(
         &mut self,
@@ -184,52 +215,15 @@ struct Combination<'a> {
     alpha: f64,
 }
 
-impl WithSimd for Combination<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        let m = self.v.ncols();
-        for rows in blocks(self.v.nrows()) {
-            let mut first = 0;
-            while first < m {
-                if m - first >= COMBINED {
-                    self.add_multiples::<S, COMBINED>(simd, first, &rows);
-                    first += COMBINED;
-                } else {
-                    self.add_multiples::<S, 1>(simd, first, &rows);
-                    first += 1;
-                }
-            }
-        }
-    }
-}
-
-impl Combination<'_> {
-    /// Adds what `V` columns, from the `first` on, contribute to all of W.
-    #[inline(always)]
-    fn add_multiples<S: Simd, const V: usize>(&mut self, simd: S, first: usize, rows: &Range<usize>) {
-        let k = self.w.ncols();
-        let mut column = 0;
-        while column < k {
-            match k - column {
-                8.. if has_long_vectors::<S>() => {
-                    self.add_tile::<S, V, 8>(simd, first, column, rows);
-                    column += 8;
-                }
-                4.. => {
-                    self.add_tile::<S, V, 4>(simd, first, column, rows);
-                    column += 4;
-                }
-                _ => {
-                    self.add_tile::<S, V, 1>(simd, first, column, rows);
-                    column += 1;
-                }
-            }
-        }
+impl Tiled for Combination<'_> {
+    fn tall(&self) -> MatRef<'_, f64> {
+        self.v
     }
 
-    /// The same to `W` columns.
+    fn few(&self) -> usize {
+        self.w.ncols()
+    }
+
     #[inline(always)]
     fn add_tile<S: Simd, const V: usize, const W: usize>(
         &mut self,
