@@ -4,7 +4,7 @@ use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
 use crate::numerics::linalg::{
-    Solve, Tall, combine, combine_in_place, dense_cholesky, divide, gram, solve_upper, subtract_combination,
+    Solve, Tall, combine, combine_in_place, dense_cholesky, divide, full_qr, gram, solve_upper, subtract_combination,
     uniform, weighted_square,
 };
 use faer::prelude::{IntoConst, ReborrowMut};
@@ -27,7 +27,6 @@ const LEAST_KEPT: f64 = 0.1;
 /// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
-    factor: &'a dyn Solve,
     v: Tall,
     /// Has as many rows as the basis may have vectors.
     t: Mat<f64>,
@@ -54,11 +53,10 @@ struct Block {
 
 impl<'a> Krylov<'a> {
     /// An empty basis for at most `capacity` vectors.
-    pub(super) fn new(problem: &'a EigenProblem<'a>, factor: &'a dyn Solve, capacity: usize) -> Self {
+    pub(super) fn new(problem: &'a EigenProblem<'a>, capacity: usize) -> Self {
         let n = problem.pencil.n();
         Self {
             problem,
-            factor,
             v: Tall::with_room(n, capacity),
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
@@ -137,7 +135,7 @@ impl<'a> Krylov<'a> {
 
     /// Appends a deterministic random block of `width` columns, filtered by one application of the operator,
     /// which removes what a singular M does not see.
-    pub(super) fn append_random(&mut self, width: usize, counters: &mut Counters) {
+    pub(super) fn append_random(&mut self, width: usize, factor: &dyn Solve, counters: &mut Counters) {
         let n = self.problem.pencil.n();
         let seed = self.random;
         self.random += 1;
@@ -148,17 +146,17 @@ impl<'a> Krylov<'a> {
         counters.mass_columns += width as u64;
         let mut y = self.problem.pencil.apply_mass(x.as_ref());
         counters.solved_columns += width as u64;
-        self.factor.solve_in_place(y.as_mut());
+        factor.solve_in_place(y.as_mut());
         self.append(y, counters);
     }
 
     /// One Lanczos step: applies the operator to the newest block and appends what is new.
-    pub(super) fn step(&mut self, counters: &mut Counters) {
+    pub(super) fn step(&mut self, factor: &dyn Solve, counters: &mut Counters) {
         let old = self.fresh;
         let at = self.size() - old;
         let mut w = std::mem::replace(&mut self.m_fresh, Mat::zeros(0, 0));
         counters.solved_columns += old as u64;
-        self.factor.solve_in_place(w.as_mut());
+        factor.solve_in_place(w.as_mut());
         let block = self.orthonormalise(w, self.reach, counters);
         self.reach = at;
         for j in 0..old {
@@ -188,6 +186,36 @@ impl<'a> Krylov<'a> {
         for (i, &value) in theta.iter().enumerate() {
             self.t[(i, i)] = value;
         }
+        self.reach = 0;
+    }
+
+    /// Goes on with the operator of another shift, tau' = tau + `difference`, in the same space (the rational Krylov
+    /// method: Ruhe, Linear Algebra Appl. 197/198 (1994) 283). With the newest block F, W = [V, F] and H = [T; B E']
+    /// satisfy (K + tau M) W H = M V, so that
+    ///
+    /// (K + tau' M) W H = M W A, A = [I; 0] + (tau' - tau) H.
+    ///
+    /// With A = Q R, Q = [Q1, Q2] orthogonal, W Q1 is the basis and W Q2 its newest block: with Q_1, Q_2 the first rows
+    /// of Q1, Q2, one for each column of T, T' = (I - Q_1' R^-1) / (tau' - tau) and B' = -Q_2' R^-1 / (tau' - tau).
+    pub(super) fn change_shift(&mut self, difference: f64, counters: &mut Counters) {
+        let (size, all, last) = (self.projected(), self.size(), self.coupling.ncols());
+        let h = |i: usize, j: usize| match (i < size, j + last >= size) {
+            (true, _) => self.t[(i, j)],
+            (false, true) => self.coupling[(i - size, j + last - size)],
+            (false, false) => 0.0,
+        };
+        let a = Mat::from_fn(all, size, |i, j| f64::from(u8::from(i == j)) + difference * h(i, j));
+        let (q, r) = full_qr(a);
+        let inverse = solve_upper(&r.transpose().to_owned(), &Mat::identity(size, size));
+        let product = combine(q.as_ref().subrows(0, size).transpose(), inverse.as_ref());
+        let t = |i: usize, j: usize| (f64::from(u8::from(i == j)) - product[(i, j)]) / difference;
+        for (i, j) in (0..size * size).map(|k| (k % size, k / size)) {
+            self.t[(i, j)] = 0.5 * (t(i, j) + t(j, i));
+        }
+        self.coupling = Mat::from_fn(all - size, size, |i, j| -product[(size + i, j)] / difference);
+        combine_in_place(self.v.as_mut(), q.as_ref());
+        counters.mass_columns += (all - size) as u64;
+        self.m_fresh = self.problem.pencil.apply_mass(self.v.columns(size..all));
         self.reach = 0;
     }
 

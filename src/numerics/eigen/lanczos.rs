@@ -12,10 +12,11 @@ use super::noise::{energy_noise, is_noisy};
 use super::problem::EigenProblem;
 use super::refine::{Refined, residuals};
 use super::resume::Snapshot;
+use super::second_shift::SecondShift;
 use super::start::snapshot;
 use super::zero_energy::NOISE_FACTOR;
 use crate::base::progress::{Event, Watch};
-use crate::numerics::linalg::{Solve, SymmetricEigen, symmetric_eigen};
+use crate::numerics::linalg::{Analysis, Solve, SymmetricEigen, symmetric_eigen};
 use faer::{Mat, MatRef};
 use std::ops::RangeInclusive;
 
@@ -128,10 +129,10 @@ fn zero_energy(
     tau: f64,
     counters: &mut Counters,
 ) -> Result<EigenFailure, EigenFailure> {
-    let mut krylov = Krylov::new(problem, factor, ZERO_ENERGY_BASIS);
-    krylov.append_random(BLOCK, counters);
+    let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS);
+    krylov.append_random(BLOCK, factor, counters);
     while krylov.room() >= BLOCK && !krylov.exhausted() {
-        krylov.step(counters);
+        krylov.step(factor, counters);
     }
     let ritz = descending(&krylov)?;
     let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
@@ -145,8 +146,8 @@ fn zero_energy(
 }
 
 /// What a search is for.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Goal {
+#[derive(Clone, Copy)]
+pub(super) struct Goal<'a> {
     /// Number of modes, extended to the end of the cluster of the last one.
     pub wanted: usize,
     /// K-residual.
@@ -160,6 +161,8 @@ pub(super) struct Goal {
     pub block: usize,
     /// Whether the solves are rough: the modes are then handed out as a span to be corrected.
     pub rough: bool,
+    /// Where a [second shift](SecondShift) among the modes pays and fits the memory: what it is factored with.
+    pub second: Option<&'a Analysis>,
     /// Chooses the random start: a search repeated after a count that found more modes starts elsewhere.
     pub attempt: u64,
 }
@@ -169,7 +172,7 @@ pub(super) struct Goal {
 pub(super) fn lowest_modes(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
-    goal: &Goal,
+    goal: &Goal<'_>,
     start: Option<&Snapshot>,
     watch: Watch<'_>,
     counters: &mut Counters,
@@ -180,6 +183,7 @@ pub(super) fn lowest_modes(
         if let Some(shift) = iteration.better_shift(counters)? {
             return Ok(Search::ShiftTooLarge(shift));
         }
+        iteration.change_shift(counters)?;
         if !iteration.is_test_due() {
             continue;
         }
@@ -198,7 +202,13 @@ pub(super) fn lowest_modes(
 struct Iteration<'a> {
     problem: &'a EigenProblem<'a>,
     factor: &'a dyn Solve,
-    goal: &'a Goal,
+    /// What to factor for a second shift with, until it is tried.
+    to_come: Option<&'a Analysis>,
+    /// The second shift, from when it is used on.
+    second: Option<SecondShift<'a>>,
+    /// Modes that had converged before the second shift, far from which rounding hides it.
+    settled: usize,
+    goal: &'a Goal<'a>,
     watch: Watch<'a>,
     krylov: Krylov<'a>,
     /// Vectors that the basis has room for.
@@ -246,21 +256,21 @@ impl Ritz {
 
     /// Whether the residual of the operator is within `tolerance` of theta.
     fn is_good(&self, i: usize, tolerance: f64) -> bool {
-        self.norms[i] <= tolerance * self.theta[i]
+        self.norms[i] <= tolerance * self.theta[i].abs()
     }
 
     /// K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with
     /// M-norms for the Euclidean ones.
     fn estimate(&self, i: usize) -> f64 {
         let theta = self.theta[i];
-        0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta).max(SMALLEST_PART))
+        0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta)).abs().max(SMALLEST_PART * theta.abs())
     }
 
     /// Whether the first pair beyond the modes is as good as the gap below it needs.
     fn shows_gap(&self) -> bool {
         let last = self.last;
         last < self.size() && {
-            let gap = if last > 0 { self.theta[last - 1] - self.theta[last] } else { f64::MAX };
+            let gap = if last > 0 { (self.theta[last - 1] - self.theta[last]).abs() } else { f64::MAX };
             self.is_good(last, 1e-3) && self.norms[last] <= 0.1 * gap
         }
     }
@@ -276,7 +286,7 @@ impl<'a> Iteration<'a> {
     fn begin(
         problem: &'a EigenProblem<'a>,
         factor: &'a dyn Solve,
-        goal: &'a Goal,
+        goal: &'a Goal<'a>,
         start: Option<&Snapshot>,
         watch: Watch<'a>,
         counters: &mut Counters,
@@ -284,7 +294,7 @@ impl<'a> Iteration<'a> {
         let block = goal.block;
         let free = problem.pencil.n() - problem.rigid.ncols();
         let capacity = (2 * goal.wanted + SPARE).min(free + block);
-        let mut krylov = Krylov::new(problem, factor, capacity);
+        let mut krylov = Krylov::new(problem, capacity);
         krylov.choose_random(1000 * goal.attempt);
         match start {
             // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for
@@ -295,13 +305,16 @@ impl<'a> Iteration<'a> {
                 counters.taken_up = taken as u64;
                 krylov.take_up(start, factor.shift(), taken, counters);
             }
-            None => krylov.append_random(block.min(free), counters),
+            None => krylov.append_random(block.min(free), factor, counters),
         }
         // A start is looked at before the first step: it may hold all that is wanted.
         let at_start = krylov.projected() > 0 && !krylov.exhausted();
         Self {
             problem,
             factor,
+            to_come: goal.second.filter(|_| start.is_none() && goal.attempt == 0),
+            second: None,
+            settled: 0,
             goal,
             watch,
             krylov,
@@ -318,16 +331,32 @@ impl<'a> Iteration<'a> {
 
     /// Expands the basis by a block, unless it spans all there is.
     fn expand(&mut self, counters: &mut Counters) {
-        let Self { krylov, goal, .. } = self;
+        let Self { krylov, goal, factor, second, .. } = self;
+        let factor = second.as_ref().map_or(*factor, |second| &second.factor);
         if krylov.exhausted() {
             // An invariant subspace: go on with new directions, or everything is found.
-            krylov.append_random(goal.block.min(krylov.room()), counters);
+            krylov.append_random(goal.block.min(krylov.room()), factor, counters);
         }
         self.complete = krylov.exhausted();
         if !self.complete && !self.at_start {
-            krylov.step(counters);
+            krylov.step(factor, counters);
             self.steps += 1;
         }
+    }
+
+    /// Goes over to a second shift when the basis is large enough to tell where it is to be.
+    fn change_shift(&mut self, counters: &mut Counters) -> Result<(), EigenFailure> {
+        let is_due = !self.complete && self.krylov.projected() >= self.goal.wanted;
+        let Some(analysis) = self.to_come.take_if(|_| is_due) else { return Ok(()) };
+        let ritz = self.test()?;
+        let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
+        self.second = SecondShift::new(self.problem, analysis, &eigenvalues, self.goal.wanted, counters);
+        if let Some(second) = &self.second {
+            self.settled = ritz.converged;
+            self.krylov.change_shift(second.factor.shift() - self.factor.shift(), counters);
+            self.next_test = 0;
+        }
+        Ok(())
     }
 
     /// The shift to use instead of this one, once the lowest Ritz value tells.
@@ -358,19 +387,26 @@ impl<'a> Iteration<'a> {
 
     /// Solves the projected eigenproblem, and sees which Ritz pairs are modes.
     fn test(&mut self) -> Result<Ritz, EigenFailure> {
-        let (krylov, wanted, tau) = (&self.krylov, self.goal.wanted, self.factor.shift());
+        let (krylov, wanted) = (&self.krylov, self.goal.wanted);
+        let (tau, below) =
+            self.second.as_ref().map_or((self.factor.shift(), 0), |second| (second.factor.shift(), second.below));
         let size = krylov.projected();
         let found = descending(krylov)?;
-        if found.values.first().is_some_and(|&theta| theta < -1e-8 * found.values[size - 1].abs()) {
+        let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
+        if below == 0 && found.values.first().is_some_and(is_negative) {
             return Err(EigenFailure::MassIndefinite);
         }
-        let theta: Vec<f64> = found.values.iter().rev().copied().collect();
-        let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, size - 1 - j)]);
+        // lambda ascends where theta descends, below the shift and above it.
+        let below = below.min(size);
+        let order: Vec<usize> = (0..below).rev().chain((below..size).rev()).collect();
+        let theta: Vec<f64> = order.iter().map(|&i| found.values[i]).collect();
+        let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, order[j])]);
+        let all_below_are_there = below == 0 || found.values[below - 1] < 0.0;
         let norms = krylov.residual_norms(s.as_ref());
         let last = cluster_end(wanted, size, self.goal.cluster_gap, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
-        let is_mode = |i: &usize| self.complete || ritz.estimate(*i) <= self.asked;
-        let converged = (0..last).take_while(is_mode).count();
+        let is_mode = |i: &usize| self.complete || *i < self.settled || ritz.estimate(*i) <= self.asked;
+        let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { self.settled };
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
         self.next_test = size + (size / 25).max((last - converged) / 4);
@@ -389,10 +425,23 @@ impl<'a> Iteration<'a> {
         if converged > 0 && !self.goal.rough && (converged >= many || ritz.all_there()) {
             // All Ritz vectors: with a third of those that are no modes yet, 60 modes after 20 take 36
             // columns more.
-            self.problem
-                .resume
-                .save(|| snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged)));
+            self.problem.resume.save(|| self.snapshot(ritz));
             self.saved = converged;
+        }
+    }
+
+    /// The search as it stands; after a second shift, whose operator no other search has, the modes found alone.
+    fn snapshot(&self, ritz: &Ritz) -> Snapshot {
+        let converged = ritz.converged;
+        if self.second.is_none() {
+            return snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged));
+        }
+        Snapshot {
+            shift: self.factor.shift(),
+            eigenvalues: (0..converged).map(|i| ritz.lambda(i)).collect(),
+            basis: self.krylov.combination(ritz.s.as_ref().subcols(0, converged)),
+            coupling: Mat::zeros(0, converged),
+            converged,
         }
     }
 

@@ -19,6 +19,7 @@ mod problem;
 mod refine;
 mod resume;
 mod search_space;
+mod second_shift;
 mod settings;
 mod single;
 mod solution;

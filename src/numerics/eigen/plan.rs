@@ -4,6 +4,7 @@ use super::completeness::Counting;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::refine::TOGETHER;
+use super::second_shift;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
 use crate::numerics::linalg::{Analysis, Peaks};
 use crate::numerics::multigrid::can_have_levels;
@@ -23,6 +24,8 @@ pub struct Plan {
     pub single_failed: bool,
     /// Whether the search goes without a factor.
     pub multigrid: Multigrid,
+    /// Whether a second factor, at a shift among the modes, is made beside it.
+    pub second_shift: bool,
     /// About how long the search takes on one processor, in seconds, without the factorisation.
     pub seconds: f64,
     /// How completeness is counted; `None`: not at all.
@@ -265,6 +268,7 @@ impl Plan {
             // As with a factor of the size of K.
             seconds: seconds(n, wanted, entries, false),
             single_failed: false,
+            second_shift: false,
             multigrid: Multigrid::Used,
             counting: count.counting,
             proof_too_large: count.too_large,
@@ -297,6 +301,16 @@ impl Plan {
             FactorChoice::Auto => Precision::Double,
         };
         let mut needed = search(precision);
+        // Its memory is that of the vectors too, of which there are fewer then.
+        let with_second = needed + 8 * peaks.kept_inertia;
+        let second_shift = !dense
+            && !certified
+            && precision == Precision::Double
+            && second_shift::pays(analysis, n, wanted, basis_columns(wanted))
+            && resident(with_second) <= available;
+        if second_shift {
+            needed = with_second;
+        }
         if certified {
             // The bounds factor a matrix of their own, beside the modes.
             needed = needed.max(count_bytes(problem, &peaks, wanted))
@@ -315,6 +329,7 @@ impl Plan {
             flops: analysis.flops(),
             seconds,
             single_failed: false,
+            second_shift,
             multigrid: Multigrid::Unsuited,
             counting: count.counting,
             proof_too_large: count.too_large,

@@ -51,11 +51,11 @@ const LEAST_GAIN: f64 = 7.0;
 pub(super) fn search(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
-    goal: &Goal,
+    goal: &Goal<'_>,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, ..*goal };
+    let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, second: None, ..*goal };
     let start = fitting_start(problem, goal.attempt).filter(|start| start.converged >= goal.wanted);
     let search = |factor: &Cholesky<'_, f32>, start: Option<&Snapshot>, counters: &mut Counters| {
         let (vectors, wanted) = match start {
@@ -82,7 +82,7 @@ pub(super) fn search(
 pub(super) struct Correction<'a> {
     problem: &'a EigenProblem<'a>,
     corrector: Corrector<'a>,
-    goal: &'a Goal,
+    goal: &'a Goal<'a>,
     watch: Watch<'a>,
     space: SearchSpace<'a>,
     /// First size of the span.
@@ -108,7 +108,7 @@ impl<'a> Correction<'a> {
     pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         corrector: Corrector<'a>,
-        goal: &'a Goal,
+        goal: &'a Goal<'a>,
         x: Mat<f64>,
         wanted: usize,
         watch: Watch<'a>,

@@ -273,6 +273,7 @@ impl Sparse<'_> {
             separation,
             block: columns_per_step(wanted),
             rough: false,
+            second: self.plan.second_shift.then_some(analysis),
             attempt,
         };
         let mut found = self.search_without_factor(&goal, watch, counters)?;
@@ -292,7 +293,7 @@ impl Sparse<'_> {
     /// `None` where the plan has a factor, as it has after a search without one that failed.
     fn search_without_factor(
         &mut self,
-        goal: &Goal,
+        goal: &Goal<'_>,
         watch: Watch<'_>,
         counters: &mut Counters,
     ) -> Result<Option<Found>, EigenFailure> {
@@ -311,7 +312,7 @@ impl Sparse<'_> {
     /// `None` where the plan is in double precision, as it is after a search in single that failed.
     fn search_in_single(
         &mut self,
-        goal: &Goal,
+        goal: &Goal<'_>,
         watch: Watch<'_>,
         counters: &mut Counters,
     ) -> Result<Option<Found>, EigenFailure> {
@@ -339,7 +340,7 @@ type Found = (Refined, Vec<f64>, f64);
 fn search_in_double(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
-    goal: &Goal,
+    goal: &Goal<'_>,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Found, EigenFailure> {

@@ -10,7 +10,9 @@ use faer::linalg::cholesky::llt::inverse::{inverse as invert, inverse_scratch};
 use faer::linalg::evd::{
     ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch,
 };
-use faer::{Auto, Col, Mat, MatRef, Par};
+use faer::linalg::householder;
+use faer::linalg::qr::no_pivoting::factor as qr;
+use faer::{Auto, Col, Conj, Mat, MatRef, Par};
 
 /// Backward error beyond which a decomposition is rejected: |A V - V L| <= this * |A| (maximum norms).
 const BACKWARD_ERROR: f64 = 3e-14;
@@ -98,6 +100,31 @@ fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     let scaled = Mat::from_fn(n, n, |i, j| eigen.vectors[(i, j)] * eigen.values[j]);
     let difference = combine(a.as_ref(), eigen.vectors.as_ref()) - scaled;
     largest_entry(difference.as_ref()) / a.norm_max().max(f64::MIN_POSITIVE)
+}
+
+/// Q (n x n), orthogonal, and R (m x m) above zeros, with A = Q R for A (n x m), n >= m. On one thread.
+pub fn full_qr(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
+    let (n, m) = (a.nrows(), a.ncols());
+    let block = qr::recommended_block_size::<f64>(n, m);
+    let params = <qr::QrParams as Auto<f64>>::auto().into();
+    let mut factor = Mat::zeros(block, m);
+    let mut memory = MemBuffer::new(
+        qr::qr_in_place_scratch::<f64>(n, m, block, Par::Seq, params).or(
+            householder::apply_block_householder_sequence_on_the_left_in_place_scratch::<f64>(n, block, n),
+        ),
+    );
+    let stack = MemStack::new(&mut memory);
+    qr::qr_in_place(a.as_mut(), factor.as_mut(), Par::Seq, stack, params);
+    let mut q = Mat::identity(n, n);
+    householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
+        a.as_ref(),
+        factor.as_ref(),
+        Conj::No,
+        q.as_mut(),
+        Par::Seq,
+        stack,
+    );
+    (q, Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 }))
 }
 
 /// L^-1 B of a lower triangle L.

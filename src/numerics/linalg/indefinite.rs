@@ -3,7 +3,7 @@
 
 use super::Pencil;
 use super::contiguous::contiguous_mut;
-use super::factor::{Analysis, COLUMNS, substitute};
+use super::factor::{Analysis, COLUMNS, Solve, substitute};
 use super::front::{PANEL, ROWS, Real, Trapezoid};
 use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
 use super::random::normal;
@@ -109,6 +109,16 @@ impl<'a, T: Real> Indefinite<'a, T> {
     }
 }
 
+impl Solve for Indefinite<'_> {
+    fn shift(&self) -> f64 {
+        -self.sigma
+    }
+
+    fn solve_in_place(&self, x: MatMut<'_, f64>) {
+        Self::solve_in_place(self, x);
+    }
+}
+
 /// Calls `change` with row, column and entry of a block, its columns side by side.
 fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync) {
     let columns: Vec<_> = block.as_mut().col_iter_mut().map(contiguous_mut).collect();
@@ -137,9 +147,7 @@ fn for_rows<T: Real, B>(
 ) {
     let mut wide = vec![0.0; TOGETHER * width];
     for (l, below) in l.chunks(TOGETHER * width).zip(below) {
-        let wide = &mut wide[..l.len()];
-        wide.iter_mut().zip(l).for_each(|(to, from)| *to = from.wide());
-        work(wide, below);
+        work(T::all_wide(l, &mut wide[..l.len()]), below);
     }
 }
 

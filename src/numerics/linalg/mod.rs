@@ -33,7 +33,7 @@ pub use compensated_product::{
     CompensatedBlock, LANES, gram_compensated, multiply_compensated, projection_compensated, sum_length,
 };
 pub(crate) use contiguous::contiguous_mut;
-pub use dense::{SymmetricEigen, dense_cholesky, dense_inverse, solve_lower, solve_upper, symmetric_eigen};
+pub use dense::{SymmetricEigen, dense_cholesky, dense_inverse, full_qr, solve_lower, solve_upper, symmetric_eigen};
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, CoupledRows, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
