@@ -39,8 +39,8 @@ pub(super) fn factorise<'a, T: Real>(
 pub(super) enum Attempt<R> {
     /// To its result.
     Done(R),
-    /// It is to begin anew with this shift: it would be shorter and more accurate.
-    ShiftTooLarge(f64),
+    /// It is to begin anew with this shift: it would be shorter or more accurate.
+    Anew(f64),
 }
 
 /// Searches with a factor in the precision of `T`, the first time from `start`, until the shift suits the
@@ -51,16 +51,16 @@ pub(super) fn with_suited_shift<T: Real, R>(
     mut start: Option<&Snapshot>,
     watch: Watch<'_>,
     counters: &mut Counters,
-    search: impl Fn(&Cholesky<'_, T>, Option<&Snapshot>, &mut Counters) -> Result<Attempt<R>, EigenFailure>,
+    search: impl Fn(Cholesky<'_, T>, Option<&Snapshot>, &mut Counters) -> Result<Attempt<R>, EigenFailure>,
 ) -> Result<(R, f64), EigenFailure> {
     let mut tau = first_shift(problem, start);
     loop {
         watch(Event::Phase("factorisation"));
         let factor = factorise(problem, analysis, tau, counters)?;
         watch(Event::Phase("modes"));
-        match search(&factor, start, counters)? {
+        match search(factor, start, counters)? {
             Attempt::Done(result) => return Ok((result, tau)),
-            Attempt::ShiftTooLarge(shift) => (tau, start) = (shift, None),
+            Attempt::Anew(shift) => (tau, start) = (shift, None),
         }
     }
 }

@@ -58,8 +58,11 @@ const SMALLEST_PART: f64 = 0.02;
 /// ones would lose as many digits. The refinement separates a few much softer modes.
 const DIGITS_PART: f64 = 1e-3;
 
+/// Relative gap of two eigenvalues across which modes that have converged do not mix.
+const WIDE: f64 = 1e-3;
+
 /// How a search ended.
-pub(super) enum Search {
+pub(super) enum Search<'a> {
     /// With the modes.
     Found {
         /// The wanted modes and those that complete the cluster of the last one.
@@ -76,6 +79,8 @@ pub(super) enum Search {
     },
     /// Early: with this shift it would be shorter and more accurate.
     ShiftTooLarge(f64),
+    /// Midway: it goes on with a second shift, and needs the first factor no more.
+    Midway(Box<Iteration<'a>>),
 }
 
 /// Block steps after which the shift is judged: the lowest Ritz value is near the first eigenvalue after six;
@@ -146,8 +151,8 @@ fn zero_energy(
 }
 
 /// What a search is for.
-#[derive(Clone, Copy)]
-pub(super) struct Goal<'a> {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Goal {
     /// Number of modes, extended to the end of the cluster of the last one.
     pub wanted: usize,
     /// K-residual.
@@ -161,54 +166,34 @@ pub(super) struct Goal<'a> {
     pub block: usize,
     /// Whether the solves are rough: the modes are then handed out as a span to be corrected.
     pub rough: bool,
-    /// Where a [second shift](SecondShift) among the modes pays and fits the memory: what it is factored with.
-    pub second: Option<&'a Analysis>,
+    /// Whether a [second shift](SecondShift) among the modes pays, and fits the memory.
+    pub second_shift: bool,
     /// Chooses the random start: a search repeated after a count that found more modes starts elsewhere.
     pub attempt: u64,
 }
 
-/// The lowest flexible modes: the basis is expanded and its Ritz pairs are tested until they are good enough
-/// to be handed over; a full basis is restarted from the best of them.
-pub(super) fn lowest_modes(
-    problem: &EigenProblem<'_>,
+/// The lowest flexible modes.
+pub(super) fn lowest_modes<'a>(
+    problem: &'a EigenProblem<'a>,
     factor: &dyn Solve,
-    goal: &Goal<'_>,
+    goal: &'a Goal,
     start: Option<&Snapshot>,
-    watch: Watch<'_>,
+    watch: Watch<'a>,
     counters: &mut Counters,
-) -> Result<Search, EigenFailure> {
-    let mut iteration = Iteration::begin(problem, factor, goal, start, watch, counters);
-    loop {
-        iteration.expand(counters);
-        if let Some(shift) = iteration.better_shift(counters)? {
-            return Ok(Search::ShiftTooLarge(shift));
-        }
-        iteration.change_shift(counters)?;
-        if !iteration.is_test_due() {
-            continue;
-        }
-        let ritz = iteration.test()?;
-        iteration.save(&ritz);
-        if let Some(found) = iteration.hand_over(&ritz, counters)? {
-            return Ok(found);
-        }
-        if let Some(shift) = iteration.restart(&ritz, counters)? {
-            return Ok(Search::ShiftTooLarge(shift));
-        }
-    }
+) -> Result<Search<'a>, EigenFailure> {
+    Iteration::begin(problem, factor, goal, start, watch, counters).run(factor, counters)
 }
 
 /// A search as it goes on.
-struct Iteration<'a> {
+pub(super) struct Iteration<'a> {
     problem: &'a EigenProblem<'a>,
-    factor: &'a dyn Solve,
-    /// What to factor for a second shift with, until it is tried.
-    to_come: Option<&'a Analysis>,
-    /// The second shift, from when it is used on.
-    second: Option<SecondShift<'a>>,
-    /// Modes that had converged before the second shift, far from which rounding hides it.
-    settled: usize,
-    goal: &'a Goal<'a>,
+    /// The shift, as tau.
+    tau: f64,
+    /// Whether a second shift is still to come.
+    to_come: bool,
+    /// What is left of the first shift when there is a second one.
+    first: Option<First>,
+    goal: &'a Goal,
     watch: Watch<'a>,
     krylov: Krylov<'a>,
     /// Vectors that the basis has room for.
@@ -229,8 +214,18 @@ struct Iteration<'a> {
     least_excess: f64,
 }
 
-/// Ritz pairs of a basis, theta descending, and which of them are modes.
+/// What is left of a first shift.
+struct First {
+    tau: f64,
+    /// The lowest modes, which had converged: far from the second shift, its operator leaves rounding in them.
+    modes: Mat<f64>,
+    /// Flexible modes below the second shift.
+    below: usize,
+}
+
+/// Ritz pairs of a basis, lambda ascending, and which of them are modes.
 struct Ritz {
+    /// 1 / (lambda + tau).
     theta: Vec<f64>,
     /// Coefficients of the vectors.
     s: Mat<f64>,
@@ -285,8 +280,8 @@ impl<'a> Iteration<'a> {
     /// Begins with random vectors, or where an earlier search stood.
     fn begin(
         problem: &'a EigenProblem<'a>,
-        factor: &'a dyn Solve,
-        goal: &'a Goal<'a>,
+        factor: &dyn Solve,
+        goal: &'a Goal,
         start: Option<&Snapshot>,
         watch: Watch<'a>,
         counters: &mut Counters,
@@ -311,10 +306,9 @@ impl<'a> Iteration<'a> {
         let at_start = krylov.projected() > 0 && !krylov.exhausted();
         Self {
             problem,
-            factor,
-            to_come: goal.second.filter(|_| start.is_none() && goal.attempt == 0),
-            second: None,
-            settled: 0,
+            tau: factor.shift(),
+            to_come: goal.second_shift && start.is_none(),
+            first: None,
             goal,
             watch,
             krylov,
@@ -329,10 +323,34 @@ impl<'a> Iteration<'a> {
         }
     }
 
+    /// Expands the basis, and tests its Ritz pairs until they are good enough to be handed over; a full basis is
+    /// restarted from the best of them.
+    fn run(mut self, factor: &dyn Solve, counters: &mut Counters) -> Result<Search<'a>, EigenFailure> {
+        loop {
+            self.expand(factor, counters);
+            if let Some(shift) = self.better_shift(factor, counters)? {
+                return Ok(Search::ShiftTooLarge(shift));
+            }
+            if self.is_midway() {
+                return Ok(Search::Midway(Box::new(self)));
+            }
+            if !self.is_test_due() {
+                continue;
+            }
+            let ritz = self.test()?;
+            self.save(&ritz);
+            if let Some(found) = self.hand_over(&ritz, counters)? {
+                return Ok(found);
+            }
+            if let Some(shift) = self.restart(&ritz, counters)? {
+                return Ok(Search::ShiftTooLarge(shift));
+            }
+        }
+    }
+
     /// Expands the basis by a block, unless it spans all there is.
-    fn expand(&mut self, counters: &mut Counters) {
-        let Self { krylov, goal, factor, second, .. } = self;
-        let factor = second.as_ref().map_or(*factor, |second| &second.factor);
+    fn expand(&mut self, factor: &dyn Solve, counters: &mut Counters) {
+        let Self { krylov, goal, .. } = self;
         if krylov.exhausted() {
             // An invariant subspace: go on with new directions, or everything is found.
             krylov.append_random(goal.block.min(krylov.room()), factor, counters);
@@ -344,27 +362,46 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Goes over to a second shift when the basis is large enough to tell where it is to be.
-    fn change_shift(&mut self, counters: &mut Counters) -> Result<(), EigenFailure> {
-        let is_due = !self.complete && self.krylov.projected() >= self.goal.wanted;
-        let Some(analysis) = self.to_come.take_if(|_| is_due) else { return Ok(()) };
-        let ritz = self.test()?;
-        let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
-        self.second = SecondShift::new(self.problem, analysis, &eigenvalues, self.goal.wanted, counters);
-        if let Some(second) = &self.second {
-            self.settled = ritz.converged;
-            self.krylov.change_shift(second.factor.shift() - self.factor.shift(), counters);
-            self.next_test = 0;
+    /// Whether the basis tells where a second shift is to be.
+    fn is_midway(&self) -> bool {
+        self.to_come && !self.complete && self.krylov.projected() >= self.goal.wanted
+    }
+
+    /// Goes on with a second shift; `None` where its factor is of no use.
+    pub(super) fn with_second_shift(
+        mut self,
+        analysis: &Analysis,
+        counters: &mut Counters,
+    ) -> Result<Option<Search<'a>>, EigenFailure> {
+        self.to_come = false;
+        let mut ritz = self.test()?;
+        if self.asks_below_noise(&ritz, counters) {
+            ritz = self.test()?;
         }
-        Ok(())
+        let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
+        let settled = settled(&eigenvalues, ritz.converged);
+        let modes = self.vectors(&ritz, settled);
+        let wanted = self.goal.wanted;
+        let Some(second) = SecondShift::new(self.problem, analysis, &eigenvalues, wanted, counters) else {
+            return Ok(None);
+        };
+        let tau = second.factor.shift();
+        self.krylov.change_shift(tau - self.tau, counters);
+        self.first = Some(First { tau: self.tau, modes, below: second.below });
+        (self.tau, self.next_test) = (tau, 0);
+        self.run(&second.factor, counters).map(Some)
     }
 
     /// The shift to use instead of this one, once the lowest Ritz value tells.
-    fn better_shift(&self, counters: &mut Counters) -> Result<Option<f64>, EigenFailure> {
-        if !STEPS_TO_JUDGE.contains(&self.steps) {
+    fn better_shift(
+        &self,
+        factor: &dyn Solve,
+        counters: &mut Counters,
+    ) -> Result<Option<f64>, EigenFailure> {
+        if self.first.is_some() || !STEPS_TO_JUDGE.contains(&self.steps) {
             return Ok(None);
         }
-        better_shift(self.problem, &self.krylov, self.factor, self.goal.wanted, counters)
+        better_shift(self.problem, &self.krylov, factor, self.goal.wanted, counters)
     }
 
     /// Whether no further step fits before a restart.
@@ -388,8 +425,9 @@ impl<'a> Iteration<'a> {
     /// Solves the projected eigenproblem, and sees which Ritz pairs are modes.
     fn test(&mut self) -> Result<Ritz, EigenFailure> {
         let (krylov, wanted) = (&self.krylov, self.goal.wanted);
-        let (tau, below) =
-            self.second.as_ref().map_or((self.factor.shift(), 0), |second| (second.factor.shift(), second.below));
+        let tau = self.tau;
+        let (below, settled) =
+            self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
         let size = krylov.projected();
         let found = descending(krylov)?;
         let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
@@ -405,8 +443,8 @@ impl<'a> Iteration<'a> {
         let norms = krylov.residual_norms(s.as_ref());
         let last = cluster_end(wanted, size, self.goal.cluster_gap, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
-        let is_mode = |i: &usize| self.complete || *i < self.settled || ritz.estimate(*i) <= self.asked;
-        let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { self.settled };
+        let is_mode = |i: &usize| self.complete || *i < settled || ritz.estimate(*i) <= self.asked;
+        let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { settled };
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
         self.next_test = size + (size / 25).max((last - converged) / 4);
@@ -433,11 +471,11 @@ impl<'a> Iteration<'a> {
     /// The search as it stands; after a second shift, whose operator no other search has, the modes found alone.
     fn snapshot(&self, ritz: &Ritz) -> Snapshot {
         let converged = ritz.converged;
-        if self.second.is_none() {
+        let Some(first) = &self.first else {
             return snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged));
-        }
+        };
         Snapshot {
-            shift: self.factor.shift(),
+            shift: first.tau,
             eigenvalues: (0..converged).map(|i| ritz.lambda(i)).collect(),
             basis: self.krylov.combination(ritz.s.as_ref().subcols(0, converged)),
             coupling: Mat::zeros(0, converged),
@@ -447,26 +485,20 @@ impl<'a> Iteration<'a> {
 
     /// Hands the modes over when they are there and keep what was asked for; else more is asked of the
     /// estimates.
-    fn hand_over(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<Search>, EigenFailure> {
+    fn hand_over(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<Search<'a>>, EigenFailure> {
         if !ritz.all_there() {
             return Ok(None);
         }
         let (size, last) = (ritz.size(), ritz.last);
-        let iterated = |count: usize| {
-            self.krylov.inverse_iterated(ritz.s.as_ref().subcols(0, count), &ritz.theta[..count])
-        };
         if self.goal.rough && !self.complete {
             // Half as many again: what the corrections would have to find of the next modes is then there.
-            let vectors = iterated((last + last / 2 + 2 * self.goal.block).min(size));
+            let vectors = self.vectors(ritz, (last + last / 2 + 2 * self.goal.block).min(size));
             return Ok(Some(Search::Rough { vectors, wanted: last }));
         }
-        let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
-        let may_ask_more = !self.complete && self.asked > below_noise;
-        if may_ask_more && self.hides_residuals(ritz, iterated(last.min(1)).as_ref(), counters) {
-            self.asked = below_noise;
+        if self.asks_below_noise(ritz, counters) {
             return Ok(None);
         }
-        let modes = Refined::new(self.problem, iterated(last), counters)?;
+        let modes = Refined::new(self.problem, self.vectors(ritz, last), counters)?;
         let excess = modes.excess(self.goal.tolerance);
         // Another step costs a block, the refinement a column for each mode that needs it.
         let gains_nothing = excess.is_nan() || excess > 0.5 * self.least_excess;
@@ -480,10 +512,31 @@ impl<'a> Iteration<'a> {
         Ok(None)
     }
 
-    /// Whether rounding hides the true residual of the first mode, whose strain energy is least.
-    fn hides_residuals(&self, ritz: &Ritz, first: MatRef<'_, f64>, counters: &mut Counters) -> bool {
-        let eigenvalues: Vec<f64> = (0..first.ncols()).map(|i| ritz.lambda(i)).collect();
-        is_noisy(&residuals(self.problem, &eigenvalues, first, counters).1, self.goal.tolerance)
+    /// The vectors of the first Ritz pairs, after an inverse iteration.
+    fn vectors(&self, ritz: &Ritz, count: usize) -> Mat<f64> {
+        let mut vectors = self.krylov.inverse_iterated(ritz.s.as_ref().subcols(0, count), &ritz.theta[..count]);
+        if let Some(First { modes, .. }) = &self.first {
+            let known = modes.ncols().min(count);
+            vectors.as_mut().subcols_mut(0, known).copy_from(modes.as_ref().subcols(0, known));
+        }
+        vectors
+    }
+
+    /// Where rounding hides the true residual of the first mode, whose strain energy is least, more is asked of the
+    /// estimates. Whether it is.
+    fn asks_below_noise(&mut self, ritz: &Ritz, counters: &mut Counters) -> bool {
+        let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
+        let may_ask = !self.complete && self.asked > below_noise;
+        let asks = may_ask && {
+            let count = ritz.last.min(1);
+            let (first, eigenvalues) = (self.vectors(ritz, count), &[ritz.lambda(0)][..count]);
+            let (_, floors) = residuals(self.problem, eigenvalues, first.as_ref(), counters);
+            is_noisy(&floors, self.goal.tolerance)
+        };
+        if asks {
+            self.asked = below_noise;
+        }
+        asks
     }
 
     /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better
@@ -508,6 +561,16 @@ impl<'a> Iteration<'a> {
         self.next_test = 0;
         Ok(None)
     }
+}
+
+/// Modes that stay what they are when the search goes on with another shift: of those that have `converged`, all up to
+/// a gap. Within a cluster they may turn.
+fn settled(eigenvalues: &[f64], converged: usize) -> usize {
+    let is_end = |end: &usize| {
+        let (last, next) = (eigenvalues[end - 1], eigenvalues.get(*end).copied());
+        next.is_some_and(|next| next - last > WIDE * next)
+    };
+    (1..=converged).rev().find(is_end).unwrap_or(0)
 }
 
 fn descending(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> {

@@ -301,8 +301,8 @@ impl Plan {
             FactorChoice::Auto => Precision::Double,
         };
         let mut needed = search(precision);
-        // Its memory is that of the vectors too, of which there are fewer then.
-        let with_second = needed + 8 * peaks.kept_inertia;
+        // The first factor is given back before, and made again where its modes are to be refined.
+        let with_second = needed.max(8 * peaks.kept_inertia + vectors(problem, wanted, precision));
         let second_shift = !dense
             && !certified
             && precision == Precision::Double

@@ -51,26 +51,27 @@ const LEAST_GAIN: f64 = 7.0;
 pub(super) fn search(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
-    goal: &Goal<'_>,
+    goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
-    let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, second: None, ..*goal };
+    let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, second_shift: false, ..*goal };
     let start = fitting_start(problem, goal.attempt).filter(|start| start.converged >= goal.wanted);
-    let search = |factor: &Cholesky<'_, f32>, start: Option<&Snapshot>, counters: &mut Counters| {
+    let search = |factor: Cholesky<'_, f32>, start: Option<&Snapshot>, counters: &mut Counters| {
         let (vectors, wanted) = match start {
             Some(start) => {
                 counters.taken_up = start.eigenvalues.len() as u64;
                 (start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned(), goal.wanted)
             }
-            None => match lanczos::lowest_modes(problem, factor, &rough, None, watch, counters)? {
-                Search::ShiftTooLarge(shift) => return Ok(Attempt::ShiftTooLarge(shift)),
+            None => match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
+                Search::ShiftTooLarge(shift) => return Ok(Attempt::Anew(shift)),
+                Search::Midway(_) => unreachable!("not asked for"),
                 Search::Found { modes, next } => return Ok(Attempt::Done((modes, next))),
                 Search::Rough { vectors, wanted } => (vectors, wanted),
             },
         };
         let corrected =
-            Correction::begin(problem, Corrector::Factor(factor), goal, vectors, wanted, watch, counters)?;
+            Correction::begin(problem, Corrector::Factor(&factor), goal, vectors, wanted, watch, counters)?;
         corrected.run(counters).map(Attempt::Done)
     };
     let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
@@ -82,7 +83,7 @@ pub(super) fn search(
 pub(super) struct Correction<'a> {
     problem: &'a EigenProblem<'a>,
     corrector: Corrector<'a>,
-    goal: &'a Goal<'a>,
+    goal: &'a Goal,
     watch: Watch<'a>,
     space: SearchSpace<'a>,
     /// First size of the span.
@@ -108,7 +109,7 @@ impl<'a> Correction<'a> {
     pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         corrector: Corrector<'a>,
-        goal: &'a Goal<'a>,
+        goal: &'a Goal,
         x: Mat<f64>,
         wanted: usize,
         watch: Watch<'a>,

@@ -5,7 +5,7 @@ use super::canonical::{CLUSTER_GAP, canonical_basis, cluster_end, clusters};
 use super::completeness::{Completeness, Counting, NEAR, Proof, count, size_along};
 use super::counters::Counters;
 use super::dense;
-use super::factorise::{Attempt, with_suited_shift};
+use super::factorise::{Attempt, factorise, with_suited_shift};
 use super::failure::EigenFailure;
 use super::lanczos::{self, Goal, columns_per_step};
 use super::plan::{CountPlan, Multigrid, Plan, gigabytes};
@@ -21,6 +21,7 @@ use super::zero_energy::check_zero_energy;
 use crate::base::progress::{Event, Watch};
 use crate::numerics::linalg::{Analysis, Cholesky, Solve, is_positive_semidefinite};
 use faer::Mat;
+use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -273,7 +274,7 @@ impl Sparse<'_> {
             separation,
             block: columns_per_step(wanted),
             rough: false,
-            second: self.plan.second_shift.then_some(analysis),
+            second_shift: self.plan.second_shift && attempt == 0,
             attempt,
         };
         let mut found = self.search_without_factor(&goal, watch, counters)?;
@@ -293,7 +294,7 @@ impl Sparse<'_> {
     /// `None` where the plan has a factor, as it has after a search without one that failed.
     fn search_without_factor(
         &mut self,
-        goal: &Goal<'_>,
+        goal: &Goal,
         watch: Watch<'_>,
         counters: &mut Counters,
     ) -> Result<Option<Found>, EigenFailure> {
@@ -312,7 +313,7 @@ impl Sparse<'_> {
     /// `None` where the plan is in double precision, as it is after a search in single that failed.
     fn search_in_single(
         &mut self,
-        goal: &Goal<'_>,
+        goal: &Goal,
         watch: Watch<'_>,
         counters: &mut Counters,
     ) -> Result<Option<Found>, EigenFailure> {
@@ -340,22 +341,48 @@ type Found = (Refined, Vec<f64>, f64);
 fn search_in_double(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
-    goal: &Goal<'_>,
+    goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Found, EigenFailure> {
     let start = fitting_start(problem, goal.attempt);
-    let search = |factor: &Cholesky<'_, f64>, start: Option<&Snapshot>, counters: &mut Counters| {
-        match lanczos::lowest_modes(problem, factor, goal, start, watch, counters)? {
+    let may_change = Cell::new(goal.second_shift);
+    let search = |factor: Cholesky<'_, f64>, start: Option<&Snapshot>, counters: &mut Counters| {
+        let goal = &Goal { second_shift: may_change.get(), ..*goal };
+        match lanczos::lowest_modes(problem, &factor, goal, start, watch, counters)? {
             lanczos::Search::Found { modes, next } => {
-                Ok(Attempt::Done((refine(problem, factor, modes, goal.tolerance, counters)?, next)))
+                Ok(Attempt::Done((refine(problem, &factor, modes, goal.tolerance, counters)?, next)))
             }
-            lanczos::Search::ShiftTooLarge(shift) => Ok(Attempt::ShiftTooLarge(shift)),
+            lanczos::Search::Midway(iteration) => {
+                may_change.set(false);
+                let tau = factor.shift();
+                drop(factor);
+                let found = with_second_shift(problem, analysis, *iteration, (tau, goal.tolerance), counters);
+                Ok(found.map_or(Attempt::Anew(tau), Attempt::Done))
+            }
+            lanczos::Search::ShiftTooLarge(shift) => Ok(Attempt::Anew(shift)),
             lanczos::Search::Rough { .. } => unreachable!("not asked for"),
         }
     };
     let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
     Ok((modes, next, tau))
+}
+
+/// Goes on with a second shift, after one of tau; `None` where that does not find modes that keep the tolerance.
+fn with_second_shift(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    iteration: lanczos::Iteration<'_>,
+    (tau, tolerance): (f64, f64),
+    counters: &mut Counters,
+) -> Option<(Refined, Vec<f64>)> {
+    let found = iteration.with_second_shift(analysis, counters).ok()??;
+    let lanczos::Search::Found { mut modes, next } = found else { return None };
+    if modes.excess(tolerance) > 1.0 {
+        let factor = factorise::<f64>(problem, analysis, tau, counters).ok()?;
+        modes = refine(problem, &factor, modes, tolerance, counters).ok()?;
+    }
+    (modes.excess(tolerance) <= 1.0).then_some((modes, next))
 }
 
 /// The inertia count in the gap above the last mode.

@@ -22,7 +22,7 @@ fn guards(wanted: usize) -> usize {
 /// The lowest modes, eigenvalues beyond them, and the shift; or the reason why cycles do not find them.
 pub(super) fn search(
     problem: &EigenProblem<'_>,
-    goal: &Goal<'_>,
+    goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
