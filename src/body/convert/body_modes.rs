@@ -7,7 +7,9 @@ use crate::body::invariants::{
 };
 use crate::model::{FeModel, rigid_count};
 use crate::numerics::eigen::canonical_sign;
-use crate::numerics::linalg::{SymmetricMatrix, contiguous_mut, gram, multiply, projection_compensated};
+use crate::numerics::linalg::{
+    SymmetricMatrix, contiguous_mut, copied, gram, multiply, projection_compensated, zeros,
+};
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -39,7 +41,7 @@ pub(crate) fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
 
 /// Psi' A Psi, where the matrix A and the modes are in model axes.
 pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
-    let mut product = Mat::zeros(vectors.nrows(), vectors.ncols());
+    let mut product = zeros(vectors.nrows(), vectors.ncols());
     multiply(a, 1, vectors, product.as_mut());
     symmetric_part(&gram(vectors, product.as_ref()))
 }
@@ -75,7 +77,7 @@ impl BodyModes {
             in_space(vectors.as_ref().subrows(0, rows.displacements()), model.dimension());
         place.frame.rotate_shapes(&mut displacements);
         let mut rotations = (!rows.rotations().is_empty()).then(|| {
-            let mut rotations = Mat::zeros(3 * nodes, nf);
+            let mut rotations = zeros(3 * nodes, nf);
             for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
                 for j in 0..nf {
                     rotations[(3 * node as usize + usize::from(axis), j)] = vectors[(row, j)];
@@ -194,7 +196,7 @@ fn internal(model: &FeModel, vectors: &Mat<f64>, displacements: &Mat<f64>) -> Op
 /// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
 fn in_space(shapes: MatRef<'_, f64>, dimension: usize) -> Mat<f64> {
     if dimension == 3 {
-        return shapes.to_owned();
+        return copied(shapes);
     }
     Mat::from_fn(shapes.nrows() / 2 * 3, shapes.ncols(), |row, j| match row % 3 {
         2 => 0.0,

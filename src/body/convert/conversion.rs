@@ -14,6 +14,7 @@ use crate::body::flex_body::{
 use crate::body::invariants::{Invariants, MassProperties};
 use crate::model::FeModel;
 use crate::numerics::eigen::{Counters, Plan, Resume};
+use crate::numerics::linalg::copied;
 
 /// A finished conversion.
 #[derive(Debug, Clone)]
@@ -159,7 +160,7 @@ impl ModalModel<'_> {
             truncation: truncation
                 .map(|basis::Truncation { load, before, after }| Truncation { load, before, after })
                 .collect(),
-            shape: self.modes.of_nodes().to_owned(),
+            shape: copied(self.modes.of_nodes()),
             rotation: self.modes.rotations.clone(),
             internal: self.modes.internal.clone(),
         };

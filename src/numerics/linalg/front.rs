@@ -43,8 +43,8 @@ pub trait Real:
     fn of(x: f64) -> Self;
     /// In double precision.
     fn wide(self) -> f64;
-    /// Numbers in double precision: themselves, or as they are put into `room`, which has one for each.
-    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut [f64]) -> &'a [f64];
+    /// Numbers in double precision: themselves, or as they are put into `room`.
+    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64];
 }
 
 impl Real for f64 {
@@ -56,7 +56,7 @@ impl Real for f64 {
     fn wide(self) -> f64 {
         self
     }
-    fn all_wide<'a>(numbers: &'a [Self], _: &'a mut [f64]) -> &'a [f64] {
+    fn all_wide<'a>(numbers: &'a [Self], _: &'a mut Vec<f64>) -> &'a [f64] {
         numbers
     }
 }
@@ -70,8 +70,9 @@ impl Real for f32 {
     fn wide(self) -> f64 {
         f64::from(self)
     }
-    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut [f64]) -> &'a [f64] {
-        room.iter_mut().zip(numbers).for_each(|(to, from)| *to = from.wide());
+    fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64] {
+        room.clear();
+        room.extend(numbers.iter().map(|x| x.wide()));
         room
     }
 }

@@ -5,7 +5,7 @@ use super::Pencil;
 use super::contiguous::contiguous_mut;
 use super::factor::{Analysis, COLUMNS, Solve, substitute};
 use super::front::{PANEL, ROWS, Real, Trapezoid};
-use super::inertia::{Blocks, Contribution, Eliminated, Inertia, eliminate_front};
+use super::inertia::{Blocks, Contribution, Inertia, eliminate_front};
 use super::random::normal;
 use super::substitution::{
     WORTH_TASKS, solve_lower, solve_transposed, subtract_product, subtract_transposed,
@@ -21,7 +21,7 @@ use std::convert::Infallible;
 pub struct Indefinite<'a, T = f64> {
     analysis: &'a Analysis,
     sigma: f64,
-    /// L below the leading squares, and these.
+    /// L, and B and the order of the rows in each leading square.
     fronts: Vec<(Trapezoid<T>, Vec<Blocks<T>>)>,
     /// Scale of each row.
     scale: Vec<f64>,
@@ -34,20 +34,16 @@ impl<'a, T: Real> Indefinite<'a, T> {
     pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, sigma);
-        let mut fronts: Vec<Option<Eliminated<T>>> = (0..tree.len()).map(|_| None).collect();
-        let visit = |s: usize, slot: &mut Option<Eliminated<T>>, children: Vec<Contribution<T>>| {
+        let mut fronts: Vec<_> = (0..tree.len()).map(|_| None).collect();
+        let visit = |s: usize, slot: &mut Option<_>, children: Vec<Contribution<T>>| {
             let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
-            *slot = Some(eliminated);
+            let (negative, zero) = eliminated.signs();
+            *slot = Some(((negative, zero, eliminated.growth), eliminated.into_factor()));
             Ok::<_, Infallible>(handed_on)
         };
         let Ok(()) = analysis.walk.up(tree, &mut fronts, &visit);
-        let fronts: Vec<Eliminated<T>> = fronts.into_iter().flatten().collect();
-        let counts = fronts.iter().map(|front| {
-            let (negative, zero) = front.signs();
-            (negative, zero, front.growth)
-        });
+        let (counts, fronts): (Vec<_>, Vec<_>) = fronts.into_iter().flatten().unzip();
         let inertia = Inertia::of_fronts::<T>(counts);
-        let fronts = fronts.into_iter().map(|front| (front.columns, front.blocks)).collect();
         Self { analysis, sigma, fronts, scale: matrix.scale, inertia }
     }
 
@@ -145,22 +141,10 @@ fn for_rows<T: Real, B>(
     below: impl Iterator<Item = B>,
     mut work: impl FnMut(&[f64], B),
 ) {
-    let mut wide = vec![0.0; TOGETHER * width];
+    let mut wide = Vec::with_capacity(TOGETHER * width);
     for (l, below) in l.chunks(TOGETHER * width).zip(below) {
-        work(T::all_wide(l, &mut wide[..l.len()]), below);
+        work(T::all_wide(l, &mut wide), below);
     }
-}
-
-/// The unit lower triangle of the leading square of a panel, row by row.
-fn unit_triangle<T: Real>(block: &Blocks<T>) -> Vec<f64> {
-    let width = block.order.len();
-    let mut rows = vec![0.0; width * width];
-    for j in 0..width {
-        rows[j * width + j] = 1.0;
-        let column = &block.l.col_as_slice(j)[j + 1..];
-        column.iter().enumerate().for_each(|(i, l)| rows[(j + 1 + i) * width + j] = l.wide());
-    }
-    rows
 }
 
 /// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows
@@ -173,12 +157,12 @@ fn forward<T: Real, const K: usize>(
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
         let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| own[row]).collect();
-        solve_lower(&unit_triangle(block), &mut y);
+        let (triangle, l) = columns.panels[p].split_at(width * width);
+        solve_lower(T::all_wide(triangle, &mut Vec::new()), &mut y);
         own.copy_from_slice(&y);
         let piece = |l: &[T], below: &mut [[f64; K]]| {
             for_rows(l, width, below.chunks_mut(TOGETHER), |l, below| subtract_product(l, &y, below));
         };
-        let l = &columns.panels[p][width * width..];
         if l.len() < WORTH_TASKS {
             piece(l, below);
         } else {
@@ -206,7 +190,7 @@ fn backward<T: Real, const K: usize>(
         let piece = |l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]| {
             for_rows(l, width, below.chunks(TOGETHER), |l, below| subtract_transposed(l, below, y));
         };
-        let l = &columns.panels[p][width * width..];
+        let (triangle, l) = columns.panels[p].split_at(width * width);
         if l.len() < WORTH_TASKS {
             piece(l, below, &mut y);
         } else {
@@ -222,7 +206,7 @@ fn backward<T: Real, const K: usize>(
                 }
             }
         }
-        solve_transposed(&unit_triangle(block), &mut y);
+        solve_transposed(T::all_wide(triangle, &mut Vec::new()), &mut y);
         for (&row, x) in block.order.iter().zip(&y) {
             own[row] = *x;
         }

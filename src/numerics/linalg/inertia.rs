@@ -11,6 +11,7 @@ use super::largest::largest;
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
+use pulp::Arch;
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -45,10 +46,26 @@ pub(super) struct Eliminated<T> {
     pub growth: f64,
 }
 
-impl<T> Eliminated<T> {
+impl<T: Real> Eliminated<T> {
     /// Numbers of negative and of zero pivots.
     pub fn signs(&self) -> (usize, usize) {
         self.blocks.iter().fold((0, 0), |(n, z), block| (n + block.negative, z + block.zero))
+    }
+}
+
+impl<T: Real> Eliminated<T> {
+    /// The columns, with the unit triangles of the leading squares in their places, and what else there is of these.
+    pub fn into_factor(mut self) -> (Trapezoid<T>, Vec<Blocks<T>>) {
+        for (panel, block) in self.columns.panels.iter_mut().zip(&mut self.blocks) {
+            let width = block.order.len();
+            let l = std::mem::replace(&mut block.l, Mat::new());
+            for (i, row) in panel[..width * width].chunks_exact_mut(width).enumerate() {
+                row.iter_mut().enumerate().for_each(|(j, to)| {
+                    *to = if j < i { l[(i, j)] } else { T::of(f64::from(u8::from(i == j))) };
+                });
+            }
+        }
+        (self.columns, self.blocks)
     }
 }
 
@@ -144,7 +161,7 @@ const LANES: usize = 8;
 /// P A P' = L B L' of the leading square of a panel.
 pub(super) struct Blocks<T> {
     /// Unit lower triangle below the diagonal.
-    pub l: Mat<T>,
+    l: Mat<T>,
     /// Row of A at each place.
     pub order: Vec<usize>,
     diagonal: Vec<f64>,
@@ -196,13 +213,7 @@ impl<T: Real> Blocks<T> {
             divide_rows(rows, self.l.as_ref(), true);
             drop_negligible(rows);
             scaled.copy_from_slice(rows);
-            let mut wide = vec![0.0; width];
-            for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
-                wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());
-                self.divide(&mut wide);
-                row.iter_mut().zip(&wide).for_each(|(to, from)| *to = T::of(*from));
-                *g += self.growth(row);
-            }
+            Arch::new().dispatch(|| self.divide_rows_of_scaled(rows, growth));
             drop_negligible(rows);
         };
         let length = ROWS * width;
@@ -219,7 +230,21 @@ impl<T: Real> Blocks<T> {
         }
     }
 
+    /// Rows of L from rows of L B; adds what each contributes to |L| |B| |L|'.
+    #[inline(always)]
+    fn divide_rows_of_scaled(&self, rows: &mut [T], growth: &mut [f64]) {
+        let width = self.order.len();
+        let mut wide = vec![0.0; width];
+        for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
+            wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());
+            self.divide(&mut wide);
+            row.iter_mut().zip(&wide).for_each(|(to, from)| *to = T::of(*from));
+            *g += self.growth(row);
+        }
+    }
+
     /// Row of L from a row of L B: the row times B^-1.
+    #[inline(always)]
     pub fn divide(&self, row: &mut [f64]) {
         if !self.has_pairs {
             row.iter_mut().zip(&self.diagonal).for_each(|(x, d)| *x /= d);
@@ -244,6 +269,7 @@ impl<T: Real> Blocks<T> {
     }
 
     /// |l|' |B| |l| of a row of L.
+    #[inline(always)]
     fn growth(&self, row: &[T]) -> f64 {
         let (lanes, rest) = row.as_chunks::<LANES>();
         let (diagonal, last) = self.diagonal.as_chunks::<LANES>();

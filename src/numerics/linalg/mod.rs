@@ -51,6 +51,6 @@ pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use stored::Stored;
 pub use tall::{
-    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, divide,
-    gram, side_by_side, subtract_columns, subtract_combination, weighted_square,
+    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, copied, divide,
+    gram, side_by_side, subtract_columns, subtract_combination, weighted_square, zeros,
 };

@@ -1,5 +1,6 @@
 //! The symmetric pencil K - sigma M with M = Ms kron I_block, as the eigen-solver sees it.
 
+use super::tall::zeros;
 use super::{SymmetricMatrix, multiply};
 use faer::{Mat, MatMut, MatRef};
 
@@ -43,14 +44,14 @@ impl<'a> Pencil<'a> {
 
     /// K X.
     pub fn apply_stiffness(&self, x: MatRef<'_, f64>) -> Mat<f64> {
-        let mut y = Mat::zeros(x.nrows(), x.ncols());
+        let mut y = zeros(x.nrows(), x.ncols());
         self.stiffness_times(x, y.as_mut());
         y
     }
 
     /// M X.
     pub fn apply_mass(&self, x: MatRef<'_, f64>) -> Mat<f64> {
-        let mut y = Mat::zeros(x.nrows(), x.ncols());
+        let mut y = zeros(x.nrows(), x.ncols());
         self.mass_times(x, y.as_mut());
         y
     }

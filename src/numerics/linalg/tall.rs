@@ -7,6 +7,7 @@ use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
 use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// Rows per partial product.
@@ -106,6 +107,31 @@ impl Tall {
         }
         self.columns_mut(0..columns)
     }
+}
+
+/// Zeros (n x m), written by all threads: [`Mat::zeros`] writes them by one, and the system clears memory that is
+/// touched for the first time, which takes longer than most of what is done with it.
+#[allow(unsafe_code)]
+pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
+    let mut own = Mat::<f64>::with_capacity(rows, columns);
+    let stride = own.col_stride().unsigned_abs();
+    // SAFETY: faer reserves room for as many columns as were asked for, `stride` numbers apart, and nobody else has it;
+    // numbers that are not yet there are taken as such.
+    let room = unsafe {
+        std::slice::from_raw_parts_mut(own.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
+    };
+    room.par_chunks_mut(ROWS).for_each(|part| part.fill(MaybeUninit::new(0.0)));
+    // SAFETY: all of them have been written.
+    unsafe { own.set_dims(rows, columns) };
+    own
+}
+
+/// A copy, made by all threads.
+pub fn copied(x: MatRef<'_, f64>) -> Mat<f64> {
+    let mut own = zeros(x.nrows(), x.ncols());
+    let columns: Vec<_> = own.col_iter_mut().zip(x.col_iter()).collect();
+    columns.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
+    own
 }
 
 /// A' B (m x k) of tall blocks A (n x m) and B (n x k).
@@ -213,7 +239,7 @@ pub fn add_combination(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64
 /// # Panics
 /// When the shapes disagree.
 pub fn combine(v: MatRef<'_, f64>, h: MatRef<'_, f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(v.nrows(), h.ncols());
+    let mut out = zeros(v.nrows(), h.ncols());
     combine_into(out.as_mut(), v, h);
     out
 }
@@ -263,7 +289,10 @@ pub fn side_by_side(blocks: &[MatRef<'_, f64>]) -> Mat<f64> {
     let n = blocks.first().map_or(0, |block| block.nrows());
     assert!(blocks.iter().all(|block| block.nrows() == n), "rows of blocks side by side");
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
-    Mat::from_fn(n, columns.len(), |i, j| columns[j][i])
+    let mut own = zeros(n, columns.len());
+    let pairs: Vec<_> = own.col_iter_mut().zip(columns).collect();
+    pairs.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
+    own
 }
 
 fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
@@ -345,6 +374,18 @@ mod tests {
         grown.push_multiple(-0.5, given.as_ref().col(2));
         assert_eq!(grown.as_ref().col(2), -0.5 * given.as_ref().col(2));
         assert!(grown.columns(1..2).col(0).iter().all(|x| *x == 0.0));
+    }
+
+    #[test]
+    fn blocks_of_any_shape_are_zeros_and_copies() {
+        for (rows, columns) in [(0, 0), (0, 3), (5, 0), (1, 1), (7, 3), (ROWS + 3, 5)] {
+            let own = zeros(rows, columns);
+            assert_eq!(own, Mat::<f64>::zeros(rows, columns), "{rows} {columns}");
+            let given = Mat::from_fn(rows, columns, |i, j| (i + 10 * j) as f64);
+            assert_eq!(copied(given.as_ref()), given);
+            // Taken apart by columns and by rows.
+            assert_eq!(copied(given.as_ref().transpose()), given.transpose());
+        }
     }
 
     #[test]
