@@ -86,9 +86,28 @@ def log(text):
     print(text, file=sys.stderr, flush=True)
 
 
+# Bytes that programs took when they ran last.
+PEAKS = {}
+TOUCH = """
+import mmap, sys
+memory = mmap.mmap(-1, int(sys.argv[1]))
+memory.madvise(mmap.MADV_HUGEPAGE)
+for page in range(0, len(memory), 4096):
+    memory[page] = 1
+"""
+
+
+def touch_memory(name):
+    """Touches as much memory as the command `name` took when it ran last. A virtual machine gets memory from its host page by page when it is touched first, and
+    again a few seconds after it was given back (measured: 2.5 ms per MB, 0.05 of memory that is there): no program is to be charged for what ran before it."""
+    subprocess.run([sys.executable, "-c", TOUCH, str(int(1.2 * max(PEAKS.get(name, 0), 1e9)))], check=True)
+
+
 def measured(command, threads=None, allowed=(0,)):
     """Runs a command: its standard output, and user + system CPU seconds, wall seconds, peak resident MB of its process. `allowed` are the exit codes that are no
     failure."""
+    name = tuple(map(str, command[:3]))
+    touch_memory(name)
     env = dict(os.environ)
     for name, value in DEBIAN.items():
         env.setdefault(name, value)
@@ -105,7 +124,8 @@ def measured(command, threads=None, allowed=(0,)):
         text, complaint = out.read().decode(), err.read().decode()
     if process.returncode not in allowed:
         raise RuntimeError(f"{' '.join(map(str, command))} ended with {process.returncode}\n{complaint[-2000:]}")
-    return text, {"cpu_s": used.ru_utime + used.ru_stime, "wall_s": wall, "memory_mb": used.ru_maxrss * 1024 / 1e6}
+    PEAKS[name] = used.ru_maxrss * 1024
+    return text, {"cpu_s": used.ru_utime + used.ru_stime, "wall_s": wall, "memory_mb": PEAKS[name] / 1e6}
 
 
 def parsed(text):

@@ -8,5 +8,6 @@ mod extremes;
 mod integration;
 mod memory;
 mod multigrid;
+mod second_shift;
 mod single_precision;
 mod work_counters;

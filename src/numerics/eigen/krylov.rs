@@ -4,8 +4,8 @@ use super::counters::Counters;
 use super::problem::EigenProblem;
 use super::resume::Snapshot;
 use crate::numerics::linalg::{
-    Solve, Tall, combine, combine_in_place, dense_cholesky, divide, full_qr, gram, solve_upper, subtract_combination,
-    uniform, weighted_square,
+    Solve, Tall, combine, combine_in_place, dense_cholesky, divide, full_qr, gram, solve_upper,
+    subtract_combination, uniform, weighted_square,
 };
 use faer::prelude::{IntoConst, ReborrowMut};
 use faer::{ColRef, Mat, MatRef};
@@ -392,6 +392,8 @@ fn gram_schmidt(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::eigen::Resume;
+    use crate::numerics::linalg::{Analysis, Cholesky, CscMatrix, Indefinite, Pencil, SymmetricMatrix};
 
     /// Columns of which the last is nearly the sum of the others, up to `apart`.
     fn block(apart: f64) -> Mat<f64> {
@@ -423,6 +425,63 @@ mod tests {
         let (mut slow, mut m_slow) = (given.clone(), weighted(&given));
         let t_slow = gram_schmidt(&mut slow, &mut m_slow, &norms, &all_seen);
         assert!((&slow - &w).norm_max() < 1e-13 && (&t_slow - &t).norm_max() < 1e-13);
+    }
+
+    /// Springs of changing stiffness along a chain, and its ends to the ground.
+    fn chain(n: usize) -> [SymmetricMatrix; 2] {
+        let spring = |i: usize| 1.0 + (i % 5) as f64;
+        let entries = (0..n).flat_map(|i| {
+            let off = (i + 1 < n).then_some([(i, i + 1), (i + 1, i)]).into_iter().flatten();
+            let off = off.map(move |(row, column)| (row as u32, column as u32, -spring(i + 1)));
+            off.chain([(i as u32, i as u32, spring(i) + spring(i + 1))])
+        });
+        let stiffness: Vec<_> = entries.collect();
+        let mass: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0 + f64::from(i % 3))).collect();
+        [stiffness, mass].map(|t| SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &t)))
+    }
+
+    /// The relation that all else follows from, (K - sigma M)^-1 M V = V T + F B, holds after a change of the shift, and
+    /// the basis is as orthonormal as before.
+    #[test]
+    fn a_basis_goes_over_to_another_shift() {
+        let [k, m] = chain(300);
+        let rigid = Mat::zeros(300, 0);
+        let problem = EigenProblem {
+            pencil: Pencil::new(&k, &m, 1),
+            rigid: rigid.as_ref(),
+            first_estimate: 1e-3,
+            input_error: 0.0,
+            order: None,
+            resume: Resume::default(),
+        };
+        let analysis = Analysis::new(&problem.pencil).expect("small");
+        let mut counters = Counters::default();
+        let (tau, sigma) = (1e-3, 0.05);
+        let first = Cholesky::<f64>::new(&analysis, &problem.pencil, tau).expect("positive definite");
+        let second = Indefinite::<f64>::new(&analysis, &problem.pencil, sigma);
+        let mut krylov = Krylov::new(&problem, 80);
+        krylov.append_random(3, &first, &mut counters);
+        (0..12).for_each(|_| krylov.step(&first, &mut counters));
+        krylov.change_shift(-sigma - tau, &mut counters);
+        for step in 0..4 {
+            let (size, all) = (krylov.projected(), krylov.size());
+            let v = krylov.v.columns(0..size);
+            let mut product = problem.pencil.apply_mass(v);
+            Solve::solve_in_place(&second, product.as_mut());
+            let last = krylov.coupling.ncols();
+            let mut expected = combine(v, krylov.t());
+            let newest = combine(krylov.v.columns(size..all), krylov.coupling.as_ref());
+            let mut coupled = expected.as_mut().subcols_mut(size - last, last);
+            coupled += newest;
+            let scale = krylov.t().norm_max();
+            let off = (&product - &expected).norm_max();
+            assert!(off < 1e-12 * scale, "after {step} steps: {off:e} of {scale:e}");
+            let mass = problem.pencil.apply_mass(krylov.v.as_ref());
+            let off = (gram(krylov.v.as_ref(), mass.as_ref()) - Mat::<f64>::identity(all, all)).norm_max();
+            assert!(off < 1e-13, "after {step} steps: {off:e}");
+            assert!((krylov.m_fresh.as_ref() - mass.as_ref().subcols(size, all - size)).norm_max() < 1e-13);
+            krylov.step(&second, &mut counters);
+        }
     }
 
     #[test]

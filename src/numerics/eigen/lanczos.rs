@@ -16,8 +16,8 @@ use super::second_shift::SecondShift;
 use super::start::snapshot;
 use super::zero_energy::NOISE_FACTOR;
 use crate::base::progress::{Event, Watch};
-use crate::numerics::linalg::{Analysis, Solve, SymmetricEigen, symmetric_eigen};
-use faer::{Mat, MatRef};
+use crate::numerics::linalg::{Solve, SymmetricEigen, symmetric_eigen};
+use faer::Mat;
 use std::ops::RangeInclusive;
 
 /// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138
@@ -214,6 +214,14 @@ pub(super) struct Iteration<'a> {
     least_excess: f64,
 }
 
+/// What a search shows midway.
+pub(super) struct Midway {
+    /// Ritz values, ascending.
+    pub eigenvalues: Vec<f64>,
+    /// The lowest modes, which have converged.
+    modes: Mat<f64>,
+}
+
 /// What is left of a first shift.
 struct First {
     tau: f64,
@@ -325,7 +333,11 @@ impl<'a> Iteration<'a> {
 
     /// Expands the basis, and tests its Ritz pairs until they are good enough to be handed over; a full basis is
     /// restarted from the best of them.
-    fn run(mut self, factor: &dyn Solve, counters: &mut Counters) -> Result<Search<'a>, EigenFailure> {
+    pub(super) fn run(
+        mut self,
+        factor: &dyn Solve,
+        counters: &mut Counters,
+    ) -> Result<Search<'a>, EigenFailure> {
         loop {
             self.expand(factor, counters);
             if let Some(shift) = self.better_shift(factor, counters)? {
@@ -367,37 +379,28 @@ impl<'a> Iteration<'a> {
         self.to_come && !self.complete && self.krylov.projected() >= self.goal.wanted
     }
 
-    /// Goes on with a second shift; `None` where its factor is of no use.
-    pub(super) fn with_second_shift(
-        mut self,
-        analysis: &Analysis,
-        counters: &mut Counters,
-    ) -> Result<Option<Search<'a>>, EigenFailure> {
+    /// Midway: the Ritz values, ascending, and what is to be kept when the shift changes.
+    pub(super) fn look_midway(&mut self, counters: &mut Counters) -> Result<Midway, EigenFailure> {
         self.to_come = false;
         let mut ritz = self.test()?;
         if self.asks_below_noise(&ritz, counters) {
             ritz = self.test()?;
         }
         let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
-        let settled = settled(&eigenvalues, ritz.converged);
-        let modes = self.vectors(&ritz, settled);
-        let wanted = self.goal.wanted;
-        let Some(second) = SecondShift::new(self.problem, analysis, &eigenvalues, wanted, counters) else {
-            return Ok(None);
-        };
+        let modes = self.vectors(&ritz, settled(&eigenvalues, ritz.converged));
+        Ok(Midway { eigenvalues, modes })
+    }
+
+    /// Goes over to a second shift.
+    pub(super) fn change_shift(&mut self, midway: Midway, second: &SecondShift<'_>, counters: &mut Counters) {
         let tau = second.factor.shift();
         self.krylov.change_shift(tau - self.tau, counters);
-        self.first = Some(First { tau: self.tau, modes, below: second.below });
+        self.first = Some(First { tau: self.tau, modes: midway.modes, below: second.below });
         (self.tau, self.next_test) = (tau, 0);
-        self.run(&second.factor, counters).map(Some)
     }
 
     /// The shift to use instead of this one, once the lowest Ritz value tells.
-    fn better_shift(
-        &self,
-        factor: &dyn Solve,
-        counters: &mut Counters,
-    ) -> Result<Option<f64>, EigenFailure> {
+    fn better_shift(&self, factor: &dyn Solve, counters: &mut Counters) -> Result<Option<f64>, EigenFailure> {
         if self.first.is_some() || !STEPS_TO_JUDGE.contains(&self.steps) {
             return Ok(None);
         }
@@ -426,8 +429,7 @@ impl<'a> Iteration<'a> {
     fn test(&mut self) -> Result<Ritz, EigenFailure> {
         let (krylov, wanted) = (&self.krylov, self.goal.wanted);
         let tau = self.tau;
-        let (below, settled) =
-            self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
+        let (below, settled) = self.first.as_ref().map_or((0, 0), |first| (first.below, first.modes.ncols()));
         let size = krylov.projected();
         let found = descending(krylov)?;
         let is_negative = |theta: &f64| *theta < -1e-8 * found.values[size - 1].abs();
@@ -485,7 +487,11 @@ impl<'a> Iteration<'a> {
 
     /// Hands the modes over when they are there and keep what was asked for; else more is asked of the
     /// estimates.
-    fn hand_over(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<Search<'a>>, EigenFailure> {
+    fn hand_over(
+        &mut self,
+        ritz: &Ritz,
+        counters: &mut Counters,
+    ) -> Result<Option<Search<'a>>, EigenFailure> {
         if !ritz.all_there() {
             return Ok(None);
         }
@@ -514,7 +520,8 @@ impl<'a> Iteration<'a> {
 
     /// The vectors of the first Ritz pairs, after an inverse iteration.
     fn vectors(&self, ritz: &Ritz, count: usize) -> Mat<f64> {
-        let mut vectors = self.krylov.inverse_iterated(ritz.s.as_ref().subcols(0, count), &ritz.theta[..count]);
+        let mut vectors =
+            self.krylov.inverse_iterated(ritz.s.as_ref().subcols(0, count), &ritz.theta[..count]);
         if let Some(First { modes, .. }) = &self.first {
             let known = modes.ncols().min(count);
             vectors.as_mut().subcols_mut(0, known).copy_from(modes.as_ref().subcols(0, known));

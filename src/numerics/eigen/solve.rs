@@ -12,6 +12,7 @@ use super::plan::{CountPlan, Multigrid, Plan, gigabytes};
 use super::problem::EigenProblem;
 use super::refine::{Refined, refine};
 use super::resume::Snapshot;
+use super::second_shift::SecondShift;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted, keeps};
 use super::single;
 use super::solution::{EigenSolution, EigenvalueBounds};
@@ -356,8 +357,7 @@ fn search_in_double(
             lanczos::Search::Midway(iteration) => {
                 may_change.set(false);
                 let tau = factor.shift();
-                drop(factor);
-                let found = with_second_shift(problem, analysis, *iteration, (tau, goal.tolerance), counters);
+                let found = with_second_shift(problem, analysis, *iteration, (factor, goal), counters);
                 Ok(found.map_or(Attempt::Anew(tau), Attempt::Done))
             }
             lanczos::Search::ShiftTooLarge(shift) => Ok(Attempt::Anew(shift)),
@@ -368,21 +368,31 @@ fn search_in_double(
     Ok((modes, next, tau))
 }
 
-/// Goes on with a second shift, after one of tau; `None` where that does not find modes that keep the tolerance.
+/// Goes on with a second shift, whose factor takes the place of `first`; `None` where that does not find modes that keep
+/// the tolerance.
 fn with_second_shift(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
-    iteration: lanczos::Iteration<'_>,
-    (tau, tolerance): (f64, f64),
+    mut iteration: lanczos::Iteration<'_>,
+    (first, goal): (Cholesky<'_, f64>, &Goal),
     counters: &mut Counters,
 ) -> Option<(Refined, Vec<f64>)> {
-    let found = iteration.with_second_shift(analysis, counters).ok()??;
-    let lanczos::Search::Found { mut modes, next } = found else { return None };
-    if modes.excess(tolerance) > 1.0 {
-        let factor = factorise::<f64>(problem, analysis, tau, counters).ok()?;
-        modes = refine(problem, &factor, modes, tolerance, counters).ok()?;
+    let midway = iteration.look_midway(counters).ok()?;
+    let tau = first.shift();
+    drop(first);
+    let again = |counters: &mut Counters| factorise::<f64>(problem, analysis, tau, counters).ok();
+    let found = match SecondShift::new(problem, analysis, &midway.eigenvalues, goal.wanted, counters) {
+        Some(second) => {
+            iteration.change_shift(midway, &second, counters);
+            iteration.run(&second.factor, counters)
+        }
+        None => iteration.run(&again(counters)?, counters),
+    };
+    let lanczos::Search::Found { mut modes, next } = found.ok()? else { return None };
+    if modes.excess(goal.tolerance) > 1.0 {
+        modes = refine(problem, &again(counters)?, modes, goal.tolerance, counters).ok()?;
     }
-    (modes.excess(tolerance) <= 1.0).then_some((modes, next))
+    (modes.excess(goal.tolerance) <= 1.0).then_some((modes, next))
 }
 
 /// The inertia count in the gap above the last mode.

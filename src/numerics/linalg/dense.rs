@@ -108,11 +108,10 @@ pub fn full_qr(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
     let block = qr::recommended_block_size::<f64>(n, m);
     let params = <qr::QrParams as Auto<f64>>::auto().into();
     let mut factor = Mat::zeros(block, m);
-    let mut memory = MemBuffer::new(
-        qr::qr_in_place_scratch::<f64>(n, m, block, Par::Seq, params).or(
+    let mut memory =
+        MemBuffer::new(qr::qr_in_place_scratch::<f64>(n, m, block, Par::Seq, params).or(
             householder::apply_block_householder_sequence_on_the_left_in_place_scratch::<f64>(n, block, n),
-        ),
-    );
+        ));
     let stack = MemStack::new(&mut memory);
     qr::qr_in_place(a.as_mut(), factor.as_mut(), Par::Seq, stack, params);
     let mut q = Mat::identity(n, n);
@@ -192,6 +191,18 @@ mod tests {
             assert!((product[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-14, "({i}, {j})");
         }
         assert!(dense_inverse(Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 })).is_none());
+    }
+
+    #[test]
+    fn a_full_qr_has_all_directions() {
+        for (n, m) in [(5, 5), (9, 6), (140, 130), (7, 0)] {
+            let a =
+                Mat::from_fn(n, m, |i, j| ((i * 7 + j * 13) as f64).sin() + if i == j { 2.0 } else { 0.0 });
+            let (q, r) = full_qr(a.clone());
+            assert!((q.transpose() * &q - Mat::<f64>::identity(n, n)).norm_max() < 1e-14 * n as f64);
+            assert!((q.as_ref().subcols(0, m) * &r - &a).norm_max() < 1e-14 * n as f64, "{n} x {m}");
+            assert!((0..m).all(|j| (j + 1..m).all(|i| r[(i, j)] == 0.0)), "{n} x {m}");
+        }
     }
 
     #[test]

@@ -11,7 +11,6 @@ use super::largest::largest;
 use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
-use pulp::Arch;
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -213,7 +212,13 @@ impl<T: Real> Blocks<T> {
             divide_rows(rows, self.l.as_ref(), true);
             drop_negligible(rows);
             scaled.copy_from_slice(rows);
-            Arch::new().dispatch(|| self.divide_rows_of_scaled(rows, growth));
+            let mut wide = vec![0.0; width];
+            for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
+                wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());
+                self.divide(&mut wide);
+                row.iter_mut().zip(&wide).for_each(|(to, from)| *to = T::of(*from));
+                *g += self.growth(row);
+            }
             drop_negligible(rows);
         };
         let length = ROWS * width;
@@ -230,21 +235,7 @@ impl<T: Real> Blocks<T> {
         }
     }
 
-    /// Rows of L from rows of L B; adds what each contributes to |L| |B| |L|'.
-    #[inline(always)]
-    fn divide_rows_of_scaled(&self, rows: &mut [T], growth: &mut [f64]) {
-        let width = self.order.len();
-        let mut wide = vec![0.0; width];
-        for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
-            wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());
-            self.divide(&mut wide);
-            row.iter_mut().zip(&wide).for_each(|(to, from)| *to = T::of(*from));
-            *g += self.growth(row);
-        }
-    }
-
     /// Row of L from a row of L B: the row times B^-1.
-    #[inline(always)]
     pub fn divide(&self, row: &mut [f64]) {
         if !self.has_pairs {
             row.iter_mut().zip(&self.diagonal).for_each(|(x, d)| *x /= d);
@@ -269,7 +260,6 @@ impl<T: Real> Blocks<T> {
     }
 
     /// |l|' |B| |l| of a row of L.
-    #[inline(always)]
     fn growth(&self, row: &[T]) -> f64 {
         let (lanes, rest) = row.as_chunks::<LANES>();
         let (diagonal, last) = self.diagonal.as_chunks::<LANES>();

@@ -33,7 +33,9 @@ pub use compensated_product::{
     CompensatedBlock, LANES, gram_compensated, multiply_compensated, projection_compensated, sum_length,
 };
 pub(crate) use contiguous::contiguous_mut;
-pub use dense::{SymmetricEigen, dense_cholesky, dense_inverse, full_qr, solve_lower, solve_upper, symmetric_eigen};
+pub use dense::{
+    SymmetricEigen, dense_cholesky, dense_inverse, full_qr, solve_lower, solve_upper, symmetric_eigen,
+};
 pub use elimination::{Dependents, Elimination, ReducedPencil};
 pub use factor::{Analysis, Cholesky, CoupledRows, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
@@ -51,6 +53,6 @@ pub(crate) use sparse::{ColumnBlock, split_columns};
 pub use sparse::{CscMatrix, SymmetricMatrix};
 pub use stored::Stored;
 pub use tall::{
-    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, copied, divide,
-    gram, side_by_side, subtract_columns, subtract_combination, weighted_square, zeros,
+    Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, copied,
+    divide, gram, side_by_side, subtract_columns, subtract_combination, weighted_square, zeros,
 };
