@@ -63,7 +63,13 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         _ => None,
     });
     let (name, printing) = command_of(arguments);
-    let outcome = match &arguments.command {
+    // In a thread of the pool: from any other one every loop in parallel is handed over, and waited for asleep.
+    let outcome = rayon::scope(|_| outcome_of(arguments));
+    finish(Some(name), printing, outcome)
+}
+
+fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
+    match &arguments.command {
         Command::Convert(arguments) => convert::run(arguments),
         Command::Prepare(arguments) => prepare::run(arguments),
         Command::Assemble(arguments) => assemble::run(arguments),
@@ -82,8 +88,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         Command::Doctor(_) => doctor::run(),
         Command::Completions(arguments) => completions::completions(arguments),
         Command::Man(arguments) => completions::man(arguments),
-    };
-    finish(Some(name), printing, outcome)
+    }
 }
 
 fn command_of(arguments: &Arguments) -> (&'static str, Printing) {

@@ -19,11 +19,13 @@ pub(super) fn use_threads(asked: Option<u16>) -> usize {
 /// itself cannot be tried twice: its threads are started before, and told their work when it is known how
 /// many there are.
 fn start(wanted: usize) {
+    /// The command itself runs in one of them.
+    const STACK: usize = 8 << 20;
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let started = (0..wanted).map_while(|number| {
             let (work, told) = mpsc::channel::<rayon::ThreadBuilder>();
-            let worker = std::thread::Builder::new().name(format!("worker {number}"));
+            let worker = std::thread::Builder::new().name(format!("worker {number}")).stack_size(STACK);
             worker.spawn(move || told.recv().map(rayon::ThreadBuilder::run)).ok().map(|_| work)
         });
         let started: Vec<_> = started.collect();

@@ -108,7 +108,7 @@ fn analyse(
     let analysis = problem.analysis().ok_or(EigenFailure::TooLarge)?;
     counters.factor_len = analysis.factor_len() as u64;
     counters.factor_flops = analysis.flops() as u64;
-    if !is_positive_semidefinite(problem.pencil.mass(), &analysis) {
+    if !is_positive_semidefinite(&problem.pencil, &analysis) {
         return Err(EigenFailure::MassIndefinite);
     }
     Ok(analysis)

@@ -166,7 +166,7 @@ fn count(
         let remark = format!("the count needs {needed} of memory, {available} are available");
         return Ok(outcome(last, None, remark));
     }
-    if !is_positive_semidefinite(problem.pencil.mass(), analysis) {
+    if !is_positive_semidefinite(&problem.pencil, analysis) {
         return Err(EigenFailure::MassIndefinite);
     }
     let mut counted = (last, 0);

