@@ -374,10 +374,10 @@ impl std::fmt::Display for Plan {
 
 /// What a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given
 /// back and not yet taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its
-/// own, and buffers of the dense products (measured on models of 4 000 to 20 000 degrees of freedom: 42 to 52
-/// MB on one thread, 50 to 90 MB on two).
+/// own, and buffers of the dense products (measured on models of 18 000 degrees of freedom: 14 to 20 MB on one
+/// thread, 34 to 48 MB on two).
 fn resident(bytes: u64) -> u64 {
-    bytes + bytes / 8 + 24_000_000 + 24_000_000 * rayon::current_num_threads() as u64
+    bytes + bytes / 8 + 8_000_000 + 20_000_000 * rayon::current_num_threads() as u64
 }
 
 /// Bytes in GB, or MB where that is less.
