@@ -56,7 +56,7 @@ fn contrast() -> FeModel {
     let mesh = Mesh::block(Kind::Hex8, [12, 5, 4], [1.2, 0.5, 0.41]);
     let half = |left: bool, youngs: f64| {
         let kept = move |x: [f64; 3]| (x[0] < 0.6) == left;
-        mesh.part(&kept).assemble(&Material { youngs, ..Material::STEEL }, MassRule::Consistent)
+        mesh.part(kept).assemble(&Material { youngs, ..Material::STEEL }, MassRule::Consistent)
     };
     checked(&half(true, 2e11).plus(&half(false, 2e3)))
 }
