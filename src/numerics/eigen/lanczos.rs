@@ -224,7 +224,6 @@ pub(super) struct Midway {
 
 /// What is left of a first shift.
 struct First {
-    tau: f64,
     /// The lowest modes, which had converged: far from the second shift, its operator leaves rounding in them.
     modes: Mat<f64>,
     /// Flexible modes below the second shift.
@@ -395,7 +394,7 @@ impl<'a> Iteration<'a> {
     pub(super) fn change_shift(&mut self, midway: Midway, second: &SecondShift<'_>, counters: &mut Counters) {
         let tau = second.factor.shift();
         self.krylov.change_shift(tau - self.tau, counters);
-        self.first = Some(First { tau: self.tau, modes: midway.modes, below: second.below });
+        self.first = Some(First { modes: midway.modes, below: second.below });
         (self.tau, self.next_test) = (tau, 0);
     }
 
@@ -465,23 +464,10 @@ impl<'a> Iteration<'a> {
         if converged > 0 && !self.goal.rough && (converged >= many || ritz.all_there()) {
             // All Ritz vectors: with a third of those that are no modes yet, 60 modes after 20 take 36
             // columns more.
-            self.problem.resume.save(|| self.snapshot(ritz));
+            self.problem
+                .resume
+                .save(|| snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged)));
             self.saved = converged;
-        }
-    }
-
-    /// The search as it stands; after a second shift, whose operator no other search has, the modes found alone.
-    fn snapshot(&self, ritz: &Ritz) -> Snapshot {
-        let converged = ritz.converged;
-        let Some(first) = &self.first else {
-            return snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged));
-        };
-        Snapshot {
-            shift: first.tau,
-            eigenvalues: (0..converged).map(|i| ritz.lambda(i)).collect(),
-            basis: self.krylov.combination(ritz.s.as_ref().subcols(0, converged)),
-            coupling: Mat::zeros(0, converged),
-            converged,
         }
     }
 

@@ -301,11 +301,13 @@ impl Plan {
             FactorChoice::Auto => Precision::Double,
         };
         let mut needed = search(precision);
-        // The first factor is given back before, and made again where its modes are to be refined.
+        // The first factor is given back before, and made again where its modes are to be refined. A search that is kept
+        // has one operator from its beginning to its end.
         let with_second = needed.max(8 * peaks.kept_inertia + vectors(problem, wanted, precision));
         let second_shift = !dense
             && !certified
             && precision == Precision::Double
+            && problem.resume.save.is_none()
             && second_shift::pays(analysis, n, wanted, basis_columns(wanted))
             && resident(with_second) <= available;
         if second_shift {
