@@ -86,28 +86,16 @@ def log(text):
     print(text, file=sys.stderr, flush=True)
 
 
-# Bytes that programs took when they ran last.
-PEAKS = {}
-TOUCH = """
-import mmap, sys
-memory = mmap.mmap(-1, int(sys.argv[1]))
-memory.madvise(mmap.MADV_HUGEPAGE)
-for page in range(0, len(memory), 4096):
-    memory[page] = 1
-"""
-
-
-def touch_memory(name):
-    """Touches as much memory as the command `name` took when it ran last. A virtual machine gets memory from its host page by page when it is touched first, and
-    again a few seconds after it was given back (measured: 2.5 ms per MB, 0.05 of memory that is there): no program is to be charged for what ran before it."""
-    subprocess.run([sys.executable, "-c", TOUCH, str(int(1.2 * max(PEAKS.get(name, 0), 1e9)))], check=True)
+def after_warm_up(command, threads=None):
+    """[`measured`], directly after a run of the same that is not. A virtual machine gets memory from its host page by page when it is touched first, and again a
+    few seconds after it was given back: up to 2.5 ms per MB, a third of some runs, for which no program is to be charged by chance."""
+    measured(command, threads)
+    return measured(command, threads)
 
 
 def measured(command, threads=None, allowed=(0,)):
     """Runs a command: its standard output, and user + system CPU seconds, wall seconds, peak resident MB of its process. `allowed` are the exit codes that are no
     failure."""
-    name = tuple(map(str, command[:3]))
-    touch_memory(name)
     env = dict(os.environ)
     for name, value in DEBIAN.items():
         env.setdefault(name, value)
@@ -124,8 +112,7 @@ def measured(command, threads=None, allowed=(0,)):
         text, complaint = out.read().decode(), err.read().decode()
     if process.returncode not in allowed:
         raise RuntimeError(f"{' '.join(map(str, command))} ended with {process.returncode}\n{complaint[-2000:]}")
-    PEAKS[name] = used.ru_maxrss * 1024
-    return text, {"cpu_s": used.ru_utime + used.ru_stime, "wall_s": wall, "memory_mb": PEAKS[name] / 1e6}
+    return text, {"cpu_s": used.ru_utime + used.ru_stime, "wall_s": wall, "memory_mb": used.ru_maxrss * 1024 / 1e6}
 
 
 def parsed(text):
@@ -142,8 +129,8 @@ def make_model(args, case, folder):
 
 
 def run_flexbody(args, folder, threads):
-    text, run = measured([args.program, "convert", folder / "model.toml", "-o", folder / "body.flex.h5", "--modes", MODES,
-                          "--threads", threads, "--json", "--quiet"])
+    text, run = after_warm_up([args.program, "convert", folder / "model.toml", "-o", folder / "body.flex.h5", "--modes", MODES,
+                               "--threads", threads, "--json", "--quiet"])
     report = parsed(text)["results"]
     worst = report["modes"]["worst_residual"]  # over |K x| + lambda |M x|; what it can be over |K x| alone
     detail = {key: report["run"][key] for key in ("phases", "counters")}
@@ -154,7 +141,7 @@ def run_flexbody(args, folder, threads):
 def run_peer(args, name, folder, threads, tolerance):
     peer = PEERS[name]
     command = [interpreter(args, name), BENCHES / "peers" / peer.script, folder, "--modes", MODES, *peer.options]
-    text, _ = measured([*command, "--tolerance", tolerance] if tolerance else command, threads)
+    text, _ = after_warm_up([*command, "--tolerance", tolerance] if tolerance else command, threads)
     found = parsed(text)
     charged = {key: value for key, value in found["phases"].items() if key not in peer.free}
     return {"cpu_s": sum(p["cpu_s"] for p in charged.values()), "wall_s": sum(p["wall_s"] for p in charged.values()),

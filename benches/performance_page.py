@@ -19,8 +19,8 @@ freedom), frequencies must agree with flexbody's to 1e-8. Where rounding alone l
 * flexbody is charged for its whole process: Matrix Market text in, checks, proof that no mode is missed, invariants, both lumped comparisons, flex-body file out.
 * Peers get the matrices as arrays for nothing. SLEPc and scipy are charged for factorisation and modes alone, with the loosest tolerance
   tried that meets both; Exudyn for its whole conversion. Their imports are free. Memory is the peak of the process, models included.
-* CPU is user + system seconds of all threads. Figures are medians; +/- is half the range of the runs. Model files are in the page cache. As much memory
-  as a program takes is touched before it is started: a virtual machine gets it from its host page by page, at up to 2.5 ms per MB, whoever is first.
+* CPU is user + system seconds of all threads. Figures are medians; +/- is half the range of the runs. Model files are in the page cache. Every run
+  follows one of the same program that is not measured: a virtual machine gets memory from its host page by page, at up to 2.5 ms per MB, whoever is first.
 * Ratios are peer over flexbody on as many threads: above 1, flexbody needs less. `*`: measured on another occasion than flexbody's figures beside it.
 """
 

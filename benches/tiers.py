@@ -47,7 +47,7 @@ CASES = {
 def convert(args, folder, tier, modes):
     body = folder / f"{tier}.flex.h5"
     words = [args.program, "convert", folder / "model.toml", "-o", body, "--modes", modes, "--threads", 2, "--accuracy", tier, "--json", "--quiet"]
-    text, run = performance.measured(words)
+    text, run = performance.after_warm_up(words)
     told = performance.parsed(text)["results"]
     phases = {phase["name"]: round(phase["wall_seconds"], 2) for phase in told["run"]["phases"]}
     said = told["completeness"]["sentence"]
