@@ -2,7 +2,9 @@
 
 use std::fs::File;
 use std::io::Read;
+use std::ops::Deref;
 use std::path::Path;
+use std::sync::{Arc, LazyLock};
 
 /// One input file of a model.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -20,6 +22,46 @@ impl SourceFile {
     pub fn new(role: &str, path: &Path, sha256: String) -> Self {
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Self { role: role.to_owned(), name, sha256 }
+    }
+}
+
+/// The input files of a model. Their fingerprints are taken when somebody asks for them first: a file of gigabytes takes
+/// seconds, in which something else may have to wait for a single thread.
+#[derive(Clone)]
+pub struct Sources(Arc<LazyLock<Vec<SourceFile>, Find>>);
+
+type Find = Box<dyn FnOnce() -> Vec<SourceFile> + Send>;
+
+impl Sources {
+    /// Those that `find` finds.
+    pub fn later(find: impl FnOnce() -> Vec<SourceFile> + Send + 'static) -> Self {
+        Self(Arc::new(LazyLock::new(Box::new(find))))
+    }
+}
+
+impl Default for Sources {
+    fn default() -> Self {
+        Self::later(Vec::new)
+    }
+}
+
+impl Deref for Sources {
+    type Target = [SourceFile];
+
+    fn deref(&self) -> &[SourceFile] {
+        &self.0
+    }
+}
+
+impl PartialEq for Sources {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl std::fmt::Debug for Sources {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.iter()).finish()
     }
 }
 

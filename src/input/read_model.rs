@@ -12,7 +12,7 @@ use super::readers::reader_for;
 use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
-use crate::base::provenance::SourceFile;
+use crate::base::provenance::{SourceFile, Sources};
 use crate::model::{Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -37,7 +37,7 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 /// stiffness, interfaces, mesh.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let opened = OpenFiles::new(files);
-    let (parsed, fingerprints) = rayon::join(|| Parsed::of(files, &opened), || opened.fingerprints());
+    let parsed = Parsed::of(files, &opened);
     let mut diagnostics = Vec::new();
     if let Some(path) = &files.manifest {
         opened.get(path).map(|_| ()).unwrap_or_else(|found| collect(&mut diagnostics, found));
@@ -70,6 +70,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     diagnostics.extend(matrices.diagnostics);
     let (mesh, partly) = mesh.unwrap_or_default();
     diagnostics.extend(partly);
+    let (given, of_job) = (files.clone(), matrices.files);
     Ok(RawModel {
         name: files.name.clone(),
         dimension: files.dimension,
@@ -85,7 +86,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         damping,
         geometric_stiffness,
         allow_implausible: files.allow_implausible,
-        sources: sources(files, &matrices.files, &fingerprints),
+        sources: Sources::later(move || sources(&given, &of_job, &opened.fingerprints())),
         diagnostics,
     })
 }

@@ -145,6 +145,8 @@ fn check_body(
     };
     stop_on_error(&mut found)?;
     let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
+    // Now, while the ordering library has not ended; the files need not stay open.
+    let _ = model.sources().len();
     Ok(CheckedModel { model, diagnostics: found, plausibility })
 }
 

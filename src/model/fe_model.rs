@@ -4,7 +4,7 @@
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
 use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh};
-use crate::base::provenance::SourceFile;
+use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};
 use faer::Mat;
@@ -29,7 +29,7 @@ pub struct FeModel {
     damping: Option<Damping<SymmetricMatrix>>,
     geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
-    sources: Vec<SourceFile>,
+    sources: Sources,
     digits: u8,
     rigid_residual: f64,
     mass_deviation: f64,

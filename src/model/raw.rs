@@ -2,7 +2,7 @@
 
 use super::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, SurfaceMesh};
 use crate::base::diagnostic::Diagnostic;
-use crate::base::provenance::SourceFile;
+use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::CscMatrix;
 use faer::Mat;
@@ -86,7 +86,7 @@ pub struct RawModel {
     pub allow_implausible: bool,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `mesh`, `manifest`), file name
     /// and SHA-256 (hex) of every file read.
-    pub sources: Vec<SourceFile>,
+    pub sources: Sources,
     /// Warnings and notes of the readers; never an error.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -112,7 +112,7 @@ impl RawModel {
             damping: None,
             geometric_stiffness: Vec::new(),
             allow_implausible: false,
-            sources: Vec::new(),
+            sources: Sources::default(),
             diagnostics: Vec::new(),
         }
     }
