@@ -14,7 +14,6 @@ use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, Sources};
 use crate::model::{Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
-use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -367,10 +366,11 @@ impl OpenFiles {
         file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
     }
 
-    /// Path and SHA-256 of every file that could be opened.
+    /// Path and SHA-256 of every file that could be opened. One after the other: whoever waits for [`Sources`] to be found
+    /// must not be given other work by the pool, which may ask for the same.
     fn fingerprints(&self) -> Vec<(&Path, String)> {
         self.files
-            .par_iter()
+            .iter()
             .filter_map(|(path, file)| Some((path.as_path(), file.as_ref().ok()?.sha256())))
             .collect()
     }
@@ -414,6 +414,6 @@ fn sources(
     };
     let (manifest, others): (Vec<_>, Vec<_>) =
         roles(files).into_iter().partition(|(role, _)| *role == "manifest");
-    let job: Vec<Option<SourceFile>> = job.par_iter().map(of_job).collect();
+    let job: Vec<Option<SourceFile>> = job.iter().map(of_job).collect();
     manifest.into_iter().map(source).chain(job).chain(others.into_iter().map(source)).flatten().collect()
 }

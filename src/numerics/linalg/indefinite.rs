@@ -37,8 +37,7 @@ impl<'a, T: Real> Indefinite<'a, T> {
         let mut fronts: Vec<_> = (0..tree.len()).map(|_| None).collect();
         let visit = |s: usize, slot: &mut Option<_>, children: Vec<Contribution<T>>| {
             let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
-            let (negative, zero) = eliminated.signs();
-            *slot = Some(((negative, zero, eliminated.growth), eliminated.into_factor()));
+            *slot = Some((eliminated.counts(), eliminated.into_factor()));
             Ok::<_, Infallible>(handed_on)
         };
         let Ok(()) = analysis.walk.up(tree, &mut fronts, &visit);

@@ -12,6 +12,7 @@ use dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::{Mat, MatRef, Par, Spec};
 use rayon::prelude::*;
+use std::cmp::Ordering::{Equal, Greater, Less};
 use std::convert::Infallible;
 
 /// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma
@@ -42,27 +43,25 @@ pub(super) struct Eliminated<T> {
     /// The leading squares, one per panel.
     pub blocks: Vec<Blocks<T>>,
     /// Largest diagonal entry of |L| |B| |L|' in these columns.
-    pub growth: f64,
+    growth: f64,
 }
 
 impl<T: Real> Eliminated<T> {
-    /// Numbers of negative and of zero pivots.
-    pub fn signs(&self) -> (usize, usize) {
-        self.blocks.iter().fold((0, 0), |(n, z), block| (n + block.negative, z + block.zero))
+    /// Numbers of negative and of zero pivots, and the growth.
+    pub fn counts(&self) -> (usize, usize, f64) {
+        let (negative, zero) =
+            self.blocks.iter().fold((0, 0), |(n, z), block| (n + block.negative, z + block.zero));
+        (negative, zero, self.growth)
     }
-}
 
-impl<T: Real> Eliminated<T> {
     /// The columns, with the unit triangles of the leading squares in their places, and what else there is of these.
     pub fn into_factor(mut self) -> (Trapezoid<T>, Vec<Blocks<T>>) {
         for (panel, block) in self.columns.panels.iter_mut().zip(&mut self.blocks) {
             let width = block.order.len();
-            let l = std::mem::replace(&mut block.l, Mat::new());
             for (i, row) in panel[..width * width].chunks_exact_mut(width).enumerate() {
-                row.iter_mut().enumerate().for_each(|(j, to)| {
-                    *to = if j < i { l[(i, j)] } else { T::of(f64::from(u8::from(i == j))) };
-                });
+                row.iter_mut().zip(block.row(i)).for_each(|(to, from)| *to = from);
             }
+            block.l = Mat::new();
         }
         (self.columns, self.blocks)
     }
@@ -101,8 +100,7 @@ impl Inertia {
         let mut counts = vec![(0usize, 0usize, 0.0f64); tree.len()];
         let visit = |s: usize, count: &mut (usize, usize, f64), children: Vec<Contribution<f64>>| {
             let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
-            let (negative, zero) = eliminated.signs();
-            *count = (negative, zero, eliminated.growth);
+            *count = eliminated.counts();
             Ok::<_, Infallible>(handed_on)
         };
         let Ok(()) = analysis.walk.up(tree, &mut counts, &visit);
@@ -142,9 +140,7 @@ fn eliminate<T: Real>(
         let (own, later) = growth[first..].split_at_mut(width);
         blocks.divide_below(below, &mut scaled.panels[p][width * width..], later);
         for (i, &place) in blocks.order.iter().enumerate() {
-            let row: Vec<T> = (0..width)
-                .map(|j| if j < i { blocks.l[(i, j)] } else { T::of(f64::from(u8::from(i == j))) })
-                .collect();
+            let row: Vec<T> = blocks.row(i).collect();
             own[place] += blocks.growth(&row);
         }
         pivots.panels[p] = panel;
@@ -195,6 +191,15 @@ impl<T: Real> Blocks<T> {
         let (negative, zero) = count(&diagonal, &coupling);
         let has_pairs = coupling.iter().any(|off| *off != 0.0);
         Self { l, order, diagonal, has_pairs, coupling, negative, zero }
+    }
+
+    /// Row `i` of the unit triangle.
+    fn row(&self, i: usize) -> impl Iterator<Item = T> + '_ {
+        (0..self.order.len()).map(move |j| match j.cmp(&i) {
+            Less => self.l[(i, j)],
+            Equal => T::of(1.0),
+            Greater => T::default(),
+        })
     }
 
     /// Rows of L from the rows `below` the square, whose L B is left in `scaled`; adds what they contribute

@@ -16,8 +16,7 @@ const ROWS: usize = 4096;
 /// Pieces of so many rows that one thread clears before another is called for help.
 const PIECES: usize = 16;
 
-/// A tall block that grows by columns, whose memory is first touched as they come, by all threads: a [`Mat`] is
-/// filled with zeros by one thread, which takes longer than most of what is done with it.
+/// A tall block that grows by columns, whose memory is first touched as they come, by all threads.
 #[derive(Debug, Clone, Default)]
 pub struct Tall {
     entries: Vec<f64>,
@@ -131,10 +130,7 @@ pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
 
 /// A copy, made by all threads.
 pub fn copied(x: MatRef<'_, f64>) -> Mat<f64> {
-    let mut own = zeros(x.nrows(), x.ncols());
-    let columns: Vec<_> = own.col_iter_mut().zip(x.col_iter()).collect();
-    columns.into_par_iter().for_each(|(mut to, from)| to.copy_from(from));
-    own
+    side_by_side(&[x])
 }
 
 /// A' B (m x k) of tall blocks A (n x m) and B (n x k).
