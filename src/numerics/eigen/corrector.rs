@@ -20,6 +20,11 @@ const BELOW_ALLOWED: f64 = 0.3;
 /// sooner. The few that are poor at the end take fewer steps than those that would fill them up.
 const FILLED: usize = 8;
 
+/// Vectors that a span which levels correct has room for, with so many at first.
+pub(super) fn room_with_levels(base: usize) -> usize {
+    2 * base + FILLED
+}
+
 #[derive(Clone, Copy)]
 pub(super) enum Corrector<'a> {
     /// A factor of K + tau M that is not exact: T r.
@@ -78,7 +83,7 @@ impl Corrector<'_> {
     pub(super) fn room(self, base: usize) -> usize {
         match self {
             Self::Factor(_) => 3 * base + 1,
-            Self::Levels(_) => 2 * base + FILLED,
+            Self::Levels(_) => room_with_levels(base),
         }
     }
 

@@ -1,11 +1,13 @@
 //! Memory and precision, decided before the work: the symbolic analysis knows what a factor needs.
 
 use super::completeness::Counting;
+use super::corrector::room_with_levels;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
 use super::refine::TOGETHER;
 use super::second_shift;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted};
+use super::without_factor::guards;
 use crate::numerics::linalg::{Analysis, Peaks};
 use crate::numerics::multigrid::can_have_levels;
 
@@ -112,6 +114,14 @@ fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u
         Precision::Single => (basis + found + 2 * wanted).max(17 * wanted + 180) + saved,
     };
     8 * (problem.pencil.n() * columns) as u64
+}
+
+/// What a search without a factor needs beside the levels: the span with both products; products and forces of the
+/// vectors that it begins with, their corrections, and they in single precision. What cycles hold is less than is
+/// in use before and given back.
+fn vectors_with_levels(n: usize, wanted: usize) -> u64 {
+    let base = wanted + guards(wanted);
+    8 * (n * (3 * room_with_levels(base) + 4 * base)) as u64
 }
 
 /// What the dense path holds: both matrices, their transformed product, its eigenvectors and copies in work.
@@ -254,7 +264,7 @@ impl Plan {
         let n = problem.pencil.n();
         let entries = problem.pencil.stiffness().as_csc().nnz() as u64;
         let levels = LEVEL_BYTES.0 * entries + LEVEL_BYTES.1 * n as u64;
-        let found = levels + vectors(problem, wanted, Precision::Single);
+        let found = levels + vectors_with_levels(n, wanted);
         let needed = found.max(made_of_them(n, wanted));
         if settings.memory.is_some_and(|available| resident(needed) > available) {
             return None;
