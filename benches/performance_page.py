@@ -18,7 +18,8 @@ freedom), frequencies must agree with flexbody's to 1e-8. Where rounding alone l
 
 * flexbody is charged for its whole process: Matrix Market text in, checks, proof that no mode is missed, invariants, both lumped comparisons, flex-body file out.
 * Peers get the matrices as arrays for nothing. SLEPc and scipy are charged for factorisation and modes alone, with the loosest tolerance
-  tried that meets both; Exudyn for its whole conversion. Their imports are free. Memory is the peak of the process, models included.
+  tried that meets both; Exudyn for its whole conversion. Their imports are free. SLEPc's shift is guessed from simple deformations, for solids;
+  for shells flexbody's first frequency tells it. Memory is the peak of the process, models included.
 * CPU is user + system seconds of all threads. Figures are medians; +/- is half the range of the runs. Model files are in the page cache. Every run
   follows one of the same program that is not measured: a virtual machine gets memory from its host page by page, at up to 2.5 ms per MB, whoever is first.
 * Ratios are peer over flexbody on as many threads: above 1, flexbody needs less. `*`: measured on another occasion than flexbody's figures beside it.
@@ -164,7 +165,7 @@ def case_lines(r, case):
         rows.append((title, threads, *[spread(record["runs"], what) for what in ("cpu_s", "wall_s", "memory_mb")], *ratios,
                      f"{record['residual']:.0e}", f"{record['difference']:.0e}", len(record["runs"])))
     model = content["model"]
-    about = ", ".join([f"{model['dofs']:,} DOF"] + ([f"{' x '.join(map(str, model['cells']))} hexahedra"] if "cells" in model else [f"{model['elements']:,} tetrahedra"])
+    about = ", ".join([f"{model['dofs']:,} DOF"] + ([f"{' x '.join(map(str, model['cells']))} hexahedra"] if "cells" in model else [f"{model['elements']:,} elements"])
                       + [f"{model['stiffness_entries'] / 1e6:.1f} million entries in K", f"{model['matrix_bytes'] / 1e6:,.0f} MB of text"])
     head = ("program", "threads", "CPU s", "wall s", "memory, MB", "CPU ratio", "wall ratio", "memory ratio", "residual", "frequencies differ", "runs")
     own = next((r.program(case, f"flexbody-{t}") for t in (2, 1) if r.program(case, f"flexbody-{t}")), None)
