@@ -17,7 +17,6 @@ case, program and thread count; all the rest stays. Peers that are not installed
 import argparse
 import datetime
 import json
-import math
 import os
 import platform
 import shutil
@@ -45,7 +44,6 @@ class Case:
     dofs: int
     peers: dict = field(default_factory=dict)  # name: most runs
     threads: tuple = (1, 2)
-    shift_given: bool = False  # to SLEPc, from flexbody's first frequency: the peers' guess of it is one for solids
 
 
 @dataclass(frozen=True)
@@ -62,9 +60,6 @@ class Peer:
     free: frozenset = frozenset({"import", "read"})
 
 
-# Of the first eigenvalue: where SLEPc's shift lies, as the peers' own guess of it has it.
-SHIFT_PART = -0.3
-
 CUBE = ("--shape", "cube", "--lengths", "1", "1", "1")
 CASES = {
     "block-30k": Case("make_block.py", ("--shape", "block"), 30000, {"exudyn": 3, "scipy": 3, "cholmod": 9, "slepc": 9}),
@@ -75,7 +70,7 @@ CASES = {
     "cube-300k": Case("make_block.py", CUBE, 300000, {"cholmod": 1, "slepc": 3}),
     "tet10-100k": Case("make_tet10.py", (), 100000, {"cholmod": 3, "slepc": 3}),
     "plate-50k": Case("make_block.py", ("--shape", "thin-plate"), 50000, {"cholmod": 3, "slepc": 3}),
-    "shell-200k": Case("make_shell.py", (), 200000, {"slepc": 1}, shift_given=True),  # SLEPc took 760 s with its guess
+    "shell-200k": Case("make_shell.py", (), 200000),  # no peer: SLEPc did not end within two minutes, with a good shift and 1e-6 either
     # 70 nodes along each edge: 1,029,000 degrees of freedom.
     "cube-1m": Case("make_block.py", (*CUBE, "--cells", "69", "69", "69"), 1029000, threads=(2,)),
 }
@@ -143,11 +138,9 @@ def run_flexbody(args, folder, threads):
                   "versions": {"flexbody": report["generator"].split()[-1]}, "completeness": report["completeness"]["sentence"]}
 
 
-def run_peer(args, name, folder, threads, tolerance, shift):
+def run_peer(args, name, folder, threads, tolerance):
     peer = PEERS[name]
     command = [interpreter(args, name), BENCHES / "peers" / peer.script, folder, "--modes", MODES, *peer.options]
-    if shift is not None:
-        command.append(f"--shift={shift}")
     text, _ = after_warm_up([*command, "--tolerance", tolerance] if tolerance else command, threads)
     found = parsed(text)
     charged = {key: value for key, value in found["phases"].items() if key not in peer.free}
@@ -183,21 +176,20 @@ def good(residual, difference, floor):
 class Contestant:
     """One program at one thread count: how many runs it still owes, and those it has made."""
 
-    def __init__(self, args, name, threads, owed, tolerances, shift_given=False):
-        self.args, self.name, self.threads, self.owed, self.tolerances, self.shift_given = args, name, threads, owed, tolerances, shift_given
+    def __init__(self, args, name, threads, owed, tolerances):
+        self.args, self.name, self.threads, self.owed, self.tolerances = args, name, threads, owed, tolerances
         self.runs, self.failed = [], None
 
     def run(self, folder, reference):
         if self.name == "flexbody":
             found = run_flexbody(self.args, folder, self.threads)
         else:
-            shift = SHIFT_PART * (2 * math.pi * reference[0]) ** 2 if self.shift_given else None
             try:
-                found = run_peer(self.args, self.name, folder, self.threads, self.tolerances[0], shift)
+                found = run_peer(self.args, self.name, folder, self.threads, self.tolerances[0])
                 while len(self.tolerances) > 1 and not good(found["residual"], difference(found, reference), found["floor"]):
                     log(f"  {self.name}: residual {found['residual']:.1e}, frequencies differ by {difference(found, reference):.1e} at tolerance "
                         f"{self.tolerances.pop(0)}, once more")
-                    found = run_peer(self.args, self.name, folder, self.threads, self.tolerances[0], shift)
+                    found = run_peer(self.args, self.name, folder, self.threads, self.tolerances[0])
             except RuntimeError as error:
                 log(f"  {error}")
                 self.owed, self.failed = 0, str(error).splitlines()[-1]
@@ -226,7 +218,7 @@ def run_case(args, name, peers):
         wanted = [peer for peer in case.peers if peer in peers]
         for peer in wanted:
             tolerances = list(PEERS[peer].tolerances)  # one list: what one thread count found out spares the other
-            contestants += [Contestant(args, peer, threads, min(args.runs, case.peers[peer]), tolerances, case.shift_given) for threads in PEERS[peer].threads]
+            contestants += [Contestant(args, peer, threads, min(args.runs, case.peers[peer]), tolerances) for threads in PEERS[peer].threads]
         if wanted:
             measured([args.python, BENCHES / "peers" / "pack.py", folder])
         turn, reference = 0, None
@@ -277,12 +269,16 @@ def commit():
 
 
 def doubts(case, records):
-    """Results that make a comparison void. Exudyn has no tolerance to set: its residual is shown, not judged."""
+    """Results that make a comparison void. Exudyn has no tolerance to set: its residual is shown, not judged. Where no peer
+    tells what rounding leaves, flexbody itself judges its modes."""
     floor = max([record.get("floor", 0.0) for record in records.values()] + [1e-8 if case == "cube-1m" else 0.0])
+    peers_tell = any("floor" in record for record in records.values())
+    def is_judged(key):
+        return not key.startswith("exudyn") and (peers_tell or case == "cube-1m")
     for key, record in records.items():
         if "failed" in record:
             yield f"{case}, {key}: {record['failed']}"
-        elif not good(0.0 if key.startswith("exudyn") else record["residual"], record["difference"], floor):
+        elif not good(record["residual"] if is_judged(key) else 0.0, record["difference"], floor):
             yield f"{case}, {key}: residual {record['residual']:.1e}, frequencies differ from flexbody's by {record['difference']:.1e}"
 
 
