@@ -76,7 +76,7 @@ fn the_peak_is_within_15_percent_of_the_estimate() {
 #[ignore = "slow"]
 fn the_peak_of_a_search_without_a_factor_is_within_a_quarter_of_the_estimate() {
     let folder = tempfile::tempdir().expect("a folder");
-    write_model(folder.path(), &block([25; 3], [1.0; 3]).raw_model(), Triangle::Lower); // 52 728 rows
+    write_model(folder.path(), &block([31; 3], [1.0; 3]).raw_model(), Triangle::Lower); // 98 304 rows
     for options in ["--accuracy fast", "--accuracy fast --modes 8"] {
         let plan = report(folder.path(), options)["run"]["phases"].to_string();
         assert!(plan.contains("multigrid"), "`{options}`: {plan}");

@@ -85,6 +85,17 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
     }
 }
 
+/// Wherever the modes end: where that is within a repeated eigenvalue, `fast` sees all of it and keeps the same part.
+#[test]
+#[ignore = "slow"]
+fn the_last_modes_of_a_cube_are_those_of_a_factor() {
+    let model = cube(Kind::Hex8, 9);
+    for count in 1..=24 {
+        let [_, found] = both(&format!("{count} modes"), &model, count);
+        assert_eq!(way(&found), Multigrid::Used, "{count} modes");
+    }
+}
+
 #[test]
 #[ignore = "slow"]
 fn plane_bodies_and_bodies_with_arms_have_them_too() {

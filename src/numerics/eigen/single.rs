@@ -35,6 +35,11 @@ const HANDED_OVER: f64 = 1e-4;
 /// the count.
 const BEYOND: f64 = 1e-3;
 
+/// Distance of the first mode beyond the wanted ones from these, beside its eigenvalue, up to which it may belong to the
+/// cluster of the last of them: with a residual of [`BEYOND`] its Ritz value does not tell. It is wanted as well as they
+/// are then, so that the cluster is seen, and its canonical basis does not depend on how far the search went.
+const MAY_REPEAT: f64 = 1e-3;
+
 /// Corrections before single precision is given up.
 const MAX_ROUNDS: usize = 60;
 
@@ -163,8 +168,10 @@ impl<'a> Correction<'a> {
         if self.seeks_gap(&relative) {
             return self.excess(counters);
         }
-        let tolerance = self.goal.tolerance;
-        let allowed = |j: usize| if j < self.wanted { tolerance.max(self.floors[j]) } else { BEYOND };
+        let (tolerance, lambda) = (self.goal.tolerance, &self.space.lambda);
+        let may_repeat = |j: usize| j > 0 && lambda[j] - lambda[j - 1] <= MAY_REPEAT * lambda[j];
+        let is_wanted = |j: usize| j < self.wanted || may_repeat(j);
+        let allowed = |j: usize| if is_wanted(j) { tolerance.max(self.floors[j]) } else { BEYOND };
         let pair = |(number, residual)| Pair { number, residual, allowed: allowed(number) };
         (forces, relative.into_iter().enumerate().map(pair).collect())
     }
