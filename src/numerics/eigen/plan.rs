@@ -116,9 +116,9 @@ fn vectors(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u
     8 * (problem.pencil.n() * columns) as u64
 }
 
-/// What a search without a factor needs beside the levels: the span with both products; products and forces of the
-/// vectors that it begins with, their corrections, and they in single precision. What cycles hold is less than is
-/// in use before and given back.
+/// What a search without a factor needs beside the levels: the span with both products; and for each vector that it
+/// begins with a product, a force, a correction, and the copies in single precision that cycles keep it apart from.
+/// What cycles hold besides is less than what is in use before and given back.
 fn vectors_with_levels(n: usize, wanted: usize) -> u64 {
     let base = wanted + guards(wanted);
     8 * (n * (3 * room_with_levels(base) + 4 * base)) as u64

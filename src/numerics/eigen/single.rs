@@ -169,9 +169,8 @@ impl<'a> Correction<'a> {
             return self.excess(counters);
         }
         let (tolerance, lambda) = (self.goal.tolerance, &self.space.lambda);
-        let may_repeat = |j: usize| j > 0 && lambda[j] - lambda[j - 1] <= MAY_REPEAT * lambda[j];
-        let is_wanted = |j: usize| j < self.wanted || may_repeat(j);
-        let allowed = |j: usize| if is_wanted(j) { tolerance.max(self.floors[j]) } else { BEYOND };
+        let may_be_wanted = cluster_end(self.wanted, lambda.len(), MAY_REPEAT, |i| lambda[i]);
+        let allowed = |j: usize| if j < may_be_wanted { tolerance.max(self.floors[j]) } else { BEYOND };
         let pair = |(number, residual)| Pair { number, residual, allowed: allowed(number) };
         (forces, relative.into_iter().enumerate().map(pair).collect())
     }
