@@ -13,8 +13,9 @@ HEAD = """<!-- Written by benches/performance.py; edit that -->
 # Performance
 
 `python3 benches/performance.py` makes the models and runs flexbody and its peers in turns. Every program computes {modes} flexible modes; the relative
-residual |K x - lambda M x| / |K x| of every mode is recomputed and must be below 1e-9 (Exudyn has no tolerance to set; 1e-8 for a million degrees of
-freedom), frequencies must agree with flexbody's to 1e-8. Where rounding alone leaves more, eps | |K| |x| | / |K x|, that is the bound.
+residual |K x - lambda M x| / |K x| of every mode is recomputed and must be below 1e-9 (1e-8 for a million degrees of freedom), frequencies must
+agree with flexbody's to 1e-8. Where rounding alone leaves more, eps | |K| |x| | / |K x|, that is the bound. Exudyn has no tolerance to set: its
+residual and frequencies are shown, not judged.
 
 * flexbody is charged for its whole process: Matrix Market text in, checks, proof that no mode is missed, invariants, both lumped comparisons, flex-body file out.
 * Peers get the matrices as arrays for nothing. SLEPc and scipy are charged for factorisation and modes alone, with the loosest tolerance
