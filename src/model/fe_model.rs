@@ -3,13 +3,13 @@
 
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
-use super::{BodyNumber, Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh};
+use super::{BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh};
 use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};
 use faer::Mat;
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the
 /// order of `nodes`, then what else [`rows`](FeModel::rows) says.
@@ -38,6 +38,8 @@ pub struct FeModel {
     row_to_internal: Option<Vec<u32>>,
     number: Option<BodyNumber>,
     elimination: Option<Arc<Analysis>>,
+    /// M on points and directors, once somebody needs it.
+    director_mass: OnceLock<Option<Arc<DirectorMass>>>,
 }
 
 impl FeModel {
@@ -71,6 +73,7 @@ impl FeModel {
             row_to_internal: body.row_to_internal,
             number,
             elimination: None,
+            director_mass: OnceLock::new(),
         }
     }
 
@@ -125,6 +128,7 @@ impl FeModel {
             mass_deviation: 0.0,
             diagonal_mass: true,
             elimination: None,
+            director_mass: OnceLock::new(),
             ..self.clone()
         }
     }
@@ -138,6 +142,15 @@ impl FeModel {
     /// row carries mass. `None` when M has no such form.
     pub fn scalar_mass(&self) -> Option<&SymmetricMatrix> {
         self.commutes.then_some(&self.mean_mass)
+    }
+
+    /// M on points and directors; `None` when no rotation of a node carries mass. Made at the first call.
+    pub fn director_mass(&self) -> Option<&Arc<DirectorMass>> {
+        let made = || {
+            let mass = self.whole_mass.as_ref()?;
+            DirectorMass::new(mass, &self.rows).map(Arc::new)
+        };
+        self.director_mass.get_or_init(made).as_ref()
     }
 
     /// The mean over the directions of the mass between displacements of nodes (n x n): what lumping starts

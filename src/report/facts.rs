@@ -13,7 +13,6 @@ use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::{self, SourceFile};
 use crate::base::units::UnitSystem;
 use crate::body::flex_body::{FlexBody, Interface, MassStructure, Truncation, is_static};
-use crate::body::invariants::GENERAL_REMARK;
 use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
@@ -60,7 +59,7 @@ pub(super) struct ModelFacts {
     /// Precision of shapes and of the inertia of the modes: `f64` or `f32`.
     pub storage: &'static str,
     /// What is not exact of a mass that does not commute with rotations.
-    pub approximation: Option<&'static str>,
+    pub approximation: Option<String>,
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
     pub interfaces: Vec<InterfaceFacts>,
@@ -312,7 +311,7 @@ impl ModelFacts {
                 MassStructure::General => "general",
             },
             storage: body.storage().name(),
-            approximation: (source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK),
+            approximation: source.approximation.clone(),
             units: UnitFacts::new(units),
             files: source.files.clone(),
             interfaces: body

@@ -43,7 +43,7 @@ pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     (!given && body.groups().w2).then(|| {
         [0, 1, 2].map(|axis| {
             let spins = body.dimension() == 3 || axis == 2;
-            let rate = spins.then(|| body.invariants().softening_rate(axis)).flatten();
+            let rate = spins.then(|| body.softening_rate(axis)).flatten();
             rate.map(|rate| body.units().frequency_of(rate * rate))
         })
     })

@@ -84,7 +84,7 @@ fn extent(body: &FlexBody) -> Option<[f64; 3]> {
 /// What is not exact, of what the body was made of.
 fn limits(html: &mut String, model: &ModelFacts) {
     let mut minded = Vec::new();
-    if let Some(remark) = model.approximation {
+    if let Some(remark) = &model.approximation {
         minded.push(format!("The mass matrix does not commute with rotations: {}.", escape(remark)));
     }
     if model.mass_structure == "diagonal" {

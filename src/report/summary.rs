@@ -143,7 +143,7 @@ fn body(summary: &mut Summary, facts: &Facts<'_>) {
     let plane = if model.dimension == 2 { ", PLANE model" } else { "" };
     let lumped = model.mass_structure == "diagonal";
     let tone = if lumped || !plane.is_empty() { Tone::Warning } else { Tone::Plain };
-    let size = match model.approximation {
+    let size = match &model.approximation {
         Some(_) => model.nodes_in_words(),
         None => model.size_in_words(),
     };

@@ -125,7 +125,7 @@ fn heading(page: &mut Page, facts: &Facts<'_>) {
     let units = &model.units;
     page.entry("body", &format!("{} ({})", plain(&model.name), units.in_words()));
     page.entry("model", &model.size_in_words());
-    if let Some(remark) = model.approximation {
+    if let Some(remark) = &model.approximation {
         page.entry("", remark);
     }
     if let Some(mesh) = &model.mesh {

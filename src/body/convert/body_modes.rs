@@ -2,10 +2,10 @@
 
 use crate::body::flex_body::{FlexBody, Frame, InternalRows};
 use crate::body::invariants::{
-    Invariants, RigidMotion, condense, condense_general, condense_general_linear, condense_linear,
-    symmetric_part,
+    InertiaStiffness, Invariants, RigidMotion, condense, condense_general, condense_general_linear,
+    condense_linear, rigid_first_moment, symmetric_part,
 };
-use crate::model::{FeModel, rigid_count};
+use crate::model::{DirectorMass, FeModel, NodeMoments, rigid_count};
 use crate::numerics::eigen::canonical_sign;
 use crate::numerics::linalg::{
     SymmetricMatrix, contiguous_mut, copied, gram, multiply, projection_compensated, zeros,
@@ -124,7 +124,17 @@ impl BodyModes {
 
     /// The invariants, by the formulas that the mass of `model` allows.
     pub fn condensed(&self, model: &FeModel, place: &NodesInFrame, modal_stiffness: Mat<f64>) -> Invariants {
-        self.by(model, place, modal_stiffness, condense, condense_general)
+        if let Some(mass) = model.scalar_mass() {
+            return condense(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
+        }
+        match model.director_mass() {
+            Some(mass) => self.of_directors(model, mass, place, |mass, motion, shapes| {
+                condense_general(mass, motion, shapes, modal_stiffness)
+            }),
+            None => self.of_rows(model, place, |mass, motion, shapes| {
+                condense_general(mass, motion, shapes, modal_stiffness)
+            }),
+        }
     }
 
     /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
@@ -134,7 +144,30 @@ impl BodyModes {
         place: &NodesInFrame,
         modal_stiffness: Mat<f64>,
     ) -> Invariants {
-        self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
+        if let Some(mass) = model.scalar_mass() {
+            return condense_linear(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
+        }
+        match model.director_mass() {
+            Some(mass) => self.of_directors(model, mass, place, |mass, motion, shapes| {
+                condense_general_linear(mass, motion, shapes, modal_stiffness)
+            }),
+            None => self.of_rows(model, place, |mass, motion, shapes| {
+                condense_general_linear(mass, motion, shapes, modal_stiffness)
+            }),
+        }
+    }
+
+    /// The stiffnesses of inertia of nodes with rotational mass; `None` where there are none.
+    pub fn inertia_stiffness(&self, model: &FeModel, frame: &Frame) -> Option<InertiaStiffness> {
+        let (mass, rotations) = (model.director_mass()?, self.rotations.as_ref()?);
+        let mut fields = mass.extend_rigid(model.rigid_fields(frame.origin.into(), 1.0).as_ref());
+        frame.rotate_rigid(&mut fields);
+        let nothing = NodeMoments { first: Vector3::zeros(), second: nalgebra::Matrix3::zeros() };
+        let mut moments = vec![nothing; self.nodes];
+        for (&node, own) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
+            moments[node as usize] = own;
+        }
+        Some(InertiaStiffness::new(moments, rotations.as_ref(), model.dimension()))
     }
 
     /// Columns that the condensation with and without W2 or W3 multiplies by M.
@@ -149,25 +182,44 @@ impl BodyModes {
         }
     }
 
-    fn by(
+    /// The invariants of a mass without rotations that does not commute with them: by its rows.
+    fn of_rows(
         &self,
         model: &FeModel,
         place: &NodesInFrame,
-        modal_stiffness: Mat<f64>,
-        solid: impl Fn(&SymmetricMatrix, &[[f64; 3]], MatRef<'_, f64>, Mat<f64>) -> Invariants,
-        general: impl Fn(&SymmetricMatrix, &RigidMotion<'_>, MatRef<'_, f64>, Mat<f64>) -> Invariants,
+        condensed: impl FnOnce(&SymmetricMatrix, &RigidMotion<'_>, MatRef<'_, f64>) -> Invariants,
     ) -> Invariants {
-        if let Some(mass) = model.scalar_mass() {
-            return solid(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
-        }
         let fields = rigid_fields(model, &place.frame);
-        let motion = RigidMotion {
-            fields: fields.as_ref(),
-            displacements: model.rows().displacements(),
-            axes: place.frame.axes,
-        };
-        general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
+        let displacements = model.rows().displacements();
+        let motion = RigidMotion { fields: fields.as_ref(), displacements, axes: place.frame.axes };
+        condensed(model.pencil().mass(), &motion, self.vectors.as_ref())
     }
+
+    /// The invariants of a mass of points and directors: about the centre of mass, then about the origin of the
+    /// frame. What does not turn with the nodes belongs to no frame but the one it is condensed in; so a body is
+    /// the same whatever frame it is described in.
+    fn of_directors(
+        &self,
+        model: &FeModel,
+        mass: &DirectorMass,
+        place: &NodesInFrame,
+        condensed: impl FnOnce(&DirectorMass, &RigidMotion<'_>, MatRef<'_, f64>) -> Invariants,
+    ) -> Invariants {
+        let offset = centre_of_mass(model, &place.frame);
+        let frame = Frame { origin: place.frame.origin + place.frame.axes * offset, axes: place.frame.axes };
+        let mut fields = mass.extend_rigid(model.rigid_fields(frame.origin.into(), 1.0).as_ref());
+        frame.rotate_rigid(&mut fields);
+        let motion =
+            RigidMotion { fields: fields.as_ref(), displacements: mass.turning_rows(), axes: frame.axes };
+        let shapes = mass.extend(self.vectors.as_ref());
+        condensed(mass, &motion, shapes.as_ref()).without_feeling_of_flight().shifted(-offset)
+    }
+}
+
+/// The centre of mass in a frame.
+fn centre_of_mass(model: &FeModel, frame: &Frame) -> Vector3<f64> {
+    let (mass, first_moment) = rigid_first_moment(rigid_mass(model, frame).as_ref());
+    first_moment / mass
 }
 
 /// The rows without a place of modes in model rows (`vectors`), of which `displacements` has the vectors in

@@ -83,7 +83,7 @@ impl ModalModel<'_> {
             .collect::<Result<_>>()?;
         let (parts, overdamped) = self.parts(&condensed, lumped)?;
         let body = FlexBody::new(parts)?;
-        let diagnostics = self.remarks(exact, overdamped, &body);
+        let diagnostics = self.remarks(overdamped, &body);
         let solution = self.found.solution;
         Ok(Conversion {
             body,
@@ -116,6 +116,7 @@ impl ModalModel<'_> {
             modes,
             invariants: condensed.invariants.clone(),
             geometric_stiffness: self.geometric_stiffness.clone(),
+            inertia_stiffness: self.inertia_stiffness.clone(),
             lumped,
             certificate: self.certificate(condensed.guarantee.clone()),
             terms: condensed.terms.clone(),
@@ -137,8 +138,26 @@ impl ModalModel<'_> {
                 Some(_) if model.has_diagonal_mass() => MassStructure::Diagonal,
                 Some(_) => MassStructure::RotationInvariant,
             },
+            approximation: self.approximation(),
             settings: settings.described(model),
         }
+    }
+
+    /// Part of the mass that does not turn with the nodes, where there is any.
+    fn approximation(&self) -> Option<String> {
+        let model = self.model;
+        if model.scalar_mass().is_some() {
+            return None;
+        }
+        let part = match model.director_mass() {
+            Some(mass) => mass.rest_share(),
+            None => model.mass_deviation(),
+        };
+        (part > 0.0).then(|| {
+            format!(
+                "exact: m, c, I0, C1, C2, m_ff; a part of the mass matrix, up to {part:.1e} of its diagonal, differs by direction and is kept along the axes of the body in W1, W2, W3: an error that falls with the square of the element size"
+            )
+        })
     }
 
     /// The modes with the damping that the model states.
@@ -179,11 +198,10 @@ impl ModalModel<'_> {
     /// Warnings and notes about the finished body.
     fn remarks(
         &self,
-        invariants: &Invariants,
         overdamped: Option<Diagnostic>,
         body: &FlexBody,
     ) -> Vec<Diagnostic> {
-        let softening = softening_warning(self.model, &self.settings.basis, invariants);
+        let softening = softening_warning(self.model, &self.settings.basis, body);
         let poor_fits = self
             .interfaces
             .iter()

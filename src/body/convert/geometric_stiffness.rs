@@ -5,7 +5,7 @@ use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::{BasisChoice, Loads};
-use crate::body::invariants::Invariants;
+use crate::body::flex_body::FlexBody;
 use crate::model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
 use faer::{Mat, MatRef, Scale};
 use nalgebra::Matrix3;
@@ -58,7 +58,7 @@ pub(crate) fn modal_geometric_stiffness(
 pub(super) fn softening_warning(
     model: &FeModel,
     basis: &BasisChoice,
-    invariants: &Invariants,
+    body: &FlexBody,
 ) -> Option<Diagnostic> {
     let BasisChoice::Free(free) = basis else { return None };
     let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
@@ -67,7 +67,7 @@ pub(super) fn softening_warning(
     }
     let axes = if model.dimension() == 2 { 2..3 } else { 0..3 };
     let rates: Vec<(f64, usize)> =
-        axes.filter_map(|axis| Some((invariants.softening_rate(axis)?, axis))).collect();
+        axes.filter_map(|axis| Some((body.softening_rate(axis)?, axis))).collect();
     let lowest = rates.iter().map(|(rate, _)| *rate).reduce(f64::min)?;
     // The first of axes that are alike but for rounding.
     let &(rate, axis) = rates.iter().find(|(rate, _)| *rate <= (1.0 + ALIKE) * lowest)?;

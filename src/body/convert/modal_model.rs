@@ -8,7 +8,7 @@ use crate::base::progress::{Event, Watch};
 use crate::body::basis::{BasisChoice, ModalBasis, Task};
 use crate::body::flex_body::Interface;
 use crate::body::invariants::{
-    BodyFrame, Frame, LumpedMasses, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
+    BodyFrame, Frame, InertiaStiffness, LumpedMasses, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
 };
 use crate::model::{FeModel, GeometricStiffness, Nodes, Reference};
 use crate::numerics::eigen::{Accuracy, Resume};
@@ -30,6 +30,7 @@ pub struct ModalModel<'m> {
     pub(super) modal_stiffness: Mat<f64>,
     /// Psi' K_geo Psi of unit loads along the body axes.
     pub(super) geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    pub(super) inertia_stiffness: Option<InertiaStiffness>,
     pub(super) nodes: Nodes,
     pub(super) interfaces: Vec<Interface>,
 }
@@ -63,6 +64,7 @@ impl<'m> ModalModel<'m> {
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
         let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
+        let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
         let interfaces = interfaces(model, &frame, coupled);
@@ -76,6 +78,7 @@ impl<'m> ModalModel<'m> {
             modes,
             modal_stiffness,
             geometric_stiffness,
+            inertia_stiffness,
             nodes,
             interfaces,
         })

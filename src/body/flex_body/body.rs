@@ -7,8 +7,10 @@ use super::{
 };
 use crate::base::error::{Error, Result};
 use crate::base::units::UnitSystem;
-use crate::body::invariants::{BodyFrame, Expected, Frame, IdentityCheck, Invariants, identities};
-use crate::model::{Coupling, GeometricStiffness, Nodes, SurfaceMesh, extents};
+use crate::body::invariants::{
+    BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, identities,
+};
+use crate::model::{Coupling, GeometricStiffness, Nodes, SurfaceMesh, UnitLoad, extents};
 use faer::Mat;
 
 /// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
@@ -141,6 +143,48 @@ impl FlexBody {
     /// Geometric stiffness of unit loads along body axes, reduced to the modes.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<Mat<f64>>] {
         &self.parts.geometric_stiffness
+    }
+
+    /// Stiffness of inertia of nodes whose rotations carry mass: terms of the kinetic energy of second order in
+    /// their rotations, signs of geometric stiffness (theory sections 6 and 7.4).
+    pub fn inertia_stiffness(&self) -> Option<&InertiaStiffness> {
+        self.parts.inertia_stiffness.as_ref()
+    }
+
+    /// What is added to K_ff for a unit of `load`: the stiffness of inertia and the geometric stiffness together;
+    /// `None` where the body has neither.
+    pub fn stiffness_under(&self, load: &UnitLoad) -> Option<Mat<f64>> {
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let all = of_inertia.chain(self.geometric_stiffness()).filter(|one| one.load == *load);
+        all.fold(None, |sum: Option<Mat<f64>>, one| match sum {
+            None => Some(one.matrix.clone()),
+            Some(sum) => Some(sum + &one.matrix),
+        })
+    }
+
+    /// Spin rate about body axis `axis` at which the centrifugal terms take 1 % of the stiffness of the motion that
+    /// they soften most, by [`Invariants::softening_rate`] with the stiffness of inertia.
+    ///
+    /// # Panics
+    /// When `axis` is not below 3.
+    pub fn softening_rate(&self, axis: usize) -> Option<f64> {
+        let spin = |one: &&GeometricStiffness<Mat<f64>>| {
+            one.load == UnitLoad { kind: crate::model::LoadKind::Spin, component: axis }
+        };
+        let own = self.inertia_stiffness().and_then(|own| own.stiffness.iter().find(spin));
+        self.invariants().softening_rate(axis, own.map(|one| &one.matrix))
+    }
+
+    /// The loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.
+    pub fn stiffening_loads(&self) -> Vec<UnitLoad> {
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let mut loads: Vec<UnitLoad> = Vec::new();
+        for one in self.geometric_stiffness().iter().chain(of_inertia) {
+            if !loads.contains(&one.load) {
+                loads.push(one.load.clone());
+            }
+        }
+        loads
     }
 
     /// Lumped comparators.

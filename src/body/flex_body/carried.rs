@@ -71,7 +71,8 @@ impl FlexBody {
     /// as it is.
     ///
     /// Geometric stiffness is left out: what stresses the carried body are the loads together with the
-    /// reaction at the interface.
+    /// reaction at the interface. The stiffness of inertia follows from the moments of the nodes and their
+    /// rotations relative to the carrier.
     ///
     /// # Errors
     /// FB212 for names that the body has not; FB214 where `carrier` has no reference point or no orientation,
@@ -113,6 +114,11 @@ impl FlexBody {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
         parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
+        // Nodes turn by less now, relative to the frame that the carrier turns.
+        parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
+            (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
+            _ => None,
+        };
         Self::new(parts)
     }
 

@@ -6,8 +6,8 @@ use super::{
 };
 use crate::base::error::Result;
 use crate::base::units::UnitSystem;
-use crate::body::invariants::{Invariants, UnitFactors};
-use crate::model::{GeometricStiffness, LoadKind};
+use crate::body::invariants::{InertiaStiffness, Invariants, UnitFactors};
+use crate::model::{GeometricStiffness, LoadKind, NodeMoments};
 use faer::Mat;
 
 /// What a number is multiplied by when its unit changes, from its powers of mass, length and time.
@@ -73,6 +73,17 @@ impl Change {
         GeometricStiffness {
             load: given.load.clone(),
             matrix: times(&given.matrix, self.eigenvalue() / load),
+        }
+    }
+
+    fn inertia_stiffness(self, given: &InertiaStiffness) -> InertiaStiffness {
+        let moments = |own: &NodeMoments| NodeMoments {
+            first: own.first * self.of(2, 1, 0),
+            second: own.second * self.of(2, 2, 0),
+        };
+        InertiaStiffness {
+            moments: given.moments.iter().map(moments).collect(),
+            stiffness: given.stiffness.iter().map(|one| self.geometric(one)).collect(),
         }
     }
 
@@ -156,6 +167,7 @@ impl FlexBody {
         parts.invariants = change.invariants(&parts.invariants);
         parts.geometric_stiffness =
             parts.geometric_stiffness.iter().map(|one| change.geometric(one)).collect();
+        parts.inertia_stiffness = parts.inertia_stiffness.as_ref().map(|own| change.inertia_stiffness(own));
         let lumped =
             |one: &LumpedBody| LumpedBody { invariants: change.invariants(&one.invariants), ..one.clone() };
         parts.lumped = parts.lumped.iter().map(lumped).collect();

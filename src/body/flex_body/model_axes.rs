@@ -49,6 +49,12 @@ impl FlexBody {
             .collect();
         let about_origin = shifted(&parts.geometric_stiffness, &origin, parts.dimension);
         parts.geometric_stiffness = along(&about_origin, &to_body);
+        parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
+            (Some(own), Some(rotation)) => {
+                Some(own.in_frame(&origin, &to_body, rotation.as_ref(), parts.dimension))
+            }
+            _ => None,
+        };
         parts.coordinates = None;
         Self::new(parts)
     }

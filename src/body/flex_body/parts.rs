@@ -3,7 +3,7 @@
 use super::{FixedInterface, Interface, InterfaceCoordinates, Storage, TermDecision};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
-use crate::body::invariants::{DIGITS, Frame, Invariants};
+use crate::body::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
 use crate::model::{BodyNumber, GeometricStiffness, Nodes, SurfaceMesh};
 use faer::Mat;
 
@@ -20,6 +20,8 @@ pub struct Source {
     pub n_dofs: usize,
     /// `rotation-invariant`: M = Ms kron I3; `diagonal`: the same and diagonal; `general`: neither.
     pub mass_structure: MassStructure,
+    /// Part of the mass that the invariants take as approximate; `None`: they are those of the matrices.
+    pub approximation: Option<String>,
     /// Settings of the run that can change the result, as JSON.
     pub settings: serde_json::Value,
 }
@@ -176,6 +178,9 @@ pub struct Parts {
     /// the sum of these times their loads. What is not here is zero or not known. Unit: 1/time^2 over that of
     /// the load.
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    /// Stiffness of inertia of nodes whose rotations carry mass; `None` where none do, or where it is not known
+    /// (files of format versions before 1.6, files of other programs).
+    pub inertia_stiffness: Option<InertiaStiffness>,
     /// Lumped comparators.
     pub lumped: Vec<LumpedBody>,
     /// Proof of completeness and noise floor.

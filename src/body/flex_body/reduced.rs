@@ -6,7 +6,7 @@ use super::{
 };
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::body::invariants::error_norms;
+use crate::body::invariants::{InertiaStiffness, error_norms};
 use crate::model::GeometricStiffness;
 use faer::Mat;
 
@@ -60,6 +60,14 @@ impl FlexBody {
                 .iter()
                 .map(|one| GeometricStiffness { load: one.load.clone(), matrix: square(&one.matrix, modes) })
                 .collect(),
+            inertia_stiffness: parts.inertia_stiffness.as_ref().map(|own| InertiaStiffness {
+                moments: own.moments.clone(),
+                stiffness: own
+                    .stiffness
+                    .iter()
+                    .map(|one| GeometricStiffness { load: one.load.clone(), matrix: square(&one.matrix, modes) })
+                    .collect(),
+            }),
             lumped: parts.lumped.iter().map(lumped).collect(),
             certificate: parts.certificate.of_some(modes, &parts.modes),
             interfaces: parts.interfaces.clone(),

@@ -2,7 +2,7 @@
 
 use super::{Group, MassStructure, Parts, SurfaceMesh};
 use crate::base::diagnostic::Diagnostic;
-use crate::body::invariants::DIGITS;
+use crate::body::invariants::{DIGITS, InertiaStiffness};
 use crate::body::problems::{LARGEST, Problems};
 use crate::model::{Coupling, UnitLoad};
 use nalgebra::Matrix3;
@@ -33,6 +33,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     }
     check.structure(parts);
     check.geometric_stiffness(parts, nf);
+    check.inertia_stiffness(parts, n, nf);
     check.lumped(parts, nf);
     let c = &parts.certificate;
     check.finite(
@@ -180,6 +181,25 @@ impl Problems {
         }
         if parts.lumped.iter().any(|lumped| lumped.invariants.general().is_some()) {
             self.add("lumped masses have `W0`, expected none: they commute with rotations".to_owned());
+        }
+    }
+
+    /// Stiffness of inertia is complete, or not there.
+    fn inertia_stiffness(&mut self, parts: &Parts, n: usize, nf: usize) {
+        let Some(own) = &parts.inertia_stiffness else { return };
+        if parts.modes.rotation.is_none() {
+            self.add("inertia stiffness of a body whose nodes have no rotations".to_owned());
+        }
+        self.length("inertia_stiffness.moments", own.moments.len(), n, "node");
+        let numbers = own.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()).copied());
+        self.finite("inertia_stiffness.moments", numbers);
+        for one in &own.stiffness {
+            self.matrix(&format!("inertia_stiffness `{}`", one.load.label()), &one.matrix, nf, nf);
+        }
+        let wanted: Vec<_> = InertiaStiffness::loads(parts.dimension).collect();
+        if !own.stiffness.iter().map(|one| &one.load).eq(&wanted) {
+            let wanted: Vec<String> = wanted.iter().map(UnitLoad::label).collect();
+            self.add(format!("inertia stiffness of other loads than {}", wanted.join(", ")));
         }
     }
 

@@ -6,8 +6,9 @@
 //! are (Phi_t, B_x + sum_j q_j B_j, Psi) times (V, omega, qd).
 
 use super::{GeneralTerms, Groups, Invariants, PrimaryData};
+use crate::model::DirectorMass;
 use crate::numerics::linalg::{SymmetricMatrix, Tall, gram, multiply};
-use faer::{ColMut, Mat, MatRef};
+use faer::{ColMut, Mat, MatMut, MatRef};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -15,18 +16,46 @@ use std::ops::Range;
 /// Columns of X that are multiplied by M at a time.
 const BLOCK: usize = 32;
 
-/// What stays approximate for a mass that does not commute with rotations.
-pub const GENERAL_REMARK: &str = "exact: m, c, I0, C1, C2, m_ff; W0 to W3 take the rotations of nodes as small, an error that falls with the element size";
+/// A symmetric mass that columns are multiplied by.
+pub trait MassProduct: Sync {
+    /// Number of its rows.
+    fn n_rows(&self) -> usize;
 
-/// How the rows of a model, which are components along the model axes, move with the body frame.
+    /// y = M x.
+    fn times(&self, x: MatRef<'_, f64>, y: MatMut<'_, f64>);
+}
+
+/// The mass matrix of the rows of a model.
+impl MassProduct for SymmetricMatrix {
+    fn n_rows(&self) -> usize {
+        self.n()
+    }
+
+    fn times(&self, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
+        multiply(self, 1, x, y);
+    }
+}
+
+/// The mass of points and directors: of extended rows.
+impl MassProduct for DirectorMass {
+    fn n_rows(&self) -> usize {
+        self.rows()
+    }
+
+    fn times(&self, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
+        self.multiply(x, y);
+    }
+}
+
+/// How the rows of a mass, which are components along the model axes, move with the body frame.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidMotion<'a> {
     /// N x 6: unit translations along the body axes, then unit rotations about them; of a plane body N x 3.
     /// Turned before they are multiplied ([`Frame::rotate_rigid`](super::Frame::rotate_rigid)), so that
     /// slender bodies keep the digits of their small moments.
     pub fields: MatRef<'a, f64>,
-    /// Rows of displacements, d per vector, which come first; all others keep their values when the body
-    /// turns.
+    /// Rows of vectors that turn with the body, d per vector, which come first; all others keep their values
+    /// when the body turns.
     pub displacements: usize,
     /// Columns are the body axes in model axes.
     pub axes: Matrix3<f64>,
@@ -38,7 +67,8 @@ pub struct RigidMotion<'a> {
 /// B_j e_b, W1 = (B_x' M B_j + B_j' M B_x) e_b; W2 = e_a' B_i' M B_j e_b at row a nf + i, column b nf + j; W3
 /// = e_a' B_i' M psi_j at row a nf + i.
 ///
-/// * `mass`: M (N x N), model axes.
+/// * `mass`: M (N x N), model axes; of a model with nodal rotations E of points and directors, with the extended
+///   rows of motion and shapes.
 /// * `motion`: of its rows.
 /// * `shapes`: N x nf, the modes, model axes.
 /// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
@@ -49,8 +79,8 @@ pub struct RigidMotion<'a> {
 ///
 /// # Panics
 /// When the sizes disagree.
-pub fn condense_general(
-    mass: &SymmetricMatrix,
+pub fn condense_general<M: MassProduct>(
+    mass: &M,
     motion: &RigidMotion<'_>,
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
@@ -64,8 +94,8 @@ pub fn condense_general(
 ///
 /// # Panics
 /// When the sizes disagree.
-pub fn condense_general_linear(
-    mass: &SymmetricMatrix,
+pub fn condense_general_linear<M: MassProduct>(
+    mass: &M,
     motion: &RigidMotion<'_>,
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
@@ -84,8 +114,8 @@ struct GeneralColumns<'a> {
 impl<'a> GeneralColumns<'a> {
     /// # Panics
     /// When mass, motion and shapes have not the same rows.
-    fn new(mass: &SymmetricMatrix, motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
-        let n = mass.n();
+    fn new(mass: &impl MassProduct, motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
+        let n = mass.n_rows();
         assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
         Self { motion, shapes }
     }
@@ -136,10 +166,10 @@ impl<'a> GeneralColumns<'a> {
     }
 
     /// The rows and columns of X' M X of rigid motion, and I for the modes; zero elsewhere.
-    fn rigid_gram(&self, mass: &SymmetricMatrix) -> Mat<f64> {
+    fn rigid_gram(&self, mass: &impl MassProduct) -> Mat<f64> {
         let (count, r) = (self.count(), self.rigid());
         let mut y = Mat::zeros(self.shapes.nrows(), r);
-        multiply(mass, 1, self.motion.fields, y.as_mut());
+        mass.times(self.motion.fields, y.as_mut());
         let first_mode = count - self.shapes.ncols();
         let mut all = Mat::from_fn(count, count, |i, j| if i == j && i >= first_mode { 1.0 } else { 0.0 });
         for start in (0..count).step_by(BLOCK) {
@@ -156,7 +186,7 @@ impl<'a> GeneralColumns<'a> {
     }
 
     /// X' M X, exactly symmetric.
-    fn gram(&self, mass: &SymmetricMatrix) -> Mat<f64> {
+    fn gram(&self, mass: &impl MassProduct) -> Mat<f64> {
         let count = self.count();
         let blocks: Vec<Range<usize>> =
             (0..count).step_by(BLOCK).map(|start| start..(start + BLOCK).min(count)).collect();
@@ -164,7 +194,7 @@ impl<'a> GeneralColumns<'a> {
         for (right, columns) in blocks.iter().enumerate() {
             let x = self.block(columns.clone());
             let mut y = Tall::zeros(self.shapes.nrows(), x.ncols());
-            multiply(mass, 1, x.as_ref(), y.as_mut());
+            mass.times(x.as_ref(), y.as_mut());
             for rows in &blocks[..=right] {
                 let part = if rows == columns {
                     gram(x.as_ref(), y.as_ref())
@@ -314,6 +344,12 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
     };
     let inertia = Matrix3::from_fn(|k, l| 0.5 * (g[(3 + k, 3 + l)] + g[(3 + l, 3 + k)]));
     (mass, Vector3::from_fn(|k, _| moment(k)), second_moment_of(&inertia))
+}
+
+/// m and c of the same matrix.
+pub(crate) fn rigid_first_moment(g: MatRef<'_, f64>) -> (f64, Vector3<f64>) {
+    let (mass, first_moment, _) = rigid_inertia(g);
+    (mass, first_moment)
 }
 
 /// J that gives I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small

@@ -41,6 +41,19 @@ impl Invariants {
         shifted.with_groups(self.0.groups)
     }
 
+    /// The same body with W0 = -C1~: whose kinetic energy does not change its motion when the body flies with a
+    /// constant velocity. Of a mass of points and directors W0 is this anyway; what does not turn with the nodes
+    /// has other products Phi_t' M B_j, errors of its order (theory section 6).
+    pub(crate) fn without_feeling_of_flight(mut self) -> Self {
+        let w0 = self.as_solid().w0();
+        if let Some(general) = &mut self.0.general {
+            let nf = w0.ncols() / 3;
+            let exists = |k: usize, column: usize| !general.plane || (k < 2 && column >= 2 * nf);
+            general.w0 = Mat::from_fn(3, 3 * nf, |k, column| if exists(k, column) { w0[(k, column)] } else { 0.0 });
+        }
+        self
+    }
+
     /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same
     /// origin.
     pub fn rotated(&self, axes: &Matrix3<f64>) -> Self {

@@ -2,12 +2,15 @@
 
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::CauchySchwarz;
-use crate::model::UnitLoad;
+use crate::model::{LoadKind, UnitLoad};
 use faer::Mat;
 
 /// Differences of numbers that are relative to their Cauchy-Schwarz bounds: below this they are rounding, and
 /// nothing is lost.
 const ROUNDING: f64 = 1e-12;
+
+/// Part of the stiffness of a motion at which the stiffness of inertia counts.
+const PART: f64 = 0.01;
 
 /// A format in space knows nothing of the plane.
 pub(crate) fn plane(body: &FlexBody) -> Option<String> {
@@ -73,6 +76,46 @@ pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> 
         .map(|one| one.load.to_string())
         .collect();
     (!lost.is_empty()).then(|| format!("the geometric stiffness for {}", lost.join(", ")))
+}
+
+/// Stiffness of inertia for loads that `holds` does not take, with the motion at which it counts.
+pub(crate) fn inertia_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bool) -> Option<String> {
+    let own = body.inertia_stiffness()?;
+    let lost: Vec<&UnitLoad> = own
+        .stiffness
+        .iter()
+        .filter(|one| one.matrix.norm_max() > 0.0 && !holds(&one.load))
+        .map(|one| &one.load)
+        .collect();
+    let is_lost = |kind: LoadKind| lost.iter().any(|load| load.kind == kind);
+    let shares = own.shares(body.invariants().modal_stiffness().as_ref())?;
+    let units = body.units();
+    let hertz = units.frequency_of(PART / shares.spin_squared);
+    let per_time2 = format!("1/{}^2", units.time.name());
+    let rates = [
+        (LoadKind::Spin, format!("a spin of {hertz:.3e} Hz")),
+        (
+            LoadKind::Acceleration,
+            format!(
+                "an acceleration of {:.3e} {}/{}^2",
+                PART / shares.acceleration,
+                units.length.name(),
+                units.time.name()
+            ),
+        ),
+        (
+            LoadKind::AngularAcceleration,
+            format!("an angular acceleration of {:.3e} {per_time2}", PART / shares.angular_acceleration),
+        ),
+    ];
+    let rates: Vec<String> =
+        rates.into_iter().filter(|(kind, _)| is_lost(kind.clone())).map(|(_, rate)| rate).collect();
+    (!rates.is_empty()).then(|| {
+        format!(
+            "the stiffness of inertia of nodes that turn, which has 1 % of the stiffness of a motion at {} or more",
+            rates.join(", at ")
+        )
+    })
 }
 
 /// Rotations of nodes, for a format without.

@@ -10,8 +10,10 @@ use crate::body::flex_body::{
     InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, SurfaceMesh, TermDecision,
     UnitLoad,
 };
-use crate::body::invariants::{DIGITS, GeneralTerms, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass};
-use crate::model::{BodyNumber, Coupling, Nodes};
+use crate::body::invariants::{
+    DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
+};
+use crate::model::{BodyNumber, Coupling, NodeMoments, Nodes};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
@@ -36,7 +38,8 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     let nf = modes.eigenvalue.len();
     let groups = take.scan.held()?;
     let invariants = take.invariants("/invariants", nf, dimension == 2, groups);
-    let geometric_stiffness = take.geometric_stiffness(nf);
+    let geometric_stiffness = take.geometric_stiffness("/geometric_stiffness", nf);
+    let inertia_stiffness = take.inertia_stiffness(nf);
     let lumped = take.lumped(nf, dimension == 2, groups);
     let terms = take.terms();
     let certificate = take.certificate();
@@ -53,6 +56,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         modes,
         invariants,
         geometric_stiffness,
+        inertia_stiffness,
         lumped,
         certificate,
         interfaces,
@@ -60,6 +64,17 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         terms,
         storage: scan.storage,
     })
+}
+
+/// Paths of the moments that the stiffness of inertia follows from.
+const ROTATIONAL_FIRST_MOMENT: &str = "/nodes/rotational_first_moment";
+const ROTATIONAL_SECOND_MOMENT: &str = "/nodes/rotational_second_moment";
+
+/// Stiffness of inertia in the order of [`InertiaStiffness::loads`]; members of a file may come in any.
+fn in_order(mut stiffness: Vec<GeometricStiffness<Mat<f64>>>) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let order: Vec<UnitLoad> = InertiaStiffness::loads(3).collect();
+    stiffness.sort_by_key(|one| order.iter().position(|load| *load == one.load));
+    stiffness
 }
 
 /// Moves values out of a scan.
@@ -77,6 +92,10 @@ impl Take<'_> {
 
     fn optional_floats(&mut self, path: &str) -> Option<Vec<f64>> {
         self.scan.values.contains_key(path).then(|| self.floats(path))
+    }
+
+    fn optional_text(&mut self, path: &str) -> Option<String> {
+        self.scan.values.contains_key(path).then(|| self.text(path))
     }
 
     fn ints(&mut self, path: &str) -> Vec<i64> {
@@ -151,6 +170,7 @@ impl Take<'_> {
             let known = MASS_STRUCTURES.map(|(name, _)| format!("`{name}`")).join(", ");
             self.scan.add(format!("/source@mass_structure: expected one of {known}, found {structure:?}"));
         }
+        let approximation = self.optional_text("/source@approximation");
         let settings = self.json("/source@settings", "JSON");
         Some(Source {
             name,
@@ -158,6 +178,7 @@ impl Take<'_> {
             number,
             n_dofs,
             mass_structure: mass_structure?,
+            approximation,
             settings: settings?,
         })
     }
@@ -279,10 +300,32 @@ impl Take<'_> {
         })
     }
 
-    fn geometric_stiffness(&mut self, nf: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
+    /// Stiffness of inertia, where the file has it: the moments of the nodes and the matrices.
+    fn inertia_stiffness(&mut self, nf: usize) -> Option<InertiaStiffness> {
+        let [first, second] =
+            [ROTATIONAL_FIRST_MOMENT, ROTATIONAL_SECOND_MOMENT].map(|path| self.optional_floats(path));
+        let stiffness = self.geometric_stiffness("/inertia_stiffness", nf);
+        let (first, second) = match (first, second, stiffness.is_empty()) {
+            (None, None, true) => return None,
+            (Some(first), Some(second), false) => (first, second),
+            _ => {
+                self.scan.add(format!(
+                    "{ROTATIONAL_FIRST_MOMENT}, {ROTATIONAL_SECOND_MOMENT}, /inertia_stiffness: expected all or none, found some"
+                ));
+                return None;
+            }
+        };
+        let moments = first.chunks_exact(3).zip(second.chunks_exact(9)).map(|(first, second)| NodeMoments {
+            first: Vector3::from_column_slice(first),
+            second: Matrix3::from_row_slice(second),
+        });
+        Some(InertiaStiffness { moments: moments.collect(), stiffness: in_order(stiffness) })
+    }
+
+    fn geometric_stiffness(&mut self, parent: &str, nf: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
         let mut out = Vec::new();
-        for (label, link) in self.scan.instances("/geometric_stiffness") {
-            let place = format!("/geometric_stiffness/{link}");
+        for (label, link) in self.scan.instances(parent) {
+            let place = format!("{parent}/{link}");
             let matrix = self.matrix(&format!("{place}/stiffness"), nf);
             match UnitLoad::from_label(&label) {
                 Some(load) => out.push(GeometricStiffness { load, matrix }),

@@ -78,6 +78,7 @@ pub(super) enum Per {
     LumpingScheme,
     Interface,
     UnitLoad,
+    InertiaLoad,
 }
 
 /// A dataset or attribute.
@@ -215,6 +216,11 @@ impl Group {
             Per::UnitLoad => {
                 let view = |g| View { geometric_stiffness: Some(g), ..view };
                 body.geometric_stiffness.iter().map(|g| (Some(g.load.label()), view(g))).collect()
+            }
+            Per::InertiaLoad => {
+                let view = |g| View { geometric_stiffness: Some(g), ..view };
+                let all = body.inertia_stiffness.iter().flat_map(|own| &own.stiffness);
+                all.map(|g| (Some(g.load.label()), view(g))).collect()
             }
         }
     }

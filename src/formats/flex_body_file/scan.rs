@@ -71,7 +71,7 @@ impl Scan {
         for group in TABLE {
             match group.per {
                 Per::Body => scan.group(file, group, None),
-                Per::LumpingScheme | Per::Interface | Per::UnitLoad => {
+                Per::LumpingScheme | Per::Interface | Per::UnitLoad | Per::InertiaLoad => {
                     scan.list(file, group);
                     for (_, link) in scan.instances(group.parent()) {
                         // Links cost nothing: a file may hold millions of them.

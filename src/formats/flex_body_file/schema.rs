@@ -8,9 +8,8 @@ use super::item::{Get, Group, Item, Kind, Origin, Per};
 use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
 use crate::base::provenance;
 use crate::body::flex_body::{Group as TermGroup, MassStructure, Storage};
-use crate::body::invariants::GENERAL_REMARK;
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
-use geometric_stiffness::GEOMETRIC_STIFFNESS;
+use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
 use interfaces::{COORDINATES, INTERFACES};
 use terms::TERMS;
 
@@ -28,8 +27,10 @@ pub(super) const WHOLE: &str = "sha256";
 pub(super) const MAJOR: i64 = 1;
 /// The minor version that has all entries; see [`MAJOR`]. A file states the least version that has those that
 /// it holds.
-pub(super) const MINOR: i64 = 5;
-/// The minor version of files without a surface.
+pub(super) const MINOR: i64 = 6;
+/// The minor version of files without stiffness of inertia.
+const WITHOUT_INERTIA_STIFFNESS: i64 = 5;
+/// The minor version of files with neither that nor a surface.
 const WITHOUT_MESH: i64 = 4;
 /// The minor version from which on every file has digests.
 pub(super) const DIGESTS_SINCE: i64 = 4;
@@ -106,7 +107,13 @@ const ROOT: &[Item] = &[
         Int,
         ONE,
         "additions within the major version; a reader ignores what it does not know",
-        |v| Some(Value::Int(if v.body.mesh.is_some() { MINOR } else { WITHOUT_MESH })),
+        |v| {
+            Some(Value::Int(match (&v.body.inertia_stiffness, &v.body.mesh) {
+                (Some(_), _) => MINOR,
+                (None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
+                (None, None) => WITHOUT_MESH,
+            }))
+        },
     ),
     attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
         text(provenance::generator())
@@ -194,9 +201,8 @@ const SOURCE: &[Item] = &[
         Text,
         ONE,
         "what stays approximate for the mass structure `general`; absent: nothing, the invariants are those of the matrices",
-        |v| text((v.body.source.mass_structure == MassStructure::General).then_some(GENERAL_REMARK)?),
+        |v| text(v.body.source.approximation.as_deref()?),
     )
-    .derived("")
     .added(2),
     attribute("settings", Text, ONE, "settings of the run that can change the result, as JSON", |v| {
         text(v.body.source.settings.to_string())
@@ -234,6 +240,30 @@ const NODES: &[Item] = &[
         "undeformed node positions in the body frame",
         |v| Some(Value::Floats(v.body.nodes.positions.as_flattened().to_vec())),
     ),
+    dataset(
+        "rotational_first_moment",
+        Floats(&[Nodes, Fixed(3)]),
+        MASS_LENGTH,
+        "h",
+        "moments of the mass that turns with each node, about the frame origin: of director a the sum of E_s over all points (theory section 6); with `rotational_second_moment` what `/inertia_stiffness` follows from",
+        |v| {
+            let moments = &v.body.inertia_stiffness.as_ref()?.moments;
+            Some(Value::Floats(moments.iter().flat_map(|own| own.first.iter().copied()).collect()))
+        },
+    )
+    .added(6),
+    dataset(
+        "rotational_second_moment",
+        Floats(&[Nodes, Fixed(3), Fixed(3)]),
+        MASS_LENGTH2,
+        "z",
+        "row a: of director a the sum of E_s with the places of all points and directors",
+        |v| {
+            let moments = &v.body.inertia_stiffness.as_ref()?.moments;
+            Some(Value::Floats(moments.iter().flat_map(|own| own.second.transpose().as_slice().to_vec()).collect()))
+        },
+    )
+    .added(6),
 ];
 
 const MESH: &[Item] = &[
@@ -548,6 +578,12 @@ pub(super) const TABLE: &[Group] = &[
         per: Per::UnitLoad,
         description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
         items: &[GEOMETRIC_STIFFNESS],
+    },
+    Group {
+        path: "/inertia_stiffness/<load>",
+        per: Per::InertiaLoad,
+        description: "Stiffness that the inertia of turning nodes adds: terms of the kinetic energy of second order in the rotations of nodes that carry rotational inertia or an eccentric mass. Signs and loads are those of `/geometric_stiffness`, to which a solver adds it: `acceleration_x` to `_z`, `angular_acceleration_x` to `_z`, `spin_xx` to `_xz`, all of them; in the plane `acceleration_x`, `_y`, `angular_acceleration_z`, `spin_zz`. Absent: zero; in files before 1.6 of mass structure `general`: not known. Since 1.6; a file without it is one of 1.5.",
+        items: &[INERTIA_STIFFNESS],
     },
     Group {
         path: "/interface_coordinates",

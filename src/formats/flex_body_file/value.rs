@@ -24,6 +24,7 @@ pub(super) struct View<'a> {
     pub body: &'a Parts,
     pub lumped: Option<&'a LumpedBody>,
     pub interface: Option<&'a Interface>,
+    /// Geometric stiffness or stiffness of inertia.
     pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
 }
 

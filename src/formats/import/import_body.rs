@@ -160,6 +160,7 @@ fn parts(file: &ImportedFile, coordinates: ModalCoordinates, source: SourceFile,
         ),
         invariants: coordinates.invariants,
         geometric_stiffness: coordinates.geometric_stiffness,
+        inertia_stiffness: None,
     }
 }
 
@@ -175,6 +176,7 @@ fn source_facts(file: &ImportedFile, invariants: &Invariants, source: SourceFile
             Some(_) => MassStructure::General,
             None => MassStructure::RotationInvariant,
         },
+        approximation: None,
         settings: serde_json::json!({
             "from": file.format,
             "dialect": file.dialect,

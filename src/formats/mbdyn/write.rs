@@ -159,9 +159,9 @@ fn tag(load: &UnitLoad, places: &[ExportFrame]) -> Option<usize> {
 const LOADS_OF_MOTION: usize = 12;
 
 /// The matrices of record group 19 by their indices.
-fn tagged<'b>(body: &'b FlexBody, places: &[ExportFrame]) -> Vec<(usize, &'b Mat<f64>)> {
-    let all = body.geometric_stiffness().iter();
-    all.filter_map(|one| Some((tag(&one.load, places)?, &one.matrix))).collect()
+fn tagged(body: &FlexBody, places: &[ExportFrame]) -> Vec<(usize, Mat<f64>)> {
+    let loads = body.stiffening_loads().into_iter();
+    loads.filter_map(|load| Some((tag(&load, places)?, body.stiffness_under(&load)?))).collect()
 }
 
 /// The text so far.
@@ -265,7 +265,7 @@ impl File {
         self.line(&tagged.len().to_string());
         for (tag, matrix) in tagged {
             self.line(&tag.to_string());
-            self.rows(matrix);
+            self.rows(&matrix);
         }
     }
 }

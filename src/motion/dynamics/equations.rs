@@ -1,7 +1,7 @@
 //! The constants of the equations of motion, laid out for their evaluation.
 
 use super::Terms;
-use super::geometric::geometric_stiffness;
+use super::geometric::{Stiffening, stiffness_under};
 use super::kernels::Panels;
 use super::modal_matrix::{ModalMass, ModalMatrix};
 use crate::body::flex_body::FlexBody;
@@ -319,7 +319,8 @@ impl<'b> EquationParts<'b> {
     }
 
     fn geometric(&self, kind: LoadKind) -> Option<impl Fn(usize, usize, usize) -> f64 + use<'b>> {
-        self.terms.geometric_stiffness.then(|| geometric_stiffness(self.body, &kind)).flatten()
+        let which = if self.terms.geometric_stiffness { Stiffening::All } else { Stiffening::OfInertia };
+        stiffness_under(self.body, &kind, which)
     }
 
     /// `count` square matrices on top of each other, with the entries (matrix, i, j).

@@ -24,7 +24,7 @@ mod terms;
 pub(crate) use constants::Constants;
 pub use equations::EquationsOfMotion;
 pub use evaluation::Evaluation;
-pub(crate) use geometric::geometric_stiffness;
+pub(crate) use geometric::{Stiffening, stiffness_under};
 pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Surroundings};
 pub(crate) use nodal::add_turned;

@@ -1,6 +1,6 @@
 //! Points of a body: where forces and torques act and motion is read.
 
-use super::geometric::geometric_stiffness;
+use super::geometric::{Stiffening, stiffness_under};
 use super::kernels::{add_scaled, dot};
 use super::modal_matrix::ModalMatrix;
 use super::{Evaluation, LoadAxes, LoadJacobian, Orientation, RotationVector, Terms};
@@ -27,7 +27,7 @@ impl PointMotion {
     }
 
     fn with_geometric_stiffness(mut self, body: &FlexBody, kind: &LoadKind) -> Self {
-        if let Some(entry) = geometric_stiffness(body, kind) {
+        if let Some(entry) = stiffness_under(body, kind, Stiffening::All) {
             let matrix = |k: usize| Mat::from_fn(self.nf, self.nf, |i, j| entry(k, i, j));
             let stiffness = |&k: &usize| (k, ModalMatrix::new(matrix(k).as_ref(), 0.0));
             self.second = kind.of_dimension(body.dimension()).iter().map(stiffness).collect();

@@ -152,7 +152,7 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
         && body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
     if scene.run.terms.w2 && !stiffened {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let Some(limit) = body.invariants().softening_rate(axis) else { continue };
+            let Some(limit) = body.softening_rate(axis) else { continue };
             let largest = extremes.spin_about[axis];
             if largest > limit {
                 let lost = (0.1 * largest / limit).powi(2) * 100.0;

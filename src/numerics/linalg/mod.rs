@@ -32,7 +32,7 @@ pub use compensated_pencil::{SmallEigen, small_pencil};
 pub use compensated_product::{
     CompensatedBlock, LANES, gram_compensated, multiply_compensated, projection_compensated, sum_length,
 };
-pub(crate) use contiguous::contiguous_mut;
+pub(crate) use contiguous::{contiguous, contiguous_mut};
 pub use dense::{
     SymmetricEigen, dense_cholesky, dense_inverse, full_qr, solve_lower, solve_upper, symmetric_eigen,
 };

@@ -1,8 +1,9 @@
-//! Geometric stiffness of unit loads: the rows of `/geometric_stiffness/<load>`.
+//! Geometric stiffness and stiffness of inertia of unit loads: the rows of `/geometric_stiffness/<load>` and
+//! `/inertia_stiffness/<load>`.
 
 use super::super::item::Kind::{Floats, Text};
 use super::super::item::{Extent::Modes, Item};
-use super::super::value::{Units, View, matrix, text};
+use super::super::value::{Units, Value, View, matrix, text};
 use super::{ONE, PER_TIME2, attribute, dataset};
 use crate::body::flex_body::{LoadKind, UnitLoad};
 
@@ -38,16 +39,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
     )
     .derived("")
     .within(2),
-    attribute("load_units", Text, ONE, "unit of the load; 1 for `load`, whose unit is the user's", |v| {
-        let units = match load(v)?.kind {
-            LoadKind::Acceleration => ACCELERATION,
-            LoadKind::AngularAcceleration | LoadKind::Spin => PER_TIME2,
-            LoadKind::Force(_) => FORCE,
-            LoadKind::Moment(_) => MOMENT,
-            LoadKind::Named(_) => ONE,
-        };
-        text(units.concrete(&v.body.units))
-    })
+    attribute("load_units", Text, ONE, "unit of the load; 1 for `load`, whose unit is the user's", load_units)
     .derived("")
     .within(2),
     attribute("interface", Text, ONE, "name of the interface, for `force` and `moment`", |v| {
@@ -56,6 +48,44 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
     .derived("")
     .added(2),
 ];
+
+pub(super) const INERTIA_STIFFNESS: &[Item] = &[
+    dataset(
+        "stiffness",
+        Floats(&[Modes, Modes]),
+        PER_TIME2,
+        "K",
+        "stiffness of inertia for one unit of the load: times the load, it is added to K_ff and belongs to the kinetic energy (theory section 6)",
+        |v| matrix(v.geometric_stiffness?.matrix.as_ref()),
+    )
+    .within(6),
+    attribute(
+        "kind",
+        Text,
+        ONE,
+        "`acceleration` of the frame's origin less gravity, `angular_acceleration`, or `spin` (K = sum of w_k w_l times the six)",
+        |v| text(load(v)?.kind.name()),
+    )
+    .derived("")
+    .within(6),
+    attribute("axis", Text, ONE, "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`", |v| {
+        text(load(v)?.axis())
+    })
+    .derived("")
+    .within(6),
+    attribute("load_units", Text, ONE, "unit of the load", load_units).derived("").within(6),
+];
+
+fn load_units(view: &View<'_>) -> Option<Value> {
+    let units = match load(view)?.kind {
+        LoadKind::Acceleration => ACCELERATION,
+        LoadKind::AngularAcceleration | LoadKind::Spin => PER_TIME2,
+        LoadKind::Force(_) => FORCE,
+        LoadKind::Moment(_) => MOMENT,
+        LoadKind::Named(_) => ONE,
+    };
+    text(units.concrete(&view.body.units))
+}
 
 fn load<'a>(view: &View<'a>) -> Option<&'a UnitLoad> {
     Some(&view.geometric_stiffness?.load)

@@ -7,7 +7,7 @@ use crate::body::invariants::Numbered;
 use crate::formats::export::losses::is_damped;
 use crate::formats::export::{ExportFrame, frames};
 use crate::model::LoadKind;
-use crate::motion::dynamics::geometric_stiffness;
+use crate::motion::dynamics::{Stiffening, stiffness_under};
 use faer::Mat;
 use nalgebra::Matrix3;
 
@@ -16,7 +16,7 @@ const INERTIA: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1
 
 /// (K + K') / 2 of the components of a kind of load, `None` where not one is given.
 fn stiffness(body: &FlexBody, kind: &LoadKind) -> Option<Vec<Mat<f64>>> {
-    let (nf, entry) = (body.n_modes(), geometric_stiffness(body, kind)?);
+    let (nf, entry) = (body.n_modes(), stiffness_under(body, kind, Stiffening::All)?);
     let symmetric_part = |component: usize| Mat::from_fn(nf, nf, |i, j| entry(component, i, j));
     Some((0..kind.components().len()).map(symmetric_part).collect())
 }

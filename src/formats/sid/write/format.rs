@@ -95,7 +95,7 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
         facts.push(format!("units {length} {mass} {time}"));
     }
     for kind in [LoadKind::Spin, LoadKind::AngularAcceleration] {
-        if body.geometric_stiffness().iter().any(|one| one.load.kind == kind) {
+        if body.stiffening_loads().iter().any(|load| load.kind == kind) {
             facts.push(format!("geometric stiffness for {}", kind.name().replace('_', " ")));
         }
     }

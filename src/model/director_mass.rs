@@ -1,0 +1,578 @@
+//! The mass matrix of a model with nodal rotations as a mass of points and directors (theory section 6).
+//!
+//! A node with rotations is a point x and directors d_a = R e_a, a = 1..d, which turn with it. With the blocks
+//! of M between node i and node j,
+//!
+//! ```text
+//! M_tr,ij = -h_ij~ + N_ij            h_ij: first moment, N_ij: symmetric
+//! M_rr,ij = tr(P_ij) I - P_ij'       P_ij' = tr(M_rr,ij)/2 I - M_rr,ij: second moment
+//! M_tt,ij = mu_ij I + D_ij           mu_ij = tr(M_tt,ij)/d
+//! ```
+//!
+//! the kinetic energy of points and directors is that of a solid: their mass E_s = [mu, h; h', P], a number for
+//! every pair of points and directors, is the same along every axis and does not change with the rotations.
+//! What it leaves of M, N and D, is multiplied by the velocities of the rows along the axes of the body: the
+//! rest. Of a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of the column M_tr, P = M_rr/2 I and
+//! N = 0.
+
+use super::rows::Rows;
+use crate::numerics::linalg::{
+    CscMatrix, SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros,
+};
+use faer::{Mat, MatMut, MatRef};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Part of sqrt(M_ii M_jj) below which an entry of the rest is rounding of the values it is the difference of.
+const ROUNDING: f64 = 1e-14;
+
+/// Vertices per parallel task.
+const CHUNK: usize = 1024;
+
+/// No director.
+const NONE: u32 = u32::MAX;
+
+/// M as a mass of points and directors, and what this leaves of it.
+///
+/// Columns of *extended rows* are what it multiplies: displacements of the points (d for each), then of the
+/// directors (d for each of the d directors of a node with rotational mass), then, where there is a rest, the
+/// rotations of these nodes (three for each, in the plane one). [`DirectorMass::extend`] takes the columns of a
+/// model there, [`DirectorMass::restrict`] forces back.
+#[derive(Debug, Clone)]
+pub struct DirectorMass {
+    dimension: usize,
+    model_rows: usize,
+    points: usize,
+    /// Nodes with directors, ascending.
+    nodes: Vec<u32>,
+    /// Place of its node in `nodes`, axis and row of the model of every rotation of these nodes.
+    rotations: Vec<Rotation>,
+    /// E_s: points, then d directors of each of the nodes.
+    scalar: SymmetricMatrix,
+    /// N and D, on extended rows.
+    rest: Option<SymmetricMatrix>,
+    rest_share: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Rotation {
+    place: usize,
+    axis: usize,
+    row: usize,
+}
+
+impl DirectorMass {
+    /// The mass `m` (rows of the model, symmetric) on points and directors; `None` when no rotation carries
+    /// mass.
+    pub(super) fn new(m: &SymmetricMatrix, rows: &Rows) -> Option<Self> {
+        let first = rows.displacements();
+        let carries = |at: usize| !m.row(first + at).0.is_empty();
+        let mut nodes: Vec<u32> = Vec::new();
+        for (at, &(node, _)) in rows.rotations().iter().enumerate() {
+            if carries(at) && nodes.last() != Some(&node) {
+                nodes.push(node);
+            }
+        }
+        if nodes.is_empty() {
+            return None;
+        }
+        let d = rows.dimension;
+        let points = first / d;
+        let mut place_of = vec![NONE; points];
+        nodes.iter().zip(0..).for_each(|(&node, place)| place_of[node as usize] = place);
+        let rotations = rows.rotations().iter().zip(first..).filter_map(|(&(node, axis), row)| {
+            let place = place_of[node as usize];
+            (place != NONE).then_some(Rotation { place: place as usize, axis: axis.into(), row })
+        });
+        let rotations = rotations.collect();
+        let blocks = Blocks { m, rows, nodes: &nodes, place_of: &place_of, points };
+        let (scalar, rest, rest_share) = blocks.split();
+        Some(Self { dimension: d, model_rows: rows.len(), points, rotations, nodes, scalar, rest, rest_share })
+    }
+
+    /// Nodes with directors, ascending.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    /// Number of extended rows.
+    pub fn rows(&self) -> usize {
+        self.turning_rows() + if self.rest.is_some() { self.turns() * self.nodes.len() } else { 0 }
+    }
+
+    /// Extended rows that turn with the body, which come first: vectors of points and directors.
+    pub fn turning_rows(&self) -> usize {
+        self.dimension * self.scalar.n()
+    }
+
+    /// Largest entry of the rest relative to sqrt(M_ii M_jj): how much of M does not turn with the nodes. Zero
+    /// for lumped masses and rigid regions of solids; of consistent beams and shells it stays, and its effect
+    /// falls with the square of the element size.
+    pub fn rest_share(&self) -> f64 {
+        self.rest_share
+    }
+
+    /// Rotations of a node that there can be.
+    fn turns(&self) -> usize {
+        if self.dimension == 2 { 1 } else { 3 }
+    }
+
+    /// First extended row of director `a` of the node at `place`.
+    fn director(&self, place: usize, a: usize) -> usize {
+        let d = self.dimension;
+        d * (self.points + d * place + a)
+    }
+
+    /// First extended row of the rotations of the node at `place`, where there is a rest.
+    fn rotation(&self, place: usize) -> usize {
+        self.turning_rows() + self.turns() * place
+    }
+
+    /// Velocities of the extended rows for those of the rows of the model, both to first order and along the
+    /// axes of the model: theta x e_a of a director.
+    ///
+    /// # Panics
+    /// When there is not one row for each of the model.
+    pub fn extend(&self, shapes: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(shapes.nrows(), self.model_rows, "one row per row of the model");
+        let mut extended = zeros(self.rows(), shapes.ncols());
+        let columns: Vec<_> = shapes.col_iter().zip(extended.col_iter_mut()).collect();
+        columns.into_par_iter().for_each(|(from, to)| self.extend_vector(contiguous(from), contiguous_mut(to)));
+        extended
+    }
+
+    /// [`DirectorMass::extend`] of one column, into another.
+    pub fn extend_vector(&self, shape: &[f64], extended: &mut [f64]) {
+        let points = self.dimension * self.points;
+        extended[..points].copy_from_slice(&shape[..points]);
+        extended[points..].fill(0.0);
+        for &Rotation { place, axis, row } in &self.rotations {
+            self.turn(place, axis, shape[row], extended);
+        }
+    }
+
+    /// Adds the rotation of a node about an axis of the model to its directors.
+    fn turn(&self, place: usize, axis: usize, angle: f64, extended: &mut [f64]) {
+        // e_axis x e_a = e_b and e_axis x e_b = -e_a for the cyclic order (axis, a, b).
+        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+        extended[self.director(place, a) + b] += angle;
+        extended[self.director(place, b) + a] -= angle;
+        if self.rest.is_some() {
+            extended[self.rotation(place) + if self.dimension == 2 { 0 } else { axis }] += angle;
+        }
+    }
+
+    /// Unit translations and unit rotations of the extended rows, given those of the model (N x 6, in the plane
+    /// N x 3, along its axes, rotations not divided by a length): directors and rotations of nodes turn whatever
+    /// rows of rotations their nodes have.
+    ///
+    /// # Panics
+    /// As [`DirectorMass::extend`].
+    pub fn extend_rigid(&self, fields: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(fields.nrows(), self.model_rows, "one row per row of the model");
+        let (d, points) = (self.dimension, self.dimension * self.points);
+        let mut extended = zeros(self.rows(), fields.ncols());
+        extended.as_mut().subrows_mut(0, points).copy_from(fields.subrows(0, points));
+        for column in d..fields.ncols() {
+            let axis = if d == 2 { 2 } else { column - 3 };
+            let extended = extended.col_as_slice_mut(column);
+            (0..self.nodes.len()).for_each(|place| self.turn(place, axis, 1.0, extended));
+        }
+        extended
+    }
+
+    /// Forces on the rows of the model that do the power of forces on the extended rows: moments
+    /// sum_a e_a x f_a of those of the directors on the rotations of their node.
+    ///
+    /// # Panics
+    /// When there is not one row for each extended one.
+    pub fn restrict(&self, forces: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(forces.nrows(), self.rows(), "one row per extended row");
+        let mut restricted = zeros(self.model_rows, forces.ncols());
+        let columns: Vec<_> = forces.col_iter().zip(restricted.col_iter_mut()).collect();
+        columns.into_par_iter().for_each(|(from, to)| self.restrict_vector(contiguous(from), contiguous_mut(to)));
+        restricted
+    }
+
+    /// [`DirectorMass::restrict`] of one column, into another.
+    pub fn restrict_vector(&self, forces: &[f64], restricted: &mut [f64]) {
+        let points = self.dimension * self.points;
+        restricted[..points].copy_from_slice(&forces[..points]);
+        restricted[points..].fill(0.0);
+        for &Rotation { place, axis, row } in &self.rotations {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            restricted[row] = forces[self.director(place, a) + b] - forces[self.director(place, b) + a];
+            if self.rest.is_some() {
+                restricted[row] += forces[self.rotation(place) + if self.dimension == 2 { 0 } else { axis }];
+            }
+        }
+    }
+
+    /// y = E x of extended rows.
+    ///
+    /// # Panics
+    /// When the sizes disagree.
+    pub fn multiply(&self, x: MatRef<'_, f64>, mut y: MatMut<'_, f64>) {
+        let turning = self.turning_rows();
+        if let Some(rest) = &self.rest {
+            multiply(rest, 1, x, y.as_mut());
+            let mut product = zeros(turning, x.ncols());
+            multiply(&self.scalar, self.dimension, x.subrows(0, turning), product.as_mut());
+            let mut head = y.subrows_mut(0, turning);
+            head += product;
+        } else {
+            multiply(&self.scalar, self.dimension, x, y);
+        }
+    }
+
+    /// [`DirectorMass::multiply`] of one column; `scratch` has as many entries.
+    pub fn multiply_vector(&self, x: &[f64], y: &mut [f64], scratch: &mut [f64]) {
+        let turning = self.turning_rows();
+        multiply_vector(&self.scalar, self.dimension, &x[..turning], &mut y[..turning]);
+        if let Some(rest) = &self.rest {
+            multiply_vector(rest, 1, x, scratch);
+            y[turning..].fill(0.0);
+            y.iter_mut().zip(scratch).for_each(|(y, rest)| *y += *rest);
+        }
+    }
+
+    /// The moments of the mass that turns with every node, about the point and along the axes that the rigid
+    /// motions `fields` of the extended rows have, columns of `axes` in the axes of the model.
+    ///
+    /// * `fields`: [`DirectorMass::extend_rigid`], turned to these axes.
+    pub fn moments(&self, fields: MatRef<'_, f64>, axes: &Matrix3<f64>) -> Vec<NodeMoments> {
+        let mut product = zeros(self.rows(), fields.ncols());
+        self.multiply(fields, product.as_mut());
+        let d = self.dimension;
+        let vector = |row: usize, column: usize| {
+            Vector3::from_fn(|k, _| if k < d { product[(row + k, column)] } else { 0.0 })
+        };
+        let axis = |k: usize| axes.column(k).into_owned();
+        let of_node = |place: usize| {
+            let (mut first, mut second) = (Vector3::zeros(), Matrix3::zeros());
+            for a in 0..d {
+                let row = self.director(place, a);
+                first[a] = (0..d).map(|k| vector(row, k).dot(&axis(k))).sum::<f64>() / d as f64;
+                // The sum over the axes k of e_k x (e_k x z) is -2 z, in the plane -z.
+                let turned = |k: usize, column: usize| axis(k).cross(&vector(row, column));
+                let z = match d {
+                    2 => -turned(2, 2),
+                    _ => (0..3).map(|k| turned(k, 3 + k)).sum::<Vector3<f64>>() * -0.5,
+                };
+                second.set_row(a, &z.transpose());
+            }
+            NodeMoments { first: axes.transpose() * first, second: axes.transpose() * second * axes }
+        };
+        (0..self.nodes.len()).map(of_node).collect()
+    }
+}
+
+/// Moments of the mass that turns with a node, about the origin of a frame and along its axes: what the rows of
+/// its directors have of the rigid motions of the whole body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeMoments {
+    /// h_a = sum over the points of E_s with director a. Unit: mass length.
+    pub first: Vector3<f64>,
+    /// Row a: z_a = sum of E_s of director a with the places of points and directors. Unit: mass length^2.
+    pub second: Matrix3<f64>,
+}
+
+/// M by blocks of vertices.
+struct Blocks<'a> {
+    m: &'a SymmetricMatrix,
+    rows: &'a Rows,
+    nodes: &'a [u32],
+    place_of: &'a [u32],
+    points: usize,
+}
+
+/// Local rows of a vertex: displacements 0, 1, 2, rotations 3, 4, 5.
+type Block = [[f64; 6]; 6];
+
+/// Columns of a sparse matrix, one after the other.
+#[derive(Default)]
+struct Columns {
+    ends: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Columns {
+    fn push(&mut self, row: usize, value: f64) {
+        if value != 0.0 {
+            self.row_idx.push(row as u32);
+            self.values.push(value);
+        }
+    }
+
+    fn end(&mut self) {
+        self.ends.push(self.row_idx.len());
+    }
+
+    fn joined(n: usize, parts: Vec<Self>) -> SymmetricMatrix {
+        let (mut col_ptr, mut row_idx, mut values) = (vec![0], Vec::new(), Vec::new());
+        for part in parts {
+            let before = row_idx.len();
+            col_ptr.extend(part.ends.iter().map(|end| before + end));
+            row_idx.extend(part.row_idx);
+            values.extend(part.values);
+        }
+        SymmetricMatrix::new(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+            .expect("entries are computed alike on both sides of the diagonal")
+    }
+}
+
+impl Blocks<'_> {
+    /// E_s, the rest on extended rows, and its largest entry relative to sqrt(M_ii M_jj).
+    fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>, f64) {
+        let d = self.rows.dimension;
+        let sizes = self.sizes();
+        let chunks = |n: usize| (0..n).step_by(CHUNK).map(move |i| i..(i + CHUNK).min(n));
+        // Columns in the order of the extended rows: points, then directors, then rotations.
+        let points: Vec<_> = chunks(self.points).collect();
+        let places: Vec<_> = chunks(self.nodes.len()).collect();
+        let of = |ranges: &[Range<usize>], part: &(dyn Fn(Range<usize>, &mut Columns) + Sync)| -> Vec<Columns> {
+            let columns = |range: &Range<usize>| {
+                let mut columns = Columns::default();
+                part(range.clone(), &mut columns);
+                columns
+            };
+            ranges.par_iter().map(columns).collect()
+        };
+        let mut scalar = of(&points, &|range, columns| {
+            self.each(range, |blocks| self.point_column(blocks, columns));
+        });
+        scalar.extend(of(&places, &|range, columns| {
+            self.each_node(range, |blocks| self.director_columns(blocks, columns));
+        }));
+        let scalar = Columns::joined(self.points + d * self.nodes.len(), scalar);
+
+        let shares: Vec<f64> = points
+            .par_iter()
+            .map(|range| {
+                let mut largest = 0.0f64;
+                for p in range.clone() {
+                    for (q, block) in self.neighbours(p) {
+                        largest = largest.max(self.rest_of(p, q, &block, &sizes).1);
+                    }
+                }
+                largest
+            })
+            .collect();
+        let share = shares.into_iter().fold(0.0, f64::max);
+        if share <= ROUNDING {
+            return (scalar, None, 0.0);
+        }
+        let turns = if d == 2 { 1 } else { 3 };
+        let directors = d * d * self.nodes.len();
+        let mut rest = of(&points, &|range, columns| {
+            for p in range {
+                self.rest_of_point(p, &sizes, columns);
+            }
+        });
+        let start = rest.len();
+        rest.push(Columns { ends: vec![0; directors], ..Columns::default() });
+        debug_assert_eq!(rest.len(), start + 1);
+        rest.extend(of(&places, &|range, columns| {
+            for place in range {
+                self.rest_of_rotations(place, &sizes, columns);
+            }
+        }));
+        let n = d * self.points + directors + turns * self.nodes.len();
+        (scalar, Some(Columns::joined(n, rest)), share)
+    }
+
+    fn each(&self, points: Range<usize>, mut column: impl FnMut(&[(usize, Block)])) {
+        points.for_each(|p| column(&self.neighbours(p)));
+    }
+
+    fn each_node(&self, places: Range<usize>, mut columns: impl FnMut(&[(usize, Block)])) {
+        places.for_each(|place| columns(&self.neighbours(self.nodes[place] as usize)));
+    }
+
+    /// Blocks M_pq of the vertex p with every vertex q that shares mass with it, ascending.
+    fn neighbours(&self, p: usize) -> Vec<(usize, Block)> {
+        let (first, d) = (self.rows.displacements(), self.rows.dimension);
+        let local = |row: usize| match row.checked_sub(first) {
+            None => row % d,
+            Some(at) => 3 + usize::from(self.rows.rotations()[at].1),
+        };
+        let mut blocks: Vec<(usize, Block)> = Vec::new();
+        for row in self.rows.of_vertex(p) {
+            let own = local(row);
+            let (columns, values) = self.m.row(row);
+            let mut at = 0;
+            for (&column, &value) in columns.iter().zip(values) {
+                let q = self.rows.vertex(column as usize);
+                // Columns of displacements ascend, and those of rotations.
+                at = match blocks.get(at) {
+                    Some((known, _)) if *known == q => at,
+                    _ => match blocks.binary_search_by_key(&q, |(known, _)| *known) {
+                        Ok(at) => at,
+                        Err(at) => {
+                            blocks.insert(at, (q, [[0.0; 6]; 6]));
+                            at
+                        }
+                    },
+                };
+                blocks[at].1[own][local(column as usize)] = value;
+            }
+        }
+        blocks
+    }
+
+    /// mu of a block.
+    fn mean(&self, block: &Block) -> f64 {
+        let d = self.rows.dimension;
+        (0..d).map(|k| block[k][k]).sum::<f64>() / d as f64
+    }
+
+    /// h_a of the displacements of p and the rotations of q, M_tr = -h~ + N; `entry` has (displacement,
+    /// rotation).
+    fn first_moment(&self, entry: impl Fn(usize, usize) -> f64, a: usize) -> f64 {
+        if self.rows.dimension == 2 {
+            return if a == 0 { entry(1, 5) } else { -entry(0, 5) };
+        }
+        let (k, l) = ((a + 1) % 3, (a + 2) % 3);
+        0.5 * (entry(k, 3 + l) - entry(l, 3 + k))
+    }
+
+    /// P_ab of the rotations of p and q.
+    fn second_moment(&self, block: &Block, a: usize, b: usize) -> f64 {
+        if self.rows.dimension == 2 {
+            return if a == b { 0.5 * block[5][5] } else { 0.0 };
+        }
+        if a != b {
+            return -block[3 + b][3 + a];
+        }
+        let (k, l) = ((a + 1) % 3, (a + 2) % 3);
+        // tr/2 - M_aa, so that both sides of the diagonal round alike.
+        0.5 * ((block[3 + k][3 + k] + block[3 + l][3 + l]) - block[3 + a][3 + a])
+    }
+
+    fn director(&self, place: u32, a: usize) -> usize {
+        self.points + self.rows.dimension * place as usize + a
+    }
+
+    fn place(&self, q: usize) -> Option<u32> {
+        Some(self.place_of[q]).filter(|place| *place != NONE)
+    }
+
+    fn point_column(&self, blocks: &[(usize, Block)], columns: &mut Columns) {
+        for (q, block) in blocks {
+            columns.push(*q, self.mean(block));
+        }
+        for (q, block) in blocks {
+            let Some(place) = self.place(*q) else { continue };
+            for a in 0..self.rows.dimension {
+                columns.push(self.director(place, a), self.first_moment(|k, b| block[k][b], a));
+            }
+        }
+        columns.end();
+    }
+
+    fn director_columns(&self, blocks: &[(usize, Block)], columns: &mut Columns) {
+        for b in 0..self.rows.dimension {
+            for (q, block) in blocks {
+                columns.push(*q, self.first_moment(|k, c| block[c][k], b));
+            }
+            for (q, block) in blocks {
+                let Some(place) = self.place(*q) else { continue };
+                for a in 0..self.rows.dimension {
+                    // Director a of q, director b of p: P_qp[a, b] = P_pq[b, a].
+                    columns.push(self.director(place, a), self.second_moment(block, b, a));
+                }
+            }
+            columns.end();
+        }
+    }
+
+    /// Square root of the largest diagonal entry of the displacements and of the rotations of every vertex.
+    fn sizes(&self) -> Vec<[f64; 2]> {
+        let diagonal = self.m.diagonal();
+        let (first, mut sizes) = (self.rows.displacements(), vec![[0.0f64; 2]; self.points]);
+        for (row, value) in diagonal.iter().enumerate() {
+            let vertex = self.rows.vertex(row);
+            if let Some(size) = sizes.get_mut(vertex) {
+                let kind = usize::from(row >= first);
+                size[kind] = size[kind].max(value.abs().sqrt());
+            }
+        }
+        sizes
+    }
+
+    /// What E_s leaves of the rows of displacements of p and all rows of q, and the largest of it relative to
+    /// sqrt(M_ii M_jj); rounding is taken out.
+    fn rest_of(&self, p: usize, q: usize, block: &Block, sizes: &[[f64; 2]]) -> (Block, f64) {
+        let d = self.rows.dimension;
+        let mean = self.mean(block);
+        let mut rest = [[0.0; 6]; 6];
+        for k in 0..d {
+            for l in 0..d {
+                rest[k][l] = block[k][l] - if k == l { mean } else { 0.0 };
+                if d == 3 {
+                    rest[k][3 + l] = 0.5 * (block[k][3 + l] + block[l][3 + k]);
+                }
+            }
+        }
+        let mut largest = 0.0f64;
+        for row in rest.iter_mut().take(d) {
+            for (l, value) in row.iter_mut().enumerate() {
+                let size = sizes[p][0] * sizes[q][usize::from(l >= 3)];
+                let share = value.abs() / size;
+                match share > ROUNDING {
+                    true => largest = largest.max(share),
+                    false => *value = 0.0,
+                }
+            }
+        }
+        (rest, largest)
+    }
+
+    /// First extended row of the rotations of the node at a place.
+    fn rotation(&self, place: u32) -> usize {
+        let d = self.rows.dimension;
+        d * self.points + d * d * self.nodes.len() + 3 * place as usize
+    }
+
+    fn rest_of_point(&self, p: usize, sizes: &[[f64; 2]], columns: &mut Columns) {
+        let d = self.rows.dimension;
+        let rests: Vec<(usize, Block)> =
+            self.neighbours(p).iter().map(|(q, block)| (*q, self.rest_of(p, *q, block, sizes).0)).collect();
+        for k in 0..d {
+            for (q, rest) in &rests {
+                (0..d).for_each(|l| columns.push(d * q + l, rest[k][l]));
+            }
+            for (q, rest) in rests.iter().filter(|_| d == 3) {
+                let Some(place) = self.place(*q) else { continue };
+                (0..3).for_each(|b| columns.push(self.rotation(place) + b, rest[k][3 + b]));
+            }
+            columns.end();
+        }
+    }
+
+    /// The columns of the rotations of a node: N alone.
+    fn rest_of_rotations(&self, place: usize, sizes: &[[f64; 2]], columns: &mut Columns) {
+        if self.rows.dimension == 2 {
+            return columns.end();
+        }
+        let p = self.nodes[place] as usize;
+        let transposed = |block: &Block| {
+            let mut turned = [[0.0; 6]; 6];
+            (0..6).for_each(|k| (0..6).for_each(|l| turned[l][k] = block[k][l]));
+            turned
+        };
+        let rests: Vec<(usize, Block)> = self
+            .neighbours(p)
+            .iter()
+            .map(|(q, block)| (*q, self.rest_of(*q, p, &transposed(block), sizes).0))
+            .collect();
+        for b in 0..3 {
+            for (q, rest) in &rests {
+                (0..3).for_each(|k| columns.push(3 * q + k, rest[k][3 + b]));
+            }
+            columns.end();
+        }
+    }
+}
