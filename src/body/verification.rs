@@ -62,6 +62,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     checks.extend(against.modes());
     checks.extend(against.damping()?);
     checks.extend(against.geometric_stiffness()?);
+    checks.extend(against.inertia_stiffness());
     checks.extend(against.guarantee());
     Ok(checks)
 }
@@ -220,6 +221,22 @@ impl<'a> Recomputed<'a> {
             let formula = "Psi' K_geo Psi for every unit load";
             IdentityCheck::new("geometric_stiffness_recomputed", formula, found.largest, found.allowed)
         }))
+    }
+
+    /// The stiffness of inertia, by the moments of the nodes and by the matrices.
+    fn inertia_stiffness(&self) -> Option<IdentityCheck> {
+        let own = self.modes.inertia_stiffness(self.model, &self.place.frame);
+        let formula = "moments of the nodes and stiffness of inertia from M";
+        let check = |value| {
+            let limit = RECOMPUTED + self.body.storage().rounding();
+            Some(IdentityCheck::new("inertia_stiffness_recomputed", formula, value, limit))
+        };
+        match (self.body.inertia_stiffness(), own) {
+            (None, None) => None,
+            (Some(stored), Some(own)) => check(own.largest_difference(stored)),
+            // Of a body that was made before there was any, or of another model.
+            (None, Some(_)) | (Some(_), None) => check(f64::INFINITY),
+        }
     }
 
     /// What accuracy `certified` guarantees, where it does.

@@ -37,6 +37,7 @@ impl ExportFormat for AdamsInvariants {
             losses::plane(body),
             losses::general_w0(body),
             losses::geometric_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, |_| false),
             losses::internal_rows(body),
         ]
         .into_iter()

@@ -49,6 +49,7 @@ impl ExportFormat for OpenRadioss {
             ),
             losses::general_w0(body),
             losses::geometric_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, |_| false),
             damping,
             losses::internal_rows(body),
         ]

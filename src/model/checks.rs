@@ -137,14 +137,20 @@ fn check_body(
         stop_on_error(&mut found)?;
     }
     let diagonal_mass = is_diagonal(&body.mass);
-    note_structure(&body, &form, diagonal_mass, &mut found);
+    note_structure(&body, diagonal_mass, &mut found);
     let plausibility = Plausibility {
         mass_pairs,
         foreign_pairs,
         ..check_local_mass(&body, &form, diagonal_mass, &mut found)
     };
     stop_on_error(&mut found)?;
-    let model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
+    let mass_rounding = block_tolerance(body.raw.mass.digits);
+    let mass_path = body.raw.mass.path.clone();
+    let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
+    let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
+    model.find_fixed_mass(mass_rounding);
+    let kept = mass_that_does_not_turn(&model, mass_rounding, [first, second]);
+    found.extend(kept.map(|note| note.in_file(&mass_path)));
     // Now, while the ordering library has not ended; the files need not stay open.
     let _ = model.sources().len();
     Ok(CheckedModel { model, diagnostics: found, plausibility })
@@ -208,7 +214,7 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
 }
 
 /// What kind of mass and of rows the body has, where it is not the plain one.
-fn note_structure(body: &Assembled, form: &MassForm, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
+fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
     let (raw, rows) = (&body.raw, &body.rows);
     if diagonal_mass {
         let message = "mass matrix is diagonal: it was lumped before it came here";
@@ -228,22 +234,25 @@ fn note_structure(body: &Assembled, form: &MassForm, diagonal_mass: bool, found:
         );
         found.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&raw.nodes_path));
     }
-    if !form.commutes {
-        let (a, b) = form.worst;
-        let label = |row| rows.label(&body.nodes, row);
-        let why = if form.deviation > block_tolerance(raw.mass.digits) {
-            let place = match a == b {
-                true => format!("at {}", label(a)),
-                false => format!("between {} and {}", label(a), label(b)),
-            };
-            let deviation = form.deviation;
-            format!("its blocks deviate by {deviation:.1e} from multiples of the identity, most {place}")
-        } else {
-            "rows that are no displacements of nodes carry mass".to_owned()
+}
+
+/// A note about the part of the mass that is kept along the axes of the body while its nodes turn; `worst` labels
+/// the rows of the block of displacements that differs most by direction.
+fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
+    let share = model.fixed_mass_share();
+    let deviation = model.mass_deviation();
+    (share > 0.0).then(|| {
+        let [a, b] = worst;
+        let place = if a == b { format!("at {a}") } else { format!("between {a} and {b}") };
+        let why = match deviation > rounding {
+            true => format!(
+                "blocks of displacements deviate by {deviation:.1e} from multiples of the identity, most {place}"
+            ),
+            false => format!("displacements and rotations share symmetric blocks of up to {share:.1e}"),
         };
-        let message = format!("mass matrix does not commute with rotations: {why}");
-        found.push(Diagnostic::new(Code::MassBlockStructure, message).in_file(&raw.mass.path));
-    }
+        let message = format!("part of the mass matrix does not turn with the nodes: {why}");
+        Diagnostic::new(Code::MassBlockStructure, message)
+    })
 }
 
 /// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.

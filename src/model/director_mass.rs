@@ -15,6 +15,7 @@
 //! rest. Of a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of the column M_tr, P = M_rr/2 I and
 //! N = 0.
 
+use super::inertial_rows::RigidAcceleration;
 use super::rows::Rows;
 use crate::numerics::linalg::{
     CscMatrix, SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros,
@@ -237,6 +238,21 @@ impl DirectorMass {
         }
     }
 
+    /// Adds H theta to the moments on the rotations of every node, in the rows of the model: theta of `u`, H of the
+    /// node at a place among [`DirectorMass::nodes`].
+    ///
+    /// # Panics
+    /// When there is not one row for each of the model.
+    pub fn add_second_order(&self, h: impl Fn(usize) -> Matrix3<f64>, u: &[f64], forces: &mut [f64]) {
+        assert!(u.len() == self.model_rows && forces.len() == u.len(), "one row per row of the model");
+        for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
+            let mut theta = Vector3::zeros();
+            of_node.iter().for_each(|rotation| theta[rotation.axis] = u[rotation.row]);
+            let moment = h(of_node[0].place) * theta;
+            of_node.iter().for_each(|rotation| forces[rotation.row] += moment[rotation.axis]);
+        }
+    }
+
     /// The moments of the mass that turns with every node, about the point and along the axes that the rigid
     /// motions `fields` of the extended rows have, columns of `axes` in the axes of the model.
     ///
@@ -276,6 +292,18 @@ pub struct NodeMoments {
     pub first: Vector3<f64>,
     /// Row a: z_a = sum of E_s of director a with the places of points and directors. Unit: mass length^2.
     pub second: Matrix3<f64>,
+}
+
+impl NodeMoments {
+    /// H = sym(G) - tr(G) I with G = sum_a e_a g_a', g_a = h_a a + alpha x z_a + omega x (omega x z_a): the stiffness
+    /// that the inertia of a rigid motion makes of the rotations of the node. `motion` is about the point and along
+    /// the axes of the moments.
+    pub fn of(&self, motion: &RigidAcceleration) -> Matrix3<f64> {
+        // omega x (omega x z) = (omega omega' - omega^2 I) z.
+        let turning = motion.angular.cross_matrix() + motion.spin - Matrix3::identity() * motion.spin.trace();
+        let g = self.first * motion.linear.transpose() + self.second * turning.transpose();
+        0.5 * (g + g.transpose()) - Matrix3::identity() * g.trace()
+    }
 }
 
 /// M by blocks of vertices.

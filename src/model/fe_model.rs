@@ -33,6 +33,8 @@ pub struct FeModel {
     digits: u8,
     rigid_residual: f64,
     mass_deviation: f64,
+    /// Part of the mass that does not turn with the nodes; zero where that is rounding.
+    fixed_mass_share: f64,
     diagonal_mass: bool,
     /// Internal row of each matrix row; none when they are the same.
     row_to_internal: Option<Vec<u32>>,
@@ -69,6 +71,7 @@ impl FeModel {
             sources: raw.sources,
             rigid_residual,
             mass_deviation: form.deviation,
+            fixed_mass_share: 0.0,
             diagonal_mass,
             row_to_internal: body.row_to_internal,
             number,
@@ -126,6 +129,7 @@ impl FeModel {
             whole_mass: (!self.rows.are_plain()).then(|| diagonal(by_row, self.rows.len())),
             commutes: true,
             mass_deviation: 0.0,
+            fixed_mass_share: 0.0,
             diagonal_mass: true,
             elimination: None,
             director_mass: OnceLock::new(),
@@ -229,6 +233,23 @@ impl FeModel {
     /// alpha_jj).
     pub fn mass_deviation(&self) -> f64 {
         self.mass_deviation
+    }
+
+    /// Largest entry of the part of M that is kept along the axes of the body while its nodes turn, relative to
+    /// sqrt(M_ii M_jj): blocks of displacements that are no multiples of I and, of [`DirectorMass`], symmetric
+    /// blocks between displacements and rotations. Zero where it is rounding.
+    pub fn fixed_mass_share(&self) -> f64 {
+        self.fixed_mass_share
+    }
+
+    /// Keeps the part of M that does not turn, unless it is at most `rounding`.
+    pub(super) fn find_fixed_mass(&mut self, rounding: f64) {
+        let share = match (self.scalar_mass(), self.director_mass()) {
+            (Some(_), _) => 0.0,
+            (None, Some(mass)) => mass.rest_share(),
+            (None, None) => self.mass_deviation,
+        };
+        self.fixed_mass_share = if share > rounding { share } else { 0.0 };
     }
 
     /// Whether M is diagonal: lumped by the FE program.

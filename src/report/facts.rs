@@ -2,7 +2,7 @@
 
 use super::completeness::Completeness;
 use super::craig_bampton::CraigBamptonFacts;
-use super::geometric_stiffness::{GeometricStiffnessFacts, softening_hz};
+use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
@@ -175,6 +175,8 @@ pub(super) struct ModeFacts {
     pub damping: Option<DampingFacts>,
     /// For each unit load.
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
+    /// Of nodes whose rotations carry mass.
+    pub inertia_stiffness: Option<InertiaStiffnessFacts>,
     /// Spin about each body axis that takes 1 % of the stiffness of a motion, where W2 is held without
     /// geometric stiffness for spin.
     pub softening_hz: Option<[Option<f64>; 3]>,
@@ -271,6 +273,7 @@ impl<'b> Facts<'b> {
                 damping_ratio: body.modes().damping_ratio.clone(),
                 damping: DampingFacts::of(body),
                 geometric_stiffness: GeometricStiffnessFacts::of(body),
+                inertia_stiffness: InertiaStiffnessFacts::of(body),
                 softening_hz: softening_hz(body),
                 worst_residual: worst_residual(body),
                 craig_bampton: CraigBamptonFacts::of(body),

@@ -35,6 +35,38 @@ impl GeometricStiffnessFacts {
     }
 }
 
+/// Motions at which the stiffness of inertia counts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct InertiaStiffnessFacts {
+    /// Spin in hertz, acceleration and angular acceleration of the frame at which it has 1 % of the stiffness of a
+    /// motion, whatever their direction; null where it is zero.
+    pub one_percent_spin_hz: Option<f64>,
+    pub one_percent_acceleration: Option<f64>,
+    pub one_percent_angular_acceleration: Option<f64>,
+    #[serde(skip)]
+    words: String,
+}
+
+impl InertiaStiffnessFacts {
+    pub fn of(body: &FlexBody) -> Option<Self> {
+        let rates = body.inertia_rates(0.01)?;
+        Some(Self {
+            one_percent_spin_hz: rates.spin_hz,
+            one_percent_acceleration: rates.acceleration,
+            one_percent_angular_acceleration: rates.angular_acceleration,
+            words: rates.in_words(body.units(), |_| true),
+        })
+    }
+
+    /// `of turning nodes: 1 % of a stiffness at a spin of 12.3 Hz, ...`.
+    pub fn in_words(&self) -> String {
+        match self.words.as_str() {
+            "" => "of turning nodes: none".to_owned(),
+            words => format!("of turning nodes: 1 % of the stiffness of a motion at {words}"),
+        }
+    }
+}
+
 /// Spin about each body axis, in hertz, at which the centrifugal term takes 1 % of the stiffness of the
 /// motion that it softens most. Nothing for a body with geometric stiffness for spin, or without W2; no
 /// number where nothing moves across the axis, nor about axes that a plane body does not spin about.

@@ -112,6 +112,9 @@ fn completeness(html: &mut String, facts: &Facts<'_>) {
     if let Some(damping) = &modes.damping {
         items.push(("Damping".to_owned(), escape(&sentence(&damping.in_words()))));
     }
+    if let Some(inertia) = &modes.inertia_stiffness {
+        items.push(("Stiffness of inertia".to_owned(), escape(&sentence(&inertia.in_words()))));
+    }
     if let Some(hertz) = &modes.softening_hz {
         items.push((word_as("geometric stiffness", "Spin"), escape(&sentence(&softening_in_words(hertz)))));
     }

@@ -148,9 +148,8 @@ fn body(summary: &mut Summary, facts: &Facts<'_>) {
         None => model.size_in_words(),
     };
     summary.entry(tone, "model", &format!("{size}{plane}"), 3);
-    if model.approximation.is_some() {
-        let remark = "W0 to W3 take the rotations of nodes as small; the rest is exact";
-        summary.entry(Tone::Warning, "approximate", remark, 2);
+    if let Some(remark) = &model.approximation {
+        summary.entry(Tone::Warning, "approximate", remark, 5);
     }
     if let Some(rounded) = model.storage_in_words() {
         summary.entry(Tone::Warning, "storage", rounded, 2);
@@ -210,6 +209,9 @@ fn modes(summary: &mut Summary, facts: &Facts<'_>) {
 fn limits(summary: &mut Summary, facts: &Facts<'_>) {
     if let Some(damping) = &facts.modes.damping {
         summary.entry(Tone::Plain, "damping", &damping.in_words(), 2);
+    }
+    if let Some(inertia) = &facts.modes.inertia_stiffness {
+        summary.entry(Tone::Plain, "inertia K", &inertia.in_words(), 3);
     }
     if let Some(hertz) = &facts.modes.softening_hz {
         summary.entry(Tone::Plain, "spin", &softening_in_words(hertz), 2);

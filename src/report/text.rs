@@ -176,6 +176,9 @@ fn modes(page: &mut Page, facts: &Facts<'_>) {
         page.entry("damping", &damping.in_words());
     }
     page.list("geometric", &modes.geometric_stiffness, |one| plain(&one.in_words()));
+    if let Some(inertia) = &modes.inertia_stiffness {
+        page.entry("inertia K", &inertia.in_words());
+    }
     if let Some(hertz) = &modes.softening_hz {
         page.entry("spin", &softening_in_words(hertz));
     }

@@ -49,7 +49,7 @@ pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> R
     let Task { model, settings, resume, watch } = *task;
     let rigid = rigid_modes(model, &model.pencil())?;
     let problem = problem_of_span(model, rigid.as_ref(), resume);
-    let loads = NamedLoads::new(&problem, model, loads, what, settings)?;
+    let loads = NamedLoads::new(model, loads, what, settings)?;
     let free = free_surface_resumed(model, settings, resume, watch)?;
     with_residual_vectors(model, &problem, free, &loads, settings, watch)
 }

@@ -12,13 +12,14 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
-use crate::model::{Coupling, FeModel, RawShapes, centre_and_length};
+use crate::model::{Coupling, FeModel, InertialRows, RawShapes};
 use crate::numerics::eigen::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Resume,
     Wanted, dynamic_responses, modes_of_span, static_responses,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
 use faer::{Mat, MatRef};
+use nalgebra::Vector3;
 
 /// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
 const LEFT: f64 = 1e-8;
@@ -63,8 +64,8 @@ pub fn interface_loads(model: &FeModel, name: &str) -> Result<Option<Mat<f64>>> 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Loads {
     /// The six centrifugal loads that any constant angular velocity about the centre of mass is made of, f(w)
-    /// = sum_kl w_k w_l f_kl: f_kl = -e_k x (M B_x e_l) - e_l x (M B_x e_k), once for k = l, at displacements
-    /// (theory sections 3 and 6). For M = Ms kron I3 f_kl = -Ms (e_k x (e_l x x) + e_l x (e_k x x)).
+    /// = sum_kl w_k w_l f_kl: f_kl = -T_e'E (S_k S_l + S_l S_k) X_0, once for k = l, of points and directors
+    /// (theory section 6). For M = Ms kron I3 f_kl = -Ms (e_k x (e_l x x) + e_l x (e_k x x)).
     Centrifugal,
     /// Unit force and unit torque along every model axis at the reference point of every interface,
     /// distributed over its nodes as a rigid motion of these would be (averaging coupling, also where another
@@ -133,14 +134,14 @@ impl Loads {
     }
 
     /// Names and nodal forces.
-    fn forces(&self, problem: &EigenProblem<'_>, model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
+    fn forces(&self, model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
         match self {
-            Self::Centrifugal => Ok(centrifugal(problem, model)),
+            Self::Centrifugal => Ok(centrifugal(model)),
             Self::Interfaces => interfaces(model),
             Self::User(UserLoads { loads, .. }) => Ok(numbered("load", loads)),
             Self::Motion(loads) => Ok(numbered("motion", loads)),
             Self::At { loads, hertz } => {
-                let at_rest = loads.forces(problem, model)?;
+                let at_rest = loads.forces(model)?;
                 Ok(at_rest
                     .into_iter()
                     .map(|(name, force)| (format!("{name} at {hertz} Hz"), force))
@@ -156,46 +157,24 @@ fn numbered(what: &str, loads: &Mat<f64>) -> Vec<(String, Mat<f64>)> {
     (0..loads.ncols()).map(one).collect()
 }
 
-fn centrifugal(problem: &EigenProblem<'_>, model: &FeModel) -> Vec<(String, Mat<f64>)> {
-    let (mut loads, d) = (Vec::new(), model.dimension());
-    let pencil = &problem.pencil;
-    let turning = model.rigid_fields(centre_of_mass(problem, model), 1.0);
-    let momenta = pencil.apply_mass(turning.as_ref().subcols(d, turning.ncols() - d));
+fn centrifugal(model: &FeModel) -> Vec<(String, Mat<f64>)> {
+    let d = model.dimension();
+    let rows = InertialRows::new(model, model.centre_of_mass());
+    let turning = rows.rigid();
+    let momenta = rows.weigh(turning.as_ref().subcols(d, turning.ncols() - d));
     // A plane body spins about z alone.
     let spins: &[(usize, usize)] =
         if d == 2 { &[(2, 2)] } else { &[(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] };
-    let displacements = model.rows().displacements();
-    for &(k, l) in spins {
-        let mut load = Mat::zeros(pencil.n(), 1);
-        // -e_k x (M B_x e_l) at every displacement, where (a, b) follow k in cyclic order.
+    let load = |&(k, l): &(usize, usize)| {
+        let mut load = Mat::zeros(momenta.nrows(), 1);
+        // -e_k x (M B_x e_l) of every vector that turns.
         for (k, l) in if k == l { vec![(k, l)] } else { vec![(k, l), (l, k)] } {
-            let (a, b) = ((k + 1) % 3, (k + 2) % 3);
-            let momentum = momenta.col(if d == 2 { 0 } else { l });
-            for first in (0..displacements).step_by(d) {
-                let along = |axis: usize| if axis < d { momentum[first + axis] } else { 0.0 };
-                for (axis, value) in [(a, along(b)), (b, -along(a))] {
-                    if axis < d {
-                        load[(first + axis, 0)] += value;
-                    }
-                }
-            }
+            let momentum = momenta.as_ref().subcols(if d == 2 { 0 } else { l }, 1).to_owned();
+            rows.add_turned(|_| -Vector3::ith(k, 1.0), &momentum, &mut load);
         }
-        loads.push((format!("centrifugal {}{}", AXES[k], AXES[l]), load));
-    }
-    loads
-}
-
-/// Centre of mass in model coordinates.
-fn centre_of_mass(problem: &EigenProblem<'_>, model: &FeModel) -> [f64; 3] {
-    let (centre, _) = centre_and_length(&model.nodes().positions);
-    let rigid = model.rigid_fields(centre, 1.0);
-    let g = gram(rigid.as_ref(), problem.pencil.apply_mass(rigid.as_ref()).as_ref());
-    // R'MR = [m I, -c~; c~, I0].
-    let offset = match model.dimension() {
-        2 => [g[(1, 2)], -g[(0, 2)], 0.0],
-        _ => [0, 1, 2].map(|k| 0.5 * (g[((k + 1) % 3, 3 + (k + 2) % 3)] - g[((k + 2) % 3, 3 + (k + 1) % 3)])),
+        (format!("centrifugal {}{}", AXES[k], AXES[l]), rows.restrict(load))
     };
-    [0, 1, 2].map(|k| centre[k] + offset[k] / g[(0, 0)])
+    spins.iter().map(load).collect()
 }
 
 /// The load on each coordinate of every interface.
@@ -228,7 +207,6 @@ impl NamedLoads {
     /// [`InterfaceNode`](Code::InterfaceNode) without interfaces, [`Usage`](Code::Usage) at accuracy
     /// `certified`: residual vectors have no guaranteed bounds.
     pub fn new(
-        problem: &EigenProblem<'_>,
         model: &FeModel,
         loads: &[Loads],
         what: &str,
@@ -241,7 +219,7 @@ impl NamedLoads {
         let (mut names, mut forces, mut frequencies) = (Vec::new(), Vec::new(), Vec::new());
         for loads in loads {
             let frequency = (loads.hertz(), model.units().eigenvalue_of(loads.hertz()));
-            for (name, force) in loads.forces(problem, model)? {
+            for (name, force) in loads.forces(model)? {
                 names.push(name);
                 forces.push(force);
                 frequencies.push(frequency);

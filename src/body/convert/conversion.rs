@@ -145,17 +145,10 @@ impl ModalModel<'_> {
 
     /// Part of the mass that does not turn with the nodes, where there is any.
     fn approximation(&self) -> Option<String> {
-        let model = self.model;
-        if model.scalar_mass().is_some() {
-            return None;
-        }
-        let part = match model.director_mass() {
-            Some(mass) => mass.rest_share(),
-            None => model.mass_deviation(),
-        };
-        (part > 0.0).then(|| {
+        let share = self.model.fixed_mass_share();
+        (share > 0.0).then(|| {
             format!(
-                "exact: m, c, I0, C1, C2, m_ff; a part of the mass matrix, up to {part:.1e} of its diagonal, differs by direction and is kept along the axes of the body in W1, W2, W3: an error that falls with the square of the element size"
+                "exact: m, c, I0, C1, C2, m_ff; W1, W2 and W3 keep a part of the mass matrix, entries of up to {share:.1e} of its diagonal, along the axes of the body while the nodes turn: an error that falls with the square of the element size"
             )
         })
     }

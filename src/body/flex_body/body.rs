@@ -10,13 +10,46 @@ use crate::base::units::UnitSystem;
 use crate::body::invariants::{
     BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, identities,
 };
-use crate::model::{Coupling, GeometricStiffness, Nodes, SurfaceMesh, UnitLoad, extents};
+use crate::model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, extents};
 use faer::Mat;
 
 /// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlexBody {
     parts: Parts,
+}
+
+/// Motions at which the stiffness of inertia has a given part of the stiffness of some motion of a body, whatever
+/// their direction; `None` where it is zero at all of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InertiaRates {
+    /// Spin, in hertz.
+    pub spin_hz: Option<f64>,
+    /// Acceleration of the origin less gravity. Unit: length/time^2.
+    pub acceleration: Option<f64>,
+    /// Angular acceleration. Unit: 1/time^2.
+    pub angular_acceleration: Option<f64>,
+}
+
+impl InertiaRates {
+    /// `a spin of 12.3 Hz, an acceleration of 4.5e3 m/s^2, an angular acceleration of 1.2e4 1/s^2`, of the loads
+    /// that are asked for; empty where there is none.
+    pub fn in_words(&self, units: &UnitSystem, asked: impl Fn(&LoadKind) -> bool) -> String {
+        let (length, time) = (units.length.name(), units.time.name());
+        let all = [
+            (LoadKind::Spin, self.spin_hz.map(|hertz| format!("a spin of {hertz:.3e} Hz"))),
+            (
+                LoadKind::Acceleration,
+                self.acceleration.map(|a| format!("an acceleration of {a:.3e} {length}/{time}^2")),
+            ),
+            (
+                LoadKind::AngularAcceleration,
+                self.angular_acceleration.map(|a| format!("an angular acceleration of {a:.3e} 1/{time}^2")),
+            ),
+        ];
+        let told: Vec<String> = all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, told)| told).collect();
+        told.join(", ")
+    }
 }
 
 impl FlexBody {
@@ -169,10 +202,22 @@ impl FlexBody {
     /// When `axis` is not below 3.
     pub fn softening_rate(&self, axis: usize) -> Option<f64> {
         let spin = |one: &&GeometricStiffness<Mat<f64>>| {
-            one.load == UnitLoad { kind: crate::model::LoadKind::Spin, component: axis }
+            one.load == UnitLoad { kind: LoadKind::Spin, component: axis }
         };
         let own = self.inertia_stiffness().and_then(|own| own.stiffness.iter().find(spin));
         self.invariants().softening_rate(axis, own.map(|one| &one.matrix))
+    }
+
+    /// The motions at which the stiffness of inertia has `part` of the stiffness of some motion of the body; `None`
+    /// where it has none, or K_ff is not positive definite.
+    pub fn inertia_rates(&self, part: f64) -> Option<InertiaRates> {
+        let shares = self.inertia_stiffness()?.shares(self.invariants().modal_stiffness().as_ref())?;
+        let at = |share: f64| (share > 0.0).then_some(part / share);
+        Some(InertiaRates {
+            spin_hz: at(shares.spin_squared).map(|square| self.units().frequency_of(square)),
+            acceleration: at(shares.acceleration),
+            angular_acceleration: at(shares.angular_acceleration),
+        })
     }
 
     /// The loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.

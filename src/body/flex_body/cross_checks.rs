@@ -13,7 +13,8 @@ impl Parts {
     pub(super) fn cross_checks(&self) -> Vec<IdentityCheck> {
         let row_sums =
             if self.source.mass_structure == MassStructure::General { None } else { self.row_sums() };
-        row_sums.into_iter().chain(self.damping_ratios()).collect()
+        let all = row_sums.into_iter().chain(self.damping_ratios());
+        all.chain(self.inertia_stiffness_of_moments()).collect()
     }
 
     /// Row sums keep the mass, the centre of mass and the linear momentum of every mode.
@@ -38,6 +39,15 @@ impl Parts {
             value,
             ROUNDING,
         ))
+    }
+
+    /// The stiffness of inertia follows from the moments of the nodes and their rotations.
+    fn inertia_stiffness_of_moments(&self) -> Option<IdentityCheck> {
+        let (own, rotation) = (self.inertia_stiffness.as_ref()?, self.modes.rotation.as_ref()?);
+        let formula = "K = sum over the nodes of theta' (sym G - tr G I) theta";
+        let limit = ROUNDING + self.storage.rounding();
+        let value = own.deviation(rotation.as_ref(), self.dimension);
+        Some(IdentityCheck::new("inertia_stiffness", formula, value, limit))
     }
 
     /// Damping ratios are those of the diagonal of the modal damping.

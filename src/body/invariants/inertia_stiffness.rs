@@ -13,7 +13,7 @@
 //! e_k x (e_l x z_a) (k = l, else both orders added) for the spin w_k w_l, of the moments h_a and z_a of the node.
 
 use super::softening::largest_relative_norm;
-use crate::model::{GeometricStiffness, LoadKind, NodeMoments, UnitLoad};
+use crate::model::{GeometricStiffness, LoadKind, NodeMoments, RigidAcceleration, UnitLoad};
 use crate::numerics::linalg::{gram, zeros};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -46,7 +46,7 @@ impl InertiaStiffness {
         let of_load = |load: UnitLoad| {
             let mut turned = zeros(theta.nrows(), theta.ncols());
             for (at, &node) in turning.iter().enumerate() {
-                let h = second_order(&load, &moments[node]);
+                let h = moments[node].of(&motion_of(&load));
                 for j in 0..theta.ncols() {
                     let own = Vector3::from_fn(|k, _| theta[(3 * at + k, j)]);
                     let product = h * own;
@@ -106,13 +106,37 @@ impl InertiaStiffness {
     /// # Panics
     /// As [`InertiaStiffness::new`].
     pub fn deviation(&self, rotation: MatRef<'_, f64>, dimension: usize) -> f64 {
-        let own = self.with_rotations(rotation, dimension);
+        self.with_rotations(rotation, dimension).difference_of_stiffness(self)
+    }
+
+    /// Largest difference of moments and stiffnesses from those of `other`, relative to the largest of their kind;
+    /// infinite when they have other sizes.
+    pub fn largest_difference(&self, other: &Self) -> f64 {
+        if self.moments.len() != other.moments.len() || self.stiffness.len() != other.stiffness.len() {
+            return f64::INFINITY;
+        }
+        let relative = |entries: &dyn Fn(&NodeMoments) -> Vec<f64>| {
+            let pairs = self.moments.iter().zip(&other.moments);
+            let pairs = pairs.flat_map(|(a, b)| entries(a).into_iter().zip(entries(b)));
+            let (mut difference, mut size) = (0.0f64, 0.0f64);
+            pairs.for_each(|(a, b)| (difference, size) = (difference.max((a - b).abs()), size.max(a.abs())));
+            if difference == 0.0 { 0.0 } else { difference / size }
+        };
+        let first = relative(&|own| own.first.iter().copied().collect());
+        let second = relative(&|own| own.second.iter().copied().collect());
+        first.max(second).max(self.difference_of_stiffness(other))
+    }
+
+    fn difference_of_stiffness(&self, other: &Self) -> f64 {
         let size = |kind: &LoadKind| {
-            let of_kind = own.stiffness.iter().filter(|one| one.load.kind == *kind);
+            let of_kind = self.stiffness.iter().filter(|one| one.load.kind == *kind);
             of_kind.map(|one| one.matrix.norm_max()).fold(0.0, f64::max)
         };
-        let differences = self.stiffness.iter().zip(&own.stiffness).map(|(stored, own)| {
-            let difference = (&stored.matrix - &own.matrix).norm_max();
+        let differences = self.stiffness.iter().zip(&other.stiffness).map(|(own, other)| {
+            if own.matrix.nrows() != other.matrix.nrows() {
+                return f64::INFINITY;
+            }
+            let difference = (&own.matrix - &other.matrix).norm_max();
             if difference == 0.0 { 0.0 } else { difference / size(&own.load.kind) }
         });
         differences.fold(0.0, f64::max)
@@ -158,26 +182,23 @@ fn is_zero(moments: &NodeMoments) -> bool {
     moments.first == Vector3::zeros() && moments.second == Matrix3::zeros()
 }
 
-/// H of a node under a unit load.
-fn second_order(load: &UnitLoad, moments: &NodeMoments) -> Matrix3<f64> {
+/// The rigid motion that a unit load stands for.
+fn motion_of(load: &UnitLoad) -> RigidAcceleration {
     let unit = |axis: usize| Vector3::ith(axis, 1.0);
-    let row = |a: usize| {
-        let z = moments.second.row(a).transpose();
-        match load.kind {
-            LoadKind::Acceleration => unit(load.component) * moments.first[a],
-            LoadKind::AngularAcceleration => unit(load.component).cross(&z),
-            LoadKind::Spin => {
-                let (k, l) = LoadKind::SPIN[load.component];
-                let twice = |k: usize, l: usize| unit(k).cross(&unit(l).cross(&z));
-                if k == l { twice(k, l) } else { twice(k, l) + twice(l, k) }
-            }
-            LoadKind::Force(_) | LoadKind::Moment(_) | LoadKind::Named(_) => Vector3::zeros(),
+    let (zero, none) = (Vector3::zeros(), Matrix3::zeros());
+    match load.kind {
+        LoadKind::Acceleration => RigidAcceleration { linear: unit(load.component), angular: zero, spin: none },
+        LoadKind::AngularAcceleration => {
+            RigidAcceleration { linear: zero, angular: unit(load.component), spin: none }
         }
-    };
-    symmetric_less_trace(&Matrix3::from_rows(&[0, 1, 2].map(|a| row(a).transpose())))
-}
-
-/// sym(G) - tr(G) I.
-pub fn symmetric_less_trace(g: &Matrix3<f64>) -> Matrix3<f64> {
-    0.5 * (g + g.transpose()) - Matrix3::identity() * g.trace()
+        LoadKind::Spin => {
+            let (k, l) = LoadKind::SPIN[load.component];
+            let product = unit(k) * unit(l).transpose();
+            let spin = if k == l { product } else { product + product.transpose() };
+            RigidAcceleration { linear: zero, angular: zero, spin }
+        }
+        LoadKind::Force(_) | LoadKind::Moment(_) | LoadKind::Named(_) => {
+            RigidAcceleration { linear: zero, angular: zero, spin: none }
+        }
+    }
 }

@@ -37,7 +37,7 @@ pub use general::{MassProduct, RigidMotion, condense_general, condense_general_l
 pub(crate) use general::rigid_first_moment;
 pub use groups::{Group, Groups};
 pub use identities::{Expected, IdentityCheck, derived_identities, identities};
-pub use inertia_stiffness::{InertiaShares, InertiaStiffness, symmetric_less_trace};
+pub use inertia_stiffness::{InertiaShares, InertiaStiffness};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use numbered::Numbered;
 pub use primary::{GeneralTerms, Invariants, MassKind, PrimaryData};

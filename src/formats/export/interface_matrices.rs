@@ -87,6 +87,7 @@ pub(crate) fn matrix_losses(body: &FlexBody) -> Vec<String> {
         losses::changing_inertia(body, "W1", small),
         losses::general_w0(body),
         losses::geometric_stiffness(body, |_| false),
+        losses::inertia_stiffness(body, |_| false),
     ]
     .into_iter()
     .flatten()

@@ -87,34 +87,10 @@ pub(crate) fn inertia_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bo
         .filter(|one| one.matrix.norm_max() > 0.0 && !holds(&one.load))
         .map(|one| &one.load)
         .collect();
-    let is_lost = |kind: LoadKind| lost.iter().any(|load| load.kind == kind);
-    let shares = own.shares(body.invariants().modal_stiffness().as_ref())?;
-    let units = body.units();
-    let hertz = units.frequency_of(PART / shares.spin_squared);
-    let per_time2 = format!("1/{}^2", units.time.name());
-    let rates = [
-        (LoadKind::Spin, format!("a spin of {hertz:.3e} Hz")),
-        (
-            LoadKind::Acceleration,
-            format!(
-                "an acceleration of {:.3e} {}/{}^2",
-                PART / shares.acceleration,
-                units.length.name(),
-                units.time.name()
-            ),
-        ),
-        (
-            LoadKind::AngularAcceleration,
-            format!("an angular acceleration of {:.3e} {per_time2}", PART / shares.angular_acceleration),
-        ),
-    ];
-    let rates: Vec<String> =
-        rates.into_iter().filter(|(kind, _)| is_lost(kind.clone())).map(|(_, rate)| rate).collect();
+    let is_lost = |kind: &LoadKind| lost.iter().any(|load| load.kind == *kind);
+    let rates = body.inertia_rates(PART)?.in_words(body.units(), is_lost);
     (!rates.is_empty()).then(|| {
-        format!(
-            "the stiffness of inertia of nodes that turn, which has 1 % of the stiffness of a motion at {} or more",
-            rates.join(", at ")
-        )
+        format!("the stiffness of inertia of nodes that turn, which reaches 1 % of the stiffness of a motion at {rates}")
     })
 }
 

@@ -39,6 +39,7 @@ impl ExportFormat for Mbsim {
             losses::general_w3(body),
             other_w2(body),
             losses::geometric_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, |_| false),
             losses::internal_rows(body),
         ]
         .into_iter()

@@ -2,11 +2,11 @@
 
 use super::compressed::Compressed;
 use super::residual::NodalView;
-use crate::motion::dynamics::add_turned;
+use crate::model::RigidAcceleration;
 use crate::motion::scene::Instant;
 use crate::numerics::linalg::{combine, side_by_side};
 use faer::Mat;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Instants that are computed together.
 const BLOCK: usize = 256;
@@ -17,8 +17,11 @@ const BLOCK: usize = 256;
 /// ```text
 /// r = sum f_l - K Psi q - D Psi q' - M Psi q'' - M R (V' - g, omega')
 ///     - M S_a Psi (omega'_a q + omega_a q') - S_a M Psi omega_a q' - S_a M R omega_a (V, omega)
-///     - S_b M S_a Psi omega_b omega_a q = F phi
+///     - S_b M S_a Psi omega_b omega_a q - H Psi q = F phi
 /// ```
+///
+/// with V, V' - g and R of [`Inertia`](super::residual::Inertia), and the stiffness of inertia H, which is linear in
+/// V' - g, omega' and the products of omega.
 ///
 /// With P that takes forces to what they do to the modes and to amplitudes of compressed forces, P F is
 /// computed once, and P r = (P F) phi at every instant.
@@ -47,20 +50,30 @@ impl<'v> Projected<'v> {
             let along = compressed.map_or_else(Mat::new, |own| own.amplitudes(&unbalanced.forces));
             above(&unbalanced.in_modes, &along)
         };
-        let weigh = |x: &Mat<f64>| view.model.pencil().apply_mass(x.as_ref());
-        let turned = |a: usize, x: &Mat<f64>| turned(view, a, x);
+        let rows = &view.rows;
+        let weigh = |x: &Mat<f64>| rows.weigh(x.as_ref());
+        let turned = |a: usize, x: &Mat<f64>| rows.turned(&Vector3::ith(a, 1.0), x);
+        let project_inertia = |forces: Mat<f64>| project(rows.restrict(forces));
         let mut parts: Vec<Mat<f64>> = view.loads.iter().map(|load| project(-load)).collect();
         parts.push(project(view.model.pencil().apply_stiffness(view.vectors.as_ref())));
         parts.push(project(view.damped.clone()));
         parts.push(project(view.weighted.clone()));
-        let heavy = weigh(&view.rigid);
-        parts.push(project(heavy.clone()));
+        let heavy = weigh(&view.extended_rigid);
+        parts.push(project_inertia(heavy.clone()));
+        let [modes, weighted] = view.extended();
         for &a in turns {
-            let heavy_turned = weigh(&turned(a, &view.vectors));
-            parts.extend([turned(a, &view.weighted), turned(a, &heavy)].map(&project));
-            parts.extend(turns.iter().map(|&b| project(turned(b, &heavy_turned))));
-            parts.push(project(heavy_turned));
+            let heavy_turned = weigh(&turned(a, modes));
+            parts.extend([turned(a, weighted), turned(a, &heavy)].map(project_inertia));
+            parts.extend(turns.iter().map(|&b| project_inertia(turned(b, &heavy_turned))));
+            parts.push(project_inertia(heavy_turned));
         }
+        parts.extend(unit_accelerations(view).iter().map(|unit| {
+            let mut forces = Mat::zeros(view.vectors.nrows(), view.vectors.ncols());
+            for j in 0..forces.ncols() {
+                rows.add_second_order(unit, view.vectors.col_as_slice(j), forces.col_as_slice_mut(j));
+            }
+            project(forces)
+        }));
         // All of these are taken from the loads.
         let matrix = -side_by_side(&parts.iter().map(Mat::as_ref).collect::<Vec<_>>());
         Self { view, matrix, turns }
@@ -86,9 +99,10 @@ impl<'v> Projected<'v> {
     /// phi of every instant.
     fn functions(&self, motion: &[Instant]) -> Mat<f64> {
         let view = self.view;
-        let free = view.along_model(motion, |now| (now.velocity_rate - now.gravity, now.omega_rate));
-        let moving = view.along_model(motion, |now| (now.velocity, now.omega));
+        let free = view.along_model(motion, |now| view.free_acceleration(now));
+        let moving = view.along_model(motion, |now| view.rigid_velocity(now));
         let loads: Vec<Mat<f64>> = (0..view.loads.len()).map(|at| view.load_amplitudes(motion, at)).collect();
+        let units = unit_accelerations(view);
         let mut functions = Mat::zeros(self.matrix.ncols(), motion.len());
         for (i, now) in motion.iter().enumerate() {
             let column = functions.col_as_slice_mut(i);
@@ -107,18 +121,35 @@ impl<'v> Projected<'v> {
                 }
                 now.q.iter().zip(&now.qd).for_each(|(q, qd)| put(rate[a] * q + omega[a] * qd));
             }
+            let rigid = view.rigid_acceleration(now);
+            for unit in &units {
+                let amount = rigid.linear.dot(&unit.linear)
+                    + rigid.angular.dot(&unit.angular)
+                    + rigid.spin.component_mul(&unit.spin).sum();
+                now.q.iter().for_each(|q| put(amount * q));
+            }
         }
         functions
     }
 }
 
-/// S_a x of every column.
-fn turned(view: &NodalView<'_>, a: usize, x: &Mat<f64>) -> Mat<f64> {
-    let mut turned = Mat::zeros(x.nrows(), x.ncols());
-    for j in 0..x.ncols() {
-        add_turned(view.model, 1.0, &Vector3::ith(a, 1.0), x.col_as_slice(j), turned.col_as_slice_mut(j));
+/// Accelerations that those of every rigid motion are sums of, where rotations of nodes carry mass: three linear
+/// ones, three angular ones and the six symmetric products of two axes, of unit length as matrices.
+fn unit_accelerations(view: &NodalView<'_>) -> Vec<RigidAcceleration> {
+    if !view.rows.have_directors() {
+        return Vec::new();
     }
-    turned
+    let (zero, none) = (Vector3::zeros(), Matrix3::zeros());
+    let unit = |axis: usize| Vector3::ith(axis, 1.0);
+    let linear = (0..3).map(|k| RigidAcceleration { linear: unit(k), angular: zero, spin: none });
+    let angular = (0..3).map(|k| RigidAcceleration { linear: zero, angular: unit(k), spin: none });
+    let pairs = (0..3).flat_map(|k| (k..3).map(move |l| (k, l)));
+    let products = pairs.map(|(k, l)| {
+        let both = unit(k) * unit(l).transpose();
+        let spin = if k == l { both } else { (both + both.transpose()) * 0.5f64.sqrt() };
+        RigidAcceleration { linear: zero, angular: zero, spin }
+    });
+    linear.chain(angular).chain(products).collect()
 }
 
 /// The rows of one matrix above those of another, which may have none.

@@ -17,27 +17,29 @@ impl NodalView<'_> {
     ///
     /// (theory 6.17, without the elastic forces, which balance each other).
     pub fn reactions(&self, motion: &[Instant], field: &Displacements) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-        let Displacements { u, ud, .. } = field;
-        let Inertia { momentum, change } = self.inertia(motion, field);
-        let momenta = self.resultants(&momentum);
-        let changes = self.resultants(&change);
-        let loads = self.resultants(&self.loads_of(motion));
-        let shifts = self.shifts(motion, u);
+        let Inertia { u, ud, momentum, change } = self.inertia(motion, field);
+        let momenta = self.resultants(self.extended_rigid.as_ref(), &momentum);
+        let changes = self.resultants(self.extended_rigid.as_ref(), &change);
+        let loads = self.resultants(self.rigid.as_ref(), &self.loads_of(motion));
+        let shifts = self.shifts(motion, &field.u);
         let at = |i: usize| {
-            let column = |x: &Mat<f64>| x.col_as_slice(i).to_vec();
-            let (u, ud, w) = (column(u), column(ud), column(&momentum));
-            let (velocity, omega) = (self.axes * motion[i].velocity, self.axes * motion[i].omega);
-            let (p, h) = (momenta[i].0, momenta[i].1 + self.moment(&u, &w));
-            let force = changes[i].0 + omega.cross(&p) - loads[i].0;
-            let turning = changes[i].1 + self.moment(&u, &column(&change)) + self.moment(&ud, &w);
-            (force, turning + omega.cross(&h) + velocity.cross(&p) - loads[i].1 - shifts[i])
+            let [u, ud, w, change] = [&u, &ud, &momentum, &change].map(|x| x.col_as_slice(i));
+            let (velocity, _) = self.rigid_velocity(&motion[i]);
+            let (velocity, omega) = (self.axes * velocity, self.axes * motion[i].omega);
+            let (p, h) = (momenta[i].0, momenta[i].1 + self.rows.moment(u, w));
+            let force = changes[i].0 + omega.cross(&p);
+            let turning = changes[i].1 + self.rows.moment(u, change) + self.rows.moment(ud, w);
+            let about_centre = turning + omega.cross(&h) + velocity.cross(&p);
+            // Where rigid motions are about the centre of mass, the force acts there.
+            let torque = about_centre + self.centre.cross(&force);
+            (force - loads[i].0, torque - loads[i].1 - shifts[i])
         };
         (0..motion.len()).map(at).collect()
     }
 
-    /// Force and torque about the origin of the frame of nodal `forces`, column by column.
-    fn resultants(&self, forces: &Mat<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-        let all = gram(self.rigid.as_ref(), forces.as_ref());
+    /// Force and torque, about the point that the `rigid` motions are about, of `forces`, column by column.
+    fn resultants(&self, rigid: MatRef<'_, f64>, forces: &Mat<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+        let all = gram(rigid, forces.as_ref());
         let of = |i: usize| match self.model.dimension() {
             2 => (Vector3::new(all[(0, i)], all[(1, i)], 0.0), Vector3::new(0.0, 0.0, all[(2, i)])),
             _ => (Vector3::from_fn(|k, _| all[(k, i)]), Vector3::from_fn(|k, _| all[(3 + k, i)])),
@@ -63,14 +65,6 @@ impl NodalView<'_> {
         let moved = gram(unit.subcols(0, d), displacements);
         let of = |i: usize| Vector3::from_fn(|k, _| if k < d { moved[(k, i)] } else { 0.0 });
         (0..moved.ncols()).map(of).collect()
-    }
-
-    /// sum_i x_i x y_i over the displacements of the nodes.
-    fn moment(&self, x: &[f64], y: &[f64]) -> Vector3<f64> {
-        let (d, end) = (self.model.dimension(), self.model.rows().displacements());
-        let vector = |a: &[f64]| Vector3::from_fn(|k, _| if k < d { a[k] } else { 0.0 });
-        let pairs = x[..end].chunks_exact(d).zip(y[..end].chunks_exact(d));
-        pairs.fold(Vector3::zeros(), |sum, (x, y)| sum + vector(x).cross(&vector(y)))
     }
 
     /// Displacements Psi q + X y of all rows at some instants, with their rates and accelerations: `columns`

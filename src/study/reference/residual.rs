@@ -2,8 +2,8 @@
 
 use super::held::Held;
 use crate::body::flex_body::FlexBody;
-use crate::model::{Damping, FeModel};
-use crate::motion::dynamics::{NodalPoint, add_turned};
+use crate::model::{Damping, FeModel, InertialRows, RigidAcceleration};
+use crate::motion::dynamics::NodalPoint;
 use crate::motion::scene::Instant;
 use crate::numerics::linalg::{
     combine, dense_cholesky, gram, multiply, solve_lower, solve_upper, subtract_combination,
@@ -30,6 +30,13 @@ pub(super) struct NodalView<'m> {
     stiffens: bool,
     /// Rigid motions about the origin of the frame (N x 6, in the plane N x 3), axes of the model.
     pub rigid: Mat<f64>,
+    /// The rows that inertia acts on, the modes there and M times these where they are not the rows of the model,
+    /// and rigid motions about their centre.
+    pub rows: InertialRows<'m>,
+    extended: Option<[Mat<f64>; 2]>,
+    pub extended_rigid: Mat<f64>,
+    /// Where that centre is from the origin of the frame, axes of the model.
+    pub centre: Vector3<f64>,
     /// Axes of the frame in the model.
     pub axes: Matrix3<f64>,
     /// Nodal forces of unit forces and torques where each load of the scene acts (N x 6, in the plane N x 3).
@@ -46,15 +53,20 @@ pub(super) struct Unbalanced {
     pub in_modes: Mat<f64>,
 }
 
-/// Displacements of all rows with their rates and accelerations, relative to the frame (N of every instant).
+/// Displacements of all rows of the model with their rates and accelerations, relative to the frame (N of every instant).
 pub(super) struct Displacements {
     pub u: Mat<f64>,
     pub ud: Mat<f64>,
     pub udd: Mat<f64>,
 }
 
-/// What the inertia of all rows does at every instant, gravity as an acceleration that is not there.
+/// Inertia of the rows that it acts on ([`InertialRows`]) at every instant, gravity as an acceleration that is not
+/// there. Where rotations of nodes carry mass, V = 0 and V' - g is a = V' + omega x V - g, both of the centre of
+/// mass.
 pub(super) struct Inertia {
+    /// The displacements u and rates u' there.
+    pub u: Mat<f64>,
+    pub ud: Mat<f64>,
     /// w = M (R (V, omega) + omega x u + u').
     pub momentum: Mat<f64>,
     /// M (R (V' - g, omega') + omega' x u + omega x u' + u'').
@@ -80,8 +92,19 @@ impl<'m> NodalView<'m> {
             Some(point) => Some(Held::new(model, point, &rigid)?),
             None => None,
         };
+        let origin = body.frame().origin;
+        let rows = InertialRows::new(model, origin);
+        let extended = rows.have_directors().then(|| {
+            let modes = rows.extend(&vectors).into_owned();
+            let weighted = rows.weigh(modes.as_ref());
+            [modes, weighted]
+        });
         let mut view = Self {
             model,
+            centre: rows.centre() - origin,
+            extended_rigid: rows.rigid(),
+            extended,
+            rows,
             damped: Mat::new(),
             vectors,
             weighted,
@@ -106,8 +129,15 @@ impl<'m> NodalView<'m> {
     pub fn unbalanced(&self, motion: &[Instant]) -> Unbalanced {
         let own = |of: fn(&Instant) -> &Vec<f64>| self.displacements(motion, of);
         let field = Displacements { u: own(|now| &now.q), ud: own(|now| &now.qd), udd: own(|now| &now.qdd) };
-        let Inertia { momentum, change: mut taken } = self.inertia(motion, &field);
-        self.add_turned(motion, |now| self.axes * now.omega, &momentum, &mut taken);
+        let Inertia { momentum, mut change, .. } = self.inertia(motion, &field);
+        self.rows.add_turned(|i| self.axes * motion[i].omega, &momentum, &mut change);
+        let mut taken = self.rows.restrict(change);
+        if self.rows.have_directors() {
+            for (i, now) in motion.iter().enumerate() {
+                let rigid = self.rigid_acceleration(now);
+                self.rows.add_second_order(&rigid, field.u.col_as_slice(i), taken.col_as_slice_mut(i));
+            }
+        }
         taken += self.model.pencil().apply_stiffness(field.u.as_ref());
         let rates = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| motion[i].qd[j]);
         taken += combine(self.damped.as_ref(), rates.as_ref());
@@ -163,18 +193,47 @@ impl<'m> NodalView<'m> {
         }
     }
 
-    /// What the inertia of the rows with the displacements `field` does while the frame moves as in `motion`.
+    /// The inertia of the displacements `field` while the frame moves as in `motion`.
     pub fn inertia(&self, motion: &[Instant], field: &Displacements) -> Inertia {
-        let Displacements { u, ud, udd } = field;
-        let omega = |now: &Instant| self.axes * now.omega;
-        let mut velocity = self.rigid_part(motion, |now| (now.velocity, now.omega)) + ud;
-        self.add_turned(motion, omega, u, &mut velocity);
-        let free = |now: &Instant| (now.velocity_rate - now.gravity, now.omega_rate);
-        let mut acceleration = self.rigid_part(motion, free) + udd;
-        self.add_turned(motion, |now| self.axes * now.omega_rate, u, &mut acceleration);
-        self.add_turned(motion, omega, ud, &mut acceleration);
-        let weigh = |x: MatRef<'_, f64>| self.model.pencil().apply_mass(x);
-        Inertia { momentum: weigh(velocity.as_ref()), change: weigh(acceleration.as_ref()) }
+        let [u, ud, udd] = [&field.u, &field.ud, &field.udd].map(|x| self.rows.extend(x).into_owned());
+        let omega = |i: usize| self.axes * motion[i].omega;
+        let mut velocity = self.rigid_part(motion, |now| self.rigid_velocity(now)) + &ud;
+        self.rows.add_turned(omega, &u, &mut velocity);
+        let mut acceleration = self.rigid_part(motion, |now| self.free_acceleration(now)) + udd;
+        self.rows.add_turned(|i| self.axes * motion[i].omega_rate, &u, &mut acceleration);
+        self.rows.add_turned(omega, &ud, &mut acceleration);
+        let weigh = |x: &Mat<f64>| self.rows.weigh(x.as_ref());
+        Inertia { u, ud, momentum: weigh(&velocity), change: weigh(&acceleration) }
+    }
+
+    /// (V, omega) of [`Inertia`], axes of the frame.
+    pub fn rigid_velocity(&self, now: &Instant) -> (Vector3<f64>, Vector3<f64>) {
+        let velocity = if self.rows.have_directors() { Vector3::zeros() } else { now.velocity };
+        (velocity, now.omega)
+    }
+
+    /// (V' - g, omega') of [`Inertia`], axes of the frame.
+    pub fn free_acceleration(&self, now: &Instant) -> (Vector3<f64>, Vector3<f64>) {
+        let mut linear = now.velocity_rate - now.gravity;
+        if self.rows.have_directors() {
+            let (w, centre) = (now.omega, self.axes.tr_mul(&self.centre));
+            linear += w.cross(&now.velocity) + now.omega_rate.cross(&centre) + w.cross(&w.cross(&centre));
+        }
+        (linear, now.omega_rate)
+    }
+
+    /// The acceleration of the undeformed body about the centre of mass, axes of the model.
+    pub fn rigid_acceleration(&self, now: &Instant) -> RigidAcceleration {
+        let (linear, angular) = self.free_acceleration(now);
+        RigidAcceleration::new(self.axes * linear, self.axes * angular, &(self.axes * now.omega))
+    }
+
+    /// The modes in the rows that inertia acts on, and the mass times these.
+    pub fn extended(&self) -> [&Mat<f64>; 2] {
+        match &self.extended {
+            Some([modes, weighted]) => [modes, weighted],
+            None => [&self.vectors, &self.weighted],
+        }
     }
 
     /// Psi q, or with the rates or accelerations in place of q.
@@ -183,14 +242,14 @@ impl<'m> NodalView<'m> {
         combine(self.vectors.as_ref(), q.as_ref())
     }
 
-    /// R (linear, angular), given along the axes of the frame.
+    /// R (linear, angular) of the rows that inertia acts on, given along the axes of the frame.
     fn rigid_part(
         &self,
         motion: &[Instant],
         of: impl Fn(&Instant) -> (Vector3<f64>, Vector3<f64>),
     ) -> Mat<f64> {
         let amplitudes = self.along_model(motion, of);
-        combine(self.rigid.as_ref(), amplitudes.as_ref())
+        combine(self.extended_rigid.as_ref(), amplitudes.as_ref())
     }
 
     /// A linear and an angular vector in the coordinates of the model, a column for every instant.
@@ -211,19 +270,6 @@ impl<'m> NodalView<'m> {
             entries.iter().enumerate().for_each(|(k, value)| both[(k, i)] = *value);
         }
         both
-    }
-
-    /// y += omega x x at displacements.
-    fn add_turned(
-        &self,
-        motion: &[Instant],
-        omega: impl Fn(&Instant) -> Vector3<f64>,
-        x: &Mat<f64>,
-        y: &mut Mat<f64>,
-    ) {
-        for (i, now) in motion.iter().enumerate() {
-            add_turned(self.model, 1.0, &omega(now), x.col_as_slice(i), y.col_as_slice_mut(i));
-        }
     }
 
     /// Nodal forces of the loads of the scene.

@@ -1,7 +1,6 @@
 //! How what a body lacks turns it: the error of the attitude of a free body.
 
 use super::residual::NodalView;
-use crate::motion::dynamics::add_turned;
 use crate::motion::scene::Instant;
 use crate::numerics::linalg::{combine, gram};
 use faer::Mat;
@@ -20,27 +19,27 @@ pub(super) struct Turning {
 }
 
 impl Turning {
-    /// With the rotations R_a = e_a x (x - x_cm) about the axes of the body, J_ab = R_a'M R_b, and to first
-    /// order R_a changes by e_a x u.
+    /// With the rotations R_a = e_a x (x - x_cm) of points (and of directors) about the axes of the body, J_ab = R_a'M
+    /// R_b, and to first order R_a changes by e_a x u.
     pub fn new(view: &NodalView<'_>, responses: &Mat<f64>) -> Self {
         let plane = view.model.dimension() == 2;
         let turns = central_turns(view);
-        let weighted = view.model.pencil().apply_mass(turns.as_ref());
+        let weighted = view.rows.weigh(turns.as_ref());
+        let extended = view.rows.extend(responses);
         let square = |own: &Mat<f64>| match plane {
             true => Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, own[(0, 0)])),
             false => Matrix3::from_fn(|a, b| own[(a, b)]),
         };
         let inertia = square(&gram(turns.as_ref(), weighted.as_ref()));
-        let change = |response: &[f64]| {
+        let change = |j: usize| {
+            let repeated = Mat::from_fn(turns.nrows(), turns.ncols(), |row, _| extended[(row, j)]);
             let mut turned = Mat::<f64>::zeros(turns.nrows(), turns.ncols());
-            for k in 0..turns.ncols() {
-                let axis = view.axes.column(if plane { 2 } else { k }).into_owned();
-                add_turned(view.model, 1.0, &axis, response, turned.col_as_slice_mut(k));
-            }
+            let axis = |k: usize| view.axes.column(if plane { 2 } else { k }).into_owned();
+            view.rows.add_turned(axis, &repeated, &mut turned);
             let half = square(&gram(turned.as_ref(), weighted.as_ref()));
             half + half.transpose()
         };
-        let changes = (0..responses.ncols()).map(|j| change(responses.col_as_slice(j))).collect();
+        let changes = (0..responses.ncols()).map(change).collect();
         let at_load = |unit: &Mat<f64>| {
             let moved = gram(unit.as_ref().subcols(0, view.model.dimension()), responses.as_ref());
             let along_model =
@@ -112,15 +111,16 @@ impl Turning {
     }
 }
 
-/// Rotations about the axes of the body through the centre of mass (N x 3, in the plane N x 1).
+/// Rotations about the axes of the body through the centre of mass of the rows that inertia acts on, three columns,
+/// in the plane one.
 fn central_turns(view: &NodalView<'_>) -> Mat<f64> {
     let d = view.model.dimension();
-    let (shifts, turns) = view.rigid.as_ref().split_at_col(d);
+    let (shifts, turns) = view.extended_rigid.as_ref().split_at_col(d);
     let turns = match d {
         2 => turns.to_owned(),
         _ => combine(turns, Mat::from_fn(3, 3, |i, j| view.axes[(i, j)]).as_ref()),
     };
-    let weighted = view.model.pencil().apply_mass(shifts);
+    let weighted = view.rows.weigh(shifts);
     let mass = gram(shifts, weighted.as_ref())[(0, 0)];
     let moments = gram(weighted.as_ref(), turns.as_ref());
     let offsets = Mat::from_fn(moments.nrows(), moments.ncols(), |i, j| moments[(i, j)] / mass);

@@ -277,8 +277,8 @@ fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
         "the body is carried: its frame moves its modes"
     } else if body.invariants().general().is_some() {
         "the mass matrix does not commute with rotations"
-    } else if !body.geometric_stiffness().is_empty() {
-        "the body has geometric stiffness"
+    } else if body.inertia_stiffness().is_some() || !body.geometric_stiffness().is_empty() {
+        "the body has stiffness of inertia or geometric stiffness"
     } else if !is_about_centre(body.invariants()) {
         "the frame is not that of free-surface modes about the centre of mass"
     } else {
