@@ -8,10 +8,12 @@ mod calculix;
 mod coordinate_files;
 mod deck;
 mod deck_mesh;
+mod deck_surfaces;
 mod element_kinds;
 mod expanded;
 mod labelled_lines;
 mod nastran;
+mod rotation_nodes;
 
 use super::bytes::InputFile;
 use super::compression::refuse_packed;

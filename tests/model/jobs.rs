@@ -92,6 +92,86 @@ fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
     assert_is_the_block(&body(raw, 6));
 }
 
+/// Each of two kinematic couplings gives its reference node the rotations that CalculiX labels as displacements
+/// of a node that the deck does not have, and they are those of *RIGID BODY with ROT NODE.
+#[test]
+fn kinematic_couplings_have_the_rotations_of_their_reference_nodes() {
+    let raw = job(&small("calculix_couplings"), Vec::new());
+    let labels = raw.dofs.clone().expect("labels");
+    let of =
+        |node: i64| labels.iter().filter(|label| label.node == node).map(|l| l.direction).collect::<Vec<_>>();
+    for (node, directions) in [(900, 1..7), (970, 1..7), (971, 1..1), (980, 1..1), (985, 1..4)] {
+        assert_eq!(of(node), directions.collect::<Vec<u8>>(), "{node}");
+    }
+    // The reference nodes stand beside their faces, so that a turn moves the mass that follows them, and no
+    // other.
+    let row = |node, direction| {
+        labels.iter().position(|own| (own.node, own.direction) == (node, direction)).expect("a row")
+    };
+    let coupled = |a: (i64, u8), b: (i64, u8)| {
+        let (a, b) = (row(a.0, a.1), row(b.0, b.1));
+        raw.mass.matrix.get(a, b).abs().max(raw.mass.matrix.get(b, a).abs())
+    };
+    for (own, other) in [(900, 970), (970, 900)] {
+        assert!(coupled((own, 2), (own, 6)) > 1e-3, "{own}");
+        assert_eq!(coupled((own, 2), (other, 6)), 0.0, "{own}");
+    }
+    assert_is_the_block(&body(raw, 6));
+
+    let place = tempfile::tempdir().expect("a folder");
+    copy_job("calculix_couplings", place.path());
+    let deck = place.path().join("job.inp");
+    let text = fs::read_to_string(&deck).expect("a deck");
+    let (head, rest) = text.split_once("*COUPLING").expect("couplings");
+    let (_, rest) = rest.split_once("*NODE\n").expect("nodes");
+    let rigid = "*RIGID BODY, NSET=RIGHT, REF NODE=970, ROT NODE=971\n*RIGID BODY, NSET=LEFT, REF NODE=900, ROT NODE=980\n";
+    let rotations = "*NODE\n971, 0, 0, 0\n980, 0, 0, 0\n";
+    fs::write(&deck, format!("{head}{rigid}{rotations}{rest}")).expect("written");
+    assert_eq!(job(&deck, Vec::new()).dofs.expect("labels"), labels);
+}
+
+/// A reference node may be named by a set, and a deck whose couplings do not explain the rows is refused.
+#[test]
+fn couplings_that_do_not_explain_the_rows_are_refused() {
+    let place = tempfile::tempdir().expect("a folder");
+    copy_job("calculix_couplings", place.path());
+    let deck = place.path().join("job.inp");
+    let text = fs::read_to_string(&deck).expect("a deck");
+    let read = |from: &str, to: &str| {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        fs::write(&deck, text.replace(from, to)).expect("written");
+        read_model(&ModelFiles::from_job(&deck, None, Vec::new(), None).expect("files"))
+    };
+    let of_a_set = read("REF NODE=970", "REF NODE=Pin").expect_err("refused");
+    assert!(of_a_set.to_string().contains("REF NODE `Pin` of *COUPLING is neither"), "{of_a_set}");
+    let pin = "*NSET, NSET=PIN\n970\n*COUPLING, REF NODE=pin, SURFACE=FACES";
+    let named = read("*COUPLING, REF NODE=970, SURFACE=FACES", pin).expect("a model").dofs;
+    assert_eq!(named, job(&small("calculix_couplings"), Vec::new()).dofs);
+    let third = "*COUPLING, REF NODE=23, SURFACE=NODES, CONSTRAINT NAME=C3\n*KINEMATIC\n1, 3\n*MATERIAL";
+    for (from, to, line, part) in [
+        (
+            "2, S4",
+            "2, SPOS",
+            30,
+            "REF NODE 900 cannot be identified: the nodes of the surface of a coupling above",
+        ),
+        ("1, 2\n3\n", "1, 3\n", 29, "belong to node 976, but node 980 has rows"),
+        ("REF NODE=970", "REF NODE=900", 30, "REF NODE 900 of *COUPLING is also the REF NODE of another"),
+        ("970, 0.23", "975, 0, 0, 0\n970, 0.23", 26, "belong to node 976, but node 971 has rows"),
+        ("*MATERIAL", third, 36, "belong to node 985, but node 986 has rows"),
+        (
+            "*KINEMATIC\n1, 3\n",
+            "*DISTRIBUTING\n1, 3\n",
+            26,
+            "belong to node 971, and elements have 6 internal nodes, but 8 nodes",
+        ),
+    ] {
+        let refused = read(from, to).err().unwrap_or_else(|| panic!("{to} is read")).to_string();
+        assert!(refused.contains(part), "{to}: {refused}");
+        assert!(refused.contains(&format!("job.inp, line {line}")), "{to}: {refused}");
+    }
+}
+
 /// Shells that CalculiX expands into solids: the nodes between the faces lie where the deck says, those on
 /// the faces half a thickness beside it. Mass and inertia are those of the plate, frequencies those of
 /// CalculiX's own table.
@@ -258,12 +338,13 @@ proptest! {
 
     /// Damaged files of jobs and meshes are read or refused, nothing else.
     #[test]
-    fn damaged_jobs_never_panic(of in 0..14usize, damages in proptest::collection::vec(damage(), 1..4)) {
+    fn damaged_jobs_never_panic(of in 0..15usize, damages in proptest::collection::vec(damage(), 1..4)) {
         let (folder, file) = [
             ("calculix", "job.inp"),
             ("calculix", "nodes.inp"),
             ("calculix", "job.dof"),
             ("calculix", "job.sti"),
+            ("calculix_couplings", "job.inp"),
             ("abaqus", "job.inp"),
             ("abaqus", "job_STIF1.mtx"),
             ("abaqus_labels", "job_MASS1.mtx"),

@@ -2,9 +2,10 @@
 //! digits) and `job.dof` (a line `node.direction` for every row) beside the deck `job.inp`.
 
 use super::coordinate_files::CoordinateFile;
-use super::deck::{Deck, fields};
+use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::expanded::label_once;
+use super::rotation_nodes::rotation_nodes;
 use super::{Found, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
@@ -12,7 +13,6 @@ use crate::input::coordinates::excerpt;
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
 use crate::model::{DofLabel, Nodes};
-use std::collections::HashMap;
 use std::path::Path;
 
 /// The reader of CalculiX jobs.
@@ -46,13 +46,13 @@ impl JobReader for Calculix {
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::of(&deck)?;
         let labels = read_labels(&dof)?;
+        let rotations = rotation_nodes(&deck, &mesh, &labels)?;
         let n = labels.len();
         let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
         // One after the other: each is read by all threads, and the entries of only one are held.
         let stiffness = read(&sti, MatrixRole::Stiffness);
         let (stiffness, mass) = both(stiffness, read(&mas, MatrixRole::Mass))?;
         let (labels, added) = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
-        let rotations = rotation_nodes(&deck)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
             None => *own,
@@ -102,29 +102,4 @@ fn read_labels(path: &Path) -> Found<Vec<DofLabel>> {
         labels.push(label);
     }
     Ok(labels)
-}
-
-/// Nodes whose directions 1 to 3 are rotations, each with the reference node that turns: ROT NODE of
-/// *RIGID BODY.
-fn rotation_nodes(deck: &Deck) -> Found<HashMap<i64, i64>> {
-    let mut rotations = HashMap::new();
-    for card in deck.cards().iter().filter(|card| card.keyword == "RIGID BODY") {
-        let node = |name: &str| {
-            card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer))
-        };
-        match (node("REFNODE"), node("ROTNODE")) {
-            (Some(reference), Some(rotation)) => {
-                rotations.insert(rotation, reference);
-            }
-            (Some(_), None) => {
-                let message = "*RIGID BODY has no ROT NODE: which rows are its rotations cannot be told";
-                let diagnostic = deck.about(card, Code::DeckUnsupported, message);
-                return Err(vec![
-                    diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B"),
-                ]);
-            }
-            _ => {}
-        }
-    }
-    Ok(rotations)
 }

@@ -36,6 +36,8 @@ pub(super) struct DeckMesh {
     pub elements: Vec<Elements>,
     /// Node sets by name as the deck has it, in the order of the deck.
     pub sets: NodeSets,
+    /// Element sets by name in upper case. Those of parts and instances are not among them.
+    pub element_sets: HashMap<String, Vec<i64>>,
     /// Notes about the numbering.
     pub notes: Vec<Diagnostic>,
 }
@@ -160,6 +162,7 @@ impl Scopes {
             nodes: self.top.nodes,
             elements: self.top.elements,
             sets: self.top.sets,
+            element_sets: self.top.element_sets,
             notes: Vec::new(),
         };
         let placed: Vec<(Instance, Scope)> = self
