@@ -286,6 +286,18 @@ impl Body {
         Ok(all)
     }
 
+    /// Stiffness of inertia (nf x nf) of nodes whose rotations carry mass, for unit loads: dict of load
+    /// ("acceleration_x", "angular_acceleration_x", "spin_xx", ...) to array; empty where no rotation does. Added
+    /// to K_ff as geometric stiffness is. Unit: 1/time^2 over that of the load.
+    #[getter]
+    fn inertia_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for one in self.inner.inertia_stiffness() {
+            all.set_item(one.load, matrix(py, &one.matrix)?)?;
+        }
+        Ok(all)
+    }
+
     /// Interfaces: dict of name to Interface (node_ids, coupling, reference, translation, rotation).
     #[getter]
     fn interfaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

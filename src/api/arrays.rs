@@ -17,13 +17,13 @@ pub struct SourceFile {
     pub sha256: String,
 }
 
-/// What the stress under a unit load adds to the stiffness.
+/// Stiffness that a unit load adds: by the stress that it makes, or by the inertia of turning nodes.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct GeometricStiffness {
     /// The load: `spin_xx`, `acceleration_x`, `force_z_tip` (interface `tip`), ...
     pub load: String,
-    /// Psi' K_geo Psi (nf x nf). Unit: 1/time^2 over that of the load.
+    /// The matrix of the modes (nf x nf), Psi' K_geo Psi of geometric stiffness. Unit: 1/time^2 over that of the load.
     pub matrix: Matrix,
 }
 
@@ -112,6 +112,16 @@ impl FlexBody {
     /// known.
     pub fn geometric_stiffness(&self) -> Vec<GeometricStiffness> {
         let all = self.0.geometric_stiffness().iter();
+        all.map(|one| GeometricStiffness { load: one.load.label(), matrix: shown(one.matrix.as_ref()) })
+            .collect()
+    }
+
+    /// Stiffness of inertia of nodes whose rotations carry mass, for unit loads along the axes of the body frame:
+    /// `acceleration_x` (of the origin, less gravity), `angular_acceleration_x`, `spin_xx`, ... It belongs to the
+    /// kinetic energy (theory section 6) and is added to K_ff as geometric stiffness is. Empty where no rotation
+    /// carries mass.
+    pub fn inertia_stiffness(&self) -> Vec<GeometricStiffness> {
+        let all = self.0.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
         all.map(|one| GeometricStiffness { load: one.load.label(), matrix: shown(one.matrix.as_ref()) })
             .collect()
     }

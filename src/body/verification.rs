@@ -228,7 +228,7 @@ impl<'a> Recomputed<'a> {
         let own = self.modes.inertia_stiffness(self.model, &self.place.frame);
         let formula = "moments of the nodes and stiffness of inertia from M";
         let check = |value| {
-            let limit = RECOMPUTED + self.body.storage().rounding();
+            let limit = RECOMPUTED + 4.0 * self.body.storage().rounding();
             Some(IdentityCheck::new("inertia_stiffness_recomputed", formula, value, limit))
         };
         match (self.body.inertia_stiffness(), own) {

@@ -3,32 +3,39 @@
 use super::arguments::ExportArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
+use super::resources::memory_left;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
-use crate::formats::export::{ExportOptions, Exported, Points};
+use crate::body::flex_body::FlexBody;
+use crate::formats::export::{ExportOptions, Exported, InertiaInScene, Points};
 use crate::formats::flex_body_file::{self, read_simulation};
 use crate::formats::{export, find_format};
 use crate::input::parse_units;
 use std::borrow::Cow;
-use std::path::PathBuf;
+use crate::motion::scene::{inertia_share, read_cases};
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let format = find_format(&arguments.to)?;
     let level = arguments.mbdyn_level.as_ref().map(|level| format!("level{level}"));
-    let options = ExportOptions {
+    let mut options = ExportOptions {
         dialect: arguments.dialect.clone().or(level),
         points: arguments.points.as_deref().map_or(Ok(Points::Usual), points)?,
         modes: arguments.modes.map(|modes| modes as usize),
         motion: arguments.simulation.as_ref().map(read_simulation).transpose()?,
         name: Some(arguments.output.clone()),
+        in_scene: None,
     };
     let units = arguments.to_units.as_deref().map(parse_units).transpose()?;
-    let inputs = || std::iter::once(&arguments.body).chain(&arguments.simulation);
+    let inputs = || std::iter::once(&arguments.body).chain(&arguments.simulation).chain(&arguments.scene);
     refuse_replacing(inputs(), std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
     let (mut body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
+    if let Some(scene) = &arguments.scene {
+        options.in_scene = inertia_in_scene(&body, scene)?;
+    }
     if let Some(units) = units {
         body = body.in_units(&units)?;
     }
@@ -59,6 +66,18 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
         text += &format!("{} and others, {} files, {size} bytes\n", first.display(), others.len());
     }
     Ok(Outcome { text, json: format!("{json:#}"), diagnostics, passed: true })
+}
+
+/// The largest share of the stiffness of inertia over the load cases of a scene; nothing of a body without.
+fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScene>> {
+    let mut largest: Option<InertiaInScene> = None;
+    for scene in read_cases(path)? {
+        let Some(share) = inertia_share(body, &scene, memory_left(None))? else { continue };
+        if largest.as_ref().is_none_or(|known| known.share < share) {
+            largest = Some(InertiaInScene { scene: scene.name.clone(), share });
+        }
+    }
+    Ok(largest)
 }
 
 /// Of more files than these the first is told, and what the others are together.

@@ -32,12 +32,12 @@ impl ExportFormat for AdamsInvariants {
         true
     }
 
-    fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         [
             losses::plane(body),
             losses::general_w0(body),
             losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, options, |_| false),
             losses::internal_rows(body),
         ]
         .into_iter()

@@ -24,8 +24,8 @@ impl ExportFormat for Chrono {
         "Project Chrono, ChModalAssembly: matrices for DoModalReduction"
     }
 
-    fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        matrix_losses(body)
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        matrix_losses(body, options)
     }
 
     fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {

@@ -36,7 +36,7 @@ impl ExportFormat for OpenRadioss {
         true
     }
 
-    fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         let other = losses::is_damped(body) && rayleigh(body).is_none();
         let damping = other.then(|| "damping of the modes other than alpha M + beta K".to_owned());
         [
@@ -49,7 +49,7 @@ impl ExportFormat for OpenRadioss {
             ),
             losses::general_w0(body),
             losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, options, |_| false),
             damping,
             losses::internal_rows(body),
         ]

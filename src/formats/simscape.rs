@@ -29,8 +29,8 @@ impl ExportFormat for Simscape {
         &["mat5", HDF5]
     }
 
-    fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        matrix_losses(body)
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        matrix_losses(body, options)
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {

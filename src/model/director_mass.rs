@@ -15,7 +15,7 @@
 //! rest. Of a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of the column M_tr, P = M_rr/2 I and
 //! N = 0.
 
-use super::inertial_rows::RigidAcceleration;
+use super::node_moments::NodeMoments;
 use super::rows::Rows;
 use crate::numerics::linalg::{
     CscMatrix, SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros,
@@ -281,28 +281,6 @@ impl DirectorMass {
             NodeMoments { first: axes.transpose() * first, second: axes.transpose() * second * axes }
         };
         (0..self.nodes.len()).map(of_node).collect()
-    }
-}
-
-/// Moments of the mass that turns with a node, about the origin of a frame and along its axes: what the rows of
-/// its directors have of the rigid motions of the whole body.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NodeMoments {
-    /// h_a = sum over the points of E_s with director a. Unit: mass length.
-    pub first: Vector3<f64>,
-    /// Row a: z_a = sum of E_s of director a with the places of points and directors. Unit: mass length^2.
-    pub second: Matrix3<f64>,
-}
-
-impl NodeMoments {
-    /// H = sym(G) - tr(G) I with G = sum_a e_a g_a', g_a = h_a a + alpha x z_a + omega x (omega x z_a): the stiffness
-    /// that the inertia of a rigid motion makes of the rotations of the node. `motion` is about the point and along
-    /// the axes of the moments.
-    pub fn of(&self, motion: &RigidAcceleration) -> Matrix3<f64> {
-        // omega x (omega x z) = (omega omega' - omega^2 I) z.
-        let turning = motion.angular.cross_matrix() + motion.spin - Matrix3::identity() * motion.spin.trace();
-        let g = self.first * motion.linear.transpose() + self.second * turning.transpose();
-        0.5 * (g + g.transpose()) - Matrix3::identity() * g.trace()
     }
 }
 

@@ -1,7 +1,8 @@
 //! The rows that the inertia of a model acts on, whatever its mass is.
 
-use super::director_mass::NodeMoments;
-use super::{DirectorMass, FeModel, centre_and_length};
+use super::node_moments::{NodeMoments, RigidAcceleration};
+use super::rigid::centre_and_length;
+use super::{DirectorMass, FeModel};
 use crate::numerics::linalg::{contiguous_mut, gram};
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -133,24 +134,6 @@ impl<'m> InertialRows<'m> {
         mass.add_second_order(|place| moments[place].of(motion), u, forces);
     }
 
-}
-
-/// Acceleration of a rigid motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RigidAcceleration {
-    /// Of the point that the motion is about, less gravity. Unit: length/time^2.
-    pub linear: Vector3<f64>,
-    /// Angular acceleration. Unit: 1/time^2.
-    pub angular: Vector3<f64>,
-    /// omega omega', the products of the angular velocity. Unit: 1/time^2.
-    pub spin: Matrix3<f64>,
-}
-
-impl RigidAcceleration {
-    /// With the angular velocity `omega`.
-    pub fn new(linear: Vector3<f64>, angular: Vector3<f64>, omega: &Vector3<f64>) -> Self {
-        Self { linear, angular, spin: omega * omega.transpose() }
-    }
 }
 
 /// y += omega x x for vectors of d components.

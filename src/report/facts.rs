@@ -58,7 +58,7 @@ pub(super) struct ModelFacts {
     pub mass_structure: &'static str,
     /// Precision of shapes and of the inertia of the modes: `f64` or `f32`.
     pub storage: &'static str,
-    /// What is not exact of a mass that does not commute with rotations.
+    /// Part of the mass that the invariants take as approximate.
     pub approximation: Option<String>,
     pub units: UnitFacts,
     pub files: Vec<SourceFile>,
@@ -353,7 +353,7 @@ impl ModelFacts {
         match self.mass_structure {
             "rotation-invariant" => "consistent mass",
             "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",
-            _ => "mass that does not commute with rotations",
+            _ => "mass on rotations of nodes or different by direction",
         }
     }
 }

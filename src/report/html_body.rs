@@ -85,7 +85,7 @@ fn extent(body: &FlexBody) -> Option<[f64; 3]> {
 fn limits(html: &mut String, model: &ModelFacts) {
     let mut minded = Vec::new();
     if let Some(remark) = &model.approximation {
-        minded.push(format!("The mass matrix does not commute with rotations: {}.", escape(remark)));
+        minded.push(format!("Approximation: {}.", escape(remark)));
     }
     if model.mass_structure == "diagonal" {
         minded.push(

@@ -148,8 +148,9 @@ fn body(summary: &mut Summary, facts: &Facts<'_>) {
         None => model.size_in_words(),
     };
     summary.entry(tone, "model", &format!("{size}{plane}"), 3);
-    if let Some(remark) = &model.approximation {
-        summary.entry(Tone::Warning, "approximate", remark, 5);
+    if model.approximation.is_some() {
+        let remark = "W1, W2 and W3 keep a part of the mass along the axes of the body; the rest is exact";
+        summary.entry(Tone::Warning, "approximate", remark, 2);
     }
     if let Some(rounded) = model.storage_in_words() {
         summary.entry(Tone::Warning, "storage", rounded, 2);

@@ -16,3 +16,4 @@ mod invariants;
 mod partial_bodies;
 mod partial_conversion;
 mod residual_vectors;
+mod turning_nodes;

@@ -464,7 +464,8 @@ fn what_cannot_be_held_is_told() {
         |model: &str| sid().losses(&fixture(model, MODES, BodyFrame::Model), &ExportOptions::default());
     assert!(said("bracket_hex20").is_empty() && said("turbine_blade").is_empty());
     assert!(said("plane_frame").iter().any(|loss| loss.contains("plane")));
-    assert!(said("frame_beams").iter().any(|loss| loss.contains("W0")), "{:?}", said("frame_beams"));
+    // Stiffness of inertia is written as geometric stiffness is.
+    assert!(said("frame_beams").is_empty(), "{:?}", said("frame_beams"));
     let body = fixture("bracket_hex20", MODES, BodyFrame::Model);
     let body = stressed(body, &[LoadKind::Named("bolts".to_owned())], 1.0, &mut Random(2));
     let refused = export(&body, sid(), &ExportOptions::default(), false).expect_err("a load without a place");

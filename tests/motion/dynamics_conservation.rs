@@ -1,10 +1,13 @@
 //! What motion keeps: energy and momenta of all terms, of every truncation and of general masses; and what
 //! misprints lose.
 
-use crate::support::flexible::{fixture, oracle, soft_block, stressed};
+use crate::support::elements::Kind;
+use crate::support::flexible::{body_of, fixture, oracle, soft_block, stressed};
+use crate::support::general::dense;
 use crate::support::integrate;
 use crate::support::motion::{Drift, Kept, orientation, velocity_rates};
 use crate::support::random::Random;
+use crate::support::turning::{block, disc_on_shaft};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::model::LoadKind;
@@ -64,7 +67,9 @@ fn nothing(_: &Evaluation<'_>, _: &Matrix3<f64>, _: &DVector<f64>, _: &mut [f64]
 
 #[test]
 fn energy_and_momenta_are_kept_by_every_truncation() {
-    for body in [soft_block(10), fixture("frame_beams", 6, BodyFrame::Principal)] {
+    let turning = [block(Kind::Hex8).raw, disc_on_shaft(2.0)].map(|raw| body_of(raw, 6, BodyFrame::Principal));
+    let bodies = [soft_block(10), fixture("frame_beams", 6, BodyFrame::Principal)];
+    for body in bodies.into_iter().chain(turning) {
         for bits in 0..8 {
             let terms = Terms { w1: bits & 1 == 0, w2: bits & 2 == 0, w3: bits & 4 == 0, ..Terms::ALL };
             let drift = tumble(&body, terms, nothing, |_| 0.0);
@@ -142,8 +147,14 @@ fn gravity_keeps_the_energy() {
         let load = |at: &Evaluation<'_>, axes: &Matrix3<f64>, _: &DVector<f64>, forces: &mut [f64]| {
             at.add_gravity(&(axes.transpose() * gravity), forces);
         };
+        // s(q) = c + C1 q + q'K^a q / 2, with the stiffness of inertia of the nodes that turn.
         let potential = |y: &DVector<f64>| {
-            let s = own.first_moment + Vector3::from_column_slice((&own.c1 * y.rows(7, nf)).as_slice());
+            let q = y.rows(7, nf);
+            let of_inertia = body.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+            let mut s = own.first_moment + Vector3::from_column_slice((&own.c1 * q).as_slice());
+            for one in of_inertia.filter(|one| one.load.kind == LoadKind::Acceleration) {
+                s[one.load.component] += 0.5 * q.dot(&(dense(&one.matrix) * q));
+            }
             -gravity.dot(&(own.mass * y.fixed_rows::<3>(0) + orientation(y).axes() * s))
         };
         let drift = tumble(&body, Terms::ALL, load, potential);

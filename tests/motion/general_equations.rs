@@ -16,7 +16,7 @@ use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{Conversion, ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, RigidMotion, condense, condense_general, primary_differences};
-use flexbody::model::FeModel;
+use flexbody::model::{FeModel, LoadKind};
 use flexbody::numerics::eigen::Wanted;
 use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -289,6 +289,28 @@ fn in_plane(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64>
     a.select_rows(rows).select_columns(columns)
 }
 
+/// The stiffness of inertia is that of the reference, which has it from displacements of second order of the
+/// directors; signs of modes are free.
+fn assert_stiffness_of_inertia(name: &str, body: &FlexBody, reference: &Value) {
+    let Some(own) = body.inertia_stiffness() else {
+        return assert!(reference["K_a"].is_null(), "{name} turns");
+    };
+    let nf = body.n_modes();
+    for (kind, what) in [
+        (LoadKind::Acceleration, "K_a"),
+        (LoadKind::AngularAcceleration, "K_alpha"),
+        (LoadKind::Spin, "K_omega"),
+    ] {
+        let all = matrix(&reference[what]);
+        let modes = all.ncols();
+        for one in own.stiffness.iter().filter(|one| one.load.kind == kind) {
+            let expected = all.view((one.load.component * modes, 0), (nf, nf));
+            let error = (dense(&one.matrix).abs() - expected.abs()).amax() / all.amax();
+            assert!(error < 1e-9, "{name} {}: {error:e}", one.load.label());
+        }
+    }
+}
+
 #[test]
 fn conversions_have_these_invariants_and_move_like_the_nodes() {
     for name in FIXTURES {
@@ -325,6 +347,7 @@ fn conversions_have_these_invariants_and_move_like_the_nodes() {
             let error = (in_plane(a, rows, columns) - in_plane(b, rows, columns)).norm() / scale;
             assert!(error < 1e-9, "{name} {what}: {error:e}");
         }
+        assert_stiffness_of_inertia(name, &conversion.body, &fixture.reference["invariants"]);
         if plane {
             continue;
         }
@@ -367,6 +390,7 @@ fn nodal_body(name: &str, body: &FlexBody) -> NodalBody {
         match kind {
             RowKind::Displacement => modes.shape[(3 * place(node) + axis, j)],
             RowKind::Rotation => modes.rotation.as_ref().expect("rotations")[(3 * place(node) + axis, j)],
+            RowKind::Director => unreachable!("no row of a model"),
             RowKind::Internal => {
                 let internal = modes.internal.as_ref().expect("rows without a place");
                 let label = [node as i64, axis as i64 + 1];

@@ -3,7 +3,7 @@
 use crate::support::report_bodies::{engine_mount, run_data};
 use flexbody::base::diagnostic::{Code, Diagnostic};
 use flexbody::body::flex_body::{FlexBody, Guarantee, MassStructure, Parts, Storage};
-use flexbody::body::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, identities};
+use flexbody::body::invariants::{BodyFrame, DIGITS, ERROR_NORMS, Expected, Turning, identities};
 use flexbody::model::{BodyNumber, Coupling};
 use flexbody::report::{
     Facts, Format, LumpedModes, RunData, Screen, diagnostics_json, identities_json, identities_text, render,
@@ -456,6 +456,7 @@ fn identities_and_diagnostics_are_told_as_they_are() {
         eigenvalues: Some(&body.modes().eigenvalue),
         eigenvalue_noise: 0.0,
         eigenvalue_rounding: 0.0,
+            turning: Turning::None,
     };
     let good = identities(&invariants, &expected);
     assert!(identities_text(&good).ends_with(&format!("all {} identities hold\n", good.len())));

@@ -9,8 +9,10 @@ use flexbody::body::flex_body::{
     InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
     SurfaceMesh, Truncation, UnitLoad,
 };
-use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, Invariants, PrimaryData};
-use flexbody::model::{BodyNumber, Coupling, Nodes};
+use flexbody::body::invariants::{
+    DIGITS, GeneralTerms, Groups, InertiaStiffness, Invariants, PrimaryData,
+};
+use flexbody::model::{BodyNumber, Coupling, NodeMoments, Nodes};
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -156,6 +158,18 @@ fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
     }
 }
 
+/// Moments of nodes, some of which have none.
+fn moments(r: &mut Random, n: usize) -> Vec<NodeMoments> {
+    let of_node = |r: &mut Random| match r.below(3) {
+        0 => NodeMoments { first: Vector3::zeros(), second: Matrix3::zeros() },
+        _ => NodeMoments {
+            first: Vector3::from_fn(|_, _| r.value()),
+            second: Matrix3::from_fn(|_, _| r.value()),
+        },
+    };
+    (0..n).map(|_| of_node(r)).collect()
+}
+
 /// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and
 /// `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
@@ -180,7 +194,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
     let bounded = eigenvalue.clone();
     let mass_structure = structures[r.below(3)];
     let general = (mass_structure == MassStructure::General).then(|| r.general(nf));
-    Parts {
+    let wild = r.wild;
+    let mut parts = Parts {
         source: Source {
             name: r.name(),
             files: (0..r.below(4))
@@ -193,6 +208,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             number: (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) }),
             n_dofs: 3 * n,
             mass_structure,
+            approximation: (mass_structure == MassStructure::General).then(|| "Ω \"10 %\"".to_owned()),
             settings: serde_json::json!({
                 "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
             }),
@@ -224,6 +240,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             invariants
         },
         geometric_stiffness: geometric_stiffness(&mut r, nf, interfaces),
+        inertia_stiffness: None,
         lumped,
         certificate: Certificate {
             proved_modes: (r.below(2) == 0).then(|| r.below(100)),
@@ -263,7 +280,12 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         terms: Vec::new(),
         mesh: r.mesh(n),
         storage: Storage::F64,
+    };
+    // Products of wild numbers overflow.
+    if let Some(rotation) = parts.modes.rotation.as_ref().filter(|_| !wild && r.below(2) == 1) {
+        parts.inertia_stiffness = Some(InertiaStiffness::new(moments(&mut r, n), rotation.as_ref(), 3));
     }
+    parts
 }
 
 /// A body of moderate numbers.
@@ -299,6 +321,11 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     }
     matrix(&mut bits, &p.modes.shape);
     p.geometric_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
+    if let Some(own) = &p.inertia_stiffness {
+        own.stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
+        let moments = own.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()));
+        bits.extend(moments.map(|v| v.to_bits()));
+    }
     let m = &p.modes;
     let c = &p.certificate;
     bits.extend(m.eigenvalue.iter().chain(&m.residual).chain(&m.damping_ratio).map(|v| v.to_bits()));

@@ -105,6 +105,7 @@ pub fn made_of(
             number: None,
             n_dofs: 3 * positions.len(),
             mass_structure: if general { MassStructure::General } else { MassStructure::RotationInvariant },
+            approximation: None,
             settings: serde_json::Value::Null,
         },
         dimension: 3,
@@ -124,6 +125,7 @@ pub fn made_of(
         },
         invariants,
         geometric_stiffness: Vec::new(),
+        inertia_stiffness: None,
         lumped: Vec::new(),
         certificate: Certificate {
             proved_modes: None,
@@ -145,6 +147,13 @@ pub fn made_of(
         storage: Storage::F64,
     })
     .expect("valid parts")
+}
+
+/// `body` without the terms of second order that its turning nodes make: what oracles of first order describe.
+pub fn to_first_order(body: FlexBody) -> FlexBody {
+    let mut parts = body.into_parts();
+    parts.inertia_stiffness = None;
+    FlexBody::new(parts).expect("valid parts")
 }
 
 /// `body` with random geometric stiffness for all loads of the given kinds, entries up to `size`.

@@ -37,6 +37,8 @@ pub enum RowKind {
     Rotation,
     /// A vector without a place that vanishes in rigid motion and turns with the body.
     Internal,
+    /// Director `node` % 3 of node `node` / 3: a vector e_a that turns with the rotation of its node.
+    Director,
 }
 
 /// One matrix row: a component of a vector of the given kind.
@@ -80,6 +82,10 @@ pub fn rigid_velocities(rows: &[Row], positions: &[[f64; 3]]) -> DMatrix<f64> {
                 (0..3).for_each(|a| rigid[(i, 3 + a)] = arm[(row.axis, a)]);
             }
             RowKind::Rotation => rigid[(i, 3 + row.axis)] = 1.0,
+            RowKind::Director => {
+                let arm = -skew(&Vector3::ith(row.node % 3, 1.0));
+                (0..3).for_each(|a| rigid[(i, 3 + a)] = arm[(row.axis, a)]);
+            }
             RowKind::Internal => {}
         }
     }
@@ -103,11 +109,16 @@ pub fn turned(rows: &[Row], a: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
     product
 }
 
-/// Nodal velocities vbar = B(q) nu with nu = (V, omega, qd) in body axes.
+/// Nodal velocities vbar = B(q) nu with nu = (V, omega, qd) in body axes. Where rotations carry mass, the rows of
+/// the mass are points, directors and rotations (docs/theory.md section 6, to first order in q);
+/// `couples_by_moment` then puts s(q) = c + C1 q into the coupling of V and omega.
 pub struct NodalBody {
     rows: Vec<Row>,
     stiffness: DMatrix<f64>,
     mass: DMatrix<f64>,
+    couples_by_moment: bool,
+    /// Psi in the rows of K.
+    own_shapes: DMatrix<f64>,
     /// Phi_t, Bx (N x 6).
     rigid: DMatrix<f64>,
     /// Psi (N x nf).
@@ -125,7 +136,14 @@ impl NodalBody {
         positions: &[[f64; 3]],
         shapes: &Mat<f64>,
     ) -> Self {
-        let shapes = dense(shapes);
+        let own_shapes = dense(shapes);
+        let own_mass = dense(mass);
+        let turns = rows.iter().enumerate().filter(|(_, row)| row.kind == RowKind::Rotation);
+        let couples_by_moment = turns.clone().any(|(i, _)| own_mass.row(i).norm() > 0.0);
+        let (rows, shapes, mass) = match couples_by_moment {
+            true => on_directors(rows, &own_shapes, &own_mass),
+            false => (rows.to_vec(), own_shapes.clone(), own_mass),
+        };
         let mut vectors = shapes.clone();
         for (i, row) in rows.iter().enumerate() {
             if row.kind == RowKind::Rotation {
@@ -133,13 +151,44 @@ impl NodalBody {
             }
         }
         Self {
-            rows: rows.to_vec(),
             stiffness: dense(stiffness),
-            mass: dense(mass),
-            rigid: rigid_velocities(rows, positions),
-            modal: [0, 1, 2].map(|a| turned(rows, a, &vectors)),
+            mass,
+            couples_by_moment,
+            own_shapes,
+            rigid: rigid_velocities(&rows, positions),
+            modal: [0, 1, 2].map(|a| turned(&rows, a, &vectors)),
+            rows,
             shapes,
         }
+    }
+
+    /// C1 (3 x nf).
+    fn modal_momentum(&self) -> DMatrix<f64> {
+        self.rigid.columns(0, 3).transpose() * (&self.mass * &self.shapes)
+    }
+
+    /// The velocities that the nodal products are formed with: V is left out where the coupling is by s(q).
+    fn seen_by_nodes(&self, nu: &DVector<f64>) -> DVector<f64> {
+        let mut seen = nu.clone();
+        if self.couples_by_moment {
+            seen.rows_mut(0, 3).fill(0.0);
+        }
+        seen
+    }
+
+    /// What the coupling by s(q) adds to dMc/dt nu and to dT/dq.
+    fn of_flight(&self, state: &State) -> (DVector<f64>, DVector<f64>) {
+        let nf = self.n_modes();
+        let (mut rate, mut slope) = (DVector::zeros(6 + nf), DVector::zeros(nf));
+        if self.couples_by_moment {
+            let (velocity, w) = (state.axes.transpose() * state.velocity, state.omega);
+            let c1 = self.modal_momentum();
+            let moved = Vector3::from_iterator((&c1 * &state.qd).iter().copied());
+            rate.rows_mut(0, 3).copy_from(&w.cross(&moved));
+            rate.rows_mut(3, 3).copy_from(&moved.cross(&velocity));
+            slope = c1.transpose() * velocity.cross(&w);
+        }
+        (rate, slope)
     }
 
     pub fn n_modes(&self) -> usize {
@@ -164,7 +213,15 @@ impl NodalBody {
     /// Mc(q) = B'M B.
     pub fn mass_matrix(&self, q: &DVector<f64>) -> DMatrix<f64> {
         let map = self.velocity_map(q);
-        map.transpose() * &self.mass * map
+        let mut matrix = map.transpose() * &self.mass * map;
+        if self.couples_by_moment {
+            let lever = self.rigid.columns(0, 3).transpose() * (&self.mass * self.rigid.columns(3, 3));
+            let first = Vector3::new(lever[(1, 2)], lever[(2, 0)], lever[(0, 1)]);
+            let moment = first + Vector3::from_iterator((self.modal_momentum() * q).iter().copied());
+            matrix.view_mut((0, 3), (3, 3)).copy_from(&-skew(&moment));
+            matrix.view_mut((3, 0), (3, 3)).copy_from(&skew(&moment));
+        }
+        matrix
     }
 
     /// (R'' world, alpha body, q'') of the free undamped body: (p, h, pi) = B'M vbar, each term from nodal
@@ -172,17 +229,23 @@ impl NodalBody {
     pub fn accelerations(&self, state: &State) -> DVector<f64> {
         let map = self.velocity_map(&state.q);
         let map_rate = self.modal_rotation(&state.qd);
-        let nu = quasi_velocities(state);
+        let nu = self.seen_by_nodes(&quasi_velocities(state));
         let weighted = &self.mass * (&map * &nu);
-        let momenta = map.transpose() * &weighted;
+        let matrix = self.mass_matrix(&state.q);
+        let momenta = &matrix * quasi_velocities(state);
         let mut rate = map.transpose() * (&self.mass * (&map_rate * state.omega));
         let mut rotation = rate.rows_mut(3, 3);
         rotation += map_rate.transpose() * &weighted;
-        let energy_slope: DVector<f64> =
+        let mut energy_slope: DVector<f64> =
             (0..3).map(|a| self.modal[a].transpose() * &weighted * state.omega[a]).sum();
-        let elastic = self.shapes.transpose() * (&self.stiffness * (&self.shapes * &state.q));
-        let weighted_map = &self.mass * &map;
-        solve(state, map.transpose() * weighted_map, &momenta, &rate, &energy_slope, &elastic)
+        if self.couples_by_moment {
+            rate.rows_mut(0, 3).fill(0.0);
+        }
+        let (of_flight, slope) = self.of_flight(state);
+        rate += of_flight;
+        energy_slope += slope;
+        let elastic = self.own_shapes.transpose() * (&self.stiffness * (&self.own_shapes * &state.q));
+        solve(state, matrix, &momenta, &rate, &energy_slope, &elastic)
     }
 
     /// The same by the nodal formula of [ZG19], which lets the rotation of the body pass through M: B'M
@@ -194,10 +257,10 @@ impl NodalBody {
         for a in 0..3 {
             apparent += turned(&self.rows, a, &velocity).column(0) * state.omega[a];
         }
-        let elastic = &self.stiffness * (&self.shapes * &state.q);
+        let elastic = &self.stiffness * (&self.own_shapes * &state.q);
         let mut forces = -(map.transpose() * (&self.mass * apparent));
         let mut modal = forces.rows_mut(6, self.n_modes());
-        modal -= self.shapes.transpose() * elastic;
+        modal -= self.own_shapes.transpose() * elastic;
         let weighted_map = &self.mass * &map;
         in_world(state, (map.transpose() * weighted_map).lu().solve(&forces).expect("mass"))
     }
@@ -222,6 +285,13 @@ impl NodalBody {
                 w2.view_mut((a * nf, b * nf), (nf, nf)).copy_from(&product(&self.modal[a], &self.modal[b]));
             }
         }
+        if self.couples_by_moment {
+            let c1 = product(&translation, &self.shapes);
+            for (b, j) in (0..3).flat_map(|b| (0..nf).map(move |j| (b, j))) {
+                let own = Vector3::from_fn(|k, _| c1[(k, j)]);
+                w0.set_column(b * nf + j, &Vector3::ith(b, 1.0).cross(&own));
+            }
+        }
         let moment = product(&translation, &rotation); // -c~
         let inertia = product(&rotation, &rotation);
         GeneralBody {
@@ -235,7 +305,7 @@ impl NodalBody {
                 w2,
                 w3,
                 modal_mass: product(&self.shapes, &self.shapes),
-                modal_stiffness: self.shapes.transpose() * (&self.stiffness * &self.shapes),
+                modal_stiffness: self.own_shapes.transpose() * (&self.stiffness * &self.own_shapes),
             },
             w0,
         }
@@ -243,15 +313,13 @@ impl NodalBody {
 
     /// (p, h, pi) = B'M vbar, body axes, about the frame origin.
     fn momenta(&self, state: &State) -> DVector<f64> {
-        let map = self.velocity_map(&state.q);
-        map.transpose() * (&self.mass * (&map * quasi_velocities(state)))
+        self.mass_matrix(&state.q) * quasi_velocities(state)
     }
 
-    /// Kinetic energy vbar' M vbar / 2 and strain energy.
+    /// Kinetic energy and strain energy.
     pub fn energy(&self, state: &State) -> f64 {
-        let velocity = self.velocity_map(&state.q) * quasi_velocities(state);
-        let displacement = &self.shapes * &state.q;
-        0.5 * velocity.dot(&(&self.mass * &velocity))
+        let displacement = &self.own_shapes * &state.q;
+        0.5 * quasi_velocities(state).dot(&self.momenta(state))
             + 0.5 * displacement.dot(&(&self.stiffness * &displacement))
     }
 
@@ -264,6 +332,99 @@ impl NodalBody {
     pub fn angular_momentum(&self, state: &State) -> Vector3<f64> {
         state.axes * self.momenta(state).fixed_rows::<3>(3) + state.origin.cross(&self.linear_momentum(state))
     }
+}
+
+/// Rows, shapes and mass with directors, dense and written from the blocks M_tr = -h~ + N, M_rr = tr(P) I - P'. Of
+/// a plane body h = (M_y, -M_x), P = M_rr / 2 I.
+fn on_directors(
+    rows: &[Row],
+    shapes: &DMatrix<f64>,
+    mass: &DMatrix<f64>,
+) -> (Vec<Row>, DMatrix<f64>, DMatrix<f64>) {
+    let place: HashMap<Row, usize> = rows.iter().enumerate().map(|(i, &row)| (row, i)).collect();
+    let plane = rows.iter().all(|row| (row.kind == RowKind::Rotation) == (row.axis == 2));
+    let axes = if plane { 2 } else { 3 };
+    let mut nodes: Vec<usize> =
+        rows.iter().filter(|row| row.kind == RowKind::Rotation).map(|row| row.node).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let mut vectors: Vec<(RowKind, usize)> =
+        rows.iter().filter(|row| row.kind != RowKind::Rotation).map(|row| (row.kind, row.node)).collect();
+    vectors.sort_unstable_by_key(|(kind, node)| (*kind == RowKind::Internal, *node));
+    vectors.dedup();
+
+    let mut all: Vec<Row> =
+        vectors.iter().flat_map(|&(kind, node)| (0..axes).map(move |axis| Row { kind, node, axis })).collect();
+    let directors = nodes.iter().flat_map(|&node| (0..axes).map(move |a| 3 * node + a));
+    all.extend(directors.flat_map(|node| {
+        (0..axes).map(move |axis| Row { kind: RowKind::Director, node, axis })
+    }));
+    all.extend(nodes.iter().flat_map(|&node| (0..3).map(move |axis| Row { kind: RowKind::Rotation, node, axis })));
+    let at: HashMap<Row, usize> = all.iter().enumerate().map(|(i, &row)| (row, i)).collect();
+    let director = |node: usize, a: usize, axis: usize| at[&Row { kind: RowKind::Director, node: 3 * node + a, axis }];
+
+    let entry = |a: Row, b: Row| match (place.get(&a), place.get(&b)) {
+        (Some(&i), Some(&j)) => mass[(i, j)],
+        _ => 0.0,
+    };
+    let block = |(kind, node): (RowKind, usize), (other, second): (RowKind, usize)| {
+        Matrix3::from_fn(|k, l| entry(Row { kind, node, axis: k }, Row { kind: other, node: second, axis: l }))
+    };
+    let mut e = DMatrix::zeros(all.len(), all.len());
+    for &(kind, node) in &vectors {
+        for &(other, second) in &vectors {
+            let own = block((kind, node), (other, second));
+            for (k, l) in (0..axes).flat_map(|k| (0..axes).map(move |l| (k, l))) {
+                e[(at[&Row { kind, node, axis: k }], at[&Row { kind: other, node: second, axis: l }])] = own[(k, l)];
+            }
+        }
+        for &second in &nodes {
+            let own = block((kind, node), (RowKind::Rotation, second));
+            let (moment, symmetric) = match plane {
+                true => (Vector3::new(own[(1, 2)], -own[(0, 2)], 0.0), Matrix3::zeros()),
+                false => (
+                    Vector3::new(own[(1, 2)] - own[(2, 1)], own[(2, 0)] - own[(0, 2)], own[(0, 1)] - own[(1, 0)]) * 0.5,
+                    (own + own.transpose()) * 0.5,
+                ),
+            };
+            for k in 0..axes {
+                let i = at[&Row { kind, node, axis: k }];
+                for a in 0..axes {
+                    let j = director(second, a, k);
+                    (e[(i, j)], e[(j, i)]) = (moment[a], moment[a]);
+                }
+                for b in 0..3 {
+                    let j = at[&Row { kind: RowKind::Rotation, node: second, axis: b }];
+                    (e[(i, j)], e[(j, i)]) = (symmetric[(k, b)], symmetric[(k, b)]);
+                }
+            }
+        }
+    }
+    for (&node, &second) in nodes.iter().flat_map(|node| nodes.iter().map(move |second| (node, second))) {
+        let own = block((RowKind::Rotation, node), (RowKind::Rotation, second));
+        let p = match plane {
+            true => Matrix3::identity() * (0.5 * own[(2, 2)]),
+            false => Matrix3::identity() * (0.5 * own.trace()) - own.transpose(),
+        };
+        for (a, b, axis) in (0..axes).flat_map(|a| (0..axes).flat_map(move |b| (0..axes).map(move |k| (a, b, k)))) {
+            e[(director(node, a, axis), director(second, b, axis))] = p[(a, b)];
+        }
+    }
+
+    let mut extended = DMatrix::zeros(all.len(), shapes.ncols());
+    for (i, row) in all.iter().enumerate() {
+        for j in 0..shapes.ncols() {
+            let value = |row: Row| place.get(&row).map_or(0.0, |&i| shapes[(i, j)]);
+            extended[(i, j)] = match row.kind {
+                RowKind::Director => {
+                    let angle = |axis| value(Row { kind: RowKind::Rotation, node: row.node / 3, axis });
+                    Vector3::new(angle(0), angle(1), angle(2)).cross(&Vector3::ith(row.node % 3, 1.0))[row.axis]
+                }
+                _ => value(*row),
+            };
+        }
+    }
+    (all, extended, e)
 }
 
 /// The invariants of a body with any mass matrix: those of the file, and W0 (3 x 3nf), column b nf + j:
@@ -450,9 +611,9 @@ pub fn to_faer(a: &DMatrix<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M
-/// is any positive definite matrix with the given rigid mass matrix: T'M T with T R = R S, and S taking R'M R
-/// to what it has to be.
+/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M is the
+/// mass of points and directors, a positive definite number for every pair of them, and a twentieth of it that differs
+/// by direction and is zero on rigid motion.
 pub fn random_body(seed: u64) -> NodalBody {
     let mut random = Random(seed);
     let positions: Vec<[f64; 3]> = (0..5).map(|_| random.vector::<3>()).collect();
@@ -468,23 +629,28 @@ pub fn random_body(seed: u64) -> NodalBody {
         let a = random_matrix(random, n, n);
         &a * a.transpose() / n as f64
     };
-    let (any, stiffness) = (square(&mut random, n), square(&mut random, n));
-
+    // Points 0 to 4, inner vectors 5 and 6, directors 7 + 3 node + a.
+    let of_vectors = square(&mut random, 7 + 9).kronecker(&DMatrix::<f64>::identity(3, 3));
+    let mut lift = DMatrix::zeros(of_vectors.nrows(), n);
+    for (i, row) in rows.iter().enumerate() {
+        match row.kind {
+            RowKind::Displacement => lift[(3 * row.node + row.axis, i)] = 1.0,
+            RowKind::Internal => lift[(3 * (row.node - 2) + row.axis, i)] = 1.0,
+            RowKind::Rotation => {
+                for a in 0..3 {
+                    let turned = Vector3::ith(row.axis, 1.0).cross(&Vector3::ith(a, 1.0));
+                    (0..3).for_each(|k| lift[(3 * (7 + 3 * row.node + a) + k, i)] = turned[k]);
+                }
+            }
+            RowKind::Director => unreachable!("no row of a model"),
+        }
+    }
+    let (any, stiffness) = (square(&mut random, n) * 0.05, square(&mut random, n));
     let rigid = rigid_velocities(&rows, &positions);
-    let (mass, first) = (2.0, Vector3::from(random.vector::<3>()) * 0.5);
-    let mixed = -skew(&first);
-    let mut wanted = DMatrix::<f64>::identity(6, 6) * mass;
-    wanted.view_mut((0, 3), (3, 3)).copy_from(&mixed);
-    wanted.view_mut((3, 0), (3, 3)).copy_from(&mixed.transpose());
-    let inertia = square(&mut random, 3) + Matrix3::identity();
-    wanted.view_mut((3, 3), (3, 3)).copy_from(&inertia);
-    let lower = |a: DMatrix<f64>| a.cholesky().expect("positive definite").l();
-    let found = lower(rigid.transpose() * &any * &rigid);
-    let change = found.transpose().try_inverse().expect("regular") * lower(wanted).transpose();
     let gram = (rigid.transpose() * &rigid).try_inverse().expect("regular");
-    let turn = DMatrix::identity(n, n)
-        + &rigid * (change - DMatrix::<f64>::identity(6, 6)) * gram * rigid.transpose();
-    let general = turn.transpose() * any * turn;
+    let elastic = DMatrix::identity(n, n) - &rigid * gram * rigid.transpose();
+    let mass = lift.transpose() * of_vectors * lift + elastic.transpose() * any * elastic;
+    let mass = (&mass + mass.transpose()) * 0.5;
     let shapes = random_matrix(&mut random, n, 4);
-    NodalBody::new(&to_faer(&stiffness), &to_faer(&general), &rows, &positions, &to_faer(&shapes))
+    NodalBody::new(&to_faer(&stiffness), &to_faer(&mass), &rows, &positions, &to_faer(&shapes))
 }

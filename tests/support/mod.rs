@@ -26,4 +26,5 @@ pub mod random;
 pub mod reference;
 pub mod report_bodies;
 pub mod scenes;
+pub mod turning;
 pub mod unreduced;

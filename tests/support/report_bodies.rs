@@ -82,6 +82,7 @@ pub fn engine_mount() -> FlexBody {
             number: None,
             n_dofs: 24,
             mass_structure: MassStructure::RotationInvariant,
+            approximation: None,
             settings: serde_json::json!({ "accuracy": "standard", "frame": "principal", "modes": 8 }),
         },
         dimension: 3,
@@ -106,6 +107,7 @@ pub fn engine_mount() -> FlexBody {
         },
         invariants: invariants(1.25, 1.0),
         geometric_stiffness: vec![],
+        inertia_stiffness: None,
         lumped: vec![lumped("row-sum", 312, 1.0), lumped("diagonal-scaling", 0, 0.125)],
         certificate: Certificate {
             proved_modes: Some(8),
@@ -239,6 +241,7 @@ pub fn condensed(
             number: None,
             n_dofs: 3 * ids.len(),
             mass_structure: MassStructure::RotationInvariant,
+            approximation: None,
             settings: serde_json::json!({}),
         },
         dimension: 3,
@@ -258,6 +261,7 @@ pub fn condensed(
         },
         invariants,
         geometric_stiffness: vec![],
+        inertia_stiffness: None,
         lumped: vec![],
         certificate: Certificate {
             proved_modes: None,

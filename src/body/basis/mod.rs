@@ -11,6 +11,7 @@ mod free_surface;
 mod imported;
 mod interface_coordinates;
 mod interface_rows;
+mod massless;
 mod modal_basis;
 mod nodal_modes;
 mod pseudo_free_surface;

@@ -3,6 +3,7 @@
 
 use super::columns::columns;
 use super::failure::explain;
+use super::massless::on_mass;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::modal_basis::{ModalBasis, problem_of_span};
 use super::pseudo_free_surface::{independent, part_in_words};
@@ -226,7 +227,8 @@ impl NamedLoads {
             }
         }
         let forces: Vec<_> = forces.iter().map(Mat::as_ref).collect();
-        Ok(Self { what: what.to_owned(), names, forces: side_by_side(&forces), frequencies })
+        let forces = on_mass(model, side_by_side(&forces))?;
+        Ok(Self { what: what.to_owned(), names, forces, frequencies })
     }
 
     /// The frequencies, each once, with the numbers of its loads.

@@ -8,7 +8,7 @@ use super::{
 use crate::base::error::{Error, Result};
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{
-    BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, identities,
+    BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, Turning, identities,
 };
 use crate::model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, extents};
 use faer::Mat;
@@ -284,6 +284,11 @@ impl FlexBody {
             eigenvalues: Some(&self.parts.modes.eigenvalue),
             eigenvalue_noise: self.parts.certificate.rigid_noise,
             eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
+            turning: match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
+                (None, _) => Turning::None,
+                (Some(_), Some(_)) => Turning::InPart,
+                (Some(_), None) => Turning::Whole,
+            },
         };
         let checks = identities(&self.parts.invariants, &expected);
         // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.

@@ -45,7 +45,8 @@ impl Parts {
     fn inertia_stiffness_of_moments(&self) -> Option<IdentityCheck> {
         let (own, rotation) = (self.inertia_stiffness.as_ref()?, self.modes.rotation.as_ref()?);
         let formula = "K = sum over the nodes of theta' (sym G - tr G I) theta";
-        let limit = ROUNDING + self.storage.rounding();
+        // Both rotations of a product are rounded.
+        let limit = ROUNDING + 4.0 * self.storage.rounding();
         let value = own.deviation(rotation.as_ref(), self.dimension);
         Some(IdentityCheck::new("inertia_stiffness", formula, value, limit))
     }

@@ -60,9 +60,24 @@ pub struct Expected<'a> {
     /// Relative noise of the lowest eigenvalue that the digits of the input leave (the certificate's
     /// `rigid_noise`); 0 when unknown.
     pub eigenvalue_noise: f64,
+    /// How nodes turn whose rotations carry mass.
+    pub turning: Turning,
     /// What rounding of the products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p
     /// lambda_q); 0 when unknown.
     pub eigenvalue_rounding: f64,
+}
+
+/// How the mass of a body turns with its nodes, as far as identities know it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Turning {
+    /// No rotation carries mass, or the mass is kept along the axes of the body (files before format 1.6).
+    #[default]
+    None,
+    /// Points and directors, and a part that does not turn: W0 = -C1~.
+    InPart,
+    /// Points and directors alone: every formula of M = Ms kron I3 holds, but for signs of products, since the mass of
+    /// directors may be one of no places.
+    Whole,
 }
 
 /// Evaluates every identity that the primary data of a body must fulfil, in a fixed order.
@@ -78,14 +93,14 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
         check("second_moment_symmetric", "J = J'", terms::second_moment_asymmetry(body, &bound), ROUNDING),
     ];
     checks.extend(rigid_identities(body));
-    checks.extend(gram_identities(body, &bound));
+    checks.extend(gram_identities(body, &bound, expected.turning));
     checks.extend(mode_identities(body, expected, &bound));
     checks.extend(frame_identities(body, expected));
     checks
 }
 
 /// What products of rigid motion and modes must be, whatever the modes are.
-fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
+fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
     let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
     if groups.w2 || groups.w3 {
@@ -100,6 +115,10 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityChec
             ROUNDING,
         ),
     ]);
+    if turning != Turning::None {
+        checks.extend(turning_identities(body, bound, turning));
+        return checks;
+    }
     match body.w2().zip(body.w3()).filter(|_| body.0.general.is_some()) {
         Some((w2, w3)) => checks.push(check(
             "velocity_gram_psd",
@@ -109,6 +128,24 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityChec
         )),
         None if body.0.general.is_some() => {}
         None => checks.extend(scalar_identities(body, bound)),
+    }
+    checks
+}
+
+/// What holds of a mass of points and directors.
+fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
+    let (check, nf, solid) = (IdentityCheck::new, body.n_modes(), body.as_solid());
+    let difference = terms::difference(&solid.w0(), &body.w0(), &|_, column| bound.c1(column % nf));
+    let mut checks = vec![check("w0_of_c1", "W0 = -C1~", difference, ROUNDING)];
+    if turning == Turning::InPart {
+        return checks;
+    }
+    let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
+    if let (Some(own), Some(of_s), true) = (body.w3(), solid.w3(), body.0.groups.w2) {
+        let value = terms::difference(&of_s, &own, &by_modes);
+        checks.push(check("w3_of_s", "W3_k = S_lm - S_ml", value, CONDENSED));
+        let value = terms::difference(&solid.modal_mass(), &body.modal_mass(), &by_modes);
+        checks.push(check("modal_mass_of_s", "m_ff = S11 + S22 + S33", value, CONDENSED));
     }
     checks
 }

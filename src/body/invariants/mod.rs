@@ -36,7 +36,7 @@ pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_general_f
 pub use general::{MassProduct, RigidMotion, condense_general, condense_general_linear};
 pub(crate) use general::rigid_first_moment;
 pub use groups::{Group, Groups};
-pub use identities::{Expected, IdentityCheck, derived_identities, identities};
+pub use identities::{Expected, IdentityCheck, Turning, derived_identities, identities};
 pub use inertia_stiffness::{InertiaShares, InertiaStiffness};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};
 pub use numbered::Numbered;

@@ -68,6 +68,17 @@ pub struct ExportOptions {
     pub motion: Option<RecordedMotion>,
     /// Name of the file, for formats whose file names those beside it.
     pub name: Option<PathBuf>,
+    /// How much of the stiffness of the body its stiffness of inertia is in a scene, for the size of what is lost.
+    pub in_scene: Option<InertiaInScene>,
+}
+
+/// Largest part of the stiffness of a motion that the stiffness of inertia has in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InertiaInScene {
+    /// Name of the scene.
+    pub scene: String,
+    /// The part, 0.01 for 1 %.
+    pub share: f64,
 }
 
 /// Which places of the body a file has.

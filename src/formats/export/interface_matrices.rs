@@ -1,7 +1,7 @@
 //! K, M and D in the motions of interface frames, as reduced-order blocks take them: six coordinates for each
 //! frame, then the fixed-interface modes.
 
-use super::losses;
+use super::{ExportOptions, losses};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
@@ -81,13 +81,13 @@ impl<'a> InterfaceMatrices<'a> {
 const AXES: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 
 /// What such matrices cannot hold of a body.
-pub(crate) fn matrix_losses(body: &FlexBody) -> Vec<String> {
+pub(crate) fn matrix_losses(body: &FlexBody, options: &ExportOptions) -> Vec<String> {
     let small = "K and M are those of small motions";
     [
         losses::changing_inertia(body, "W1", small),
         losses::general_w0(body),
         losses::geometric_stiffness(body, |_| false),
-        losses::inertia_stiffness(body, |_| false),
+        losses::inertia_stiffness(body, options, |_| false),
     ]
     .into_iter()
     .flatten()

@@ -2,7 +2,8 @@
 
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::CauchySchwarz;
-use crate::model::{LoadKind, UnitLoad};
+use crate::formats::export::{ExportOptions, InertiaInScene};
+use crate::model::UnitLoad;
 use faer::Mat;
 
 /// Differences of numbers that are relative to their Cauchy-Schwarz bounds: below this they are rounding, and
@@ -78,20 +79,27 @@ pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> 
     (!lost.is_empty()).then(|| format!("the geometric stiffness for {}", lost.join(", ")))
 }
 
-/// Stiffness of inertia for loads that `holds` does not take, with the motion at which it counts.
-pub(crate) fn inertia_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bool) -> Option<String> {
+/// Stiffness of inertia for loads that `holds` does not take, with its size in a scene or else the motion at which it
+/// counts.
+pub(crate) fn inertia_stiffness(
+    body: &FlexBody,
+    options: &ExportOptions,
+    holds: impl Fn(&UnitLoad) -> bool,
+) -> Option<String> {
+    const WHAT: &str = "the stiffness of inertia of nodes that turn";
     let own = body.inertia_stiffness()?;
-    let lost: Vec<&UnitLoad> = own
-        .stiffness
-        .iter()
-        .filter(|one| one.matrix.norm_max() > 0.0 && !holds(&one.load))
-        .map(|one| &one.load)
-        .collect();
-    let is_lost = |kind: &LoadKind| lost.iter().any(|load| load.kind == *kind);
-    let rates = body.inertia_rates(PART)?.in_words(body.units(), is_lost);
-    (!rates.is_empty()).then(|| {
-        format!("the stiffness of inertia of nodes that turn, which reaches 1 % of the stiffness of a motion at {rates}")
-    })
+    let all = own.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
+    let lost: Vec<&UnitLoad> = all.map(|one| &one.load).filter(|load| !holds(load)).collect();
+    if lost.is_empty() {
+        return None;
+    }
+    if let Some(InertiaInScene { scene, share }) = &options.in_scene {
+        let percent = 100.0 * share;
+        return Some(format!("{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"));
+    }
+    let rates = body.inertia_rates(PART)?;
+    let rates = rates.in_words(body.units(), |kind| lost.iter().any(|load| load.kind == *kind));
+    Some(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
 }
 
 /// Rotations of nodes, for a format without.

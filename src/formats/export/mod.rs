@@ -10,5 +10,5 @@ pub(crate) mod interface_matrices;
 pub(crate) mod losses;
 pub(crate) mod mat5;
 
-pub use format::{ExportFormat, ExportOptions, Exported, Points};
+pub use format::{ExportFormat, ExportOptions, Exported, InertiaInScene, Points};
 pub use frames::{ExportFrame, frames};

@@ -38,7 +38,7 @@ impl ExportFormat for Exudyn {
             losses::general_w0(body),
             losses::general_w3(body),
             losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, options, |_| false),
             losses::damping(body),
             // An interface as a cross of nodes turns as it does in the body.
             losses::rotations(body).filter(|_| !options.points.of_interfaces()),

@@ -1,6 +1,6 @@
 //! What is asked of every body, whatever its modes are.
 
-use crate::body::invariants::{BodyFrame, Expected, Numbered};
+use crate::body::invariants::{BodyFrame, Expected, Numbered, Turning};
 use nalgebra::Matrix3;
 
 /// The identities that hold in any modes.
@@ -12,6 +12,7 @@ pub(crate) const ANY_BODY: Expected<'static> = Expected {
     eigenvalues: None,
     eigenvalue_noise: 0.0,
     eigenvalue_rounding: 0.0,
+    turning: Turning::None,
 };
 
 /// What counts as rounding in files of 10 digits and more, relative to Cauchy-Schwarz bounds; what is told

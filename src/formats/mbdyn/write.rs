@@ -53,7 +53,7 @@ impl ExportFormat for Mbdyn {
             .chain(general)
             .chain([
                 losses::geometric_stiffness(body, |load| exact && tag(load, &places).is_some()),
-                losses::inertia_stiffness(body, |_| exact),
+                losses::inertia_stiffness(body, options, |_| exact),
                 losses::internal_rows(body),
             ])
             .flatten()

@@ -32,14 +32,14 @@ impl ExportFormat for Mbsim {
         true
     }
 
-    fn losses(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         [
             losses::plane(body),
             losses::general_w0(body),
             losses::general_w3(body),
             other_w2(body),
             losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, options, |_| false),
             losses::internal_rows(body),
         ]
         .into_iter()

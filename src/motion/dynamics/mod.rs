@@ -27,7 +27,6 @@ pub use evaluation::Evaluation;
 pub(crate) use geometric::{Stiffening, stiffness_under};
 pub use load_jacobian::{LoadAxes, LoadJacobian};
 pub use motion::{EmptySpace, Motion, Surroundings};
-pub(crate) use nodal::add_turned;
 pub use nodal::{
     NodalConfiguration, NodalEquations, NodalError, NodalEvaluation, NodalModes, NodalMotion, NodalPoint,
     ReferenceConditions,

@@ -8,7 +8,7 @@ use crate::motion::scene::Instant;
 use crate::numerics::linalg::{
     combine, dense_cholesky, gram, multiply, solve_lower, solve_upper, subtract_combination,
 };
-use faer::{Mat, MatRef};
+use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
 
 /// Instants that are computed together.

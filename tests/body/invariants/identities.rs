@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use faer::Mat;
 use flexbody::body::invariants::{
     BodyFrame, Derived, Expected, IdentityCheck, Invariants, LumpedMasses, choose_frame, condense,
-    condense_lumped, derived_identities, identities,
+    condense_lumped, derived_identities, Turning, identities,
 };
 use nalgebra::Vector3;
 
@@ -21,6 +21,7 @@ fn expected() -> Expected<'static> {
         eigenvalues: Some(&EIGENVALUES),
         eigenvalue_noise: 0.0,
         eigenvalue_rounding: 0.0,
+            turning: Turning::None,
     }
 }
 

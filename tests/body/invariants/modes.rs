@@ -5,7 +5,7 @@ use crate::support::models::{self, Model};
 use faer::Mat;
 use flexbody::base::progress::SILENT;
 use flexbody::body::invariants::{
-    BodyFrame, Expected, Invariants, LumpedMasses, choose_frame, condense, condense_lumped, identities,
+    BodyFrame, Expected, Invariants, LumpedMasses, choose_frame, condense, condense_lumped, Turning, identities,
 };
 use flexbody::model::rigid_fields;
 use flexbody::numerics::eigen::{EigenProblem, EigenSettings, Resume, Wanted, solve};
@@ -90,6 +90,7 @@ fn norms_are_those_of_the_reference_program() {
             eigenvalues: Some(&modes.eigenvalues),
             eigenvalue_noise: 0.0,
             eigenvalue_rounding: 0.0,
+            turning: Turning::None,
         };
         for check in identities(&exact, &expected) {
             assert!(check.passed, "{}: {} is {:e}", model.name, check.name, check.value);

@@ -324,7 +324,7 @@ fn answers(model: &FeModel, factor: &SparseLdl, columns: &Motions, moving: &[usi
 }
 
 /// y += factor omega x x, at the displacements of the rows of `model`.
-pub(crate) fn add_turned(model: &FeModel, factor: f64, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
+fn add_turned(model: &FeModel, factor: f64, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
     let end = model.rows().displacements();
     let w = omega * factor;
     if model.dimension() == 2 {

@@ -21,7 +21,6 @@ mod stiff;
 
 pub use conditions::ReferenceConditions;
 pub use equations::NodalEquations;
-pub(crate) use equations::add_turned;
 pub use error::NodalError;
 pub use evaluation::NodalEvaluation;
 pub use modes::NodalModes;
