@@ -12,8 +12,8 @@ use crate::formats::export::{ExportOptions, Exported, InertiaInScene, Points};
 use crate::formats::flex_body_file::{self, read_simulation};
 use crate::formats::{export, find_format};
 use crate::input::parse_units;
-use std::borrow::Cow;
 use crate::motion::scene::{inertia_share, read_cases};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {

@@ -89,7 +89,16 @@ impl DirectorMass {
         let rotations = rotations.collect();
         let blocks = Blocks { m, rows, nodes: &nodes, place_of: &place_of, points };
         let (scalar, rest, rest_share) = blocks.split();
-        Some(Self { dimension: d, model_rows: rows.len(), points, rotations, nodes, scalar, rest, rest_share })
+        Some(Self {
+            dimension: d,
+            model_rows: rows.len(),
+            points,
+            rotations,
+            nodes,
+            scalar,
+            rest,
+            rest_share,
+        })
     }
 
     /// Nodes with directors, ascending.
@@ -139,7 +148,9 @@ impl DirectorMass {
         assert_eq!(shapes.nrows(), self.model_rows, "one row per row of the model");
         let mut extended = zeros(self.rows(), shapes.ncols());
         let columns: Vec<_> = shapes.col_iter().zip(extended.col_iter_mut()).collect();
-        columns.into_par_iter().for_each(|(from, to)| self.extend_vector(contiguous(from), contiguous_mut(to)));
+        columns
+            .into_par_iter()
+            .for_each(|(from, to)| self.extend_vector(contiguous(from), contiguous_mut(to)));
         extended
     }
 
@@ -192,7 +203,9 @@ impl DirectorMass {
         assert_eq!(forces.nrows(), self.rows(), "one row per extended row");
         let mut restricted = zeros(self.model_rows, forces.ncols());
         let columns: Vec<_> = forces.col_iter().zip(restricted.col_iter_mut()).collect();
-        columns.into_par_iter().for_each(|(from, to)| self.restrict_vector(contiguous(from), contiguous_mut(to)));
+        columns
+            .into_par_iter()
+            .for_each(|(from, to)| self.restrict_vector(contiguous(from), contiguous_mut(to)));
         restricted
     }
 
@@ -338,14 +351,15 @@ impl Blocks<'_> {
         // Columns in the order of the extended rows: points, then directors, then rotations.
         let points: Vec<_> = chunks(self.points).collect();
         let places: Vec<_> = chunks(self.nodes.len()).collect();
-        let of = |ranges: &[Range<usize>], part: &(dyn Fn(Range<usize>, &mut Columns) + Sync)| -> Vec<Columns> {
-            let columns = |range: &Range<usize>| {
-                let mut columns = Columns::default();
-                part(range.clone(), &mut columns);
-                columns
+        let of =
+            |ranges: &[Range<usize>], part: &(dyn Fn(Range<usize>, &mut Columns) + Sync)| -> Vec<Columns> {
+                let columns = |range: &Range<usize>| {
+                    let mut columns = Columns::default();
+                    part(range.clone(), &mut columns);
+                    columns
+                };
+                ranges.par_iter().map(columns).collect()
             };
-            ranges.par_iter().map(columns).collect()
-        };
         let mut scalar = of(&points, &|range, columns| {
             self.each(range, |blocks| self.point_column(blocks, columns));
         });

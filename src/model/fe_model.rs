@@ -3,7 +3,9 @@
 
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
-use super::{BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh};
+use super::{
+    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh,
+};
 use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};

@@ -35,7 +35,9 @@ impl<'m> InertialRows<'m> {
     /// The rows of `model`; rigid motions are about `origin` (axes of the model) or, where there are directors,
     /// about the centre of mass.
     pub fn new(model: &'m FeModel, origin: Vector3<f64>) -> Self {
-        let Some(mass) = model.director_mass() else { return Self { model, directors: None, centre: origin } };
+        let Some(mass) = model.director_mass() else {
+            return Self { model, directors: None, centre: origin };
+        };
         let centre = model.centre_of_mass();
         let fields = mass.extend_rigid(model.rigid_fields(centre.into(), 1.0).as_ref());
         let moments = mass.moments(fields.as_ref(), &Matrix3::identity());
@@ -133,7 +135,6 @@ impl<'m> InertialRows<'m> {
         let Some(Directors { mass, moments }) = &self.directors else { return };
         mass.add_second_order(|place| moments[place].of(motion), u, forces);
     }
-
 }
 
 /// y += omega x x for vectors of d components.

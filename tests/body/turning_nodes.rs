@@ -43,7 +43,9 @@ impl AllNodes<'_> {
         let node = self.body.n_nodes() - 1;
         let modes = self.body.modes();
         let rotation = modes.rotation.as_ref().expect("rotations");
-        let sum = |shape: &Mat<f64>| Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * node + k, j)] * q[j]).sum());
+        let sum = |shape: &Mat<f64>| {
+            Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * node + k, j)] * q[j]).sum())
+        };
         let place = Vector3::from(self.body.frame().to_body(&[self.block.reference])[0]);
         (place, sum(&modes.shape), sum(rotation))
     }
@@ -58,7 +60,9 @@ impl AllNodes<'_> {
             let start = self.start(i);
             let place = match self.block.rigid.contains(&i) {
                 true => at + moved + Rotation3::new(turned) * (start - at),
-                false => start + Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * i + k, j)] * q[j]).sum()),
+                false => {
+                    start + Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * i + k, j)] * q[j]).sum())
+                }
             };
             places.set_row(i, &place.transpose());
         }
@@ -111,7 +115,10 @@ impl AllNodes<'_> {
             unit[j] = step;
             let rate = (self.places(&(q + &unit)) - self.places(&(q - &unit))) / (2.0 * step);
             let s = self.moments(&x, &rate);
-            coupling.set_column(j, &Vector3::new(s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]));
+            coupling.set_column(
+                j,
+                &Vector3::new(s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]),
+            );
         }
         coupling
     }
@@ -130,7 +137,9 @@ fn largest(a: impl IntoIterator<Item = f64>) -> f64 {
 
 #[test]
 fn a_rigid_region_has_the_invariants_of_all_its_nodes() {
-    for (kind, frame) in [(Kind::Hex8, BodyFrame::Principal), (Kind::Tet10, BodyFrame::Model), (Kind::Hex8, BodyFrame::Model)] {
+    for (kind, frame) in
+        [(Kind::Hex8, BodyFrame::Principal), (Kind::Tet10, BodyFrame::Model), (Kind::Hex8, BodyFrame::Model)]
+    {
         let block = block(kind);
         let (_, body) = converted(block.raw.clone(), 6, frame);
         let nodes = AllNodes { block: &block, body: &body };
@@ -176,14 +185,21 @@ fn the_stiffness_of_inertia_is_what_a_finite_rotation_of_the_region_does() {
             let q = &direction * step;
             let quadratic = |k: &DMatrix<f64>| direction.dot(&(k * &direction));
 
-            let second = (nodes.first_moment(&q) + nodes.first_moment(&-&q) - nodes.first_moment(&zero) * 2.0) / step.powi(2);
+            let second = (nodes.first_moment(&q) + nodes.first_moment(&-&q)
+                - nodes.first_moment(&zero) * 2.0)
+                / step.powi(2);
             let found = Vector3::from_fn(|k, _| quadratic(&stiffness(&body, LoadKind::Acceleration, k)));
             assert!((second - found).norm() < 1e-6 * found.norm(), "K^a: {second} {found}");
 
-            let second = (nodes.inertia(&q) + nodes.inertia(&-&q) - nodes.inertia(&zero) * 2.0) / (2.0 * step.powi(2));
+            let second =
+                (nodes.inertia(&q) + nodes.inertia(&-&q) - nodes.inertia(&zero) * 2.0) / (2.0 * step.powi(2));
             let w2 = body.invariants().w2().expect("held");
             let mut found = Matrix3::from_fn(|k, l| {
-                (0..nf * nf).map(|at| direction[at / nf] * w2[(k * nf + at / nf, l * nf + at % nf)] * direction[at % nf]).sum()
+                (0..nf * nf)
+                    .map(|at| {
+                        direction[at / nf] * w2[(k * nf + at / nf, l * nf + at % nf)] * direction[at % nf]
+                    })
+                    .sum()
             });
             for (component, (k, l)) in LoadKind::SPIN.into_iter().enumerate() {
                 let taken = quadratic(&stiffness(&body, LoadKind::Spin, component));
@@ -212,11 +228,18 @@ fn the_stiffness_of_inertia_is_what_a_finite_rotation_of_the_region_does() {
 /// The same body, described about two origins and along other axes, feels the same forces.
 #[test]
 fn two_frames_describe_one_body() {
-    for raw in [block(Kind::Hex8).raw, raw_fixture("shell_folded"), raw_fixture("frame_beams"), raw_fixture("plane_frame")] {
+    for raw in [
+        block(Kind::Hex8).raw,
+        raw_fixture("shell_folded"),
+        raw_fixture("frame_beams"),
+        raw_fixture("plane_frame"),
+    ] {
         let name = raw.name.clone();
         let (_, a) = converted(raw.clone(), 6, BodyFrame::Com);
         let (_, b) = converted(raw, 6, BodyFrame::Model);
-        let moved = a.in_model_axes(a.frame().axes.transpose() * (b.frame().origin - a.frame().origin)).expect("a body");
+        let moved = a
+            .in_model_axes(a.frame().axes.transpose() * (b.frame().origin - a.frame().origin))
+            .expect("a body");
         let (own, other) = (moved.inertia_stiffness().expect("turns"), b.inertia_stiffness().expect("turns"));
         // Modes of both are the same up to their signs, which the frame does not change here.
         let difference = other.largest_difference(own);
@@ -228,7 +251,13 @@ fn two_frames_describe_one_body() {
 }
 
 /// Accelerations of the modes and of the frame, along its axes, of a body that moves freely.
-fn free_accelerations(body: &FlexBody, velocity: Vector3<f64>, omega: Vector3<f64>, q: &[f64], qd: &[f64]) -> Vec<f64> {
+fn free_accelerations(
+    body: &FlexBody,
+    velocity: Vector3<f64>,
+    omega: Vector3<f64>,
+    q: &[f64],
+    qd: &[f64],
+) -> Vec<f64> {
     let equations = EquationsOfMotion::new(body, Terms::ALL);
     let mut evaluation = Evaluation::new(&equations);
     let rigid: Vec<f64> = match equations.n_rigid() {
@@ -261,7 +290,8 @@ fn a_constant_velocity_changes_nothing() {
         let extent = body.extent();
         let plane = body.dimension() == 2;
         let omega = if plane { Vector3::z() } else { Vector3::new(0.4, -0.7, 0.6) } * (0.3 * rate);
-        let flight = if plane { Vector3::new(0.6, -0.8, 0.0) } else { Vector3::new(0.5, -0.6, 0.62) } * (10.0 * rate * extent);
+        let flight = if plane { Vector3::new(0.6, -0.8, 0.0) } else { Vector3::new(0.5, -0.6, 0.62) }
+            * (10.0 * rate * extent);
         let rotation = body.modes().rotation.as_ref().expect("rotations");
         let turned = |j: usize| largest((0..rotation.nrows()).map(|row| rotation[(row, j)]));
         let amplitude = |j: usize| 0.05 * extent / body.largest_displacement(j).max(extent * turned(j));
@@ -284,7 +314,8 @@ fn classical_whirl(raw: &RawModel, spin: f64) -> Vec<f64> {
     let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
     // Of every node uy, uz, ry, rz.
     let lateral: Vec<usize> = (0..k.nrows()).filter(|row| [1, 2, 4, 5].contains(&(row % 6))).collect();
-    let part = |a: &DMatrix<f64>| DMatrix::from_fn(lateral.len(), lateral.len(), |i, j| a[(lateral[i], lateral[j])]);
+    let part =
+        |a: &DMatrix<f64>| DMatrix::from_fn(lateral.len(), lateral.len(), |i, j| a[(lateral[i], lateral[j])]);
     let (k, own) = (part(&k), part(&m));
     let n = lateral.len();
     // Angular momentum Ip Omega along the shaft e_x turns with it: moments Ip Omega (-rz', ry') about y and z.
@@ -313,15 +344,19 @@ fn classical_whirl(raw: &RawModel, spin: f64) -> Vec<f64> {
     let mut seen = Vec::new();
     for value in eigenvalues.iter().filter(|value| value.im > 1.0) {
         // Inverse iteration for the vector.
-        let shifted = &complex - DMatrix::identity(2 * n, 2 * n) * (value + nalgebra::Complex::new(1e-7, 1e-7) * value.im);
+        let shifted = &complex
+            - DMatrix::identity(2 * n, 2 * n) * (value + nalgebra::Complex::new(1e-7, 1e-7) * value.im);
         let lu = shifted.lu();
-        let mut x = DVector::from_fn(2 * n, |i, _| nalgebra::Complex::new((1.0 + i as f64).sin(), (2.0 + i as f64).cos()));
+        let mut x = DVector::from_fn(2 * n, |i, _| {
+            nalgebra::Complex::new((1.0 + i as f64).sin(), (2.0 + i as f64).cos())
+        });
         for _ in 0..4 {
             x = lu.solve(&x).expect("regular");
             x /= nalgebra::Complex::new(x.norm(), 0.0);
         }
         let moved = shapes.map(|value| nalgebra::Complex::new(value, 0.0)) * x.rows(0, n);
-        let forwards: f64 = (0..lateral / 4).map(|node| (moved[4 * node].conj() * moved[4 * node + 1]).im).sum();
+        let forwards: f64 =
+            (0..lateral / 4).map(|node| (moved[4 * node].conj() * moved[4 * node + 1]).im).sum();
         let shift = if forwards < 0.0 { -spin } else { spin };
         seen.push((value.im + shift).abs());
     }
@@ -348,7 +383,8 @@ fn discs_whirl_as_classical_rotors_do() {
         a.view_mut((0, nf), (nf, nf)).copy_from(&DMatrix::identity(nf, nf));
         a.view_mut((nf, 0), (nf, nf)).copy_from(&-k);
         a.view_mut((nf, nf), (nf, nf)).copy_from(&-g);
-        let mut found: Vec<f64> = a.complex_eigenvalues().iter().map(|value| value.im).filter(|w| *w > 0.0).collect();
+        let mut found: Vec<f64> =
+            a.complex_eigenvalues().iter().map(|value| value.im).filter(|w| *w > 0.0).collect();
         found.sort_by(f64::total_cmp);
         let expected = classical_whirl(&raw, spin);
         let near = |w: f64| found.iter().map(|own| (own - w).abs()).fold(f64::INFINITY, f64::min);
@@ -387,7 +423,10 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
     nodes.positions.push((Vector3::from(nodes.positions[4]) + offset).into());
     let mut dofs = plain.dofs.clone().expect("labels");
     dofs.extend((1..=3).map(|direction| DofLabel { node: 6, direction }));
-    let as_node = RawModel { dofs: Some(dofs), ..RawModel::in_memory("mass on an arm", sparse(&arm), sparse(&m), nodes) };
+    let as_node = RawModel {
+        dofs: Some(dofs),
+        ..RawModel::in_memory("mass on an arm", sparse(&arm), sparse(&m), nodes)
+    };
     let (_, point) = converted(as_node, 8, BodyFrame::Com);
 
     // The load of rest f(w) on the modes, energy f' K^-1 f / 2: it does not depend on signs of modes.
@@ -396,7 +435,8 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
             let (w1, nf) = (body.invariants().w1().expect("held"), body.n_modes());
             let lambda = &body.modes().eigenvalue;
             let load = |j: usize| -> f64 {
-                (0..9).map(|at| axis[at / 3] * w1[(at / 3, (at % 3) * nf + j)] * axis[at % 3]).sum::<f64>() * 0.5
+                (0..9).map(|at| axis[at / 3] * w1[(at / 3, (at % 3) * nf + j)] * axis[at % 3]).sum::<f64>()
+                    * 0.5
             };
             (0..nf).map(|j| load(j).powi(2) / lambda[j]).sum::<f64>()
         };
@@ -421,7 +461,17 @@ fn gravity_is_an_acceleration_of_the_frame() {
         let rotation = body.modes().rotation.as_ref().expect("rotations");
         let turned = |j: usize| largest((0..rotation.nrows()).map(|row| rotation[(row, j)]));
         let q: Vec<f64> = (0..nf).map(|j| 0.03 * (1.0 + j as f64).sin() / turned(j)).collect();
-        let nu: Vec<f64> = (0..6 + nf).map(|k| if k < 3 { rate * extent } else if k < 6 { 0.2 * rate } else { 0.0 }).collect();
+        let nu: Vec<f64> = (0..6 + nf)
+            .map(|k| {
+                if k < 3 {
+                    rate * extent
+                } else if k < 6 {
+                    0.2 * rate
+                } else {
+                    0.0
+                }
+            })
+            .collect();
         evaluation.set(&q, &nu);
         let gravity = Vector3::new(0.3, -0.8, 0.5) * (0.2 * rate * rate * extent);
         let accelerations = |evaluation: &mut Evaluation<'_>, gravity: Vector3<f64>| {
@@ -510,11 +560,14 @@ fn refinement_takes_what_does_not_turn_away() {
         let spin = Vector3::new(0.3, -0.9, 0.4);
         let lambda = &body.modes().eigenvalue;
         // Softening of the first mode by spin, and the response to its load.
-        let softening: f64 = (0..9).map(|at| spin[at / 3] * w2[((at / 3) * nf, (at % 3) * nf)] * spin[at % 3]).sum();
+        let softening: f64 =
+            (0..9).map(|at| spin[at / 3] * w2[((at / 3) * nf, (at % 3) * nf)] * spin[at % 3]).sum();
         let stiffening: f64 = LoadKind::SPIN
             .iter()
             .enumerate()
-            .map(|(component, (k, l))| spin[*k] * spin[*l] * stiffness(&body, LoadKind::Spin, component)[(0, 0)])
+            .map(|(component, (k, l))| {
+                spin[*k] * spin[*l] * stiffness(&body, LoadKind::Spin, component)[(0, 0)]
+            })
             .sum();
         (softening - stiffening) / lambda[0]
     };

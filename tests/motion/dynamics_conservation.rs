@@ -67,7 +67,8 @@ fn nothing(_: &Evaluation<'_>, _: &Matrix3<f64>, _: &DVector<f64>, _: &mut [f64]
 
 #[test]
 fn energy_and_momenta_are_kept_by_every_truncation() {
-    let turning = [block(Kind::Hex8).raw, disc_on_shaft(2.0)].map(|raw| body_of(raw, 6, BodyFrame::Principal));
+    let turning =
+        [block(Kind::Hex8).raw, disc_on_shaft(2.0)].map(|raw| body_of(raw, 6, BodyFrame::Principal));
     let bodies = [soft_block(10), fixture("frame_beams", 6, BodyFrame::Principal)];
     for body in bodies.into_iter().chain(turning) {
         for bits in 0..8 {

@@ -467,6 +467,29 @@ fn the_summary_says_what_is_approximate() {
     }
 }
 
+#[test]
+fn exports_tell_what_they_lose_in_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = crate::support::program::fixtures().join("models/mpc_block/model.toml");
+    done(folder.path(), &format!("convert {} -o b.h5 --modes 4", model.display()));
+    let lost = |scene: &str| {
+        let line = format!("export b.h5 --to exudyn -o b.hdf5 --allow-loss {scene}");
+        done(folder.path(), &line).err
+    };
+    let plain = lost("");
+    assert!(plain.contains("reaches 1 % of the stiffness of a motion at a spin of"), "{plain}");
+    let share = |rate: f64| {
+        let scene = format!("[run]\nduration = 1e-4\n[spin]\nrate = {rate}\n");
+        std::fs::write(folder.path().join("s.toml"), scene).unwrap();
+        let told = lost("--scene s.toml");
+        let (_, rest) = told.split_once("at most ").expect("a share");
+        rest.split_once(" %").expect("a percentage").0.parse::<f64>().unwrap()
+    };
+    // It grows with the square of the spin.
+    let (slow, fast) = (share(2e3), share(4e3));
+    assert!(slow > 0.1 && (fast / slow - 4.0).abs() < 0.2, "{slow} {fast}");
+}
+
 /// Error norms of one scheme of a report.
 fn norms<'a>(json: &'a Value, scheme: &str) -> &'a Value {
     let lumped = json["lumped"].as_array().unwrap();

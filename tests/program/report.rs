@@ -456,7 +456,7 @@ fn identities_and_diagnostics_are_told_as_they_are() {
         eigenvalues: Some(&body.modes().eigenvalue),
         eigenvalue_noise: 0.0,
         eigenvalue_rounding: 0.0,
-            turning: Turning::None,
+        turning: Turning::None,
     };
     let good = identities(&invariants, &expected);
     assert!(identities_text(&good).ends_with(&format!("all {} identities hold\n", good.len())));

@@ -61,7 +61,8 @@ pub fn tube(around: usize, rings: usize, width: f64) -> (RawModel, f64) {
 /// An elbow of two legs that lie along no axis, of `parts` consistent beams each.
 pub fn elbow(parts: usize) -> RawModel {
     let corners = [Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.9, 0.5, 0.1), Vector3::new(1.1, 0.2, 0.9)];
-    let along = |leg: usize, i: usize| corners[leg] + (corners[leg + 1] - corners[leg]) * (i as f64 / parts as f64);
+    let along =
+        |leg: usize, i: usize| corners[leg] + (corners[leg + 1] - corners[leg]) * (i as f64 / parts as f64);
     let positions: Vec<[f64; 3]> =
         (0..=2 * parts).map(|i| if i <= parts { along(0, i) } else { along(1, i - parts) }.into()).collect();
     let beams: Vec<_> = (0..2 * parts).map(|i| (i, i + 1)).collect();

@@ -9,9 +9,7 @@ use flexbody::body::flex_body::{
     InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
     SurfaceMesh, Truncation, UnitLoad,
 };
-use flexbody::body::invariants::{
-    DIGITS, GeneralTerms, Groups, InertiaStiffness, Invariants, PrimaryData,
-};
+use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, InertiaStiffness, Invariants, PrimaryData};
 use flexbody::model::{BodyNumber, Coupling, NodeMoments, Nodes};
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;

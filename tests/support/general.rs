@@ -353,29 +353,37 @@ fn on_directors(
     vectors.sort_unstable_by_key(|(kind, node)| (*kind == RowKind::Internal, *node));
     vectors.dedup();
 
-    let mut all: Vec<Row> =
-        vectors.iter().flat_map(|&(kind, node)| (0..axes).map(move |axis| Row { kind, node, axis })).collect();
+    let mut all: Vec<Row> = vectors
+        .iter()
+        .flat_map(|&(kind, node)| (0..axes).map(move |axis| Row { kind, node, axis }))
+        .collect();
     let directors = nodes.iter().flat_map(|&node| (0..axes).map(move |a| 3 * node + a));
-    all.extend(directors.flat_map(|node| {
-        (0..axes).map(move |axis| Row { kind: RowKind::Director, node, axis })
-    }));
-    all.extend(nodes.iter().flat_map(|&node| (0..3).map(move |axis| Row { kind: RowKind::Rotation, node, axis })));
+    all.extend(
+        directors.flat_map(|node| (0..axes).map(move |axis| Row { kind: RowKind::Director, node, axis })),
+    );
+    all.extend(
+        nodes.iter().flat_map(|&node| (0..3).map(move |axis| Row { kind: RowKind::Rotation, node, axis })),
+    );
     let at: HashMap<Row, usize> = all.iter().enumerate().map(|(i, &row)| (row, i)).collect();
-    let director = |node: usize, a: usize, axis: usize| at[&Row { kind: RowKind::Director, node: 3 * node + a, axis }];
+    let director =
+        |node: usize, a: usize, axis: usize| at[&Row { kind: RowKind::Director, node: 3 * node + a, axis }];
 
     let entry = |a: Row, b: Row| match (place.get(&a), place.get(&b)) {
         (Some(&i), Some(&j)) => mass[(i, j)],
         _ => 0.0,
     };
     let block = |(kind, node): (RowKind, usize), (other, second): (RowKind, usize)| {
-        Matrix3::from_fn(|k, l| entry(Row { kind, node, axis: k }, Row { kind: other, node: second, axis: l }))
+        Matrix3::from_fn(|k, l| {
+            entry(Row { kind, node, axis: k }, Row { kind: other, node: second, axis: l })
+        })
     };
     let mut e = DMatrix::zeros(all.len(), all.len());
     for &(kind, node) in &vectors {
         for &(other, second) in &vectors {
             let own = block((kind, node), (other, second));
             for (k, l) in (0..axes).flat_map(|k| (0..axes).map(move |l| (k, l))) {
-                e[(at[&Row { kind, node, axis: k }], at[&Row { kind: other, node: second, axis: l }])] = own[(k, l)];
+                e[(at[&Row { kind, node, axis: k }], at[&Row { kind: other, node: second, axis: l }])] =
+                    own[(k, l)];
             }
         }
         for &second in &nodes {
@@ -383,7 +391,11 @@ fn on_directors(
             let (moment, symmetric) = match plane {
                 true => (Vector3::new(own[(1, 2)], -own[(0, 2)], 0.0), Matrix3::zeros()),
                 false => (
-                    Vector3::new(own[(1, 2)] - own[(2, 1)], own[(2, 0)] - own[(0, 2)], own[(0, 1)] - own[(1, 0)]) * 0.5,
+                    Vector3::new(
+                        own[(1, 2)] - own[(2, 1)],
+                        own[(2, 0)] - own[(0, 2)],
+                        own[(0, 1)] - own[(1, 0)],
+                    ) * 0.5,
                     (own + own.transpose()) * 0.5,
                 ),
             };
@@ -406,7 +418,9 @@ fn on_directors(
             true => Matrix3::identity() * (0.5 * own[(2, 2)]),
             false => Matrix3::identity() * (0.5 * own.trace()) - own.transpose(),
         };
-        for (a, b, axis) in (0..axes).flat_map(|a| (0..axes).flat_map(move |b| (0..axes).map(move |k| (a, b, k)))) {
+        for (a, b, axis) in
+            (0..axes).flat_map(|a| (0..axes).flat_map(move |b| (0..axes).map(move |k| (a, b, k))))
+        {
             e[(director(node, a, axis), director(second, b, axis))] = p[(a, b)];
         }
     }
@@ -418,7 +432,8 @@ fn on_directors(
             extended[(i, j)] = match row.kind {
                 RowKind::Director => {
                     let angle = |axis| value(Row { kind: RowKind::Rotation, node: row.node / 3, axis });
-                    Vector3::new(angle(0), angle(1), angle(2)).cross(&Vector3::ith(row.node % 3, 1.0))[row.axis]
+                    Vector3::new(angle(0), angle(1), angle(2)).cross(&Vector3::ith(row.node % 3, 1.0))
+                        [row.axis]
                 }
                 _ => value(*row),
             };

@@ -77,7 +77,8 @@ pub fn block(kind: Kind) -> Block {
         directions.map(move |direction| DofLabel { node, direction })
     };
     let last = ids.len() as i64;
-    let dofs: Vec<DofLabel> = ids[..ids.len() - 1].iter().flat_map(|&id| own(id, 1..=3)).chain(own(last, 1..=6)).collect();
+    let dofs: Vec<DofLabel> =
+        ids[..ids.len() - 1].iter().flat_map(|&id| own(id, 1..=3)).chain(own(last, 1..=6)).collect();
     let nodes = Nodes { ids, positions: places };
     let raw = RawModel { dofs: Some(dofs), ..RawModel::in_memory("block with a rigid end", k, m, nodes) };
     // Free nodes first, as the model has them.
@@ -136,11 +137,11 @@ pub fn disc_on_shaft(ratio: f64) -> RawModel {
     }
     let ids: Vec<i64> = (1..=COUNT as i64).collect();
     let positions = (0..COUNT).map(|i| [length * i as f64, 0.0, 0.0]).collect();
-    let dofs = ids.iter().flat_map(|&node| (1..=6).map(move |direction| DofLabel { node, direction })).collect();
+    let dofs =
+        ids.iter().flat_map(|&node| (1..=6).map(move |direction| DofLabel { node, direction })).collect();
     let nodes = Nodes { ids, positions };
     RawModel { dofs: Some(dofs), ..RawModel::in_memory("disc on a shaft", sparse(&k), sparse(&m), nodes) }
 }
-
 
 /// Hangs a mass on a node by a rigid arm: T = m |v + w x r|^2 / 2, M_tr = -m r~, M_rr = -m r~ r~.
 pub fn hang(m: &mut DMatrix<f64>, node: usize, mass: f64, arm: &Vector3<f64>) {

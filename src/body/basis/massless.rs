@@ -33,9 +33,11 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
         return Ok(loads);
     }
     let stiffness = model.stiffness();
-    let factor = SparseLdl::new(&stiffness_of(stiffness, &motions), 0.0).filter(|own| own.null_rows().is_empty());
+    let factor =
+        SparseLdl::new(&stiffness_of(stiffness, &motions), 0.0).filter(|own| own.null_rows().is_empty());
     let Some(factor) = factor else {
-        let message = format!("loads act on {} motions without mass that the stiffness does not hold", motions.len());
+        let message =
+            format!("loads act on {} motions without mass that the stiffness does not hold", motions.len());
         return Err(Diagnostic::new(Code::FactorizationFailed, message).into());
     };
     let mut scratch = vec![0.0; motions.len()];

@@ -3,8 +3,8 @@
 
 use super::columns::columns;
 use super::failure::explain;
-use super::massless::on_mass;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
+use super::massless::on_mass;
 use super::modal_basis::{ModalBasis, problem_of_span};
 use super::pseudo_free_surface::{independent, part_in_words};
 use super::rigid_modes::rigid_modes;
@@ -207,12 +207,7 @@ impl NamedLoads {
     /// # Errors
     /// [`InterfaceNode`](Code::InterfaceNode) without interfaces, [`Usage`](Code::Usage) at accuracy
     /// `certified`: residual vectors have no guaranteed bounds.
-    pub fn new(
-        model: &FeModel,
-        loads: &[Loads],
-        what: &str,
-        settings: &ModeSettings,
-    ) -> Result<Self> {
+    pub fn new(model: &FeModel, loads: &[Loads], what: &str, settings: &ModeSettings) -> Result<Self> {
         if settings.accuracy == Accuracy::Certified {
             let message = format!("{what}s are no eigenvectors and cannot be certified");
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());

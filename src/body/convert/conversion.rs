@@ -189,11 +189,7 @@ impl ModalModel<'_> {
     }
 
     /// Warnings and notes about the finished body.
-    fn remarks(
-        &self,
-        overdamped: Option<Diagnostic>,
-        body: &FlexBody,
-    ) -> Vec<Diagnostic> {
+    fn remarks(&self, overdamped: Option<Diagnostic>, body: &FlexBody) -> Vec<Diagnostic> {
         let softening = softening_warning(self.model, &self.settings.basis, body);
         let poor_fits = self
             .interfaces

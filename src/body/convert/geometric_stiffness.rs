@@ -55,19 +55,14 @@ pub(crate) fn modal_geometric_stiffness(
 
 /// A warning when centrifugal loads are wanted in the basis, so that the body spins, but geometric stiffness
 /// for spin is not given: at what rate the softening begins to count.
-pub(super) fn softening_warning(
-    model: &FeModel,
-    basis: &BasisChoice,
-    body: &FlexBody,
-) -> Option<Diagnostic> {
+pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &FlexBody) -> Option<Diagnostic> {
     let BasisChoice::Free(free) = basis else { return None };
     let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
     if given || !free.residual_vectors.contains(&Loads::Centrifugal) {
         return None;
     }
     let axes = if model.dimension() == 2 { 2..3 } else { 0..3 };
-    let rates: Vec<(f64, usize)> =
-        axes.filter_map(|axis| Some((body.softening_rate(axis)?, axis))).collect();
+    let rates: Vec<(f64, usize)> = axes.filter_map(|axis| Some((body.softening_rate(axis)?, axis))).collect();
     let lowest = rates.iter().map(|(rate, _)| *rate).reduce(f64::min)?;
     // The first of axes that are alike but for rounding.
     let &(rate, axis) = rates.iter().find(|(rate, _)| *rate <= (1.0 + ALIKE) * lowest)?;

@@ -8,7 +8,8 @@ use crate::base::progress::{Event, Watch};
 use crate::body::basis::{BasisChoice, ModalBasis, Task};
 use crate::body::flex_body::Interface;
 use crate::body::invariants::{
-    BodyFrame, Frame, InertiaStiffness, LumpedMasses, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
+    BodyFrame, Frame, InertiaStiffness, LumpedMasses, MassProperties, choose_frame, choose_general_frame,
+    choose_plane_frame,
 };
 use crate::model::{FeModel, GeometricStiffness, Nodes, Reference};
 use crate::numerics::eigen::{Accuracy, Resume};

@@ -47,7 +47,8 @@ impl InertiaRates {
                 self.angular_acceleration.map(|a| format!("an angular acceleration of {a:.3e} 1/{time}^2")),
             ),
         ];
-        let told: Vec<String> = all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, told)| told).collect();
+        let told: Vec<String> =
+            all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, told)| told).collect();
         told.join(", ")
     }
 }

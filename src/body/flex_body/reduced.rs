@@ -65,7 +65,10 @@ impl FlexBody {
                 stiffness: own
                     .stiffness
                     .iter()
-                    .map(|one| GeometricStiffness { load: one.load.clone(), matrix: square(&one.matrix, modes) })
+                    .map(|one| GeometricStiffness {
+                        load: one.load.clone(),
+                        matrix: square(&one.matrix, modes),
+                    })
                     .collect(),
             }),
             lumped: parts.lumped.iter().map(lumped).collect(),

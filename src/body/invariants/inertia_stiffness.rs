@@ -39,22 +39,9 @@ impl InertiaStiffness {
     /// When there are not three rows for each of the moments.
     pub fn new(moments: Vec<NodeMoments>, rotation: MatRef<'_, f64>, dimension: usize) -> Self {
         assert_eq!(rotation.nrows(), 3 * moments.len(), "three rotations for every node");
-        let turning: Vec<usize> = (0..moments.len()).filter(|&node| !is_zero(&moments[node])).collect();
-        let theta = Mat::from_fn(3 * turning.len(), rotation.ncols(), |row, j| {
-            rotation[(3 * turning[row / 3] + row % 3, j)]
-        });
+        let turning = TurningNodes::new(&moments, rotation);
         let of_load = |load: UnitLoad| {
-            let mut turned = zeros(theta.nrows(), theta.ncols());
-            for (at, &node) in turning.iter().enumerate() {
-                let h = moments[node].of(&motion_of(&load));
-                for j in 0..theta.ncols() {
-                    let own = Vector3::from_fn(|k, _| theta[(3 * at + k, j)]);
-                    let product = h * own;
-                    (0..3).for_each(|k| turned[(3 * at + k, j)] = product[k]);
-                }
-            }
-            let k = gram(theta.as_ref(), turned.as_ref());
-            let matrix = Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]));
+            let matrix = turning.sum(|moments| moments.of(&motion_of(&load)));
             GeometricStiffness { load, matrix }
         };
         let stiffness = Self::loads(dimension).map(of_load).collect();
@@ -64,10 +51,12 @@ impl InertiaStiffness {
     /// The loads that there is a stiffness for: acceleration of the origin less gravity, angular acceleration
     /// and products of spin, along the axes of the frame.
     pub fn loads(dimension: usize) -> impl Iterator<Item = UnitLoad> {
-        [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin].into_iter().flat_map(move |kind| {
-            let components = kind.of_dimension(dimension).iter();
-            components.map(move |&component| UnitLoad { kind: kind.clone(), component })
-        })
+        [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin].into_iter().flat_map(
+            move |kind| {
+                let components = kind.of_dimension(dimension).iter();
+                components.map(move |&component| UnitLoad { kind: kind.clone(), component })
+            },
+        )
     }
 
     /// The same about the origin `d` and along the columns of `axes`, both in the present frame.
@@ -101,12 +90,21 @@ impl InertiaStiffness {
     }
 
     /// Largest difference of the stiffnesses from those that the moments and the rotations of the nodes give,
-    /// relative to the largest entry for their kind of load.
+    /// relative to the largest sum of magnitudes for their kind of load: what nodes that turn against each other
+    /// leave of it may be small.
     ///
     /// # Panics
     /// As [`InertiaStiffness::new`].
     pub fn deviation(&self, rotation: MatRef<'_, f64>, dimension: usize) -> f64 {
-        self.with_rotations(rotation, dimension).difference_of_stiffness(self)
+        let own = self.with_rotations(rotation, dimension);
+        let magnitudes = Mat::from_fn(rotation.nrows(), rotation.ncols(), |i, j| rotation[(i, j)].abs());
+        let turning = TurningNodes::new(&self.moments, magnitudes.as_ref());
+        let size = |load: &UnitLoad| turning.sum(|moments| moments.of(&motion_of(load)).abs()).norm_max();
+        let largest = |kind: &LoadKind| {
+            let loads = Self::loads(dimension).filter(|load| load.kind == *kind);
+            loads.map(|load| size(&load)).fold(0.0, f64::max)
+        };
+        self.difference_of_stiffness(&own, &largest)
     }
 
     /// Largest difference of moments and stiffnesses from those of `other`, relative to the largest of their kind;
@@ -124,14 +122,15 @@ impl InertiaStiffness {
         };
         let first = relative(&|own| own.first.iter().copied().collect());
         let second = relative(&|own| own.second.iter().copied().collect());
-        first.max(second).max(self.difference_of_stiffness(other))
-    }
-
-    fn difference_of_stiffness(&self, other: &Self) -> f64 {
         let size = |kind: &LoadKind| {
             let of_kind = self.stiffness.iter().filter(|one| one.load.kind == *kind);
             of_kind.map(|one| one.matrix.norm_max()).fold(0.0, f64::max)
         };
+        first.max(second).max(self.difference_of_stiffness(other, &size))
+    }
+
+    /// Largest difference of the stiffnesses, relative to the `size` of their kind.
+    fn difference_of_stiffness(&self, other: &Self, size: &dyn Fn(&LoadKind) -> f64) -> f64 {
         let differences = self.stiffness.iter().zip(&other.stiffness).map(|(own, other)| {
             if own.matrix.nrows() != other.matrix.nrows() {
                 return f64::INFINITY;
@@ -178,6 +177,38 @@ impl InertiaStiffness {
     }
 }
 
+/// The nodes that have moments, and their rotations in the modes.
+struct TurningNodes<'m> {
+    moments: Vec<&'m NodeMoments>,
+    /// Three rows for each of them.
+    theta: Mat<f64>,
+}
+
+impl<'m> TurningNodes<'m> {
+    fn new(moments: &'m [NodeMoments], rotation: MatRef<'_, f64>) -> Self {
+        let turning: Vec<usize> = (0..moments.len()).filter(|&node| !is_zero(&moments[node])).collect();
+        let theta = Mat::from_fn(3 * turning.len(), rotation.ncols(), |row, j| {
+            rotation[(3 * turning[row / 3] + row % 3, j)]
+        });
+        Self { moments: turning.iter().map(|&node| &moments[node]).collect(), theta }
+    }
+
+    /// The sum over the nodes of theta' H theta, symmetric.
+    fn sum(&self, h: impl Fn(&NodeMoments) -> Matrix3<f64>) -> Mat<f64> {
+        let theta = &self.theta;
+        let mut turned = zeros(theta.nrows(), theta.ncols());
+        for (at, moments) in self.moments.iter().enumerate() {
+            let h = h(moments);
+            for j in 0..theta.ncols() {
+                let product = h * Vector3::from_fn(|k, _| theta[(3 * at + k, j)]);
+                (0..3).for_each(|k| turned[(3 * at + k, j)] = product[k]);
+            }
+        }
+        let k = gram(theta.as_ref(), turned.as_ref());
+        Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+    }
+}
+
 fn is_zero(moments: &NodeMoments) -> bool {
     moments.first == Vector3::zeros() && moments.second == Matrix3::zeros()
 }
@@ -187,7 +218,9 @@ fn motion_of(load: &UnitLoad) -> RigidAcceleration {
     let unit = |axis: usize| Vector3::ith(axis, 1.0);
     let (zero, none) = (Vector3::zeros(), Matrix3::zeros());
     match load.kind {
-        LoadKind::Acceleration => RigidAcceleration { linear: unit(load.component), angular: zero, spin: none },
+        LoadKind::Acceleration => {
+            RigidAcceleration { linear: unit(load.component), angular: zero, spin: none }
+        }
         LoadKind::AngularAcceleration => {
             RigidAcceleration { linear: zero, angular: unit(load.component), spin: none }
         }

@@ -49,7 +49,8 @@ impl Invariants {
         if let Some(general) = &mut self.0.general {
             let nf = w0.ncols() / 3;
             let exists = |k: usize, column: usize| !general.plane || (k < 2 && column >= 2 * nf);
-            general.w0 = Mat::from_fn(3, 3 * nf, |k, column| if exists(k, column) { w0[(k, column)] } else { 0.0 });
+            general.w0 =
+                Mat::from_fn(3, 3 * nf, |k, column| if exists(k, column) { w0[(k, column)] } else { 0.0 });
         }
         self
     }

@@ -89,19 +89,23 @@ pub(crate) const ARRAYS: &[Described] = &[
     array(
         "w2",
         "P nf x nf",
-        "E of the pairs (theory 6.7), less geometric stiffness for spin (7.4); absent without both",
+        "E of the pairs (theory 6.7), less stiffness of inertia (6.2b) and geometric stiffness for spin (7.4); absent without both",
     ),
     array(
         "w3",
         "A nf x nf",
-        "transposed blocks of W3, each with geometric stiffness for angular acceleration (7.4); absent without both",
+        "transposed blocks of W3, each with stiffness of inertia and geometric stiffness for angular acceleration (7.4); absent without both",
     ),
     array(
         "w3_skew",
         "A nf x nf",
         "transposed blocks of W3 less the blocks; absent where that is twice `w3`, which is skew",
     ),
-    array("acceleration", "T nf x nf", "geometric stiffness for acceleration (7.4); absent without"),
+    array(
+        "acceleration",
+        "T nf x nf",
+        "stiffness of inertia and geometric stiffness for acceleration (7.4); absent without",
+    ),
     array("modal_mass", "nf x nf", "m_ff; absent: the identity"),
     array("modal_mass_factor", "nf x nf", "L' of m_ff = L L', zeros below its diagonal; as `modal_mass`"),
     array("stiffness", "nf x 1 or nf x nf", "K_ff: its diagonal, or in full"),

@@ -95,7 +95,9 @@ pub(crate) fn inertia_stiffness(
     }
     if let Some(InertiaInScene { scene, share }) = &options.in_scene {
         let percent = 100.0 * share;
-        return Some(format!("{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"));
+        return Some(format!(
+            "{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"
+        ));
     }
     let rates = body.inertia_rates(PART)?;
     let rates = rates.in_words(body.units(), |kind| lost.iter().any(|load| load.kind == *kind));

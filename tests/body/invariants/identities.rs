@@ -5,8 +5,8 @@ use crate::support::models;
 use crate::support::random::Random;
 use faer::Mat;
 use flexbody::body::invariants::{
-    BodyFrame, Derived, Expected, IdentityCheck, Invariants, LumpedMasses, choose_frame, condense,
-    condense_lumped, derived_identities, Turning, identities,
+    BodyFrame, Derived, Expected, IdentityCheck, Invariants, LumpedMasses, Turning, choose_frame, condense,
+    condense_lumped, derived_identities, identities,
 };
 use nalgebra::Vector3;
 
@@ -21,7 +21,7 @@ fn expected() -> Expected<'static> {
         eigenvalues: Some(&EIGENVALUES),
         eigenvalue_noise: 0.0,
         eigenvalue_rounding: 0.0,
-            turning: Turning::None,
+        turning: Turning::None,
     }
 }
 

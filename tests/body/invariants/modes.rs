@@ -5,7 +5,8 @@ use crate::support::models::{self, Model};
 use faer::Mat;
 use flexbody::base::progress::SILENT;
 use flexbody::body::invariants::{
-    BodyFrame, Expected, Invariants, LumpedMasses, choose_frame, condense, condense_lumped, Turning, identities,
+    BodyFrame, Expected, Invariants, LumpedMasses, Turning, choose_frame, condense, condense_lumped,
+    identities,
 };
 use flexbody::model::rigid_fields;
 use flexbody::numerics::eigen::{EigenProblem, EigenSettings, Resume, Wanted, solve};
