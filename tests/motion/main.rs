@@ -10,6 +10,7 @@ mod dynamics_conservation;
 mod dynamics_forms;
 mod dynamics_geometric;
 mod dynamics_loads;
+mod equilibrium;
 mod general_equations;
 mod histories;
 mod joined;

@@ -6,6 +6,7 @@ mod contradictions;
 mod description;
 mod driving;
 mod effort;
+mod equilibrium;
 mod errors;
 mod extremes;
 mod history;

@@ -1,6 +1,7 @@
 //! A scene made ready to be integrated.
 
 use super::effort::{Effort, longest_step};
+use super::equilibrium::settle;
 use super::extremes::Survey;
 use super::surroundings::SceneForces;
 use super::{Scene, Scheme};
@@ -13,18 +14,12 @@ use crate::motion::dynamics::{
 use crate::numerics::integration::{
     Explicit, Failure, Gauss, Method, Sight, System, Work, integrate_closely,
 };
-use crate::numerics::linalg::larger;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 use std::borrow::Cow;
 
 /// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by
 /// much, or it would not be stable.
 pub(super) const PARTS: usize = 6;
-
-/// Steps towards the static deformation at the start, each of which leaves a part (spin / first frequency)^2
-/// of the way, and what is near enough.
-const MOST_SETTLING: usize = 200;
-const SETTLED: f64 = 1e-13;
 
 /// A body, with the damping of its scene, in this scene; both in one frame and ready to be integrated.
 pub(super) struct Prepared<'a> {
@@ -175,53 +170,17 @@ fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configurat
         (q[start.mode], qd[start.mode]) = (start.amplitude, start.rate);
     }
     let attitude = RotationVector(initial.rotation);
-    let prescribed = forces.prescribed(0.0, &attitude.axes()).0;
+    let axes = attitude.axes();
+    let prescribed = forces.prescribed(0.0, &axes).0;
     Configuration {
         origin: initial.origin,
         attitude: attitude.into(),
-        velocity: prescribed.linear.unwrap_or(initial.velocity),
+        // What is prescribed is along the axes of the frame.
+        velocity: prescribed.linear.map_or(initial.velocity, |linear| axes * linear),
         omega: prescribed.angular.unwrap_or(initial.angular_velocity),
         q,
         qd,
     }
-}
-
-/// Gives `start` the deformation q that stays as it is under what acts at time zero: q'' = 0 with q' = 0, by
-/// q += K_ff^-1 m_ff q''.
-///
-/// # Errors
-/// FB540 where there is none: the spin takes the stiffness of some motion.
-fn settle(
-    body: &FlexBody,
-    scene: &Scene,
-    equations: &EquationsOfMotion,
-    forces: &SceneForces<'_>,
-    start: &mut Configuration,
-) -> Result<()> {
-    let (invariants, n) = (body.invariants(), body.n_modes());
-    let stiffness = invariants.symmetric_stiffness().cholesky();
-    let m = invariants.modal_mass();
-    let mass = DMatrix::from_fn(n, n, |i, j| m[(i, j)]);
-    let none = |why: &str| {
-        let message = format!("`{}` has no static deformation at time zero: {why}", scene.name);
-        Error::from(
-            Diagnostic::new(Code::SimulationStopped, message)
-                .with_help("leave `deformation` of [initial] out"),
-        )
-    };
-    let stiffness = stiffness.ok_or_else(|| none("the stiffness of the modes is not positive definite"))?;
-    for _ in 0..MOST_SETTLING {
-        let (mut motion, state) = Motion::new(equations, forces, start);
-        let rates = motion.accelerations(0.0, &state).map_err(|failure| none(&failure.to_string()))?;
-        let acceleration = DVector::from_column_slice(equations.split(rates).2);
-        let step = stiffness.solve(&(&mass * acceleration));
-        start.q.iter_mut().zip(&step).for_each(|(q, step)| *q += step);
-        let largest = start.q.iter().fold(0.0, |largest: f64, q| larger(largest, q.abs()));
-        if step.iter().all(|step| step.abs() <= SETTLED * largest) {
-            return Ok(());
-        }
-    }
-    Err(none("what acts on the deformed body leads away from it"))
 }
 
 fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {

@@ -131,6 +131,11 @@ impl SceneForces<'_> {
         self.gravity.map_or_else(Vector3::zeros, |gravity| place.axes.tr_mul(&gravity))
     }
 
+    /// Magnitude of the acceleration of gravity.
+    pub fn gravity_size(&self) -> f64 {
+        self.gravity.map_or(0.0, |gravity| gravity.norm())
+    }
+
     /// Force and torque of every load along the axes of the body, with the point where it acts.
     pub fn acting(
         &self,
