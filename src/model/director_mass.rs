@@ -106,6 +106,16 @@ impl DirectorMass {
         &self.nodes
     }
 
+    /// E_s: a number for every pair of points and directors, points first, then the directors of each of the nodes.
+    pub(crate) fn scalar(&self) -> &SymmetricMatrix {
+        &self.scalar
+    }
+
+    /// N and D on extended rows; `None` where E_s is all of M.
+    pub(crate) fn rest(&self) -> Option<&SymmetricMatrix> {
+        self.rest.as_ref()
+    }
+
     /// Number of extended rows.
     pub fn rows(&self) -> usize {
         self.turning_rows() + if self.rest.is_some() { self.turns() * self.nodes.len() } else { 0 }

@@ -17,6 +17,7 @@ mod joined;
 mod motion;
 mod nodal_equations;
 mod nodal_motion;
+mod nodal_turning;
 mod physics;
 mod scene_frames;
 mod simulate;

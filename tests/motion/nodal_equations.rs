@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 /// What rounding may do: conditions at nodes amplify it, and so do null vectors of M.
 const LIMIT: f64 = 1e-11;
 
-/// Solids, plane bodies, general masses, and masses without an inverse.
+/// Solids, plane bodies, general masses without rotational mass, and masses without an inverse.
 fn bodies() -> Vec<(String, Unreduced)> {
     let made = [
         ("hex8", soft_block(Kind::Hex8, [3, 2, 1])),
@@ -33,11 +33,12 @@ fn bodies() -> Vec<(String, Unreduced)> {
         ("plate", soft_plate()),
     ];
     let made = made.into_iter().map(|(name, raw)| (name.to_owned(), Unreduced::new(raw)));
-    made.chain(FIXTURES.map(|name| (name.to_owned(), Unreduced::fixture(name)))).collect()
+    let fixtures = FIXTURES.map(|name| (name.to_owned(), Unreduced::fixture(name)));
+    made.chain(fixtures.into_iter().filter(|(_, body)| body.model.director_mass().is_none())).collect()
 }
 
 /// Shapes without what the conditions forbid: Psi - R (C R)^-1 C Psi.
-fn held_shapes(body: &Unreduced, held: &[DofLabel]) -> Mat<f64> {
+pub(super) fn held_shapes(body: &Unreduced, held: &[DofLabel]) -> Mat<f64> {
     let rigid = dense(&body.model.rigid_fields(body.frame.origin.into(), 1.0));
     let shapes = dense(&body.shapes);
     let rows: Vec<usize> = held
@@ -113,11 +114,6 @@ fn accelerations_are_those_of_the_dense_oracle() {
         let held = holding(&body.model);
         let shapes = held_shapes(&body, &held);
         let conditions = ReferenceConditions::Held(held);
-        if name == "shell_folded" {
-            let error = NodalEquations::new(&body.model, &body.frame, &conditions).expect_err("null vectors");
-            assert!(error.to_string().contains("8 null vectors"), "{error}");
-            continue;
-        }
         assert_oracle(&format!("{name}, held"), &body, &conditions, &shapes, LIMIT);
     }
 }
@@ -310,17 +306,8 @@ fn assert_projection(name: &str, raw: RawModel) {
 
 #[test]
 fn projected_on_modes_they_are_the_reduced_equations() {
-    for name in [
-        "cube_hex8",
-        "bracket_hex20",
-        "connecting_rod",
-        "bar_c3d8r",
-        "frame_beams",
-        "shell_folded",
-        "mpc_block",
-        "hex8_bubbles",
-        "plane_frame",
-    ] {
+    for name in ["cube_hex8", "bracket_hex20", "connecting_rod", "bar_c3d8r", "frame_lumped", "hex8_bubbles"]
+    {
         assert_projection(name, raw_fixture(name));
     }
     assert_projection("plate", soft_plate());
@@ -333,15 +320,9 @@ fn projected_on_modes_they_are_the_reduced_equations() {
 fn real_models_have_the_reduced_equations() {
     let root = std::env::var_os("FLEXBODY_SHARED")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    for name in [
-        "a_beam_c3d20",
-        "e_bracket_near",
-        "f_cube_c3d8",
-        "g_two_1e6",
-        "i_plane_stress",
-        "j_frame_ops_cmass",
-        "k_c3d8r_singularM",
-    ] {
+    for name in
+        ["a_beam_c3d20", "e_bracket_near", "f_cube_c3d8", "g_two_1e6", "i_plane_stress", "k_c3d8r_singularM"]
+    {
         let folder = root.join("models").join(name);
         if !folder.is_dir() {
             continue;
@@ -355,31 +336,40 @@ fn real_models_have_the_reduced_equations() {
     }
 }
 
-/// Accelerations of nodes and of all modes, under the same loads.
-fn assert_same_accelerations(
-    what: &str,
+/// Differences of accelerations, and their sizes: of the origin (in the size of those of the nodes), of the
+/// rotation, and of the nodes.
+struct Apart {
+    errors: [f64; 3],
+    sizes: [f64; 3],
+}
+
+/// Accelerations of nodes and of all modes under the same loads. Deformation, its rates, the square of the spin and
+/// the loads are of the size `amplitude`.
+fn accelerations_apart(
     (model, body): &(FeModel, FlexBody),
-    loads: impl Fn(&Frame, &mut NodalEvaluation<'_>),
-    reduced_loads: impl Fn(&Evaluation<'_>, &mut [f64]),
-) {
+    amplitude: f64,
+    loads: impl Fn(f64, &mut NodalEvaluation<'_>),
+    reduced_loads: impl Fn(f64, &Evaluation<'_>, &mut [f64]),
+) -> Apart {
     let nodal = NodalEquations::new(model, body.frame(), &ReferenceConditions::MeanAxes).expect("equations");
     let lifting = NodalModes::new(&nodal, body).expect("the modes of this model");
     let reduced = EquationsOfMotion::new(body, Terms::ALL);
     let nf = reduced.n_modes();
-    let state = modal_state(9, body);
+    let mut state = modal_state(9, body);
+    state.omega *= amplitude.sqrt();
+    state.q.iter_mut().chain(&mut state.qd).for_each(|q| *q *= amplitude);
     let mut evaluation = NodalEvaluation::new(&nodal);
     evaluation.set(&nodal.state(&lifting.lift(&state)).expect("a state")).expect("a state");
-    loads(body.frame(), &mut evaluation);
+    loads(amplitude, &mut evaluation);
     let mut udd = vec![0.0; nodal.n_rows()];
     let (linear, angular) = evaluation.accelerations(&mut udd).expect("accelerations");
 
     let mut own = Evaluation::new(&reduced);
     own.set(&state.q, &velocities(&reduced, &state));
     let (mut forces, mut expected) = (vec![0.0; reduced.n_velocities()], vec![0.0; reduced.n_velocities()]);
-    reduced_loads(&own, &mut forces);
+    reduced_loads(amplitude, &own, &mut forces);
     own.accelerations(&forces, &mut expected).expect("accelerations");
     let lifted = lifting.lift(&Configuration { q: expected.split_off(reduced.n_rigid()), ..state });
-    assert_eq!(lifted.ud.len(), nodal.n_rows());
     let found: Vec<f64> = match nf + 3 == reduced.n_velocities() {
         true => vec![linear.x, linear.y, angular.z],
         false => linear.iter().chain(&angular).copied().collect(),
@@ -391,14 +381,41 @@ fn assert_same_accelerations(
     };
     let expected_udd = DVector::from_vec(lifted.u);
     let size = weighted(&expected_udd) / body.invariants().mass().sqrt();
-    for (group, scale) in [(0..half, size), (half..found.len(), 0.0)] {
+    let of_frame = |group: std::ops::Range<usize>| {
         let (a, b) =
             (DVector::from_column_slice(&found[group.clone()]), DVector::from_column_slice(&expected[group]));
-        let error = (a - &b).norm() / b.norm().max(scale);
-        assert!(error < 1e-10, "{what}: frame {error:e}");
+        ((a - &b).norm(), b.norm())
+    };
+    let ((origin, origin_size), (turning, turning_size)) = (of_frame(0..half), of_frame(half..found.len()));
+    Apart {
+        errors: [origin, turning, weighted(&(DVector::from_vec(udd) - &expected_udd))],
+        sizes: [origin_size.max(size), turning_size, weighted(&expected_udd)],
     }
-    let error = weighted(&(DVector::from_vec(udd) - &expected_udd)) / weighted(&expected_udd);
-    assert!(error < 1e-10, "{what}: nodes {error:e}");
+}
+
+/// Without rotational mass the equations of all modes are those of the nodes. With it those of modes have the
+/// kinetic energy to second order of the displacements: accelerations of the nodes that are as small as these differ
+/// by their square, those of the frame by the third power.
+fn assert_same_accelerations(
+    what: &str,
+    whole: &(FeModel, FlexBody),
+    loads: impl Fn(f64, &mut NodalEvaluation<'_>),
+    reduced_loads: impl Fn(f64, &Evaluation<'_>, &mut [f64]),
+) {
+    let at = |amplitude: f64| accelerations_apart(whole, amplitude, &loads, &reduced_loads);
+    if whole.0.director_mass().is_none() {
+        let Apart { errors, sizes } = at(1.0);
+        let errors = [0, 1, 2].map(|k| errors[k] / sizes[k]);
+        assert!(errors.iter().all(|error| *error < 1e-10), "{what}: {errors:?}");
+        return;
+    }
+    let [coarse, fine] = [0.04, 0.02].map(at);
+    let relative = [0, 1, 2].map(|k| fine.errors[k] / fine.sizes[k]);
+    let ratios = [0, 1, 2].map(|k| coarse.errors[k] / fine.errors[k]);
+    let falls = |k: usize| (if k == 2 { 3.6..4.4 } else { 7.0..9.0 }).contains(&ratios[k]);
+    assert!((0..3).all(|k| falls(k) || relative[k] < 1e-10), "{what}: {relative:?} fall by {ratios:?}");
+    assert!(relative.iter().all(|error| *error < 0.02), "{what}: {relative:?}");
+    assert!(relative[2] > 1e-7, "{what}: no terms of higher order in {relative:?}");
 }
 
 /// Gravity and forces at nodes, of solids, plane bodies, general masses and bodies with massless rows.
@@ -421,18 +438,18 @@ fn loads_accelerate_the_nodes_as_they_accelerate_all_modes() {
         assert_same_accelerations(
             name,
             &whole,
-            |_, evaluation| {
-                evaluation.add_gravity(&gravity);
-                evaluation.add_force(4, &(gravity * mass));
+            |factor, evaluation| {
+                evaluation.add_gravity(&(gravity * factor));
+                evaluation.add_force(4, &(gravity * (factor * mass)));
                 if node.turns() {
-                    evaluation.add_torque(4, &moment);
+                    evaluation.add_torque(4, &(moment * factor));
                 }
             },
-            |evaluation, forces| {
-                evaluation.add_gravity(&own, forces);
-                node.add_force(evaluation, &(own * mass), forces);
+            |factor, evaluation, forces| {
+                evaluation.add_gravity(&(own * factor), forces);
+                node.add_force(evaluation, &(own * (factor * mass)), forces);
                 if node.turns() {
-                    node.add_torque(evaluation, &axes.tr_mul(&moment), forces);
+                    node.add_torque(evaluation, &(axes.tr_mul(&moment) * factor), forces);
                 }
             },
         );
@@ -447,7 +464,7 @@ fn damping_matrices_act_on_the_nodes() {
         let lambda = converted(raw_fixture(name), 1).1.modes().eigenvalue[0];
         let (alpha, beta) = (0.2 * lambda.sqrt(), 0.01 / lambda.sqrt());
         let rayleigh = RawModel { damping: Some(Damping::Rayleigh { alpha, beta }), ..raw };
-        assert_same_accelerations(name, &converted(rayleigh, 10_000), |_, _| {}, |_, _| {});
+        assert_same_accelerations(name, &converted(rayleigh, 10_000), |_, _| {}, |_, _, _| {});
         // The same on the diagonal of K alone.
         let raw = raw_fixture(name);
         let diagonal: Vec<(u32, u32, f64)> = (0..n as u32)
@@ -458,7 +475,7 @@ fn damping_matrices_act_on_the_nodes() {
             ..raw.stiffness.clone()
         };
         let damped = RawModel { damping: Some(Damping::Matrix(matrix)), ..raw };
-        assert_same_accelerations(name, &converted(damped, 10_000), |_, _| {}, |_, _| {});
+        assert_same_accelerations(name, &converted(damped, 10_000), |_, _| {}, |_, _, _| {});
     }
 }
 
@@ -529,6 +546,10 @@ fn what_has_no_nodal_equations_says_why() {
         refused(&lumped, &ReferenceConditions::Held(rotations.clone())),
         NodalError::HeldWithoutMass(rotations[0])
     );
+
+    let folded = model(raw_fixture("shell_folded"));
+    let error = refused(&folded, &ReferenceConditions::Held(holding(&folded)));
+    assert_eq!(error, NodalError::HeldMassSingular { null_vectors: 8 });
 
     let raw = RawModel { damping: Some(Damping::Ratio(0.02)), ..soft_block(Kind::Hex8, [1, 1, 1]) };
     assert_eq!(refused(&model(raw), &ReferenceConditions::MeanAxes), NodalError::DampingOfModes);

@@ -2,6 +2,7 @@
 //! Every test binary uses its own part of it.
 #![allow(dead_code)]
 
+pub mod attached;
 pub mod beams;
 pub mod cases;
 pub mod cuboid;
@@ -26,5 +27,6 @@ pub mod random;
 pub mod reference;
 pub mod report_bodies;
 pub mod scenes;
+pub mod turned_energy;
 pub mod turning;
 pub mod unreduced;

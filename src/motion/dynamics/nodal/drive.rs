@@ -17,8 +17,8 @@ type Both = SMatrix<f64, 12, 12>;
 pub(super) struct Drive {
     /// Of (V, omega).
     pub given: [bool; 6],
-    /// \[E, -(B'C')'; B'C', 0\], rows of what is given replaced.
-    matrix: LU<f64, Const<12>, Const<12>>,
+    /// \[E, -(B'C')'; B'C', 0\], rows of what is given replaced; of a body whose mass does not turn.
+    matrix: Option<LU<f64, Const<12>, Const<12>>>,
     /// Force and torque that the given motion takes, model axes.
     pub reaction: Vector6<f64>,
 }
@@ -26,7 +26,13 @@ pub(super) struct Drive {
 impl Drive {
     /// With E = C M^-1 C' and B'C' at a deformation.
     pub fn new(answer: &Matrix6<f64>, conditions: &Matrix6<f64>, given: [bool; 6]) -> Self {
-        Self { given, matrix: matrix(answer, conditions, given).lu(), reaction: Vector6::zeros() }
+        let matrix = Some(matrix(answer, conditions, given).lu());
+        Self { given, matrix, reaction: Vector6::zeros() }
+    }
+
+    /// Of a body whose rotations carry mass.
+    pub fn of_turned(given: [bool; 6]) -> Self {
+        Self { given, matrix: None, reaction: Vector6::zeros() }
     }
 
     /// Solves (6.16) for right-hand sides of the conditions and of the momenta or, where it is given, the
@@ -39,7 +45,7 @@ impl Drive {
         let mut right = SVector::<f64, 12>::zeros();
         right.fixed_rows_mut::<6>(0).copy_from(conditions);
         right.fixed_rows_mut::<6>(6).copy_from(frame);
-        let both = self.matrix.solve(&right).ok_or(LOST)?;
+        let both = self.matrix.as_ref().and_then(|matrix| matrix.solve(&right)).ok_or(LOST)?;
         Ok((both.fixed_rows::<6>(0).into_owned(), both.fixed_rows::<6>(6).into_owned()))
     }
 }

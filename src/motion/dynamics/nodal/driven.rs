@@ -4,6 +4,8 @@ use super::NodalEvaluation;
 use super::drive::{Drive, mask};
 use super::equations::NodalEquations;
 use super::evaluation::{halves, joined};
+use super::inversion::Conditions;
+use super::turned_motion::Given;
 use crate::motion::dynamics::Prescribed;
 use crate::numerics::integration::Failure;
 use nalgebra::{Vector3, Vector6};
@@ -46,6 +48,10 @@ impl NodalEvaluation<'_> {
         let momenta = self.go_to(state);
         let at_rest = body.conditions_at(&self.u);
         let given = mask(velocities);
+        if self.turned.is_some() {
+            self.conditions = Conditions::new(&at_rest);
+            return self.set_turned(&Given { components: given, motion: body.given(velocities) }, &momenta);
+        }
         let drive = Drive::new(&body.answer, &at_rest, given);
 
         self.vbar.copy_from_slice(&self.w);
@@ -81,6 +87,11 @@ impl NodalEvaluation<'_> {
         let drive = self.drive.take().filter(|drive| drive.given == mask(rates));
         let mut drive = drive.expect("a state that was set with what is given");
         let body = self.equations;
+        if self.turned.is_some() {
+            self.drive = Some(drive);
+            let given = Given { components: mask(rates), motion: body.given(rates) };
+            return self.turned_accelerations(&given, udd);
+        }
         let wanted = self.find_forces();
         udd.copy_from_slice(&self.w_rate);
         body.solve(udd, &mut self.first);
@@ -113,13 +124,15 @@ impl NodalEvaluation<'_> {
         (to_frame * force, to_frame * torque)
     }
 
-    /// (p', h') less what turning makes of p and h, of the loads alone: what B'w' is of a body that nothing
-    /// drives.
-    pub(super) fn wanted(&self) -> Vector6<f64> {
-        let torque = self.torque
-            - self.omega.cross(&self.h)
-            - self.velocity.cross(&self.p)
-            - self.equations.moment(&self.ud, &self.w);
+    /// (p', h') along the axes of the frame, less what forces that drive it make of them.
+    pub(super) fn momentum_rates(&self) -> Vector6<f64> {
+        let torque = self.torque - self.omega.cross(&self.h) - self.velocity.cross(&self.p);
         joined(&(self.force - self.omega.cross(&self.p)), &torque)
+    }
+
+    /// B'w' of a body that nothing drives: (p', h') less what u' makes of B'w.
+    pub(super) fn wanted(&self) -> Vector6<f64> {
+        let turned = self.equations.moment(&self.ud, &self.w);
+        self.momentum_rates() - joined(&Vector3::zeros(), &turned)
     }
 }

@@ -3,13 +3,15 @@
 use super::damping::{Amplitudes, ModalDamping};
 use super::drive::{Drive, LOST};
 use super::equations::NodalEquations;
+use super::inversion::{Conditions, TurnedMass};
 use super::massless::Room;
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
+use super::turned_motion::Given;
 use crate::model::Damping;
 use crate::motion::dynamics::{EulerParameters, Orientation};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
-use nalgebra::{LU, Matrix3, U6, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after
 /// [`NodalEvaluation::new`].
@@ -36,9 +38,9 @@ pub struct NodalEvaluation<'e> {
     pub(super) ud: Vec<f64>,
     pub(super) vbar: Vec<f64>,
     pub(super) w: Vec<f64>,
-    /// B'C' and its transpose.
-    conditions: LU<f64, U6, U6>,
-    conditions_transposed: LU<f64, U6, U6>,
+    pub(super) conditions: Conditions,
+    /// The mass of turned nodes, where rotations carry mass.
+    pub(super) turned: Option<TurnedMass<'e>>,
     /// Loads: force, torque about the origin, forces of rows; model axes.
     pub(super) force: Vector3<f64>,
     pub(super) torque: Vector3<f64>,
@@ -73,8 +75,8 @@ impl<'e> NodalEvaluation<'e> {
             ud: zeros(),
             vbar: zeros(),
             w: zeros(),
-            conditions: equations.conditions_rigid.lu(),
-            conditions_transposed: equations.conditions_rigid.transpose().lu(),
+            conditions: Conditions::new(&equations.conditions_rigid),
+            turned: TurnedMass::new(equations),
             force: zero,
             torque: zero,
             row_forces: zeros(),
@@ -96,27 +98,37 @@ impl<'e> NodalEvaluation<'e> {
     /// Goes to a state, without loads.
     ///
     /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a
-    /// whole. Then M vbar = w, C B (V, omega) = C vbar and u' = vbar - B (V, omega).
+    /// whole. Then M(u) vbar = w, C B (V, omega) = C vbar and u' = vbar - B (V, omega), where M(u) = M unless
+    /// rotations carry mass.
     ///
     /// # Errors
-    /// [`Failure::Rates`] when the body is deformed so far that C B is singular.
+    /// [`Failure::Rates`] when the body is deformed so far that C B is singular, or nodes are turned so far that
+    /// their mass is not positive definite.
     ///
     /// # Panics
     /// When `state` has not [`NodalEquations::dimension`] entries.
     pub fn set(&mut self, state: &[f64]) -> Result<(), Failure> {
         let body = self.equations;
         let momenta = self.go_to(state);
-        let matrix = body.conditions_at(&self.u);
-        (self.conditions, self.conditions_transposed) = (matrix.lu(), matrix.transpose().lu());
+        self.conditions = Conditions::new(&body.conditions_at(&self.u));
         let missing = momenta - body.onto_frame(&self.u, &self.w);
-        let mu = self.conditions.solve(&missing).ok_or(LOST)?;
+        let mu = self.conditions.plain.solve(&missing).ok_or(LOST)?;
         NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
 
         self.vbar.copy_from_slice(&self.w);
-        body.solve(&mut self.vbar, &mut self.first);
+        match &mut self.turned {
+            None => body.solve(&mut self.vbar, &mut self.first),
+            Some(turned) => {
+                turned.turn(&self.u, &self.conditions);
+                turned.solve(&mut self.vbar)?;
+            }
+        }
         let nu = NodalEquations::sums(&body.conditions, &self.vbar);
-        let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
+        let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
         self.move_frame(&nu);
+        if let Some(turned) = &mut self.turned {
+            turned.kinetics.go(&nu, &self.ud, &mut self.first);
+        }
         Ok(())
     }
 
@@ -195,7 +207,7 @@ impl<'e> NodalEvaluation<'e> {
             return Ok(());
         }
         let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
-        self.multipliers = self.conditions.solve(&missing).ok_or(LOST)?;
+        self.multipliers = self.conditions.plain.solve(&missing).ok_or(LOST)?;
         NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
         Ok(())
     }
@@ -203,7 +215,10 @@ impl<'e> NodalEvaluation<'e> {
     /// w' without C'lambda; what B'w' is of a body that nothing drives.
     pub(super) fn find_forces(&mut self) -> Vector6<f64> {
         self.first.copy_from_slice(&self.row_forces);
-        self.equations.add_turned(-1.0, &self.omega, &self.w, &mut self.first);
+        match &self.turned {
+            None => self.equations.add_turned(-1.0, &self.omega, &self.w, &mut self.first),
+            Some(turned) => turned.kinetics.add_slope(&self.ud, &mut self.first),
+        }
         self.take_internal_forces();
         self.wanted()
     }
@@ -246,13 +261,16 @@ impl<'e> NodalEvaluation<'e> {
     /// When `udd` has not N entries.
     pub fn accelerations(&mut self, udd: &mut [f64]) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
         assert_eq!(udd.len(), self.u.len(), "one entry per row");
+        if self.turned.is_some() {
+            return self.turned_accelerations(&Given::nothing(), udd);
+        }
         self.find_rates()?;
         let body = self.equations;
         udd.copy_from_slice(&self.w_rate);
         body.solve(udd, &mut self.first);
         body.add_turned(-1.0, &self.omega, &self.ud, udd);
         let nu = NodalEquations::sums(&body.conditions, udd);
-        let nu = self.conditions_transposed.solve(&nu).ok_or(LOST)?;
+        let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
         let (linear, angular) = halves(&nu);
         body.add_frame(-1.0, &nu, &self.u, udd);
         body.massless.project(body.stiffness(), udd, &mut self.room);
@@ -261,7 +279,8 @@ impl<'e> NodalEvaluation<'e> {
     }
 
     /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame:
-    /// what it takes to hold C u = 0. Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the
+    /// what it takes to hold C u = 0. Where rotations carry mass, lambda is that of the last accelerations: in
+    /// rates it counts up to what leaves (p, h) = B'w. Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the
     /// moment that linear elastic forces have about the deformed body.
     pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
         let (force, torque) = halves(&(self.equations.conditions_at(&self.u) * self.multipliers));
@@ -284,6 +303,9 @@ impl<'e> NodalEvaluation<'e> {
         let body = self.equations;
         assert!(udd.len() == self.u.len() && forces.len() == self.u.len(), "one entry per row");
         let nu = body.in_model(linear, angular);
+        if self.turned.is_some() {
+            return self.turned_balance(&nu, udd, forces);
+        }
         let change = &mut self.first;
         change.copy_from_slice(udd);
         body.add_frame(1.0, &nu, &self.u, change);
@@ -296,12 +318,17 @@ impl<'e> NodalEvaluation<'e> {
             + self.omega.cross(&self.h)
             + self.velocity.cross(&self.p);
         body.add_turned(1.0, &self.omega, &self.w, forces);
+        self.take_inertia_forces(forces);
+        let to_frame = body.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+
+    /// Adds what K and damping take to the `forces` that inertia takes.
+    pub(super) fn take_inertia_forces(&mut self, forces: &mut [f64]) {
         self.first.copy_from_slice(forces);
         self.first.iter_mut().for_each(|force| *force = -*force);
         self.take_internal_forces();
         forces.iter_mut().zip(&self.w_rate).for_each(|(force, rate)| *force = -rate);
-        let to_frame = body.frame.axes.transpose();
-        (to_frame * force, to_frame * torque)
     }
 }
 

@@ -7,7 +7,8 @@ use crate::motion::dynamics::{LoadAxes, Orientation, RotationVector};
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEvaluation<'_> {
-    /// Adds uniform gravity: the gradient of -g'(m R + A s), s = c + Phi_t'M u.
+    /// Adds uniform gravity: the gradient of -g'(m R + A s) with the first moment s(u), c + Phi_t'M u where no
+    /// rotation carries mass.
     ///
     /// * `gravity`: g, world axes; of a plane body what it has along z is left out. Unit: length/time^2.
     pub fn add_gravity(&mut self, gravity: &Vector3<f64>) {
@@ -16,13 +17,21 @@ impl NodalEvaluation<'_> {
         let mass = &body.rigid_mass;
         // R'M R = [m I, -c~; c~, I0]: of a plane body it has only the last column of c~.
         let mut moment = Vector3::new(mass[(1, 5)], -mass[(0, 5)], mass[(0, 4)]);
-        let displaced = NodalEquations::sums(&body.mass_rigid, &self.u);
+        // Rows whose part in s is linear in u.
+        let linear = body.directors.as_ref().map_or(body.n_rows(), |directors| directors.points);
+        let displaced = NodalEquations::sums(&body.mass_rigid, &self.u[..linear]);
         moment += displaced.fixed_rows::<3>(0);
+        if let Some(turned) = &self.turned {
+            moment += turned.kinetics.first_moment_of_turns();
+        }
         self.force += own * mass[(0, 0)];
         self.torque += moment.cross(&own);
-        let mut linear = Vector6::zeros();
-        linear.fixed_rows_mut::<3>(0).copy_from(&own);
-        NodalEquations::add_motion(&body.mass_rigid, 1.0, &linear, &mut self.row_forces);
+        let mut translation = Vector6::zeros();
+        translation.fixed_rows_mut::<3>(0).copy_from(&own);
+        NodalEquations::add_motion(&body.mass_rigid, 1.0, &translation, &mut self.row_forces[..linear]);
+        if let Some(turned) = &self.turned {
+            turned.kinetics.add_weight_of_turns(&own, &mut self.row_forces);
+        }
     }
 
     /// Adds a force at node `i`.

@@ -1,6 +1,7 @@
 //! What carries no mass follows from the rest: exact condensation (theory 6.13).
 
 use super::NodalError;
+use super::directors::Directors;
 use crate::model::FeModel;
 use crate::numerics::linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -115,6 +116,12 @@ impl Massless {
     /// Whether M has an inverse.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty() && self.vectors.is_empty()
+    }
+
+    /// True if there are null vectors beside the empty rows, or an empty row turns a node with directors: their
+    /// motion may have mass where nodes are turned.
+    pub fn turns(&self, directors: &Directors<'_>) -> bool {
+        self.n_vectors() > 0 || self.rows.iter().any(|&row| directors.has_rotation(row))
     }
 
     /// Number of null vectors beside the empty rows.

@@ -3,11 +3,14 @@
 
 mod conditions;
 mod damping;
+mod directors;
 mod drive;
 mod driven;
 mod equations;
 mod error;
 mod evaluation;
+mod inversion;
+mod kinetics;
 mod loads;
 mod massless;
 mod modes;
@@ -18,6 +21,8 @@ mod reframe;
 mod settled;
 mod state;
 mod stiff;
+mod turned;
+mod turned_motion;
 
 pub use conditions::ReferenceConditions;
 pub use equations::NodalEquations;

@@ -71,8 +71,11 @@ impl NodalEvaluation<'_> {
         (self.axes * self.p, self.axes * self.h)
     }
 
-    /// T = vbar'M vbar / 2.
+    /// T, which is vbar'M vbar / 2 where no rotation carries mass.
     pub fn kinetic_energy(&self) -> f64 {
+        if let Some(turned) = &self.turned {
+            return turned.kinetics.energy();
+        }
         0.5 * self.vbar.iter().zip(&self.w).map(|(v, w)| v * w).sum::<f64>()
     }
 

@@ -2,6 +2,7 @@
 
 use super::NodalError;
 use super::equations::NodalEquations;
+use super::inversion::{Conditions, TurnedMass};
 use crate::motion::dynamics::{EulerParameters, Orientation};
 use crate::numerics::linalg::quadratic_form;
 use nalgebra::Vector3;
@@ -72,10 +73,18 @@ impl NodalEquations<'_> {
         let nu = self.in_model(&attitude.axes().tr_mul(velocity), omega);
         self.add_frame(1.0, &nu, &u, &mut vbar);
         let mut w = vec![0.0; n];
-        self.weigh(&vbar, &mut w);
+        let momenta = match TurnedMass::new(self) {
+            Some(mut turned) => {
+                turned.turn(&u, &Conditions::new(&self.conditions_at(&u)));
+                turned.momenta(&vbar, &mut w).map_err(|_| NodalError::ConditionsDependent)?
+            }
+            None => {
+                self.weigh(&vbar, &mut w);
+                self.onto_frame(&u, &w)
+            }
+        };
 
         let to_world = attitude.axes() * self.frame.axes.transpose();
-        let momenta = self.onto_frame(&u, &w);
         let linear = to_world * momenta.fixed_rows::<3>(0);
         let angular = to_world * momenta.fixed_rows::<3>(3);
         let mut state = Vec::with_capacity(self.dimension());
