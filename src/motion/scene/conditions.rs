@@ -31,11 +31,12 @@ pub(super) struct MeanAxes {
 
 impl MeanAxes {
     /// Of `body`, or `None` where its frame is no mean frame (C1 and C2 do not vanish, as where something
-    /// carries the body) or it does not hold W3.
+    /// carries the body), it does not hold W3, or its mass matrix is general: couples on nodes that turn are no sums
+    /// over the invariants.
     pub fn new(body: &FlexBody) -> Option<Self> {
         let (invariants, nf) = (body.invariants(), body.n_modes());
         let w3 = invariants.w3()?;
-        if !is_uncoupled(body) || !turns_no_mode(body) {
+        if invariants.general().is_some() || !is_uncoupled(body) || !turns_no_mode(body) {
             return None;
         }
         let m = invariants.modal_mass();
