@@ -139,7 +139,7 @@ codes! {
     NodesUnused = "FB406", Note, Done, "nodes without any degree of freedom are left out", "nothing to do if they are reference or deleted nodes";
     MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
     MassDirectional = "FB408", Error, BadInput, "mass is not that of a rigid body: it differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
-    MassBlockStructure = "FB409", Note, Done, "part of the mass matrix does not turn with the nodes", "nothing to do for beams and shells, whose error falls with the square of the element size; of a condensed model (superelement) keep more nodes";
+    MassBlockStructure = "FB409", Note, Done, "part of the mass matrix does not turn with the nodes", "nothing to do for slender beams and thin shells, whose error falls with the square of the element size to that of the rotary inertia of their sections; of a condensed model (superelement) keep more nodes";
     RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "the body is constrained or grounded, rotations are labelled as displacements, or coordinates are in other units or another order than the matrix";
     PencilSingular = "FB411", Error, BadInput, "rows that neither K nor M holds: the eigenproblem is singular", "remove these degrees of freedom from the matrices, or hold them";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";

@@ -53,7 +53,6 @@ pub struct DirectorMass {
     scalar: SymmetricMatrix,
     /// N and D, on extended rows.
     rest: Option<SymmetricMatrix>,
-    rest_share: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -67,38 +66,28 @@ impl DirectorMass {
     /// The mass `m` (rows of the model, symmetric) on points and directors; `None` when no rotation carries
     /// mass.
     pub(super) fn new(m: &SymmetricMatrix, rows: &Rows) -> Option<Self> {
-        let first = rows.displacements();
-        let carries = |at: usize| !m.row(first + at).0.is_empty();
-        let mut nodes: Vec<u32> = Vec::new();
-        for (at, &(node, _)) in rows.rotations().iter().enumerate() {
-            if carries(at) && nodes.last() != Some(&node) {
-                nodes.push(node);
-            }
-        }
-        if nodes.is_empty() {
-            return None;
-        }
-        let d = rows.dimension;
+        let (nodes, place_of) = carriers(m, rows)?;
+        let (d, first) = (rows.dimension, rows.displacements());
         let points = first / d;
-        let mut place_of = vec![NONE; points];
-        nodes.iter().zip(0..).for_each(|(&node, place)| place_of[node as usize] = place);
         let rotations = rows.rotations().iter().zip(first..).filter_map(|(&(node, axis), row)| {
             let place = place_of[node as usize];
             (place != NONE).then_some(Rotation { place: place as usize, axis: axis.into(), row })
         });
         let rotations = rotations.collect();
         let blocks = Blocks { m, rows, nodes: &nodes, place_of: &place_of, points };
-        let (scalar, rest, rest_share) = blocks.split();
-        Some(Self {
-            dimension: d,
-            model_rows: rows.len(),
-            points,
-            rotations,
-            nodes,
-            scalar,
-            rest,
-            rest_share,
-        })
+        let (scalar, rest) = blocks.split();
+        Some(Self { dimension: d, model_rows: rows.len(), points, rotations, nodes, scalar, rest })
+    }
+
+    /// Largest entry of the rest of the mass `m`, as [`DirectorMass::new`] finds it, relative to sqrt(M_ii M_jj): how much
+    /// of M does not turn with the nodes. Zero for lumped masses and rigid regions of solids; of consistent beams and
+    /// shells it stays, and its effect falls with the square of the element size to that of the rotary inertia of their
+    /// sections. `None` when no rotation carries mass.
+    pub(super) fn rest_share(m: &SymmetricMatrix, rows: &Rows) -> Option<f64> {
+        let (nodes, place_of) = carriers(m, rows)?;
+        let points = rows.displacements() / rows.dimension;
+        let share = Blocks { m, rows, nodes: &nodes, place_of: &place_of, points }.share();
+        Some(if share > ROUNDING { share } else { 0.0 })
     }
 
     /// Nodes with directors, ascending.
@@ -124,13 +113,6 @@ impl DirectorMass {
     /// Extended rows that turn with the body, which come first: vectors of points and directors.
     pub fn turning_rows(&self) -> usize {
         self.dimension * self.scalar.n()
-    }
-
-    /// Largest entry of the rest relative to sqrt(M_ii M_jj): how much of M does not turn with the nodes. Zero
-    /// for lumped masses and rigid regions of solids; of consistent beams and shells it stays, and its effect
-    /// falls with the square of the element size.
-    pub fn rest_share(&self) -> f64 {
-        self.rest_share
     }
 
     /// Rotations of a node that there can be.
@@ -307,6 +289,20 @@ impl DirectorMass {
     }
 }
 
+/// Nodes whose rotations carry mass, ascending, and the place of every vertex among them; `None` when there are none.
+fn carriers(m: &SymmetricMatrix, rows: &Rows) -> Option<(Vec<u32>, Vec<u32>)> {
+    let first = rows.displacements();
+    let mut nodes: Vec<u32> = Vec::new();
+    for (at, &(node, _)) in rows.rotations().iter().enumerate() {
+        if !m.row(first + at).0.is_empty() && nodes.last() != Some(&node) {
+            nodes.push(node);
+        }
+    }
+    let mut place_of = vec![NONE; first / rows.dimension];
+    nodes.iter().zip(0..).for_each(|(&node, place)| place_of[node as usize] = place);
+    (!nodes.is_empty()).then_some((nodes, place_of))
+}
+
 /// M by blocks of vertices.
 struct Blocks<'a> {
     m: &'a SymmetricMatrix,
@@ -340,7 +336,10 @@ impl Columns {
     }
 
     fn joined(n: usize, parts: Vec<Self>) -> SymmetricMatrix {
-        let (mut col_ptr, mut row_idx, mut values) = (vec![0], Vec::new(), Vec::new());
+        let entries = parts.iter().map(|part| part.values.len()).sum();
+        let (mut row_idx, mut values) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
+        let mut col_ptr = Vec::with_capacity(n + 1);
+        col_ptr.push(0);
         for part in parts {
             let before = row_idx.len();
             col_ptr.extend(part.ends.iter().map(|end| before + end));
@@ -352,73 +351,76 @@ impl Columns {
     }
 }
 
+/// Columns of a range of vertices.
+#[derive(Default)]
+struct Part {
+    points: Columns,
+    directors: Columns,
+    rest_of_points: Columns,
+    rest_of_rotations: Columns,
+    share: f64,
+}
+
 impl Blocks<'_> {
-    /// E_s, the rest on extended rows, and its largest entry relative to sqrt(M_ii M_jj).
-    fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>, f64) {
+    /// E_s, and the rest on extended rows where it is more than rounding.
+    fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>) {
         let d = self.rows.dimension;
         let sizes = self.sizes();
-        let chunks = |n: usize| (0..n).step_by(CHUNK).map(move |i| i..(i + CHUNK).min(n));
-        // Columns in the order of the extended rows: points, then directors, then rotations.
-        let points: Vec<_> = chunks(self.points).collect();
-        let places: Vec<_> = chunks(self.nodes.len()).collect();
-        let of =
-            |ranges: &[Range<usize>], part: &(dyn Fn(Range<usize>, &mut Columns) + Sync)| -> Vec<Columns> {
-                let columns = |range: &Range<usize>| {
-                    let mut columns = Columns::default();
-                    part(range.clone(), &mut columns);
-                    columns
-                };
-                ranges.par_iter().map(columns).collect()
-            };
-        let mut scalar = of(&points, &|range, columns| {
-            self.each(range, |blocks| self.point_column(blocks, columns));
-        });
-        scalar.extend(of(&places, &|range, columns| {
-            self.each_node(range, |blocks| self.director_columns(blocks, columns));
-        }));
-        let scalar = Columns::joined(self.points + d * self.nodes.len(), scalar);
-
-        let shares: Vec<f64> = points
-            .par_iter()
-            .map(|range| {
-                let mut largest = 0.0f64;
-                for p in range.clone() {
-                    for (q, block) in self.neighbours(p) {
-                        largest = largest.max(self.rest_of(p, q, &block, &sizes).1);
-                    }
-                }
-                largest
-            })
-            .collect();
-        let share = shares.into_iter().fold(0.0, f64::max);
-        if share <= ROUNDING {
-            return (scalar, None, 0.0);
+        let parts: Vec<Part> =
+            self.chunks().into_par_iter().map(|vertices| self.part(vertices, &sizes)).collect();
+        let (mut points, mut directors, mut share) = (Vec::new(), Vec::new(), 0.0f64);
+        let (mut rest_of_points, mut rest_of_rotations) = (Vec::new(), Vec::new());
+        for part in parts {
+            points.push(part.points);
+            directors.push(part.directors);
+            rest_of_points.push(part.rest_of_points);
+            rest_of_rotations.push(part.rest_of_rotations);
+            share = share.max(part.share);
         }
+        // Columns in the order of the extended rows: points, then directors, then rotations.
+        points.append(&mut directors);
+        let scalar = Columns::joined(self.points + d * self.nodes.len(), points);
+        if share <= ROUNDING {
+            return (scalar, None);
+        }
+        let empty = d * d * self.nodes.len();
+        rest_of_points.push(Columns { ends: vec![0; empty], ..Columns::default() });
+        rest_of_points.append(&mut rest_of_rotations);
         let turns = if d == 2 { 1 } else { 3 };
-        let directors = d * d * self.nodes.len();
-        let mut rest = of(&points, &|range, columns| {
-            for p in range {
-                self.rest_of_point(p, &sizes, columns);
-            }
-        });
-        let start = rest.len();
-        rest.push(Columns { ends: vec![0; directors], ..Columns::default() });
-        debug_assert_eq!(rest.len(), start + 1);
-        rest.extend(of(&places, &|range, columns| {
-            for place in range {
-                self.rest_of_rotations(place, &sizes, columns);
-            }
-        }));
-        let n = d * self.points + directors + turns * self.nodes.len();
-        (scalar, Some(Columns::joined(n, rest)), share)
+        let n = d * self.points + empty + turns * self.nodes.len();
+        (scalar, Some(Columns::joined(n, rest_of_points)))
     }
 
-    fn each(&self, points: Range<usize>, mut column: impl FnMut(&[(usize, Block)])) {
-        points.for_each(|p| column(&self.neighbours(p)));
+    /// Vertices of every parallel task.
+    fn chunks(&self) -> Vec<Range<usize>> {
+        (0..self.points).step_by(CHUNK).map(|i| i..(i + CHUNK).min(self.points)).collect()
     }
 
-    fn each_node(&self, places: Range<usize>, mut columns: impl FnMut(&[(usize, Block)])) {
-        places.for_each(|place| columns(&self.neighbours(self.nodes[place] as usize)));
+    /// Largest entry of the rest relative to sqrt(M_ii M_jj); 0 where it is rounding.
+    fn share(&self) -> f64 {
+        let sizes = self.sizes();
+        let of_vertex = |p: usize| {
+            let blocks = self.neighbours(p);
+            blocks.iter().map(|(q, block)| self.rest_of(p, *q, block, &sizes).1).fold(0.0, f64::max)
+        };
+        let of_chunk = |vertices: Range<usize>| vertices.map(of_vertex).fold(0.0, f64::max);
+        let shares: Vec<f64> = self.chunks().into_par_iter().map(of_chunk).collect();
+        shares.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The columns of these vertices.
+    fn part(&self, vertices: Range<usize>, sizes: &[[f64; 2]]) -> Part {
+        let mut part = Part::default();
+        for p in vertices {
+            let blocks = self.neighbours(p);
+            self.point_column(&blocks, &mut part.points);
+            part.share = part.share.max(self.rest_of_point(p, &blocks, sizes, &mut part.rest_of_points));
+            if self.place(p).is_some() {
+                self.director_columns(&blocks, &mut part.directors);
+                self.rest_of_rotations(p, &blocks, sizes, &mut part.rest_of_rotations);
+            }
+        }
+        part
     }
 
     /// Blocks M_pq of the vertex p with every vertex q that shares mass with it, ascending.
@@ -566,10 +568,22 @@ impl Blocks<'_> {
         d * self.points + d * d * self.nodes.len() + 3 * place as usize
     }
 
-    fn rest_of_point(&self, p: usize, sizes: &[[f64; 2]], columns: &mut Columns) {
+    /// The columns of the displacements of p. Returns their largest entry relative to sqrt(M_ii M_jj).
+    fn rest_of_point(
+        &self,
+        p: usize,
+        blocks: &[(usize, Block)],
+        sizes: &[[f64; 2]],
+        columns: &mut Columns,
+    ) -> f64 {
         let d = self.rows.dimension;
-        let rests: Vec<(usize, Block)> =
-            self.neighbours(p).iter().map(|(q, block)| (*q, self.rest_of(p, *q, block, sizes).0)).collect();
+        let mut largest = 0.0f64;
+        let rest_of = |(q, block): &(usize, Block)| {
+            let (rest, share) = self.rest_of(p, *q, block, sizes);
+            largest = largest.max(share);
+            (*q, rest)
+        };
+        let rests: Vec<(usize, Block)> = blocks.iter().map(rest_of).collect();
         for k in 0..d {
             for (q, rest) in &rests {
                 (0..d).for_each(|l| columns.push(d * q + l, rest[k][l]));
@@ -580,24 +594,27 @@ impl Blocks<'_> {
             }
             columns.end();
         }
+        largest
     }
 
-    /// The columns of the rotations of a node: N alone.
-    fn rest_of_rotations(&self, place: usize, sizes: &[[f64; 2]], columns: &mut Columns) {
+    /// The columns of the rotations of the node p: N alone.
+    fn rest_of_rotations(
+        &self,
+        p: usize,
+        blocks: &[(usize, Block)],
+        sizes: &[[f64; 2]],
+        columns: &mut Columns,
+    ) {
         if self.rows.dimension == 2 {
             return columns.end();
         }
-        let p = self.nodes[place] as usize;
         let transposed = |block: &Block| {
             let mut turned = [[0.0; 6]; 6];
             (0..6).for_each(|k| (0..6).for_each(|l| turned[l][k] = block[k][l]));
             turned
         };
-        let rests: Vec<(usize, Block)> = self
-            .neighbours(p)
-            .iter()
-            .map(|(q, block)| (*q, self.rest_of(*q, p, &transposed(block), sizes).0))
-            .collect();
+        let rest_of = |(q, block): &(usize, Block)| (*q, self.rest_of(*q, p, &transposed(block), sizes).0);
+        let rests: Vec<(usize, Block)> = blocks.iter().map(rest_of).collect();
         for b in 0..3 {
             for (q, rest) in &rests {
                 (0..3).for_each(|k| columns.push(3 * q + k, rest[k][3 + b]));

@@ -246,10 +246,10 @@ impl FeModel {
 
     /// Keeps the part of M that does not turn, unless it is at most `rounding`.
     pub(super) fn find_fixed_mass(&mut self, rounding: f64) {
-        let share = match (self.scalar_mass(), self.director_mass()) {
-            (Some(_), _) => 0.0,
-            (None, Some(mass)) => mass.rest_share(),
+        let share = match (self.scalar_mass(), &self.whole_mass) {
+            (None, Some(mass)) => DirectorMass::rest_share(mass, &self.rows).unwrap_or(self.mass_deviation),
             (None, None) => self.mass_deviation,
+            (Some(_), _) => 0.0,
         };
         self.fixed_mass_share = if share > rounding { share } else { 0.0 };
     }

@@ -148,7 +148,7 @@ impl ModalModel<'_> {
         let share = self.model.fixed_mass_share();
         (share > 0.0).then(|| {
             format!(
-                "exact: m, c, I0, C1, C2, m_ff; W1, W2 and W3 keep a part of the mass matrix, entries of up to {share:.1e} of its diagonal, along the axes of the body while the nodes turn: of beams and shells an error that falls with the square of the element size"
+                "exact: m, c, I0, C1, C2, m_ff; W1, W2 and W3 keep a part of the mass matrix, entries of up to {share:.1e} of its diagonal, along the axes of the body while the nodes turn: of beams and shells an error that falls with the square of the element size to that of the rotary inertia of their sections"
             )
         })
     }

@@ -9,6 +9,12 @@ use crate::motion::dynamics::{Configuration, EquationsOfMotion, Motion};
 use faer::Mat;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// A value, or the reason why there is no equilibrium.
+type Outcome<T> = std::result::Result<T, String>;
+
+/// A deformation and its residual.
+type Trial = (DVector<f64>, DVector<f64>);
+
 /// Newton steps; each squares the error, so that more than these go nowhere.
 const MAX_STEPS: usize = 40;
 
@@ -104,7 +110,7 @@ impl<'a> Balance<'a> {
     }
 
     /// r(q) = m_ff q''.
-    fn residual(&mut self, q: &DVector<f64>) -> std::result::Result<DVector<f64>, String> {
+    fn residual(&mut self, q: &DVector<f64>) -> Outcome<DVector<f64>> {
         self.start.q.copy_from_slice(q.as_slice());
         let (mut motion, state) = Motion::new(self.equations, self.forces, &self.start);
         let rates = motion.accelerations(0.0, &state).map_err(|failure| failure.to_string())?;
@@ -124,7 +130,7 @@ impl<'a> Balance<'a> {
     }
 
     /// dr/dq by central differences.
-    fn derivative(&mut self, q: &DVector<f64>, size: f64) -> std::result::Result<DMatrix<f64>, String> {
+    fn derivative(&mut self, q: &DVector<f64>, size: f64) -> Outcome<DMatrix<f64>> {
         let n = q.len();
         let mut derivative = DMatrix::zeros(n, n);
         for j in 0..n {
@@ -140,7 +146,7 @@ impl<'a> Balance<'a> {
         Ok(derivative)
     }
 
-    fn solve(&mut self) -> std::result::Result<(), String> {
+    fn solve(&mut self) -> Outcome<()> {
         let mut q = DVector::from_column_slice(&self.start.q);
         let mut residual = self.residual(&q)?;
         for _ in 0..MAX_STEPS {
@@ -162,12 +168,7 @@ impl<'a> Balance<'a> {
     }
 
     /// The first of q + step, q + step / 2, ... whose residual is smaller than `left`.
-    fn shortened(
-        &mut self,
-        q: &DVector<f64>,
-        step: &DVector<f64>,
-        left: f64,
-    ) -> std::result::Result<Option<(DVector<f64>, DVector<f64>)>, String> {
+    fn shortened(&mut self, q: &DVector<f64>, step: &DVector<f64>, left: f64) -> Outcome<Option<Trial>> {
         for halvings in 0..MAX_HALVINGS {
             let moved = q + step * 0.5f64.powi(halvings as i32);
             // A state that has no motion lies too far.
@@ -180,7 +181,7 @@ impl<'a> Balance<'a> {
     }
 
     /// Keeps the equilibrium q if the body does not leave it by itself: all motions q'' = m_ff^-1 (dr/dq) q vibrate.
-    fn accept(&mut self, q: &DVector<f64>, scale: f64) -> std::result::Result<(), String> {
+    fn accept(&mut self, q: &DVector<f64>, scale: f64) -> Outcome<()> {
         let size = if scale > 0.0 { scale } else { 1.0 };
         let derivative = self.derivative(q, size)?;
         self.start.q.copy_from_slice(q.as_slice());

@@ -1,5 +1,6 @@
 //! What ties the frame to the body.
 
+use super::motions::Motions;
 use super::{NodalError, NodalPoint};
 use crate::model::{DofLabel, FeModel};
 
@@ -16,9 +17,6 @@ pub enum ReferenceConditions {
     /// This point rests, displacement and rotation: the frame is fixed to it.
     AtRest(NodalPoint),
 }
-
-/// Numbers of each row for the six rigid motions; zero for those that a plane body does not have.
-pub(super) type Motions = Vec<[f64; 6]>;
 
 impl ReferenceConditions {
     /// C', given M R; none of the held rows is without mass.

@@ -1,7 +1,6 @@
 //! Constants of the kinetic energy of nodes with rotational mass (theory section 6).
 
-use super::conditions::Motions;
-use super::equations::NodalEquations;
+use super::motions::{Motions, add_motion};
 use crate::model::{DirectorMass, FeModel};
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -119,7 +118,7 @@ impl Rest {
             motion.fixed_rows_mut::<3>(0).copy_from(&centre.cross(&unit));
             motion[3 + axis] = 1.0;
             let mut field = vec![0.0; directors.mass.rows()];
-            NodalEquations::add_motion(&rigid[..directors.points], 1.0, &motion, &mut field);
+            add_motion(&rigid[..directors.points], 1.0, &motion, &mut field);
             for place in 0..directors.rotations.len() {
                 let (first, axes) = directors.rest_rotations(place);
                 field[first + axis - axes.start] = 1.0;

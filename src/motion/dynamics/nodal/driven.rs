@@ -3,9 +3,9 @@
 use super::NodalEvaluation;
 use super::drive::{Drive, mask};
 use super::equations::NodalEquations;
-use super::evaluation::{halves, joined};
 use super::inversion::Conditions;
-use super::turned_motion::Given;
+use super::inversion::Given;
+use super::motions::{add_motion, halves, joined, sums};
 use crate::motion::dynamics::Prescribed;
 use crate::numerics::integration::Failure;
 use nalgebra::{Vector3, Vector6};
@@ -19,8 +19,8 @@ impl NodalEquations<'_> {
 
     /// Takes from w what of C'mu makes R'w vanish: of w only what is beside C' counts where motion is given.
     pub(super) fn take_conditions(&self, w: &mut [f64]) {
-        let part = self.rigid_part.tr_mul(&Self::sums(&self.rigid, w));
-        Self::add_motion(&self.conditions, -1.0, &part, w);
+        let part = self.rigid_part.tr_mul(&sums(&self.rigid, w));
+        add_motion(&self.conditions, -1.0, &part, w);
     }
 }
 
@@ -59,10 +59,10 @@ impl NodalEvaluation<'_> {
         let missing = momenta - body.onto_frame(&self.u, &self.w);
         let own = body.given(velocities);
         let frame = Vector6::from_fn(|k, _| if given[k] { own[k] } else { missing[k] });
-        let conditions = -NodalEquations::sums(&body.conditions, &self.vbar);
+        let conditions = -sums(&body.conditions, &self.vbar);
         let (mu, nu) = drive.solve(&conditions, &frame)?;
-        NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
-        NodalEquations::add_motion(&body.answered, 1.0, &mu, &mut self.vbar);
+        add_motion(&body.conditions, 1.0, &mu, &mut self.w);
+        add_motion(&body.answered, 1.0, &mu, &mut self.vbar);
         (self.p, self.h) = halves(&body.onto_frame(&self.u, &self.w));
         self.move_frame(&nu);
         self.drive = Some(drive);
@@ -100,11 +100,11 @@ impl NodalEvaluation<'_> {
         let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
         let own = body.given(rates);
         let frame = Vector6::from_fn(|k, _| if drive.given[k] { own[k] } else { missing[k] });
-        let conditions = -NodalEquations::sums(&body.conditions, udd);
+        let conditions = -sums(&body.conditions, udd);
         let (lambda, nu) = drive.solve(&conditions, &frame)?;
         self.multipliers = lambda;
-        NodalEquations::add_motion(&body.conditions, 1.0, &lambda, &mut self.w_rate);
-        NodalEquations::add_motion(&body.answered, 1.0, &lambda, udd);
+        add_motion(&body.conditions, 1.0, &lambda, &mut self.w_rate);
+        add_motion(&body.answered, 1.0, &lambda, udd);
         body.add_frame(-1.0, &nu, &self.u, udd);
         body.massless.project(body.stiffness(), udd, &mut self.room);
         let taken = body.onto_frame(&self.u, &self.w_rate) - wanted;

@@ -1,10 +1,11 @@
 //! The constants of the nodal equations.
 
 use super::NodalError;
-use super::conditions::{Motions, ReferenceConditions};
+use super::conditions::ReferenceConditions;
 use super::damping::ModalDamping;
 use super::directors::Directors;
 use super::massless::{Massless, NULL_PIVOT};
+use super::motions::{Motions, add_motion, sums};
 use crate::body::flex_body::{FlexBody, Frame};
 use crate::model::{Damping, FeModel, centre_and_length};
 use crate::numerics::linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
@@ -278,44 +279,27 @@ impl<'m> NodalEquations<'m> {
 
     /// x += factor B_r nu at the displacements u.
     pub(super) fn add_frame(&self, factor: f64, nu: &Vector6<f64>, u: &[f64], x: &mut [f64]) {
-        Self::add_motion(&self.rigid, factor, nu, x);
+        add_motion(&self.rigid, factor, nu, x);
         self.add_turned(factor, &nu.fixed_rows::<3>(3).into_owned(), u, x);
     }
 
     /// B_r'x at the displacements u.
     pub(super) fn onto_frame(&self, u: &[f64], x: &[f64]) -> Vector6<f64> {
-        let mut both = Self::sums(&self.rigid, x);
+        let mut both = sums(&self.rigid, x);
         let mut angular = both.fixed_rows_mut::<3>(3);
         angular += self.moment(u, x);
         both
     }
 
-    /// The sums over all rows of `motions` times x.
-    pub(super) fn sums(motions: &Motions, x: &[f64]) -> Vector6<f64> {
-        let mut sum = [0.0; 6];
-        for (motion, x) in motions.iter().zip(x) {
-            sum.iter_mut().zip(motion).for_each(|(sum, motion)| *sum += motion * x);
-        }
-        sum.into()
-    }
-
-    /// x += factor (motions) nu.
-    pub(super) fn add_motion(motions: &[[f64; 6]], factor: f64, nu: &Vector6<f64>, x: &mut [f64]) {
-        let nu: [f64; 6] = (nu * factor).into();
-        for (x, motion) in x.iter_mut().zip(motions) {
-            *x += motion.iter().zip(&nu).map(|(motion, nu)| motion * nu).sum::<f64>();
-        }
-    }
-
     /// (C R)^-1 C u: the rigid motion in displacements.
     pub(super) fn rigid_motion(&self, u: &[f64]) -> Vector6<f64> {
-        self.rigid_part * Self::sums(&self.conditions, u)
+        self.rigid_part * sums(&self.conditions, u)
     }
 
     /// Takes it out, u - R (C R)^-1 C u, and returns it.
     pub(super) fn take_rigid(&self, u: &mut [f64]) -> Vector6<f64> {
         let part = self.rigid_motion(u);
-        Self::add_motion(&self.rigid, -1.0, &part, u);
+        add_motion(&self.rigid, -1.0, &part, u);
         part
     }
 

@@ -3,10 +3,11 @@
 use super::damping::{Amplitudes, ModalDamping};
 use super::drive::{Drive, LOST};
 use super::equations::NodalEquations;
+use super::inversion::Given;
 use super::inversion::{Conditions, TurnedMass};
 use super::massless::Room;
+use super::motions::{add_motion, halves, joined, sums};
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
-use super::turned_motion::Given;
 use crate::model::Damping;
 use crate::motion::dynamics::{EulerParameters, Orientation};
 use crate::numerics::integration::Failure;
@@ -113,7 +114,7 @@ impl<'e> NodalEvaluation<'e> {
         self.conditions = Conditions::new(&body.conditions_at(&self.u));
         let missing = momenta - body.onto_frame(&self.u, &self.w);
         let mu = self.conditions.plain.solve(&missing).ok_or(LOST)?;
-        NodalEquations::add_motion(&body.conditions, 1.0, &mu, &mut self.w);
+        add_motion(&body.conditions, 1.0, &mu, &mut self.w);
 
         self.vbar.copy_from_slice(&self.w);
         match &mut self.turned {
@@ -123,7 +124,7 @@ impl<'e> NodalEvaluation<'e> {
                 turned.solve(&mut self.vbar)?;
             }
         }
-        let nu = NodalEquations::sums(&body.conditions, &self.vbar);
+        let nu = sums(&body.conditions, &self.vbar);
         let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
         self.move_frame(&nu);
         if let Some(turned) = &mut self.turned {
@@ -208,7 +209,7 @@ impl<'e> NodalEvaluation<'e> {
         }
         let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
         self.multipliers = self.conditions.plain.solve(&missing).ok_or(LOST)?;
-        NodalEquations::add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
+        add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
         Ok(())
     }
 
@@ -269,7 +270,7 @@ impl<'e> NodalEvaluation<'e> {
         udd.copy_from_slice(&self.w_rate);
         body.solve(udd, &mut self.first);
         body.add_turned(-1.0, &self.omega, &self.ud, udd);
-        let nu = NodalEquations::sums(&body.conditions, udd);
+        let nu = sums(&body.conditions, udd);
         let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
         let (linear, angular) = halves(&nu);
         body.add_frame(-1.0, &nu, &self.u, udd);
@@ -330,16 +331,6 @@ impl<'e> NodalEvaluation<'e> {
         self.take_internal_forces();
         forces.iter_mut().zip(&self.w_rate).for_each(|(force, rate)| *force = -rate);
     }
-}
-
-/// A linear and an angular part as one vector.
-pub(super) fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::from_iterator(linear.iter().chain(angular).copied())
-}
-
-/// The linear and the angular part.
-pub(super) fn halves(both: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    (both.fixed_rows::<3>(0).into_owned(), both.fixed_rows::<3>(3).into_owned())
 }
 
 /// y += factor x.

@@ -4,6 +4,7 @@ use super::drive::LOST;
 use super::equations::NodalEquations;
 use super::kinetics::Kinetics;
 use super::massless::Room;
+use super::motions::{add_motion, sums};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{LU, Matrix6, U6, Vector6};
@@ -62,9 +63,45 @@ pub(super) struct TurnedMass<'e> {
     room: Room,
 }
 
+/// Components of (V, omega), or of their rates, that are given.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given {
+    pub components: [bool; 6],
+    /// Model axes; zero in the components that are free.
+    pub motion: Vector6<f64>,
+}
+
+impl Given {
+    /// No component.
+    pub fn nothing() -> Self {
+        Self { components: [false; 6], motion: Vector6::zeros() }
+    }
+
+    /// `free` in the components that are free, `own` in the given ones.
+    pub fn or_own(&self, free: &Vector6<f64>, own: &Vector6<f64>) -> Vector6<f64> {
+        Vector6::from_fn(|k, _| if self.components[k] { own[k] } else { free[k] })
+    }
+
+    /// x <- v with the given motion, and M(u) v = x + C'(B'C')^-1 (rest of the momenta) in what is free.
+    pub fn solve(
+        &self,
+        turned: &mut TurnedMass<'_>,
+        momenta: &Vector6<f64>,
+        own: &Vector6<f64>,
+        x: &mut [f64],
+    ) -> Result<Vector6<f64>, Failure> {
+        turned.complete(&self.or_own(momenta, own), x)?;
+        match self.components.contains(&true) {
+            true => turned.solve_given(x, self.components, &self.motion)?,
+            false => turned.solve(x)?,
+        }
+        turned.frame_of(x)
+    }
+}
+
 /// Components of the motion of the frame that are given, and the rest of what constrains it.
 #[derive(Debug, Clone)]
-struct Given {
+struct Constraint {
     components: [bool; 6],
     /// (B'C')^-1 and the inverse of N'M^-1 N for the columns N of C'(B'C')^-1 that belong to given components.
     multipliers: Matrix6<f64>,
@@ -103,13 +140,13 @@ impl<'e> TurnedMass<'e> {
     pub fn complete(&self, momenta: &Vector6<f64>, w: &mut [f64]) -> Result<(), Failure> {
         let missing = momenta - self.body.onto_frame(&self.u, w);
         let mu = self.conditions.plain.solve(&missing).ok_or(LOST)?;
-        NodalEquations::add_motion(&self.body.conditions, 1.0, &mu, w);
+        add_motion(&self.body.conditions, 1.0, &mu, w);
         Ok(())
     }
 
     /// nu = (C B)^-1 C v.
     pub fn frame_of(&self, v: &[f64]) -> Result<Vector6<f64>, Failure> {
-        let nu = NodalEquations::sums(&self.body.conditions, v);
+        let nu = sums(&self.body.conditions, v);
         self.conditions.transposed.solve(&nu).ok_or(LOST)
     }
 
@@ -173,7 +210,7 @@ impl<'e> TurnedMass<'e> {
         self.iterate(x, energy, Some(&given))
     }
 
-    fn given(&self, components: [bool; 6]) -> Result<Given, Failure> {
+    fn given(&self, components: [bool; 6]) -> Result<Constraint, Failure> {
         let multipliers = self.conditions.plain.solve(&Matrix6::identity()).ok_or(LOST)?;
         let mut answer = multipliers.transpose() * self.body.answer * multipliers;
         for (k, _) in components.iter().enumerate().filter(|(_, given)| !**given) {
@@ -181,12 +218,12 @@ impl<'e> TurnedMass<'e> {
             answer.column_mut(k).fill(0.0);
             answer[(k, k)] = 1.0;
         }
-        Ok(Given { components, multipliers, answer: answer.try_inverse().ok_or(LOST)? })
+        Ok(Constraint { components, multipliers, answer: answer.try_inverse().ok_or(LOST)? })
     }
 
     /// Conjugate gradients from x, whose residual is set, to rounding of the larger of `energy` and that of the
     /// correction.
-    fn iterate(&mut self, x: &mut [f64], energy: f64, given: Option<&Given>) -> Result<(), Failure> {
+    fn iterate(&mut self, x: &mut [f64], energy: f64, given: Option<&Constraint>) -> Result<(), Failure> {
         self.precondition(given)?;
         let mut square = dot(&self.residual, &self.preconditioned);
         let enough = SOLVED * SOLVED * square.max(energy);
@@ -223,7 +260,7 @@ impl<'e> TurnedMass<'e> {
 
     /// The residual times M^-1, without motion in the given components: forces on these are taken from both, and
     /// rounding on what carries no mass from the residual.
-    fn precondition(&mut self, given: Option<&Given>) -> Result<(), Failure> {
+    fn precondition(&mut self, given: Option<&Constraint>) -> Result<(), Failure> {
         let mut residual = std::mem::take(&mut self.residual);
         self.restrict(&mut residual);
         self.residual = residual;
@@ -233,8 +270,8 @@ impl<'e> TurnedMass<'e> {
         let nu = self.frame_of(&self.preconditioned)?;
         let moved = Vector6::from_fn(|k, _| if given.components[k] { nu[k] } else { 0.0 });
         let mu = given.multipliers * (given.answer * moved);
-        NodalEquations::add_motion(&self.body.conditions, -1.0, &mu, &mut self.residual);
-        NodalEquations::add_motion(&self.body.answered, -1.0, &mu, &mut self.preconditioned);
+        add_motion(&self.body.conditions, -1.0, &mu, &mut self.residual);
+        add_motion(&self.body.answered, -1.0, &mu, &mut self.preconditioned);
         Ok(())
     }
 }

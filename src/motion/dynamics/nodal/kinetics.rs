@@ -2,7 +2,7 @@
 
 use super::directors::{Directors, Rest};
 use super::equations::NodalEquations;
-use super::evaluation::{halves, joined};
+use super::motions::{add_motion, halves, joined};
 use super::turned::TurnedNode;
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{Vector3, Vector6};
@@ -102,7 +102,7 @@ impl TurnedNodes<'_> {
         let (of_points, of_rows) = (&flow.velocities[..points], &mut flow.rest_velocities);
         of_rows[..points].copy_from_slice(of_points);
         let flight = joined(&(linear + omega.cross(&rest.centre)), &Vector3::zeros());
-        NodalEquations::add_motion(&self.body.rigid[..points], -1.0, &flight, &mut of_rows[..points]);
+        add_motion(&self.body.rigid[..points], -1.0, &flight, &mut of_rows[..points]);
         for place in 0..self.nodes.len() {
             let (first, axes) = self.directors.rest_rotations(place);
             let turning = omega + self.directors.turn_of(place, ud);

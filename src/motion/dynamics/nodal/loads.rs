@@ -1,6 +1,6 @@
 //! Loads on the nodes.
 
-use super::equations::NodalEquations;
+use super::motions::{add_motion, sums};
 use super::points::Weights;
 use super::{NodalEvaluation, NodalPoint};
 use crate::motion::dynamics::{LoadAxes, Orientation, RotationVector};
@@ -19,7 +19,7 @@ impl NodalEvaluation<'_> {
         let mut moment = Vector3::new(mass[(1, 5)], -mass[(0, 5)], mass[(0, 4)]);
         // Rows whose part in s is linear in u.
         let linear = body.directors.as_ref().map_or(body.n_rows(), |directors| directors.points);
-        let displaced = NodalEquations::sums(&body.mass_rigid, &self.u[..linear]);
+        let displaced = sums(&body.mass_rigid, &self.u[..linear]);
         moment += displaced.fixed_rows::<3>(0);
         if let Some(turned) = &self.turned {
             moment += turned.kinetics.first_moment_of_turns();
@@ -28,7 +28,7 @@ impl NodalEvaluation<'_> {
         self.torque += moment.cross(&own);
         let mut translation = Vector6::zeros();
         translation.fixed_rows_mut::<3>(0).copy_from(&own);
-        NodalEquations::add_motion(&body.mass_rigid, 1.0, &translation, &mut self.row_forces[..linear]);
+        add_motion(&body.mass_rigid, 1.0, &translation, &mut self.row_forces[..linear]);
         if let Some(turned) = &self.turned {
             turned.kinetics.add_weight_of_turns(&own, &mut self.row_forces);
         }

@@ -15,6 +15,7 @@ mod loads;
 mod massless;
 mod modes;
 mod motion;
+mod motions;
 mod observed;
 mod points;
 mod reframe;

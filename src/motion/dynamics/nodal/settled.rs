@@ -1,7 +1,7 @@
 //! The deformation that stays as it is under what acts at time zero.
 
-use super::conditions::Motions;
 use super::equations::products;
+use super::motions::{Motions, add_motion, sums};
 use super::{NodalConfiguration, NodalEquations, NodalEvaluation, NodalMotion};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::{MatrixSum, SparseLdl, larger};
@@ -50,8 +50,8 @@ impl Steps {
     /// Takes the forces to the step.
     fn solve(&self, body: &NodalEquations<'_>, forces: &mut [f64], scratch: &mut [f64]) {
         self.factor.solve_in_place(1, forces, scratch);
-        let mu = self.inverse * NodalEquations::sums(&body.conditions, forces);
-        NodalEquations::add_motion(&self.answered, -1.0, &mu, forces);
+        let mu = self.inverse * sums(&body.conditions, forces);
+        add_motion(&self.answered, -1.0, &mu, forces);
     }
 }
 

@@ -2,47 +2,10 @@
 
 use super::NodalEvaluation;
 use super::drive::Drive;
-use super::equations::NodalEquations;
-use super::evaluation::halves;
-use super::inversion::TurnedMass;
+use super::inversion::Given;
+use super::motions::{halves, sums};
 use crate::numerics::integration::Failure;
 use nalgebra::{Vector3, Vector6};
-
-/// Components of (V, omega), or of their rates, that are given.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Given {
-    pub components: [bool; 6],
-    /// Model axes; zero in the components that are free.
-    pub motion: Vector6<f64>,
-}
-
-impl Given {
-    /// No component.
-    pub fn nothing() -> Self {
-        Self { components: [false; 6], motion: Vector6::zeros() }
-    }
-
-    /// `free` in the components that are free, `own` in the given ones.
-    fn or_own(&self, free: &Vector6<f64>, own: &Vector6<f64>) -> Vector6<f64> {
-        Vector6::from_fn(|k, _| if self.components[k] { own[k] } else { free[k] })
-    }
-
-    /// x <- v with the given motion, and M(u) v = x + C'(B'C')^-1 (rest of the momenta) in what is free.
-    fn solve(
-        &self,
-        turned: &mut TurnedMass<'_>,
-        momenta: &Vector6<f64>,
-        own: &Vector6<f64>,
-        x: &mut [f64],
-    ) -> Result<Vector6<f64>, Failure> {
-        turned.complete(&self.or_own(momenta, own), x)?;
-        match self.components.contains(&true) {
-            true => turned.solve_given(x, self.components, &self.motion)?,
-            false => turned.solve(x)?,
-        }
-        turned.frame_of(x)
-    }
-}
 
 impl NodalEvaluation<'_> {
     /// Goes on from the displacements and w of a state with the momenta (p, h) along what is free; p, h and w are
@@ -92,7 +55,7 @@ impl NodalEvaluation<'_> {
             *rest += drift - force;
         }
         // What is left is C'lambda.
-        self.multipliers = body.rigid_part.tr_mul(&NodalEquations::sums(&body.rigid, &self.second));
+        self.multipliers = body.rigid_part.tr_mul(&sums(&body.rigid, &self.second));
         if let Some(drive) = &mut self.drive {
             let taken = rates + drift - wanted;
             drive.reaction = given.or_own(&Vector6::zeros(), &taken);
