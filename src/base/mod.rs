@@ -8,6 +8,7 @@ mod exit_code;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_file;
 pub mod memory;
+pub(crate) mod numbers;
 pub mod output;
 pub mod progress;
 pub mod provenance;

@@ -16,4 +16,5 @@ mod invariants;
 mod partial_bodies;
 mod partial_conversion;
 mod residual_vectors;
+mod spinning_shaft;
 mod turning_nodes;

@@ -10,9 +10,14 @@ use nalgebra::{Matrix3, Vector3};
 pub enum BeamMass {
     /// Cubic deflections, linear extension and twist.
     Consistent,
+    /// The same with the rotary inertia of the sections.
+    Rotary,
     /// Half of every beam at each of its nodes, nothing on the rotations.
     Lumped,
 }
+
+/// Young's modulus of [`shaft`], whose density is 1.
+pub const SHAFT_YOUNGS: f64 = 4.0;
 
 /// Beams of one square section; Euler's and Bernoulli's assumptions.
 struct Section {
@@ -70,6 +75,14 @@ pub fn elbow(parts: usize) -> RawModel {
     frame("elbow of beams", &positions, &beams, &section, BeamMass::Consistent)
 }
 
+/// A straight shaft of unit length along x, of `parts` beams with rotary inertia, whose square section has this width.
+pub fn shaft(parts: usize, width: f64) -> RawModel {
+    let positions: Vec<[f64; 3]> = (0..=parts).map(|i| [i as f64 / parts as f64, 0.0, 0.0]).collect();
+    let beams: Vec<_> = (0..parts).map(|i| (i, i + 1)).collect();
+    let section = Section { width, youngs: SHAFT_YOUNGS, shear: 1.5, density: 1.0 };
+    frame("shaft", &positions, &beams, &section, BeamMass::Rotary)
+}
+
 /// Beams of one section between nodes.
 fn frame(
     name: &str,
@@ -110,6 +123,7 @@ impl Section {
         let turn = Mat::from_fn(12, 12, |i, j| if i / 3 == j / 3 { axes[(i % 3, j % 3)] } else { 0.0 });
         let m = match mass {
             BeamMass::Consistent => self.consistent(length),
+            BeamMass::Rotary => self.consistent(length) + self.rotary(length),
             BeamMass::Lumped => {
                 let half = 0.5 * self.density * self.width * self.width * length;
                 Mat::from_fn(12, 12, |i, j| if i == j && i % 6 < 3 { half } else { 0.0 })
@@ -128,6 +142,15 @@ impl Section {
         let scale = self.youngs * bending / (l * l * l);
         add_bending(&mut k, l, scale, [12.0, 6.0, -12.0, 6.0, 4.0, -6.0, 2.0, 12.0, -6.0, 4.0]);
         k
+    }
+
+    /// Rotary inertia of the sections across the beam, with cubic deflections.
+    fn rotary(&self, l: f64) -> Mat<f64> {
+        let area = self.width * self.width;
+        let mut m = Mat::zeros(12, 12);
+        let scale = self.density * area * area / 12.0 / (30.0 * l);
+        add_bending(&mut m, l, scale, [36.0, 3.0, -36.0, 3.0, 4.0, -3.0, -1.0, 36.0, -3.0, 4.0]);
+        m
     }
 
     fn consistent(&self, l: f64) -> Mat<f64> {

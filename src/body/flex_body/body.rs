@@ -6,6 +6,7 @@ use super::{
     TermDecision,
 };
 use crate::base::error::{Error, Result};
+use crate::base::numbers::significant;
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{
     BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, Turning, identities,
@@ -37,14 +38,16 @@ impl InertiaRates {
     pub fn in_words(&self, units: &UnitSystem, asked: impl Fn(&LoadKind) -> bool) -> String {
         let (length, time) = (units.length.name(), units.time.name());
         let all = [
-            (LoadKind::Spin, self.spin_hz.map(|hertz| format!("a spin of {hertz:.3e} Hz"))),
+            (LoadKind::Spin, self.spin_hz.map(|hertz| format!("a spin of {} Hz", significant(hertz, 3)))),
             (
                 LoadKind::Acceleration,
-                self.acceleration.map(|a| format!("an acceleration of {a:.3e} {length}/{time}^2")),
+                self.acceleration
+                    .map(|a| format!("an acceleration of {} {length}/{time}^2", significant(a, 3))),
             ),
             (
                 LoadKind::AngularAcceleration,
-                self.angular_acceleration.map(|a| format!("an angular acceleration of {a:.3e} 1/{time}^2")),
+                self.angular_acceleration
+                    .map(|a| format!("an angular acceleration of {} 1/{time}^2", significant(a, 3))),
             ),
         ];
         let told: Vec<String> =
