@@ -227,20 +227,16 @@ fn tumbling_bodies_keep_energy_and_momenta() {
 fn formulas_for_rotation_invariant_mass_drift_on_a_frame() {
     let fixture = fixture("frame_beams", MODES);
     let (body, exact) = (&fixture.body, fixture.body.invariants());
-    // The nodal formula of [ZG19]; section 3 with the right invariants, though W3 is not skew and W0 is not e
-    // x C1; section 6 with W0 as it would follow from C1, which vanishes.
+    // The nodal formula of [ZG19]; section 3 with the right invariants, though W3 is not skew.
     let nodes = |y: &DVector<f64>| rates(y, |s| body.accelerations_for_rotation_invariant_mass(s));
     let section_three =
         |y: &DVector<f64>| rates(y, |s| exact.reduced.free_accelerations(s, Coriolis::Correct));
-    let mut shortened = body.invariants();
-    shortened.w0.fill(0.0);
-    for (what, drift) in [
-        ("nodes", tumble(&fixture, 20.0, nodes)),
-        ("section 3", tumble(&fixture, 20.0, section_three)),
-        ("no W0", tumble(&fixture, 20.0, |y| reduced_rates(&shortened, y))),
-    ] {
-        // Measured: energy 1.2e-3 to 4e-3, angular momentum 1.2e-2 to 1.6e-2.
-        assert!(drift.energy > 5e-4 && drift.angular > 5e-3, "{what}: {drift:?}");
+    for (what, drift) in
+        [("nodes", tumble(&fixture, 20.0, nodes)), ("section 3", tumble(&fixture, 20.0, section_three))]
+    {
+        // What does not turn with the nodes is all that these formulas mistake (7e-6 to 4e-5 and 1.3e-5 to 1.2e-4 were
+        // measured); the right ones keep 1e-10.
+        assert!(drift.energy > 1e-6 && drift.angular > 2e-6, "{what}: {drift:?}");
     }
 }
 
