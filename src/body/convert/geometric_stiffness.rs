@@ -4,7 +4,6 @@
 use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::base::numbers::significant;
 use crate::body::basis::{BasisChoice, Loads};
 use crate::body::flex_body::FlexBody;
 use crate::model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
@@ -70,8 +69,7 @@ pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &Fle
     let axis = ["x", "y", "z"][axis];
     let hertz = model.units().frequency_of(rate * rate);
     let message = format!(
-        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {} Hz about body axis {axis}",
-        significant(hertz, 3)
+        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about body axis {axis}"
     );
     Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
 }
