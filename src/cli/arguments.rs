@@ -152,8 +152,8 @@ pub struct ExportArguments {
     /// With --to vtk (.pvd) or gltf: the motion to show instead of modes, as `simulate -o` has written it
     #[arg(long, value_name = "MOTION.h5", conflicts_with = "to_units")]
     pub simulation: Option<PathBuf>,
-    /// Scene that the size of what the format cannot hold is told for: the stiffness of inertia of nodes that turn,
-    /// largest over its load cases [default: the motion at which it reaches 1 %]
+    /// Scene for which the part of the stiffness that inertia of turning nodes makes is told, where the format cannot
+    /// hold it; the largest over its load cases [default: the motion at which it reaches 1 %]
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
     /// Units to write in [default: those of the body]

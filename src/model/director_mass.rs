@@ -11,14 +11,15 @@
 //!
 //! the kinetic energy of points and directors is that of a solid: their mass E_s = [mu, h; h', P], a number for
 //! every pair of points and directors, is the same along every axis and does not change with the rotations.
-//! What it leaves of M, N and D, is multiplied by the velocities of the rows along the axes of the body: the
+//! The rest N and D, which it leaves of M, is multiplied by the velocities of the rows along the axes of the body: the
 //! rest. Of a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of the column M_tr, P = M_rr/2 I and
 //! N = 0.
 
+use super::columns::Columns;
 use super::node_moments::NodeMoments;
 use super::rows::Rows;
 use crate::numerics::linalg::{
-    CscMatrix, SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros,
+    SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros,
 };
 use faer::{Mat, MatMut, MatRef};
 use nalgebra::{Matrix3, Vector3};
@@ -139,10 +140,7 @@ impl DirectorMass {
     pub fn extend(&self, shapes: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(shapes.nrows(), self.model_rows, "one row per row of the model");
         let mut extended = zeros(self.rows(), shapes.ncols());
-        let columns: Vec<_> = shapes.col_iter().zip(extended.col_iter_mut()).collect();
-        columns
-            .into_par_iter()
-            .for_each(|(from, to)| self.extend_vector(contiguous(from), contiguous_mut(to)));
+        each_column(shapes, &mut extended, |from, to| self.extend_vector(from, to));
         extended
     }
 
@@ -172,7 +170,7 @@ impl DirectorMass {
     /// rows of rotations their nodes have.
     ///
     /// # Panics
-    /// As [`DirectorMass::extend`].
+    /// When there is not one row for each of the model.
     pub fn extend_rigid(&self, fields: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(fields.nrows(), self.model_rows, "one row per row of the model");
         let (d, points) = (self.dimension, self.dimension * self.points);
@@ -194,10 +192,7 @@ impl DirectorMass {
     pub fn restrict(&self, forces: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(forces.nrows(), self.rows(), "one row per extended row");
         let mut restricted = zeros(self.model_rows, forces.ncols());
-        let columns: Vec<_> = forces.col_iter().zip(restricted.col_iter_mut()).collect();
-        columns
-            .into_par_iter()
-            .for_each(|(from, to)| self.restrict_vector(contiguous(from), contiguous_mut(to)));
+        each_column(forces, &mut restricted, |from, to| self.restrict_vector(from, to));
         restricted
     }
 
@@ -289,6 +284,12 @@ impl DirectorMass {
     }
 }
 
+/// Makes every column of `to` of that of `from`, by all threads.
+fn each_column(from: MatRef<'_, f64>, to: &mut Mat<f64>, make: impl Fn(&[f64], &mut [f64]) + Sync) {
+    let columns: Vec<_> = from.col_iter().zip(to.col_iter_mut()).collect();
+    columns.into_par_iter().for_each(|(from, to)| make(contiguous(from), contiguous_mut(to)));
+}
+
 /// Nodes whose rotations carry mass, ascending, and the place of every vertex among them; `None` when there are none.
 fn carriers(m: &SymmetricMatrix, rows: &Rows) -> Option<(Vec<u32>, Vec<u32>)> {
     let first = rows.displacements();
@@ -315,40 +316,10 @@ struct Blocks<'a> {
 /// Local rows of a vertex: displacements 0, 1, 2, rotations 3, 4, 5.
 type Block = [[f64; 6]; 6];
 
-/// Columns of a sparse matrix, one after the other.
-#[derive(Default)]
-struct Columns {
-    ends: Vec<usize>,
-    row_idx: Vec<u32>,
-    values: Vec<f64>,
-}
-
-impl Columns {
-    fn push(&mut self, row: usize, value: f64) {
-        if value != 0.0 {
-            self.row_idx.push(row as u32);
-            self.values.push(value);
-        }
-    }
-
-    fn end(&mut self) {
-        self.ends.push(self.row_idx.len());
-    }
-
-    fn joined(n: usize, parts: Vec<Self>) -> SymmetricMatrix {
-        let entries = parts.iter().map(|part| part.values.len()).sum();
-        let (mut row_idx, mut values) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-        let mut col_ptr = Vec::with_capacity(n + 1);
-        col_ptr.push(0);
-        for part in parts {
-            let before = row_idx.len();
-            col_ptr.extend(part.ends.iter().map(|end| before + end));
-            row_idx.extend(part.row_idx);
-            values.extend(part.values);
-        }
-        SymmetricMatrix::new(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
-            .expect("entries are computed alike on both sides of the diagonal")
-    }
+/// The symmetric matrix (n x n) of these columns.
+fn symmetric(n: usize, parts: Vec<Columns>) -> SymmetricMatrix {
+    SymmetricMatrix::new(Columns::joined(n, parts))
+        .expect("entries are computed alike on both sides of the diagonal")
 }
 
 /// Columns of a range of vertices.
@@ -379,16 +350,16 @@ impl Blocks<'_> {
         }
         // Columns in the order of the extended rows: points, then directors, then rotations.
         points.append(&mut directors);
-        let scalar = Columns::joined(self.points + d * self.nodes.len(), points);
+        let scalar = symmetric(self.points + d * self.nodes.len(), points);
         if share <= ROUNDING {
             return (scalar, None);
         }
         let empty = d * d * self.nodes.len();
-        rest_of_points.push(Columns { ends: vec![0; empty], ..Columns::default() });
+        rest_of_points.push(Columns::empty(empty));
         rest_of_points.append(&mut rest_of_rotations);
         let turns = if d == 2 { 1 } else { 3 };
         let n = d * self.points + empty + turns * self.nodes.len();
-        (scalar, Some(Columns::joined(n, rest_of_points)))
+        (scalar, Some(symmetric(n, rest_of_points)))
     }
 
     /// Vertices of every parallel task.

@@ -91,6 +91,14 @@ impl<'m> InertialRows<'m> {
         }
     }
 
+    /// Number of rows of vectors that turn with the body, which come first.
+    fn turning_rows(&self) -> usize {
+        match &self.directors {
+            Some(directors) => directors.mass.turning_rows(),
+            None => self.model.rows().displacements(),
+        }
+    }
+
     /// y += omega x x of every vector that turns with the body; column j with the j-th omega, axes of the model.
     pub fn add_turned(&self, omega: impl Fn(usize) -> Vector3<f64> + Sync, x: &Mat<f64>, y: &mut Mat<f64>) {
         let columns: Vec<_> = y.col_iter_mut().enumerate().collect();
@@ -107,20 +115,13 @@ impl<'m> InertialRows<'m> {
     }
 
     fn add_turned_vector(&self, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
-        let end = match &self.directors {
-            Some(directors) => directors.mass.turning_rows(),
-            None => self.model.rows().displacements(),
-        };
+        let end = self.turning_rows();
         add_turned(self.model.dimension(), &x[..end], omega, &mut y[..end]);
     }
 
     /// sum_i x_i x y_i over the vectors that turn with the body.
     pub fn moment(&self, x: &[f64], y: &[f64]) -> Vector3<f64> {
-        let d = self.model.dimension();
-        let end = match &self.directors {
-            Some(directors) => directors.mass.turning_rows(),
-            None => self.model.rows().displacements(),
-        };
+        let (d, end) = (self.model.dimension(), self.turning_rows());
         let vector = |a: &[f64]| Vector3::from_fn(|k, _| if k < d { a[k] } else { 0.0 });
         let pairs = x[..end].chunks_exact(d).zip(y[..end].chunks_exact(d));
         pairs.fold(Vector3::zeros(), |sum, (x, y)| sum + vector(x).cross(&vector(y)))

@@ -1,8 +1,9 @@
 //! The test M = Ms kron I_d of the displacements, block by block (d: the dimension), and Ms itself.
 
+use super::columns::Columns;
 use super::rows::Rows;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::numerics::linalg::{CscMatrix, SymmetricMatrix};
+use crate::numerics::linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -71,22 +72,15 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
 
 /// Ms (n x n) from its columns part by part, with the largest deviation of a block and its place.
 fn joined(n: usize, parts: Vec<Part>) -> (SymmetricMatrix, f64, (usize, usize)) {
-    let entries = parts.iter().map(|part| part.row_idx.len()).sum();
     let (mut worst, mut worst_at) = (0.0f64, (0, 0));
-    let mut col_ptr = Vec::with_capacity(n + 1);
-    let (mut row_idx, mut values) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-    col_ptr.push(0);
+    let mut columns = Vec::with_capacity(parts.len());
     for part in parts {
-        let before = row_idx.len();
-        col_ptr.extend(part.ends.iter().map(|end| before + end));
-        row_idx.extend(part.row_idx);
-        values.extend(part.values);
+        columns.push(part.columns);
         if part.worst > worst {
             (worst, worst_at) = (part.worst, part.worst_at);
         }
     }
-    let csc = CscMatrix::from_parts(n, n, col_ptr, row_idx, values);
-    let scalar = SymmetricMatrix::new(csc)
+    let scalar = SymmetricMatrix::new(Columns::joined(n, columns))
         .expect("the mean of entries is symmetric because each of them is, to the bit");
     (scalar, worst, worst_at)
 }
@@ -117,9 +111,7 @@ fn directional_mass(
 /// Some columns of Ms, and the largest deviation of their blocks with its place in M.
 #[derive(Default)]
 struct Part {
-    ends: Vec<usize>,
-    row_idx: Vec<u32>,
-    values: Vec<f64>,
+    columns: Columns,
     worst: f64,
     worst_at: (usize, usize),
 }
@@ -165,12 +157,9 @@ fn reduce(
                 let (row, column) = (dimension * node + k, dimension * other as usize + k);
                 part.deviates((v - alpha).abs() / scale, row, column);
             }
-            if alpha != 0.0 {
-                part.row_idx.push(other);
-                part.values.push(alpha);
-            }
+            part.columns.push(other as usize, alpha);
         }
-        part.ends.push(part.row_idx.len());
+        part.columns.end();
     }
     part
 }

@@ -4,6 +4,7 @@ mod assemble;
 mod assembled;
 mod body_number;
 mod checks;
+mod columns;
 mod connections;
 mod damping;
 mod density;

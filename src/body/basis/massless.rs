@@ -24,9 +24,7 @@ type LocalMotion = Vec<(usize, f64)>;
 /// [`FactorizationFailed`](Code::FactorizationFailed) where K does not hold these motions.
 pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> {
     let motions = massless_motions(model);
-    let work = |load: &[f64]| -> Vec<f64> {
-        motions.iter().map(|motion| motion.iter().map(|&(row, part)| part * load[row]).sum()).collect()
-    };
+    let work = |load: &[f64]| -> Vec<f64> { motions.iter().map(|motion| work_on(motion, load)).collect() };
     let is_loaded = |j: &usize| work(loads.col_as_slice(*j)).iter().any(|work| *work != 0.0);
     let loaded: Vec<usize> = (0..loads.ncols()).filter(is_loaded).collect();
     if loaded.is_empty() {
@@ -56,10 +54,15 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
     Ok(loads)
 }
 
+/// The work of a load on a motion.
+fn work_on(motion: &LocalMotion, load: &[f64]) -> f64 {
+    motion.iter().map(|&(row, part)| part * load[row]).sum()
+}
+
 /// Takes what rounding leaves of the work of a load on orthonormal motions.
 fn clear(motions: &[LocalMotion], load: &mut [f64]) {
     for motion in motions {
-        let work: f64 = motion.iter().map(|&(row, part)| part * load[row]).sum();
+        let work = work_on(motion, load);
         motion.iter().for_each(|&(row, part)| load[row] -= work * part);
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::body::flex_body::{FlexBody, Frame, InternalRows};
 use crate::body::invariants::{
-    InertiaStiffness, Invariants, RigidMotion, condense, condense_general, condense_general_linear,
-    condense_linear, rigid_first_moment, symmetric_part,
+    InertiaStiffness, Invariants, MassProduct, RigidMotion, condense, condense_general,
+    condense_general_linear, condense_linear, rigid_first_moment, symmetric_part,
 };
 use crate::model::{DirectorMass, FeModel, NodeMoments, rigid_count};
 use crate::numerics::eigen::canonical_sign;
@@ -124,17 +124,7 @@ impl BodyModes {
 
     /// The invariants, by the formulas that the mass of `model` allows.
     pub fn condensed(&self, model: &FeModel, place: &NodesInFrame, modal_stiffness: Mat<f64>) -> Invariants {
-        if let Some(mass) = model.scalar_mass() {
-            return condense(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
-        }
-        match model.director_mass() {
-            Some(mass) => self.of_directors(model, mass, place, |mass, motion, shapes| {
-                condense_general(mass, motion, shapes, modal_stiffness)
-            }),
-            None => self.of_rows(model, place, |mass, motion, shapes| {
-                condense_general(mass, motion, shapes, modal_stiffness)
-            }),
-        }
+        self.by(model, place, modal_stiffness, condense, condense_general)
     }
 
     /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
@@ -144,17 +134,7 @@ impl BodyModes {
         place: &NodesInFrame,
         modal_stiffness: Mat<f64>,
     ) -> Invariants {
-        if let Some(mass) = model.scalar_mass() {
-            return condense_linear(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
-        }
-        match model.director_mass() {
-            Some(mass) => self.of_directors(model, mass, place, |mass, motion, shapes| {
-                condense_general_linear(mass, motion, shapes, modal_stiffness)
-            }),
-            None => self.of_rows(model, place, |mass, motion, shapes| {
-                condense_general_linear(mass, motion, shapes, modal_stiffness)
-            }),
-        }
+        self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
     }
 
     /// The stiffnesses of inertia of nodes with rotational mass; `None` where there are none.
@@ -182,17 +162,30 @@ impl BodyModes {
         }
     }
 
-    /// The invariants of a mass without rotations that does not commute with them: by its rows.
-    fn of_rows(
+    /// The invariants by the formulas `solid` or `general`.
+    fn by(
         &self,
         model: &FeModel,
         place: &NodesInFrame,
-        condensed: impl FnOnce(&SymmetricMatrix, &RigidMotion<'_>, MatRef<'_, f64>) -> Invariants,
+        modal_stiffness: Mat<f64>,
+        solid: impl Fn(&SymmetricMatrix, &[[f64; 3]], MatRef<'_, f64>, Mat<f64>) -> Invariants,
+        general: impl Fn(&(dyn MassProduct + 'static), &RigidMotion<'_>, MatRef<'_, f64>, Mat<f64>) -> Invariants,
     ) -> Invariants {
+        if let Some(mass) = model.scalar_mass() {
+            return solid(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
+        }
+        if let Some(mass) = model.director_mass() {
+            return self.of_directors(model, mass, place, |mass, motion, shapes| {
+                general(mass, motion, shapes, modal_stiffness)
+            });
+        }
         let fields = rigid_fields(model, &place.frame);
-        let displacements = model.rows().displacements();
-        let motion = RigidMotion { fields: fields.as_ref(), displacements, axes: place.frame.axes };
-        condensed(model.pencil().mass(), &motion, self.vectors.as_ref())
+        let motion = RigidMotion {
+            fields: fields.as_ref(),
+            displacements: model.rows().displacements(),
+            axes: place.frame.axes,
+        };
+        general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
     }
 
     /// The invariants of a mass of points and directors: about the centre of mass, then about the origin of the

@@ -188,8 +188,8 @@ impl FlexBody {
         self.parts.inertia_stiffness.as_ref()
     }
 
-    /// What is added to K_ff for a unit of `load`: the stiffness of inertia and the geometric stiffness together;
-    /// `None` where the body has neither.
+    /// The stiffness of inertia plus the geometric stiffness for a unit of `load`, which is added to K_ff; `None`
+    /// where the body has neither.
     pub fn stiffness_under(&self, load: &UnitLoad) -> Option<Mat<f64>> {
         let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
         let all = of_inertia.chain(self.geometric_stiffness()).filter(|one| one.load == *load);

@@ -46,6 +46,10 @@ impl FlexBody {
                 negative_masses: lumped.negative_masses,
             }
         };
+        let stiffness = |one: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
+            load: one.load.clone(),
+            matrix: square(&one.matrix, modes),
+        };
         let before = parts.terms.iter().filter(|old| terms.iter().all(|new| new.group != old.group));
         let body = Self::new(Parts {
             source: parts.source.clone(),
@@ -55,21 +59,10 @@ impl FlexBody {
             nodes: parts.nodes.clone(),
             mesh: parts.mesh.clone(),
             modes: parts.modes.some(modes),
-            geometric_stiffness: parts
-                .geometric_stiffness
-                .iter()
-                .map(|one| GeometricStiffness { load: one.load.clone(), matrix: square(&one.matrix, modes) })
-                .collect(),
+            geometric_stiffness: parts.geometric_stiffness.iter().map(stiffness).collect(),
             inertia_stiffness: parts.inertia_stiffness.as_ref().map(|own| InertiaStiffness {
                 moments: own.moments.clone(),
-                stiffness: own
-                    .stiffness
-                    .iter()
-                    .map(|one| GeometricStiffness {
-                        load: one.load.clone(),
-                        matrix: square(&one.matrix, modes),
-                    })
-                    .collect(),
+                stiffness: own.stiffness.iter().map(stiffness).collect(),
             }),
             lumped: parts.lumped.iter().map(lumped).collect(),
             certificate: parts.certificate.of_some(modes, &parts.modes),

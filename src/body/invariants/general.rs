@@ -47,7 +47,7 @@ impl MassProduct for DirectorMass {
     }
 }
 
-/// How the rows of a mass, which are components along the model axes, move with the body frame.
+/// The motion of the rows of a mass, components along the model axes, with the body frame.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidMotion<'a> {
     /// N x 6: unit translations along the body axes, then unit rotations about them; of a plane body N x 3.
@@ -79,7 +79,7 @@ pub struct RigidMotion<'a> {
 ///
 /// # Panics
 /// When the sizes disagree.
-pub fn condense_general<M: MassProduct>(
+pub fn condense_general<M: MassProduct + ?Sized>(
     mass: &M,
     motion: &RigidMotion<'_>,
     shapes: MatRef<'_, f64>,
@@ -94,7 +94,7 @@ pub fn condense_general<M: MassProduct>(
 ///
 /// # Panics
 /// When the sizes disagree.
-pub fn condense_general_linear<M: MassProduct>(
+pub fn condense_general_linear<M: MassProduct + ?Sized>(
     mass: &M,
     motion: &RigidMotion<'_>,
     shapes: MatRef<'_, f64>,
@@ -114,7 +114,7 @@ struct GeneralColumns<'a> {
 impl<'a> GeneralColumns<'a> {
     /// # Panics
     /// When mass, motion and shapes have not the same rows.
-    fn new(mass: &impl MassProduct, motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
+    fn new(mass: &(impl MassProduct + ?Sized), motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
         let n = mass.n_rows();
         assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
         Self { motion, shapes }
@@ -166,7 +166,7 @@ impl<'a> GeneralColumns<'a> {
     }
 
     /// The rows and columns of X' M X of rigid motion, and I for the modes; zero elsewhere.
-    fn rigid_gram(&self, mass: &impl MassProduct) -> Mat<f64> {
+    fn rigid_gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let (count, r) = (self.count(), self.rigid());
         let mut y = Mat::zeros(self.shapes.nrows(), r);
         mass.times(self.motion.fields, y.as_mut());
@@ -186,7 +186,7 @@ impl<'a> GeneralColumns<'a> {
     }
 
     /// X' M X, exactly symmetric.
-    fn gram(&self, mass: &impl MassProduct) -> Mat<f64> {
+    fn gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let count = self.count();
         let blocks: Vec<Range<usize>> =
             (0..count).step_by(BLOCK).map(|start| start..(start + BLOCK).min(count)).collect();

@@ -60,14 +60,14 @@ pub struct Expected<'a> {
     /// Relative noise of the lowest eigenvalue that the digits of the input leave (the certificate's
     /// `rigid_noise`); 0 when unknown.
     pub eigenvalue_noise: f64,
-    /// How nodes turn whose rotations carry mass.
+    /// The part of the mass that turns with its nodes.
     pub turning: Turning,
     /// What rounding of the products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p
     /// lambda_q); 0 when unknown.
     pub eigenvalue_rounding: f64,
 }
 
-/// How the mass of a body turns with its nodes, as far as identities know it.
+/// The part of the mass of a body that turns with its nodes, as far as identities know it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Turning {
     /// No rotation carries mass, or the mass is kept along the axes of the body (files before format 1.6).
@@ -132,7 +132,7 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -
     checks
 }
 
-/// What holds of a mass of points and directors.
+/// Identities of a mass of points and directors.
 fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
     let (check, nf, solid) = (IdentityCheck::new, body.n_modes(), body.as_solid());
     let difference = terms::difference(&solid.w0(), &body.w0(), &|_, column| bound.c1(column % nf));

@@ -59,13 +59,13 @@ impl InertiaStiffness {
         )
     }
 
-    /// The same about the origin `d` and along the columns of `axes`, both in the present frame.
+    /// The stiffnesses about the origin `d` and along the columns of `axes`, both in the present frame.
     ///
     /// z_a' = z_a - h_a d, then every index that stands for a direction is turned; `rotation` (3n x nf) is along
     /// the new axes.
     ///
     /// # Panics
-    /// As [`InertiaStiffness::new`].
+    /// When there are not three rows for each of the moments.
     pub fn in_frame(
         &self,
         d: &Vector3<f64>,
@@ -80,11 +80,11 @@ impl InertiaStiffness {
         Self::new(self.moments.iter().map(moved).collect(), rotation, dimension)
     }
 
-    /// The same with other rotations of the nodes (3n x nf): of other modes, or relative to another frame whose
+    /// The stiffnesses with other rotations of the nodes (3n x nf): of other modes, or relative to another frame whose
     /// origin and axes are the same before deformation.
     ///
     /// # Panics
-    /// As [`InertiaStiffness::new`].
+    /// When there are not three rows for each of the moments.
     pub fn with_rotations(&self, rotation: MatRef<'_, f64>, dimension: usize) -> Self {
         Self::new(self.moments.clone(), rotation, dimension)
     }
@@ -94,7 +94,7 @@ impl InertiaStiffness {
     /// leave of it may be small.
     ///
     /// # Panics
-    /// As [`InertiaStiffness::new`].
+    /// When there are not three rows for each of the moments.
     pub fn deviation(&self, rotation: MatRef<'_, f64>, dimension: usize) -> f64 {
         let own = self.with_rotations(rotation, dimension);
         let magnitudes = Mat::from_fn(rotation.nrows(), rotation.ncols(), |i, j| rotation[(i, j)].abs());

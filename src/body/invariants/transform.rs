@@ -41,8 +41,7 @@ impl Invariants {
         shifted.with_groups(self.0.groups)
     }
 
-    /// The same body with W0 = -C1~: whose kinetic energy does not change its motion when the body flies with a
-    /// constant velocity. Of a mass of points and directors W0 is this anyway; what does not turn with the nodes
+    /// The invariants with W0 = -C1~, so that a constant velocity of flight does not change how the body moves. Of a mass of points and directors W0 is this anyway; what does not turn with the nodes
     /// has other products Phi_t' M B_j, errors of its order (theory section 6).
     pub(crate) fn without_feeling_of_flight(mut self) -> Self {
         let w0 = self.as_solid().w0();

@@ -68,7 +68,7 @@ pub struct ExportOptions {
     pub motion: Option<RecordedMotion>,
     /// Name of the file, for formats whose file names those beside it.
     pub name: Option<PathBuf>,
-    /// How much of the stiffness of the body its stiffness of inertia is in a scene, for the size of what is lost.
+    /// The part that the stiffness of inertia has in a scene, told where the format cannot hold it.
     pub in_scene: Option<InertiaInScene>,
 }
 

@@ -9,6 +9,7 @@ use super::massless::Room;
 use super::motions::{add_motion, halves, joined, sums};
 use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
 use crate::model::Damping;
+use crate::motion::dynamics::kernels::add_scaled;
 use crate::motion::dynamics::{EulerParameters, Orientation};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
@@ -331,9 +332,4 @@ impl<'e> NodalEvaluation<'e> {
         self.take_internal_forces();
         forces.iter_mut().zip(&self.w_rate).for_each(|(force, rate)| *force = -rate);
     }
-}
-
-/// y += factor x.
-fn add_scaled(factor: f64, x: &[f64], y: &mut [f64]) {
-    y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
 }

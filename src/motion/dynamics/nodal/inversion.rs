@@ -5,6 +5,7 @@ use super::equations::NodalEquations;
 use super::kinetics::Kinetics;
 use super::massless::Room;
 use super::motions::{add_motion, sums};
+use crate::motion::dynamics::kernels::{add_scaled, dot};
 use crate::numerics::integration::Failure;
 use crate::numerics::linalg::multiply_vector;
 use nalgebra::{LU, Matrix6, U6, Vector6};
@@ -274,13 +275,4 @@ impl<'e> TurnedMass<'e> {
         add_motion(&self.body.answered, -1.0, &mu, &mut self.preconditioned);
         Ok(())
     }
-}
-
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
-
-/// y += factor x.
-fn add_scaled(factor: f64, x: &[f64], y: &mut [f64]) {
-    y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
 }
