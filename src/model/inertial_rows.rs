@@ -62,6 +62,15 @@ impl<'m> InertialRows<'m> {
         }
     }
 
+    /// Displacements, velocities and accelerations of the model on these rows, to second order where directors
+    /// turn ([`DirectorMass::extend_turned`]).
+    pub fn extend_turned(&self, motion: [&Mat<f64>; 3]) -> [Mat<f64>; 3] {
+        match &self.directors {
+            Some(directors) => directors.mass.extend_turned(motion.map(Mat::as_ref)),
+            None => motion.map(Mat::clone),
+        }
+    }
+
     /// Unit translations along the axes of the model and unit rotations about the centre.
     pub fn rigid(&self) -> Mat<f64> {
         let fields = self.model.rigid_fields(self.centre.into(), 1.0);

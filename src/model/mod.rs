@@ -8,6 +8,7 @@ mod columns;
 mod connections;
 mod damping;
 mod density;
+mod director_blocks;
 mod director_mass;
 mod elements;
 mod exchanged;

@@ -21,8 +21,8 @@ use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::model::{Coupling, FeModel, rigid_count};
 use crate::numerics::eigen::{
-    Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof, Resume,
-    Wanted, modes_of_span, solve, static_responses_twice,
+    Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof,
+    ResponseAccuracy, Resume, Wanted, modes_of_span, solve, static_responses_twice,
 };
 use crate::numerics::linalg::{
     Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side,
@@ -177,8 +177,9 @@ impl<'a> Parts<'a> {
             let constraint = &moved + elimination.expand(interior.as_ref());
             elimination.restrict(pencil.apply_mass(constraint.as_ref()).as_ref())
         };
+        let (accuracy, counters) = (ResponseAccuracy::FULL, &mut fixed.counters);
         let [interior, correction] =
-            static_responses_twice(&problem, loads, inertia, lowest, precision, &mut fixed.counters)
+            static_responses_twice(&problem, loads, inertia, lowest, precision, accuracy, counters)
                 .map_err(in_model)?;
         let lacking = lacking(&problem, correction, &fixed);
         let mut constraint = moved + elimination.expand(interior.as_ref());

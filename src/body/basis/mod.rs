@@ -31,6 +31,8 @@ pub use free_surface::{
 pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
-pub use residual_vectors::{Loads, UserLoads, free_static_responses, interface_loads};
+pub use residual_vectors::{
+    Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
+};
 pub use rigid_modes::rigid_modes;
 pub use solved::{CountElsewhere, SolvedModes};

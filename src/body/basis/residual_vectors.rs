@@ -16,7 +16,7 @@ use crate::base::provenance::SourceFile;
 use crate::model::{Coupling, FeModel, InertialRows, RawShapes};
 use crate::numerics::eigen::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Resume,
-    Wanted, dynamic_responses, modes_of_span, static_responses,
+    Wanted, dynamic_responses, modes_of_span, static_responses, static_responses_twice,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
 use faer::{Mat, MatRef};
@@ -37,11 +37,25 @@ const SELF_EQUILIBRATED: f64 = 1e-10;
 /// # Errors
 /// Failures of the factorisation, and responses that are not accurate: exit code 3.
 pub fn free_static_responses(model: &FeModel, loads: Mat<f64>, first: f64) -> Result<Mat<f64>> {
+    let nothing = Mat::zeros(loads.nrows(), 0);
+    let [responses, _] = free_static_responses_twice(model, loads, |_| nothing, first)?;
+    Ok(responses)
+}
+
+/// The same, and the responses to `further` loads that these tell.
+///
+/// # Errors
+/// As [`free_static_responses`].
+pub fn free_static_responses_twice(
+    model: &FeModel,
+    loads: Mat<f64>,
+    further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
+    first: f64,
+) -> Result<[Mat<f64>; 2]> {
     let rigid = rigid_modes(model, &model.pencil())?;
     let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
-    let none = Mat::zeros(loads.nrows(), 0);
     let (precision, accuracy) = (Precision::Double, ResponseAccuracy::ROUGH);
-    static_responses(&problem, none.as_ref(), loads, first, precision, accuracy, &mut Counters::default())
+    static_responses_twice(&problem, loads, further, first, precision, accuracy, &mut Counters::default())
         .map_err(|failure| explain(model, failure))
 }
 

@@ -55,8 +55,8 @@ pub fn static_responses(
     with_responses(problem, modes, first, precision, accuracy, counters, respond)
 }
 
-/// The responses of a body that is held, K^-1 f, and with the same factor those to further loads that these
-/// responses tell.
+/// The responses K^+ f of [`static_responses`] without known modes, and with the same factor those to further
+/// loads that these responses tell.
 ///
 /// # Errors
 /// As [`static_responses`].
@@ -66,6 +66,7 @@ pub fn static_responses_twice(
     further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
     first: f64,
     precision: Precision,
+    accuracy: ResponseAccuracy,
     counters: &mut Counters,
 ) -> Result<[Mat<f64>; 2], EigenFailure> {
     let none = Mat::zeros(problem.pencil.n(), 0);
@@ -74,7 +75,7 @@ pub fn static_responses_twice(
         let loads = further(&x);
         Ok([x, responses.of(loads, counters)?])
     };
-    with_responses(problem, none.as_ref(), first, precision, ResponseAccuracy::FULL, counters, respond)
+    with_responses(problem, none.as_ref(), first, precision, accuracy, counters, respond)
 }
 
 fn with_responses<T>(

@@ -13,7 +13,7 @@ use nalgebra::Vector1;
 use std::ops::Range;
 
 /// Part of the trace of E'K E below which a direction is rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// Damping ratio from which on an oscillation is taken for one of this ratio.
 const MOST_DAMPED: f64 = 0.99;

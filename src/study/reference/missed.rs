@@ -1,30 +1,36 @@
 //! The static responses that a body lacks along its motion, and which of them would improve it most.
 
+use super::answered::ROUNDING;
 use super::compressed::{Compressed, principal};
 use super::grid::Grid;
 use super::projected::{Projected, UnbalancedAmplitudes};
 use super::residual::NodalView;
 use crate::base::error::Result;
-use crate::body::basis::free_static_responses;
+use crate::body::basis::free_static_responses_twice;
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::symmetric_part;
 use crate::motion::scene::Instant;
-use crate::numerics::linalg::{combine, gram, larger, not_negative, subtract_combination};
+use crate::numerics::linalg::{combine, gram, larger, not_negative, side_by_side, subtract_combination};
 use faer::Mat;
 
 /// Responses that may join the body at once.
 const MOST_RESPONSES: usize = 12;
 
-/// Static responses E to the forces B that the motion of a body leaves unbalanced.
+/// Largest part of the elastic energy of the responses, over the motion, whose inertia is answered too, and of how
+/// many of them at the most.
+const INERTIA_LEFT_OUT: f64 = 1e-9;
+const MOST_OF_INERTIA: usize = 8;
+
+/// Displacements E that a body lacks: static responses to the forces that its motion leaves unbalanced, and those to
+/// the inertia of these responses, without which all that is lacking would move with one frequency for each force.
 pub(super) struct Missed {
-    /// B (N x k).
+    /// B (N x k) with E = K^+ B.
     pub forces: Mat<f64>,
-    /// c (k x m): the unbalanced forces are B c(t).
+    /// c (k x m): the unbalanced forces are B c(t). Those of inertia have none.
     pub amplitudes: Mat<f64>,
     /// g (nf x m): what the unbalanced forces do to the modes.
     pub in_modes: Mat<f64>,
-    /// E = K^+ B (N x k), beside the modes; where something carries the body, with the point at rest that
-    /// does.
+    /// E (N x k), beside the modes; where something carries the body, with the point at rest that does.
     pub responses: Mat<f64>,
     /// E'K E.
     pub energy: Mat<f64>,
@@ -34,7 +40,7 @@ impl Missed {
     /// Of a body in the `motion` that it makes at the instants of `grid`.
     ///
     /// # Errors
-    /// Those of [`free_static_responses`].
+    /// Those of [`free_static_responses_twice`].
     pub fn new(view: &NodalView<'_>, body: &FlexBody, motion: &[Instant], grid: &Grid) -> Result<Self> {
         let model = view.model;
         let few: Vec<Instant> = grid.few().into_iter().map(|i| motion[i].clone()).collect();
@@ -46,20 +52,23 @@ impl Missed {
             let (forces, responses) = (nothing(), nothing());
             return Ok(Self { forces, amplitudes, in_modes, responses, energy: Mat::zeros(0, 0) });
         };
-        let forces = compressed.basis;
-        let mut responses = free_static_responses(model, forces.clone(), body.modes().eigenvalue[0])?;
-        if let Some(held) = &view.held {
-            held.hold(&mut responses);
-        }
-        // The part in the modes is that of rounding.
-        let weighted = model.pencil().apply_stiffness(view.vectors.as_ref());
-        let shared = gram(weighted.as_ref(), responses.as_ref());
-        let part =
-            Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / body.modes().eigenvalue[p]);
-        subtract_combination(responses.as_mut(), view.vectors.as_ref(), part.as_ref());
-        let energy = gram(responses.as_ref(), model.pencil().apply_stiffness(responses.as_ref()).as_ref());
-        let energy = symmetric_part(&energy);
-        Ok(Self { forces, amplitudes, in_modes, responses, energy })
+        let beside = Beside { view, eigenvalues: &body.modes().eigenvalue };
+        let inertia = |responses: &Mat<f64>| beside.inertia(responses.clone(), &amplitudes);
+        let first = body.modes().eigenvalue[0];
+        let [own, of_inertia] = free_static_responses_twice(model, compressed.basis.clone(), inertia, first)?;
+        let own = beside.of(own);
+        let of_inertia = beside.more(&own, of_inertia);
+        let responses = side_by_side(&[own.as_ref(), of_inertia.as_ref()]);
+        let taken = model.pencil().apply_stiffness(of_inertia.as_ref());
+        let mut all_amplitudes = Mat::zeros(responses.ncols(), amplitudes.ncols());
+        all_amplitudes.as_mut().subrows_mut(0, amplitudes.nrows()).copy_from(&amplitudes);
+        Ok(Self {
+            forces: side_by_side(&[compressed.basis.as_ref(), taken.as_ref()]),
+            amplitudes: all_amplitudes,
+            in_modes,
+            energy: beside.energy(&responses),
+            responses,
+        })
     }
 
     /// The fewest forces B y (N x p) whose responses leave of E z(t), at every instant, no more than `enough`
@@ -87,5 +96,70 @@ impl Missed {
             (0..roots.len()).map(|k| turned[(row, k)] / roots[k] * directions[(k, p)]).sum()
         });
         combine(self.forces.as_ref(), y.as_ref())
+    }
+}
+
+/// Displacements beside the modes of a body.
+struct Beside<'v> {
+    view: &'v NodalView<'v>,
+    eigenvalues: &'v [f64],
+}
+
+impl Beside<'_> {
+    /// `responses` with what carries the body at rest, and without their part in the modes.
+    fn of(&self, mut responses: Mat<f64>) -> Mat<f64> {
+        if let Some(held) = &self.view.held {
+            held.hold(&mut responses);
+        }
+        // The part in the modes is that of rounding.
+        let weighted = self.view.model.pencil().apply_stiffness(self.view.vectors.as_ref());
+        let shared = gram(weighted.as_ref(), responses.as_ref());
+        let part = Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / self.eigenvalues[p]);
+        subtract_combination(responses.as_mut(), self.view.vectors.as_ref(), part.as_ref());
+        responses
+    }
+
+    /// E'K E.
+    fn energy(&self, responses: &Mat<f64>) -> Mat<f64> {
+        let weighted = self.view.model.pencil().apply_stiffness(responses.as_ref());
+        symmetric_part(&gram(responses.as_ref(), weighted.as_ref()))
+    }
+
+    /// The forces M E y of the few E y that have nearly all of the elastic energy of E c(t). `amplitudes`: c.
+    fn inertia(&self, responses: Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
+        let responses = self.of(responses);
+        let Some((turned, roots)) = principal(self.energy(&responses), 0.0, usize::MAX) else {
+            return Mat::zeros(responses.nrows(), 0);
+        };
+        let moving = gram(turned.as_ref(), amplitudes.as_ref());
+        let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
+        let covariance = combine(moving.as_ref(), moving.transpose().to_owned().as_ref());
+        let Some((directions, _)) = principal(covariance, INERTIA_LEFT_OUT, MOST_OF_INERTIA) else {
+            return Mat::zeros(responses.nrows(), 0);
+        };
+        let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
+        let few = combine(responses.as_ref(), combine(unit.as_ref(), directions.as_ref()).as_ref());
+        self.view.part(self.view.model.pencil().apply_mass(few.as_ref())).forces
+    }
+
+    /// What `further` responses add to `known` ones: K-orthogonal to these and to each other, of an energy as large
+    /// as the largest of these.
+    fn more(&self, known: &Mat<f64>, further: Mat<f64>) -> Mat<f64> {
+        let mut further = self.of(further);
+        let energy = self.energy(known);
+        let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else { return further };
+        let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
+        let orthonormal = combine(known.as_ref(), unit.as_ref());
+        let weighted = self.view.model.pencil().apply_stiffness(orthonormal.as_ref());
+        // Twice: what they add may be small beside what they share.
+        for _ in 0..2 {
+            let shared = gram(weighted.as_ref(), further.as_ref());
+            subtract_combination(further.as_mut(), orthonormal.as_ref(), shared.as_ref());
+        }
+        let Some((turned, own)) = principal(self.energy(&further), ROUNDING, usize::MAX) else {
+            return Mat::zeros(further.nrows(), 0);
+        };
+        let scaled = Mat::from_fn(turned.nrows(), own.len(), |row, k| turned[(row, k)] * roots[0] / own[k]);
+        combine(further.as_ref(), scaled.as_ref())
     }
 }

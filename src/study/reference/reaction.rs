@@ -15,9 +15,10 @@ impl NodalView<'_> {
     /// p' + omega x p - F,    h' + omega x h + V x p - tau
     /// ```
     ///
-    /// (theory 6.17, without the elastic forces, which balance each other).
+    /// (theory 6.17, without the elastic forces, which balance each other). Directors turn to second order: what
+    /// they carry of mass is moved by their rotations against each other, theta' x (theta' x e_a) and so on.
     pub fn reactions(&self, motion: &[Instant], field: &Displacements) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-        let Inertia { u, ud, momentum, change } = self.inertia(motion, field);
+        let Inertia { u, ud, momentum, change } = self.inertia_of_turned(motion, field);
         let momenta = self.resultants(self.extended_rigid.as_ref(), &momentum);
         let changes = self.resultants(self.extended_rigid.as_ref(), &change);
         let loads = self.resultants(self.rigid.as_ref(), &self.loads_of(motion));

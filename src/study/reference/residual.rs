@@ -194,8 +194,17 @@ impl<'m> NodalView<'m> {
     }
 
     /// The inertia of the displacements `field` while the frame moves as in `motion`.
-    pub fn inertia(&self, motion: &[Instant], field: &Displacements) -> Inertia {
-        let [u, ud, udd] = [&field.u, &field.ud, &field.udd].map(|x| self.rows.extend(x).into_owned());
+    fn inertia(&self, motion: &[Instant], field: &Displacements) -> Inertia {
+        self.inertia_of(motion, [&field.u, &field.ud, &field.udd].map(|x| self.rows.extend(x).into_owned()))
+    }
+
+    /// The same with nodes that turn to second order, as momenta have it.
+    pub fn inertia_of_turned(&self, motion: &[Instant], field: &Displacements) -> Inertia {
+        self.inertia_of(motion, self.rows.extend_turned([&field.u, &field.ud, &field.udd]))
+    }
+
+    /// The inertia of displacements, rates and accelerations of the rows that it acts on.
+    fn inertia_of(&self, motion: &[Instant], [u, ud, udd]: [Mat<f64>; 3]) -> Inertia {
         let omega = |i: usize| self.axes * motion[i].omega;
         let mut velocity = self.rigid_part(motion, |now| self.rigid_velocity(now)) + &ud;
         self.rows.add_turned(omega, &u, &mut velocity);
