@@ -13,20 +13,28 @@ pub(super) struct LackFacts {
     attitude: f64,
     deflection: Option<f64>,
     stress: Option<f64>,
-    /// Nothing where no motion is prescribed, or it has too many periods to be followed.
+    /// Nothing where no motion is prescribed.
     reaction: Option<f64>,
-    worst: f64,
+    /// Nothing where it is not known.
+    worst: Option<f64>,
     time: f64,
+    /// The reason why nothing is known.
+    unknown: Option<&'static str>,
 }
 
 impl LackFacts {
     pub fn new(lack: &ReferenceError) -> Self {
         let OutputErrors { attitude, deflection, stress, reaction } = lack.errors;
-        Self { modes: lack.modes, attitude, deflection, stress, reaction, worst: lack.worst, time: lack.time }
+        let (modes, time, unknown) = (lack.modes, lack.time, lack.unknown);
+        let worst = unknown.is_none().then_some(lack.worst);
+        Self { modes, attitude, deflection, stress, reaction, worst, time, unknown }
     }
 
     /// `attitude 0.0012 rad, deflection 0.5 %, stress 8.6 %`, of a prescribed motion with `reaction 1.2 %`.
     pub fn parts(&self) -> String {
+        if let Some(reason) = self.unknown {
+            return format!("an unknown part ({reason})");
+        }
         let part = |name: &str, value: Option<f64>| {
             value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
         };
@@ -42,7 +50,10 @@ impl LackFacts {
 
     fn in_words(&self) -> String {
         let (parts, time) = (self.parts(), significant(self.time, 3));
-        format!("{} modes lack {parts} of the FE model, most at t = {time}", self.modes)
+        match self.unknown {
+            Some(_) => format!("{} modes lack {parts} of the FE model", self.modes),
+            None => format!("{} modes lack {parts} of the FE model, most at t = {time}", self.modes),
+        }
     }
 }
 

@@ -472,3 +472,14 @@ fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
         }
     }
 }
+
+#[test]
+fn probe_six() {
+    let seed: u64 = std::env::var("SEED").unwrap().parse().unwrap();
+    let case = case(seed);
+    let out = outcome(&case);
+    match out {
+        Ok(one) => println!("{seed} {}: {:?} {} {:?}", one.what, one.verdict, one.output, one.effectivity),
+        Err(e) => println!("{e}"),
+    }
+}

@@ -14,6 +14,7 @@ mod interface_rows;
 mod massless;
 mod modal_basis;
 mod nodal_modes;
+mod oscillating;
 mod pseudo_free_surface;
 mod residual_vectors;
 mod rigid_modes;
@@ -31,6 +32,7 @@ pub use free_surface::{
 pub use imported::ImportedShapes;
 pub use interface_coordinates::InterfaceCoordinates;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
+pub use oscillating::oscillating_responses;
 pub use residual_vectors::{
     Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
 };

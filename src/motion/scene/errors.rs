@@ -15,6 +15,10 @@ const NO_TORQUE: f64 = 1e-10;
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
 pub(crate) const LEAST_REACTION: f64 = 1e-3;
 
+/// Part of the largest force times the radius of gyration below which torques are not looked at, and of the largest
+/// torque over this radius for forces: the torque of a bar that is shaken along its axis is what rounding makes of it.
+const LEAST_BESIDE: f64 = 1e-2;
+
 /// Errors of the second half of a run over those of the first, beyond the growth of the motion, from which on
 /// they are said to grow.
 const GROWING: f64 = 1.8;
@@ -37,8 +41,9 @@ pub struct OutputErrors {
     /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that
     /// counts instead of the largest where that is less.
     pub stress: Option<f64>,
-    /// Difference of force, or torque, that the prescribed spin takes, relative to the largest force, or
-    /// torque, or to a thousandth of w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2.
+    /// Difference of force F, or torque T, that the prescribed motion takes, relative to the largest force, or
+    /// torque, or to a thousandth of w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2, or to a
+    /// hundredth of the largest T / r, or F r.
     pub reaction: Option<f64>,
 }
 
@@ -196,17 +201,22 @@ pub(crate) fn reaction_errors(
     (mass, radius): (f64, f64),
     extremes: &Extremes,
 ) -> Option<Vec<f64>> {
-    let (motion, spin) = (extremes.internal, extremes.spin);
-    let difference = |part: fn(&Reaction) -> Vector3<f64>, lever: f64| {
-        let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
-        let largest = Peak::of(time, a.iter().map(|a| part(a).norm())).value;
+    let parts: [fn(&Reaction) -> Vector3<f64>; 2] = [|both| both.0, |both| both.1];
+    let largest = parts.map(|part| Peak::of(time, a.iter().map(|a| part(a).norm())).value);
+    let levers = [radius, 1.0];
+    let of_part = |k: usize| {
+        let (part, lever) = (parts[k], levers[k]);
         // Forces that are rounding are no forces, however small the least that counts.
-        let least = LEAST_REACTION * mass * (spin * radius).powi(2) / lever;
-        (largest > NO_TORQUE * motion / lever).then(|| relative(differences, largest.max(least))).flatten()
+        if largest[k] <= NO_TORQUE * extremes.internal / lever {
+            return None;
+        }
+        // Force and torque in units of torque: each counts from a part of the other.
+        let beside = LEAST_BESIDE * largest[1 - k] * levers[1 - k];
+        let least = (LEAST_REACTION * mass * (extremes.spin * radius).powi(2)).max(beside) / lever;
+        let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
+        relative(differences, largest[k].max(least))
     };
-    let force = difference(|both| both.0, radius);
-    let torque = difference(|both| both.1, 1.0);
-    match (force, torque) {
+    match (of_part(0), of_part(1)) {
         (Some(force), Some(torque)) => {
             Some(force.into_iter().zip(torque).map(|(a, b)| larger(a, b)).collect())
         }

@@ -5,7 +5,7 @@ use super::complement::Complement;
 use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
-use crate::numerics::linalg::{Analysis, Indefinite, largest};
+use crate::numerics::linalg::{Analysis, Indefinite, Pencil, largest};
 use faer::{Mat, MatRef, Scale};
 
 /// Refinements with the true residual at the most.
@@ -30,10 +30,42 @@ const ACCEPTED: f64 = 1e-9;
 pub fn dynamic_responses(
     problem: &EigenProblem<'_>,
     modes: MatRef<'_, f64>,
-    mut loads: Mat<f64>,
+    loads: Mat<f64>,
     square: f64,
     counters: &mut Counters,
 ) -> Result<Mat<f64>, EigenFailure> {
+    let respond = |responses: &Responses<'_>, counters: &mut Counters| responses.of(loads, counters);
+    with_responses(problem, modes, square, counters, respond)
+}
+
+/// The responses of [`dynamic_responses`] without known modes, and with the same factor those to further loads that
+/// these responses tell.
+///
+/// # Errors
+/// As [`dynamic_responses`].
+pub fn dynamic_responses_twice(
+    problem: &EigenProblem<'_>,
+    loads: Mat<f64>,
+    further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
+    square: f64,
+    counters: &mut Counters,
+) -> Result<[Mat<f64>; 2], EigenFailure> {
+    let none = Mat::zeros(problem.pencil.n(), 0);
+    let respond = |responses: &Responses<'_>, counters: &mut Counters| {
+        let x = responses.of(loads, counters)?;
+        let loads = further(&x);
+        Ok([x, responses.of(loads, counters)?])
+    };
+    with_responses(problem, none.as_ref(), square, counters, respond)
+}
+
+fn with_responses<T>(
+    problem: &EigenProblem<'_>,
+    modes: MatRef<'_, f64>,
+    square: f64,
+    counters: &mut Counters,
+    respond: impl FnOnce(&Responses<'_>, &mut Counters) -> Result<T, EigenFailure>,
+) -> Result<T, EigenFailure> {
     let pencil = &problem.pencil;
     let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
     counters.factorizations += 1;
@@ -43,26 +75,39 @@ pub fn dynamic_responses(
         return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });
     }
     let complement = Complement::of(pencil, &[problem.rigid, modes]);
-    // Twice: a load may be that of a mode but for its last digits.
-    complement.equilibrate(&mut loads);
-    complement.equilibrate(&mut loads);
-    let mut x = Mat::zeros(loads.nrows(), loads.ncols());
-    let mut residual = loads.clone();
-    for _ in 0..=REFINEMENTS {
-        counters.solved_columns += loads.ncols() as u64;
-        factor.solve_in_place(residual.as_mut());
-        x += residual;
-        complement.deflate(&mut x);
-        residual =
-            &loads - pencil.apply_stiffness(x.as_ref()) + pencil.apply_mass(x.as_ref()) * Scale(square);
-        complement.equilibrate(&mut residual);
-        if largest_part(&residual, &loads) <= REACHED {
-            break;
+    respond(&Responses { pencil, complement, factor, square }, counters)
+}
+
+struct Responses<'a> {
+    pencil: &'a Pencil<'a>,
+    complement: Complement,
+    factor: Indefinite<'a, f64>,
+    square: f64,
+}
+
+impl Responses<'_> {
+    fn of(&self, mut loads: Mat<f64>, counters: &mut Counters) -> Result<Mat<f64>, EigenFailure> {
+        // Twice: a load may be that of a mode but for its last digits.
+        self.complement.equilibrate(&mut loads);
+        self.complement.equilibrate(&mut loads);
+        let mut x = Mat::zeros(loads.nrows(), loads.ncols());
+        let mut residual = loads.clone();
+        for _ in 0..=REFINEMENTS {
+            counters.solved_columns += loads.ncols() as u64;
+            self.factor.solve_in_place(residual.as_mut());
+            x += residual;
+            self.complement.deflate(&mut x);
+            residual = &loads - self.pencil.apply_stiffness(x.as_ref())
+                + self.pencil.apply_mass(x.as_ref()) * Scale(self.square);
+            self.complement.equilibrate(&mut residual);
+            if largest_part(&residual, &loads) <= REACHED {
+                break;
+            }
         }
-    }
-    match largest_part(&residual, &loads) {
-        left if left <= ACCEPTED => Ok(x),
-        residual => Err(EigenFailure::Inaccurate { residual }),
+        match largest_part(&residual, &loads) {
+            left if left <= ACCEPTED => Ok(x),
+            residual => Err(EigenFailure::Inaccurate { residual }),
+        }
     }
 }
 

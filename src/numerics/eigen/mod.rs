@@ -34,7 +34,7 @@ mod zero_energy;
 pub use canonical::{CLUSTER_GAP, canonical_basis, canonical_sign, clusters};
 pub use completeness::{Completeness, Proof};
 pub use counters::Counters;
-pub use dynamic_response::dynamic_responses;
+pub use dynamic_response::{dynamic_responses, dynamic_responses_twice};
 pub use failure::EigenFailure;
 pub use noise::{energy_noise, rounding_residual};
 pub use plan::{Multigrid, Plan};

@@ -229,7 +229,7 @@ mod tests {
 
     fn grid(times: Vec<f64>) -> Grid {
         let whole = 0..times.len();
-        Grid { times, pieces: Vec::from([whole]), is_fine: true }
+        Grid { times, pieces: Vec::from([whole]) }
     }
 
     /// No forces on the modes.

@@ -2,13 +2,14 @@
 
 use super::grid::Grid;
 use super::lack::{Found, Lack, energy_scale};
-use super::missed::Missed;
+use super::missed::{Missed, Question};
 use super::residual::NodalView;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
 use crate::motion::scene::{OutputErrors, Point, Scene, Stage, damped, instants, nodal_point, trace};
+use crate::numerics::linalg::not_negative;
 use faer::Mat;
 
 /// Part of the tolerances that the reference of a study may lack of the model without a word.
@@ -24,6 +25,13 @@ pub const MOST_LACKING: f64 = 0.5;
 /// part of what is allowed.
 const PART_OF_RESPONSES: f64 = 0.1;
 
+/// The reason why nothing is known of a motion that would have to be looked at too often.
+const TOO_MUCH: &str = "its motion has too many periods or breaks to follow them all";
+
+/// A mode that is lacking and would have less than this part of what the tolerances allow of the root of the elastic
+/// energy is not looked for.
+const PART_OF_RESONANCE: f64 = 0.05;
+
 /// What a body lacks of the model that it was made of, in a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceError {
@@ -31,16 +39,24 @@ pub struct ReferenceError {
     pub modes: usize,
     /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the
     /// equations of all nodes leave unbalanced along its motion, how these move the modes that it has, how
-    /// they turn a free body, and what a prescribed motion takes of them. Of a motion of so many periods that
-    /// it is not followed there is no reaction.
+    /// they turn a free body, and what a prescribed motion takes of them. Infinite where they are unknown.
     pub errors: OutputErrors,
     /// The largest of them over its tolerance.
     pub worst: f64,
     /// When the estimate of the elastic energy is largest.
     pub time: f64,
+    /// The reason why nothing is known of the errors; `None` where they are known.
+    pub unknown: Option<&'static str>,
 }
 
 impl ReferenceError {
+    /// Of a body of so many modes of whose errors nothing is known.
+    fn unknown(modes: usize, reason: &'static str) -> Self {
+        let all = f64::INFINITY;
+        let errors = OutputErrors { attitude: all, deflection: Some(all), stress: Some(all), reaction: None };
+        Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason) }
+    }
+
     /// Whether others may be measured against the body: against what is left of the tolerances.
     pub fn is_reference(&self) -> bool {
         self.worst <= MOST_LACKING
@@ -50,6 +66,15 @@ impl ReferenceError {
     pub fn warning(&self, scene: &Scene, enough: f64) -> Option<Diagnostic> {
         if self.worst <= enough {
             return None;
+        }
+        if let Some(reason) = self.unknown {
+            let message = format!(
+                "what the body of {} modes that everything is measured against lacks of the model is not known: {reason}",
+                self.modes
+            );
+            return Some(
+                Diagnostic::new(Code::ReferenceLacks, message).with_help("simulate a shorter `duration`"),
+            );
         }
         let message = format!(
             "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.2e}",
@@ -100,20 +125,33 @@ impl Estimate {
         let carrier = scene.carried.as_ref().map(|carried| nodal_point(model, &carried.by)).transpose()?;
         let Some(view) = NodalView::new(model, body, loads, carrier.as_ref()) else { return Ok(None) };
         let (motion, _) = trace(body, scene, memory, |_| ())?;
-        let grid = Grid::new(body, scene, &motion, duration);
-        if carrier.is_some() && !grid.is_fine {
-            return Ok(None);
-        }
+        let Some(grid) = Grid::new(body, scene, &motion, duration) else {
+            let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);
+            return Ok(Some(Self { error, missing: Mat::zeros(model.rows().len(), 0) }));
+        };
         let mut same_steps = scene.clone();
         same_steps.run.scheme = motion.scheme;
         let looked_at = instants(body, &same_steps, &grid.times)?;
-        let missed = Missed::new(&view, body, &looked_at, &grid)?;
-        let lack = Lack::new(&view, body, &missed, &looked_at, &grid, scene.initial.settled);
-        let Found { errors, time } = lack.errors(scene, body, &motion, &watched);
         let tolerance = &scene.requirements.tolerance;
-        let error = ReferenceError { modes: body.n_modes(), worst: errors.worst(tolerance), time, errors };
-        let enough = PART_OF_RESPONSES * allowed * tolerance.stress.min(tolerance.deflection);
+        let least = tolerance.stress.min(tolerance.deflection);
+        let question = Question {
+            settled: scene.initial.settled,
+            negligible: PART_OF_RESONANCE * least * energy_scale(&motion),
+            complete_below: if carrier.is_some() { 0.0 } else { complete_below(body) },
+        };
+        let missed = Missed::new(&view, body, &looked_at, &grid, &question)?;
+        let lack = Lack::new(&view, body, &missed, &looked_at, &grid, scene.initial.settled);
+        let Found { errors, time } = lack.errors(scene, &motion, &watched);
+        let worst = errors.worst(tolerance);
+        let error = ReferenceError { modes: body.n_modes(), worst, time, errors, unknown: None };
+        let enough = PART_OF_RESPONSES * allowed * least;
         let missing = missed.dominant(&lack.of_responses(), enough * energy_scale(&motion));
         Ok(Some(Self { error, missing }))
     }
+}
+
+/// Circular frequency below which all modes were proved to be in the body; zero where nothing was.
+fn complete_below(body: &FlexBody) -> f64 {
+    let certificate = body.certificate();
+    if certificate.proved_modes.is_some() { not_negative(certificate.shift).sqrt() } else { 0.0 }
 }

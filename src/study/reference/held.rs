@@ -28,6 +28,11 @@ impl Held {
         Some(Self { conditions, rigid: rigid.clone(), inverse })
     }
 
+    /// C' (N x 6, in the plane N x 3).
+    pub fn conditions(&self) -> &Mat<f64> {
+        &self.conditions
+    }
+
     /// f <- T'f.
     pub fn balance(&self, forces: &mut Mat<f64>) {
         let resultants = gram(self.rigid.as_ref(), forces.as_ref());

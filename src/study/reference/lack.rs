@@ -52,43 +52,32 @@ impl<'a> Lack<'a> {
         let weigh = |x: MatRef<'_, f64>| view.model.pencil().apply_mass(x);
         let (nf, k) = (view.vectors.ncols(), missed.responses.ncols());
         let weighted = weigh(missed.responses.as_ref());
-        // Between instants that are far apart nothing is known of the frequencies of the modes.
-        let moving = if grid.is_fine { nf } else { 0 };
-        let first = |a: &Mat<f64>, columns: usize| a.as_ref().submatrix(0, 0, moving, columns).to_owned();
         let modal_stiffness = symmetric_part(body.invariants().modal_stiffness());
         let system = Lacking {
-            modal_stiffness: first(&modal_stiffness, moving),
-            modal_mass: first(&view.modal_mass, moving),
-            modal_damping: first(&view.modal_damping, moving),
-            shared_mass: first(&gram(view.vectors.as_ref(), weighted.as_ref()), k),
+            modal_stiffness: modal_stiffness.clone(),
+            modal_mass: view.modal_mass.clone(),
+            modal_damping: view.modal_damping.clone(),
+            shared_mass: gram(view.vectors.as_ref(), weighted.as_ref()),
             stiffness: missed.energy.clone(),
             mass: symmetric_part(&gram(missed.responses.as_ref(), weighted.as_ref())),
         };
-        let in_modes = missed.in_modes.as_ref().subrows(0, moving).to_owned();
-        let answer = system.answered(&missed.amplitudes, &in_modes, grid, settled);
-        let m = grid.times.len();
         // Where nothing is lacking there is nothing to be solved; what has no solution is not small.
         let is_nothing = (0..k).all(|j| missed.energy[(j, j)] == 0.0) && missed.in_modes.is_all_finite();
-        let unknown = || Mat::full(nf + k, m, if is_nothing { 0.0 } else { f64::NAN });
-        let placed = |own: Mat<f64>| {
-            let mut all = Mat::zeros(nf + k, m);
-            all.as_mut().subrows_mut(0, moving).copy_from(own.as_ref().subrows(0, moving));
-            all.as_mut().subrows_mut(nf, k).copy_from(own.as_ref().subrows(moving, k));
-            all
-        };
-        let answer = match answer {
-            Some(Answer { value, rate, acceleration }) => {
-                Answer { value: placed(value), rate: placed(rate), acceleration: placed(acceleration) }
-            }
-            None => Answer { value: unknown(), rate: unknown(), acceleration: unknown() },
-        };
+        let unknown = || Mat::full(nf + k, grid.times.len(), if is_nothing { 0.0 } else { f64::NAN });
+        let answer = system.answered(&missed.amplitudes, &missed.in_modes, grid, settled);
+        let answer =
+            answer.unwrap_or_else(|| Answer { value: unknown(), rate: unknown(), acceleration: unknown() });
+        let histories = [&answer.value, &answer.acceleration].into_iter().flat_map(|all| {
+            (0..all.nrows()).map(move |row| (0..all.ncols()).map(|i| all[(row, i)]).collect::<Vec<f64>>())
+        });
+        let shown = grid.telling(SHOWN, histories);
         Self {
             view,
             grid,
             looked_at,
             columns: side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]),
             answer,
-            shown: grid.at_most(SHOWN),
+            shown,
             modal_stiffness,
             energy: missed.energy.clone(),
         }
@@ -101,14 +90,14 @@ impl<'a> Lack<'a> {
     }
 
     /// Errors relative to the motion of all nodes: that of the body, `motion`, with what it lacks.
-    pub fn errors(&self, scene: &Scene, body: &FlexBody, motion: &Trace, watched: &[Mat<f64>]) -> Found {
+    pub fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> Found {
         let (stress, time) = self.stress(motion);
         let free = !scene.prescribes();
         let errors = OutputErrors {
             attitude: if free { self.attitude() } else { 0.0 },
-            deflection: self.deflection(body, motion, watched),
+            deflection: self.deflection(motion, watched),
             stress: Some(stress),
-            reaction: if free || !self.grid.is_fine { None } else { self.reaction(scene, motion) },
+            reaction: if free { None } else { self.reaction(scene, motion) },
         };
         Found { errors, time }
     }
@@ -125,20 +114,15 @@ impl<'a> Lack<'a> {
         let root = |energy: f64| not_negative(0.5 * energy).sqrt();
         let lacking = of_modes.iter().zip(&of_responses).map(|(a, b)| root(a + b));
         let lacking = Peak::of(&self.grid.times, lacking);
-        let largest = match self.grid.is_fine {
-            true => {
-                let all = quadratics(&self.modal_stiffness, &whole);
-                let roots = all.iter().zip(&of_responses).map(|(a, b)| root(a + b));
-                Peak::of(&self.grid.times, roots).value
-            }
-            false => energy_scale(motion).hypot(lacking.value),
-        };
+        let all = quadratics(&self.modal_stiffness, &whole);
+        let roots = all.iter().zip(&of_responses).map(|(a, b)| root(a + b));
+        let largest = Peak::of(&self.grid.times, roots).value;
         (lacking.value / largest.max(motion.resolution.root_energy), lacking.time)
     }
 
     /// The largest displacement X y of the watched points, of all nodes without any, over the largest of
     /// Psi q + X y.
-    fn deflection(&self, body: &FlexBody, motion: &Trace, watched: &[Mat<f64>]) -> Option<f64> {
+    fn deflection(&self, motion: &Trace, watched: &[Mat<f64>]) -> Option<f64> {
         let (mut missed, mut whole) = (Vec::new(), Vec::new());
         for block in self.shown.chunks(BLOCK) {
             let lacking = combine(self.columns.as_ref(), columns_at(&self.answer.value, block).as_ref());
@@ -147,16 +131,7 @@ impl<'a> Lack<'a> {
             whole.extend(self.longest(&u, watched));
         }
         let times = self.times_shown();
-        let largest = match (self.grid.is_fine, motion.deflections.is_empty()) {
-            (true, _) => Peak::of(&times, whole).value,
-            (false, true) => motion.extremes.deflection.value * body.extent(),
-            (false, false) => {
-                let norms = |path: &Vec<Vector3<f64>>| {
-                    Peak::of(&motion.time, path.iter().map(nalgebra::Vector3::norm)).value
-                };
-                motion.deflections.iter().map(norms).fold(0.0, larger)
-            }
-        };
+        let largest = Peak::of(&times, whole).value;
         let scale = largest.max(motion.resolution.deflection);
         (scale > 0.0).then(|| Peak::of(&times, missed).value / scale)
     }

@@ -3,15 +3,18 @@
 use super::answered::ROUNDING;
 use super::compressed::{Compressed, principal};
 use super::grid::Grid;
+use super::held::Held;
 use super::projected::{Projected, UnbalancedAmplitudes};
 use super::residual::NodalView;
+use super::resonance::{Resonance, resonances};
 use crate::base::error::Result;
-use crate::body::basis::free_static_responses_twice;
+use crate::body::basis::{free_static_responses_twice, oscillating_responses};
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::symmetric_part;
 use crate::motion::scene::Instant;
 use crate::numerics::linalg::{combine, gram, larger, not_negative, side_by_side, subtract_combination};
 use faer::Mat;
+use nalgebra::Vector3;
 
 /// Responses that may join the body at once.
 const MOST_RESPONSES: usize = 12;
@@ -21,12 +24,16 @@ const MOST_RESPONSES: usize = 12;
 const INERTIA_LEFT_OUT: f64 = 1e-9;
 const MOST_OF_INERTIA: usize = 8;
 
-/// Displacements E that a body lacks: static responses to the forces that its motion leaves unbalanced, and those to
-/// the inertia of these responses, without which all that is lacking would move with one frequency for each force.
+/// Factors of a frequency at which a response is looked for: it may be a natural frequency.
+const NUDGES: [f64; 3] = [1.0, 1.0003, 0.9996];
+
+/// Displacements E that a body lacks: static responses to the forces that its motion leaves unbalanced, those to
+/// the inertia of these responses, without which all that is lacking would move with one frequency for each force, and
+/// responses at the frequencies of resonances.
 pub(super) struct Missed {
     /// B (N x k) with E = K^+ B.
     pub forces: Mat<f64>,
-    /// c (k x m): the unbalanced forces are B c(t). Those of inertia have none.
+    /// c (k x m): the unbalanced forces are B c(t). Those of inertia and of resonances have none.
     pub amplitudes: Mat<f64>,
     /// g (nf x m): what the unbalanced forces do to the modes.
     pub in_modes: Mat<f64>,
@@ -36,14 +43,30 @@ pub(super) struct Missed {
     pub energy: Mat<f64>,
 }
 
+/// What is asked about the forces that a motion leaves unbalanced.
+pub(super) struct Question {
+    /// Whether the motion starts in equilibrium.
+    pub settled: bool,
+    /// Root of the elastic energy that does not count.
+    pub negligible: f64,
+    /// Circular frequency below which the body lacks no mode.
+    pub complete_below: f64,
+}
+
 impl Missed {
     /// Of a body in the `motion` that it makes at the instants of `grid`.
     ///
     /// # Errors
-    /// Those of [`free_static_responses_twice`].
-    pub fn new(view: &NodalView<'_>, body: &FlexBody, motion: &[Instant], grid: &Grid) -> Result<Self> {
+    /// Those of [`free_static_responses_twice`] and [`oscillating_responses`].
+    pub fn new(
+        view: &NodalView<'_>,
+        body: &FlexBody,
+        motion: &[Instant],
+        grid: &Grid,
+        question: &Question,
+    ) -> Result<Self> {
         let model = view.model;
-        let few: Vec<Instant> = grid.few().into_iter().map(|i| motion[i].clone()).collect();
+        let few: Vec<Instant> = grid.few(histories(motion)).into_iter().map(|i| motion[i].clone()).collect();
         let compressed = Compressed::new(model, &view.residual(&few));
         let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
             Projected::new(view, compressed.as_ref()).amplitudes(motion);
@@ -52,23 +75,56 @@ impl Missed {
             let (forces, responses) = (nothing(), nothing());
             return Ok(Self { forces, amplitudes, in_modes, responses, energy: Mat::zeros(0, 0) });
         };
+        let forces = compressed.basis;
         let beside = Beside { view, eigenvalues: &body.modes().eigenvalue };
         let inertia = |responses: &Mat<f64>| beside.inertia(responses.clone(), &amplitudes);
         let first = body.modes().eigenvalue[0];
-        let [own, of_inertia] = free_static_responses_twice(model, compressed.basis.clone(), inertia, first)?;
+        let [own, of_inertia] = free_static_responses_twice(model, forces.clone(), inertia, first)?;
         let own = beside.of(own);
-        let of_inertia = beside.more(&own, of_inertia);
-        let responses = side_by_side(&[own.as_ref(), of_inertia.as_ref()]);
-        let taken = model.pencil().apply_stiffness(of_inertia.as_ref());
-        let mut all_amplitudes = Mat::zeros(responses.ncols(), amplitudes.ncols());
-        all_amplitudes.as_mut().subrows_mut(0, amplitudes.nrows()).copy_from(&amplitudes);
-        Ok(Self {
-            forces: side_by_side(&[compressed.basis.as_ref(), taken.as_ref()]),
-            amplitudes: all_amplitudes,
-            in_modes,
-            energy: beside.energy(&responses),
-            responses,
-        })
+        let energy = beside.energy(&own);
+        let mut missed = Self { forces, amplitudes, in_modes, responses: own, energy };
+        let resonances = missed.resonances(grid, question);
+        missed.add(&beside, of_inertia);
+        for resonance in resonances {
+            let forces = combine(
+                missed.forces.as_ref().subcols(0, resonance.amplitudes.nrows()),
+                resonance.amplitudes.as_ref(),
+            );
+            missed.add_resonance(&beside, forces, resonance.rate)?;
+        }
+        Ok(missed)
+    }
+
+    /// Frequencies at which the forces drive a mode that is lacking.
+    fn resonances(&self, grid: &Grid, question: &Question) -> Vec<Resonance> {
+        let &Question { settled, negligible, complete_below } = question;
+        resonances(grid, &self.amplitudes, &self.energy, settled, negligible, complete_below)
+    }
+
+    /// Adds what the `forces` make the model do that oscillate at a circular frequency.
+    fn add_resonance(&mut self, beside: &Beside<'_>, forces: Mat<f64>, rate: f64) -> Result<()> {
+        let conditions = beside.view.held.as_ref().map(Held::conditions);
+        for nudge in NUDGES {
+            let square = (rate * nudge).powi(2);
+            if let Some(more) = oscillating_responses(beside.view.model, forces.clone(), conditions, square)?
+            {
+                self.add(beside, more);
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds responses to forces that have no amplitude of their own.
+    fn add(&mut self, beside: &Beside<'_>, responses: Mat<f64>) {
+        let more = beside.more(&self.responses, responses);
+        let forces = beside.view.model.pencil().apply_stiffness(more.as_ref());
+        let mut amplitudes = Mat::zeros(self.amplitudes.nrows() + more.ncols(), self.amplitudes.ncols());
+        amplitudes.as_mut().subrows_mut(0, self.amplitudes.nrows()).copy_from(&self.amplitudes);
+        self.amplitudes = amplitudes;
+        self.forces = side_by_side(&[self.forces.as_ref(), forces.as_ref()]);
+        self.responses = side_by_side(&[self.responses.as_ref(), more.as_ref()]);
+        self.energy = beside.energy(&self.responses);
     }
 
     /// The fewest forces B y (N x p) whose responses leave of E z(t), at every instant, no more than `enough`
@@ -97,6 +153,25 @@ impl Missed {
         });
         combine(self.forces.as_ref(), y.as_ref())
     }
+}
+
+/// Histories along a motion whose largest values must not be overlooked: loads, accelerations of the frame, spins and
+/// accelerations of modes.
+fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
+    let history = |value: &dyn Fn(&Instant) -> f64| motion.iter().map(value).collect::<Vec<f64>>();
+    let (loads, modes) = motion.first().map_or((0, 0), |first| (first.loads.len(), first.qdd.len()));
+    let of_loads = (0..6 * loads).map(move |at| {
+        let component = |now: &Instant| {
+            let (force, torque) = &now.loads[at / 6];
+            if at % 6 < 3 { force[at % 6] } else { torque[at % 6 - 3] }
+        };
+        history(&component)
+    });
+    let frame: [fn(&Instant) -> &Vector3<f64>; 3] =
+        [|now| &now.velocity_rate, |now| &now.omega_rate, |now| &now.omega];
+    let of_frame = (0..9).map(move |at| history(&|now: &Instant| frame[at / 3](now)[at % 3]));
+    let of_modes = (0..modes).map(move |mode| history(&|now: &Instant| now.qdd[mode]));
+    of_loads.chain(of_frame).chain(of_modes)
 }
 
 /// Displacements beside the modes of a body.

@@ -14,6 +14,7 @@ mod motion_shapes;
 mod projected;
 mod reaction;
 mod residual;
+mod resonance;
 mod turning;
 
 pub use enrich::{Enriched, EnrichedForCases, Enrichment, enrich, enrich_for_cases};

@@ -1,0 +1,70 @@
+//! Responses of a model to forces that oscillate, for estimates.
+
+use super::failure::explain;
+use super::modal_basis::problem_of_span;
+use super::rigid_modes::rigid_modes;
+use crate::base::error::Result;
+use crate::model::FeModel;
+use crate::numerics::eigen::{Counters, EigenFailure, Resume, dynamic_responses_twice};
+use crate::numerics::linalg::{combine, gram, side_by_side, subtract_combination};
+use faer::Mat;
+use nalgebra::DMatrix;
+
+/// Responses x = (K - w^2 M)^-1 f to `loads` f (N x m) that oscillate at w, and y = (K - w^2 M)^-1 M x to the inertia
+/// of these, \[x, y\]: with x and y in its basis a reduced model has the transfer functions of the loads at w, and their
+/// slope. `None` where w^2 is an eigenvalue to rounding.
+///
+/// * `conditions`: C' (N x c) of a model that something holds, C x = C y = 0; none: of the free model, without rigid
+///   motion.
+/// * `square`: w^2 > 0.
+///
+/// # Errors
+/// Failures of the factorisation: exit code 3.
+pub fn oscillating_responses(
+    model: &FeModel,
+    loads: Mat<f64>,
+    conditions: Option<&Mat<f64>>,
+    square: f64,
+) -> Result<Option<Mat<f64>>> {
+    let rigid = match conditions {
+        Some(_) => Mat::zeros(loads.nrows(), 0),
+        None => rigid_modes(model, &model.pencil())?,
+    };
+    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+    let count = loads.ncols();
+    let no_conditions = Mat::zeros(loads.nrows(), 0);
+    let conditions = conditions.unwrap_or(&no_conditions);
+    // What holds the model takes C'm such that C x = 0: the response to C' is found beside the others.
+    let mut to_conditions = Mat::zeros(loads.nrows(), 0);
+    let further = |all: &Mat<f64>| {
+        to_conditions = all.as_ref().subcols(count, conditions.ncols()).to_owned();
+        let mut x = all.as_ref().subcols(0, count).to_owned();
+        hold(&mut x, conditions, &to_conditions);
+        model.pencil().apply_mass(x.as_ref())
+    };
+    let all = side_by_side(&[loads.as_ref(), conditions.as_ref()]);
+    let [x, mut y] = match dynamic_responses_twice(&problem, all, further, square, &mut Counters::default()) {
+        Ok(responses) => responses,
+        Err(EigenFailure::Inaccurate { .. }) => return Ok(None),
+        Err(failure) => return Err(explain(model, failure)),
+    };
+    let mut x = x.as_ref().subcols(0, count).to_owned();
+    hold(&mut x, conditions, &to_conditions);
+    hold(&mut y, conditions, &to_conditions);
+    let both = side_by_side(&[x.as_ref(), y.as_ref()]);
+    Ok(both.is_all_finite().then_some(both))
+}
+
+/// x <- x - X_C (C X_C)^-1 C x, with the responses X_C to the `conditions` C'. Not a number where these depend on each
+/// other.
+fn hold(x: &mut Mat<f64>, conditions: &Mat<f64>, to_conditions: &Mat<f64>) {
+    let count = conditions.ncols();
+    if count == 0 {
+        return;
+    }
+    let product = gram(conditions.as_ref(), to_conditions.as_ref());
+    let inverse = DMatrix::from_fn(count, count, |i, j| product[(i, j)]).try_inverse();
+    let inverse = Mat::from_fn(count, count, |i, j| inverse.as_ref().map_or(f64::NAN, |own| own[(i, j)]));
+    let moved = combine(inverse.as_ref(), gram(conditions.as_ref(), x.as_ref()).as_ref());
+    subtract_combination(x.as_mut(), to_conditions.as_ref(), moved.as_ref());
+}
